@@ -1,0 +1,211 @@
+"""A calibrated camera: projection, its derivative, back-projection, the box of an upright target.
+
+World: metres, z up, right-handed. Camera: OpenCV axes (x right, y down, z ahead),
+``x_camera = R @ x_world + t``. Image: pixels, origin at the centre of the top-left
+pixel, x right, y down. Lens: OpenCV's radial-tangential model (k1 k2 p1 p2 k3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray
+
+NEAREST_DEPTH = 0.05
+"""Metres: a point nearer than this in front of the lens counts as behind the camera."""
+
+_CORNER_SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """Intrinsics, lens and pose of one camera."""
+
+    name: str
+    image_size: tuple[int, int]
+    """Width and height in pixels."""
+    intrinsics: Float[ndarray, "3 3"]
+    """K, upper triangular, in pixels."""
+    rotation: Float[ndarray, "3 3"]
+    """R, from world to camera axes."""
+    translation: Float[ndarray, " 3"]
+    """t, in metres, in camera axes."""
+    distortion: Float[ndarray, " 5"]
+    """k1, k2, p1, p2, k3; zeros for a pinhole."""
+
+    @staticmethod
+    def from_projection(
+        name: str, image_size: tuple[int, int], projection: Float[ndarray, "3 4"]
+    ) -> Camera:
+        """Split P = K [R | t] (world metres to pixels) into its parts.
+
+        Raises:
+            ValueError: If the left 3×3 part of P is singular.
+        """
+        left = projection[:, :3]
+        if abs(np.linalg.det(left)) < 1e-12 * max(1.0, float(np.abs(left).max())) ** 3:
+            raise ValueError("its left 3×3 part is singular, so it is not a camera")
+        # RQ decomposition through QR of the row-reversed transpose
+        q, r = np.linalg.qr(left[::-1].T)
+        intrinsics, rotation = r.T[::-1, ::-1], q.T[::-1]
+        signs = np.diag(np.sign(np.diag(intrinsics)))
+        intrinsics, rotation = intrinsics @ signs, signs @ rotation
+        translation = np.linalg.solve(intrinsics, projection[:, 3])
+        if np.linalg.det(rotation) < 0.0:  # P and -P are the same camera
+            rotation, translation = -rotation, -translation
+        return Camera(
+            name,
+            image_size,
+            intrinsics / intrinsics[2, 2],
+            rotation,
+            translation,
+            np.zeros(5),
+        )
+
+    @cached_property
+    def centre(self) -> Float[ndarray, " 3"]:
+        """The position of the lens, world metres."""
+        return -self.rotation.T @ self.translation
+
+    @cached_property
+    def is_pinhole(self) -> bool:
+        """Whether the lens draws straight lines straight."""
+        return not np.any(self.distortion)
+
+    @cached_property
+    def _largest_radius(self) -> float:
+        """The normalised radius up to which the lens model is one-to-one.
+
+        Beyond the first extremum of r (1 + k1 r² + k2 r⁴ + k3 r⁶) the polynomial
+        folds back and would draw far-outside points inside the picture.
+        """
+        k1, k2, _, _, k3 = self.distortion
+        roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])  # in r²
+        real = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0.0)].real
+        return float(np.sqrt(real.min())) if len(real) else np.inf
+
+    def to_camera(self, points: Float[ndarray, "N 3"]) -> Float[ndarray, "N 3"]:
+        """World points (metres) in camera axes."""
+        return points @ self.rotation.T + self.translation
+
+    def project(
+        self, points: Float[ndarray, "N 3"]
+    ) -> tuple[Float[ndarray, "N 2"], Bool[ndarray, " N"]]:
+        """Pixels of world points, and whether each is in front of the lens.
+
+        Points behind the camera, and points so far aside that the lens model
+        does not hold, come back as NaN and False.
+        """
+        pixels, _, valid = self._project(points, with_jacobian=False)
+        return pixels, valid
+
+    def project_with_jacobian(
+        self, points: Float[ndarray, "N 3"]
+    ) -> tuple[Float[ndarray, "N 2"], Float[ndarray, "N 2 3"], Bool[ndarray, " N"]]:
+        """Pixels of world points, d pixel / d world (pixels a metre), and whether they hold."""
+        return self._project(points, with_jacobian=True)
+
+    def _project(
+        self, points: Float[ndarray, "N 3"], *, with_jacobian: bool
+    ) -> tuple[Float[ndarray, "N 2"], Float[ndarray, "N 2 3"], Bool[ndarray, " N"]]:
+        x, y, z = self.to_camera(np.asarray(points, dtype=float)).T
+        valid = z > NEAREST_DEPTH
+        depth = np.where(valid, z, 1.0)
+        u, v = x / depth, y / depth
+        k1, k2, p1, p2, k3 = self.distortion
+        r2 = u * u + v * v
+        valid &= r2 < self._largest_radius**2
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        ud = u * radial + 2.0 * p1 * u * v + p2 * (r2 + 2.0 * u * u)
+        vd = v * radial + p1 * (r2 + 2.0 * v * v) + 2.0 * p2 * u * v
+        linear = self.intrinsics[:2, :2]
+        pixels = np.stack([ud, vd], axis=1) @ linear.T + self.intrinsics[:2, 2]
+        pixels[~valid] = np.nan
+        jacobian = np.empty((len(pixels), 2, 3 if with_jacobian else 0))
+        if with_jacobian:
+            slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2))  # d radial / d(r²) · 2
+            lens = np.empty((len(pixels), 2, 2))
+            lens[:, 0, 0] = radial + u * u * slope + 2.0 * p1 * v + 6.0 * p2 * u
+            lens[:, 0, 1] = u * v * slope + 2.0 * p1 * u + 2.0 * p2 * v
+            lens[:, 1, 0] = u * v * slope + 2.0 * p1 * u + 2.0 * p2 * v
+            lens[:, 1, 1] = radial + v * v * slope + 6.0 * p1 * v + 2.0 * p2 * u
+            perspective = np.zeros((len(pixels), 2, 3))
+            perspective[:, 0, 0] = perspective[:, 1, 1] = 1.0 / depth
+            perspective[:, 0, 2] = -u / depth
+            perspective[:, 1, 2] = -v / depth
+            jacobian = linear @ lens @ (perspective @ self.rotation)
+            jacobian[~valid] = 0.0
+        return pixels, jacobian, valid
+
+    def back_project(self, pixels: Float[ndarray, "N 2"]) -> Float[ndarray, "N 3"]:
+        """Unit directions, in world axes, of the rays from :attr:`centre` through the pixels.
+
+        The lens model is inverted by Newton's method, to a thousandth of a pixel
+        inside the picture.
+        """
+        target = np.linalg.solve(
+            self.intrinsics[:2, :2], (np.asarray(pixels, float) - self.intrinsics[:2, 2]).T
+        ).T
+        u, v = target.T.copy()
+        if not self.is_pinhole:
+            k1, k2, p1, p2, k3 = self.distortion
+            for _ in range(12):
+                r2 = u * u + v * v
+                radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+                slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2))
+                error_u = u * radial + 2.0 * p1 * u * v + p2 * (r2 + 2.0 * u * u) - target[:, 0]
+                error_v = v * radial + p1 * (r2 + 2.0 * v * v) + 2.0 * p2 * u * v - target[:, 1]
+                a = radial + u * u * slope + 2.0 * p1 * v + 6.0 * p2 * u
+                b = u * v * slope + 2.0 * p1 * u + 2.0 * p2 * v
+                d = radial + v * v * slope + 6.0 * p1 * v + 2.0 * p2 * u
+                determinant = a * d - b * b
+                determinant = np.where(np.abs(determinant) < 1e-9, np.inf, determinant)
+                u = u - (d * error_u - b * error_v) / determinant
+                v = v - (a * error_v - b * error_u) / determinant
+        directions = np.stack([u, v, np.ones_like(u)], axis=1) @ self.rotation
+        return directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+    def sees(self, points: Float[ndarray, "N 3"]) -> Bool[ndarray, " N"]:
+        """Whether each world point falls inside the picture."""
+        pixels, valid = self.project(points)
+        width, height = self.image_size
+        with np.errstate(invalid="ignore"):
+            inside = (
+                (pixels[:, 0] >= -0.5)
+                & (pixels[:, 0] < width - 0.5)
+                & (pixels[:, 1] >= -0.5)
+                & (pixels[:, 1] < height - 0.5)
+            )
+        return valid & inside
+
+    def project_boxes(
+        self, centres: Float[ndarray, "N 3"], half_extents: Float[ndarray, " 3"]
+    ) -> tuple[Float[ndarray, "N 4"], Bool[ndarray, " N"]]:
+        """Picture boxes of upright targets: the bounds of the eight projected corners.
+
+        Args:
+            centres: World metres.
+            half_extents: Half width, depth and height of a target, metres.
+
+        Returns:
+            ``left, top, width, height`` in pixels, not clipped, NaN where invalid;
+            and whether the target is wholly in front of the lens and its box
+            overlaps the picture.
+        """
+        count = len(centres)
+        corners = (centres[:, None, :] + _CORNER_SIGNS * half_extents).reshape(-1, 3)
+        pixels, valid = self.project(corners)
+        pixels = pixels.reshape(count, 8, 2)
+        whole = valid.reshape(count, 8).all(axis=1)
+        boxes = np.full((count, 4), np.nan)
+        low, high = pixels[whole].min(axis=1), pixels[whole].max(axis=1)
+        boxes[whole, :2], boxes[whole, 2:] = low, high - low
+        width, height = self.image_size
+        visible = np.zeros(count, dtype=bool)
+        visible[whole] = (
+            (high > -0.5).all(axis=1) & (low[:, 0] < width - 0.5) & (low[:, 1] < height - 0.5)
+        )
+        return boxes, visible

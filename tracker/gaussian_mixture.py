@@ -1,0 +1,178 @@
+"""An intensity as a weighted sum of Gaussians: predict, prune, merge, cap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from tracker import kernels
+
+
+@dataclass(frozen=True, slots=True)
+class GaussianMixture:
+    """An intensity as a weighted sum of J Gaussians over a d-dimensional state.
+
+    The weights are expected numbers of targets, not probabilities: they sum to
+    the expected cardinality, and one weight may exceed 1.
+    """
+
+    weights: Float[ndarray, " J"]
+    means: Float[ndarray, "J d"]
+    covariances: Float[ndarray, "J d d"]
+    labels: Int[ndarray, " J"]
+    """The birth that each component descends from; components may share one."""
+
+    def __post_init__(self) -> None:
+        size, dimension = self.means.shape
+        if (
+            self.weights.shape != (size,)
+            or self.labels.shape != (size,)
+            or self.covariances.shape != (size, dimension, dimension)
+        ):
+            raise ValueError(
+                "weights, means, covariances and labels must have shapes (J,), (J, d), (J, d, d) "
+                f"and (J,), got {self.weights.shape}, {self.means.shape}, "
+                f"{self.covariances.shape} and {self.labels.shape}"
+            )
+
+    @staticmethod
+    def empty(dimension: int) -> GaussianMixture:
+        """The intensity of nobody, over a state of the given dimension."""
+        return GaussianMixture(
+            weights=np.zeros(0),
+            means=np.zeros((0, dimension)),
+            covariances=np.zeros((0, dimension, dimension)),
+            labels=np.zeros(0, dtype=np.int64),
+        )
+
+    @property
+    def size(self) -> int:
+        """The number of components J."""
+        return len(self.weights)
+
+    @property
+    def dimension(self) -> int:
+        """The dimension d of the state."""
+        return self.means.shape[1]
+
+    @property
+    def cardinality(self) -> float:
+        """The expected number of targets: the sum of the weights."""
+        return float(self.weights.sum())
+
+    def take(self, indices: ndarray) -> GaussianMixture:
+        """The components at ``indices`` (integers or a mask), in that order."""
+        return GaussianMixture(
+            self.weights[indices],
+            self.means[indices],
+            self.covariances[indices],
+            self.labels[indices],
+        )
+
+
+def concatenate(mixtures: Sequence[GaussianMixture]) -> GaussianMixture:
+    """The sum of intensities over the same state: all their components, in order."""
+    return GaussianMixture(
+        np.concatenate([m.weights for m in mixtures]),
+        np.concatenate([m.means for m in mixtures]),
+        np.concatenate([m.covariances for m in mixtures]),
+        np.concatenate([m.labels for m in mixtures]),
+    )
+
+
+def predict(
+    mixture: GaussianMixture,
+    transition: Float[ndarray, "d d"],
+    noise: Float[ndarray, "d d"],
+    survival_probability: float | Float[ndarray, " J"],
+) -> GaussianMixture:
+    """Move every component one step ahead through a linear motion model.
+
+    w ← p_S w,  m ← F m,  P ← F P Fᵀ + Q: eq. (25)–(27) of [VM06]_ without births.
+
+    Args:
+        mixture: J components. Labels are kept.
+        transition: F.
+        noise: Q, in squared state units per step.
+        survival_probability: p_S, one for all or one a component.
+    """
+    covariances = transition @ mixture.covariances @ transition.T + noise
+    return GaussianMixture(
+        mixture.weights * survival_probability,
+        mixture.means @ transition.T,
+        covariances,
+        mixture.labels,
+    )
+
+
+def prune(mixture: GaussianMixture, threshold: float) -> Int[ndarray, " K"]:
+    """Indices of the components whose weight is at least ``threshold``, in order."""
+    return np.flatnonzero(mixture.weights >= threshold)
+
+
+def merge(
+    mixture: GaussianMixture, threshold: float
+) -> tuple[GaussianMixture, Int[ndarray, " K"]]:
+    """Merge components that lie close to a heavier one, keeping the first two moments.
+
+    Starting from the heaviest component l, every component i with
+
+        (m_i - m_l)ᵀ P_i⁻¹ (m_i - m_l) <= threshold
+
+    is absorbed by it, as in Table II of [VM06]_. The expected cardinality and
+    the mean and second moment of the whole mixture do not change. The label is
+    the one of the heaviest component.
+
+    Args:
+        mixture: J components. An empty mixture is returned as it is.
+        threshold: Squared Mahalanobis distance U >= 0, without unit.
+
+    Returns:
+        At most J components, the heaviest leader first, and for each the index
+        of the component that led it, so that what was known of the leader can
+        be carried along.
+
+    Raises:
+        ValueError: If ``threshold`` is negative.
+        numpy.linalg.LinAlgError: If a covariance is singular.
+    """
+    if threshold < 0.0:
+        raise ValueError(f"threshold must be >= 0 (squared Mahalanobis distance), got {threshold}")
+    if mixture.size == 0:
+        return mixture, np.zeros(0, dtype=np.int64)
+    precisions = np.linalg.inv(mixture.covariances)
+    order = np.argsort(-mixture.weights, kind="stable")
+    group, leaders = kernels.merge_groups(mixture.means, precisions, order, threshold)
+    weights, means, covariances = kernels.merge_moments(
+        mixture.weights, mixture.means, mixture.covariances, group, len(leaders)
+    )
+    return GaussianMixture(weights, means, covariances, mixture.labels[leaders]), leaders
+
+
+def reduce(
+    mixture: GaussianMixture,
+    *,
+    pruning_threshold: float,
+    merging_threshold: float,
+    max_components: int,
+) -> tuple[GaussianMixture, Int[ndarray, " K"]]:
+    """Prune, merge and cap: the step that keeps the recursion bounded (Table II of [VM06]_).
+
+    Args:
+        mixture: J components.
+        pruning_threshold: T, the least weight a component must have.
+        merging_threshold: U, the squared Mahalanobis distance of :func:`merge`.
+        max_components: J_max; the heaviest are kept.
+
+    Returns:
+        The reduced mixture, heaviest first, and the index into ``mixture`` of
+        the component that led each.
+    """
+    kept = prune(mixture, pruning_threshold)
+    merged, leaders = merge(mixture.take(kept), merging_threshold)
+    heaviest = np.argsort(-merged.weights, kind="stable")[:max_components]
+    return merged.take(heaviest), kept[leaders[heaviest]]

@@ -1,0 +1,228 @@
+"""The hot loops, compiled by numba: plain functions of arrays, called without the interpreter.
+
+Every kernel has a NumPy or SciPy counterpart in the tests that it must agree with.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numba
+import numpy as np
+from numpy import ndarray
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+
+def _kernel(function: _F) -> _F:
+    """Compile on the first call, keep the machine code on disk, release the interpreter."""
+    compiled: _F = numba.njit(cache=True, nogil=True)(function)
+    return compiled
+
+
+@_kernel
+def merge_groups(
+    means: ndarray, precisions: ndarray, order: ndarray, threshold: float
+) -> tuple[ndarray, ndarray]:
+    """Group components around the heaviest ones left.
+
+    Args:
+        means: (J, d).
+        precisions: (J, d, d), the inverse covariances.
+        order: (J,) indices, heaviest first.
+        threshold: Squared Mahalanobis distance.
+
+    Returns:
+        The group of each component (J,) and the leader of each group (K,).
+    """
+    size, dimension = means.shape
+    group = np.full(size, -1, dtype=np.int64)
+    leaders = np.empty(size, dtype=np.int64)
+    count = 0
+    for rank in range(size):
+        leader = order[rank]
+        if group[leader] >= 0:
+            continue
+        group[leader] = count
+        for later in range(rank + 1, size):
+            i = order[later]
+            if group[i] >= 0:
+                continue
+            distance = 0.0
+            for a in range(dimension):
+                difference_a = means[i, a] - means[leader, a]
+                for b in range(dimension):
+                    distance += (
+                        difference_a * precisions[i, a, b] * (means[i, b] - means[leader, b])
+                    )
+            if distance <= threshold:
+                group[i] = count
+        leaders[count] = leader
+        count += 1
+    return group, leaders[:count].copy()
+
+
+@_kernel
+def merge_moments(
+    weights: ndarray, means: ndarray, covariances: ndarray, group: ndarray, count: int
+) -> tuple[ndarray, ndarray, ndarray]:
+    """Weight, mean and covariance (spread of the means included) of each group."""
+    size, dimension = means.shape
+    merged_weights = np.zeros(count)
+    merged_means = np.zeros((count, dimension))
+    merged_covariances = np.zeros((count, dimension, dimension))
+    for i in range(size):
+        g = group[i]
+        merged_weights[g] += weights[i]
+        for a in range(dimension):
+            merged_means[g, a] += weights[i] * means[i, a]
+    for g in range(count):
+        for a in range(dimension):
+            merged_means[g, a] /= merged_weights[g]
+    for i in range(size):
+        g = group[i]
+        share = weights[i] / merged_weights[g]
+        for a in range(dimension):
+            difference_a = means[i, a] - merged_means[g, a]
+            for b in range(dimension):
+                merged_covariances[g, a, b] += share * (
+                    covariances[i, a, b] + difference_a * (means[i, b] - merged_means[g, b])
+                )
+    return merged_weights, merged_means, merged_covariances
+
+
+@_kernel
+def kalman_pairs(
+    means: ndarray,
+    covariances: ndarray,
+    expected: ndarray,
+    jacobians: ndarray,
+    measurements: ndarray,
+    noises: ndarray,
+    gate: float,
+) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
+    """The Kalman update of every component by every measurement inside its gate.
+
+    Args:
+        means: (J, d).
+        covariances: (J, d, d).
+        expected: (J, m), the measurement each component predicts.
+        jacobians: (J, m, d), its derivative H.
+        measurements: (M, m).
+        noises: (1, m, m) for all, or (M, m, m).
+        gate: Squared Mahalanobis distance of the innovation; infinity for none.
+
+    Returns:
+        For each of the P pairs, measurement by measurement: component (P,),
+        measurement (P,), log N(z; h, S) (P,), mean (P, d), covariance (P, d, d)
+        in Joseph form, which stays symmetric and positive.
+    """
+    size, dimension = means.shape
+    count, order = measurements.shape
+    shared = noises.shape[0] == 1
+    gains = np.empty((size, dimension, order))
+    updated = np.empty((size, dimension, dimension))
+    lower = np.empty((size, order, order))
+    constants = np.empty(size)
+
+    component = np.empty(size * count, dtype=np.int64)
+    measured = np.empty(size * count, dtype=np.int64)
+    likelihood = np.empty(size * count)
+    new_means = np.empty((size * count, dimension))
+    new_covariances = np.empty((size * count, dimension, dimension))
+
+    ph = np.empty((dimension, order))
+    factor = np.empty((dimension, dimension))
+    half = np.empty((dimension, dimension))
+    solved = np.empty(order)
+    pairs = 0
+    for z in range(count):
+        noise = noises[0] if shared else noises[z]
+        for j in range(size):
+            if z == 0 or not shared:
+                # S = H P Hᵀ + R and its Cholesky factor
+                for a in range(dimension):
+                    for p in range(order):
+                        total = 0.0
+                        for b in range(dimension):
+                            total += covariances[j, a, b] * jacobians[j, p, b]
+                        ph[a, p] = total
+                for p in range(order):
+                    for q in range(p + 1):
+                        total = noise[p, q]
+                        for a in range(dimension):
+                            total += jacobians[j, p, a] * ph[a, q]
+                        for r in range(q):
+                            total -= lower[j, p, r] * lower[j, q, r]
+                        if p == q:
+                            lower[j, p, p] = math.sqrt(total)
+                        else:
+                            lower[j, p, q] = total / lower[j, q, q]
+                constant = -0.5 * order * math.log(2.0 * math.pi)
+                for p in range(order):
+                    constant -= math.log(lower[j, p, p])
+                constants[j] = constant
+                # K = P Hᵀ S⁻¹, row by row through the factor
+                for a in range(dimension):
+                    for p in range(order):
+                        total = ph[a, p]
+                        for r in range(p):
+                            total -= lower[j, p, r] * solved[r]
+                        solved[p] = total / lower[j, p, p]
+                    for p in range(order - 1, -1, -1):
+                        total = solved[p]
+                        for r in range(p + 1, order):
+                            total -= lower[j, r, p] * gains[j, a, r]
+                        gains[j, a, p] = total / lower[j, p, p]
+                # P = (I - K H) P (I - K H)ᵀ + K R Kᵀ
+                for a in range(dimension):
+                    for b in range(dimension):
+                        total = 1.0 if a == b else 0.0
+                        for p in range(order):
+                            total -= gains[j, a, p] * jacobians[j, p, b]
+                        factor[a, b] = total
+                for a in range(dimension):
+                    for b in range(dimension):
+                        total = 0.0
+                        for c in range(dimension):
+                            total += factor[a, c] * covariances[j, c, b]
+                        half[a, b] = total
+                for a in range(dimension):
+                    for b in range(a + 1):
+                        total = 0.0
+                        for c in range(dimension):
+                            total += half[a, c] * factor[b, c]
+                        for p in range(order):
+                            for q in range(order):
+                                total += gains[j, a, p] * noise[p, q] * gains[j, b, q]
+                        updated[j, a, b] = total
+                        updated[j, b, a] = total
+            distance = 0.0
+            for p in range(order):
+                total = measurements[z, p] - expected[j, p]
+                for r in range(p):
+                    total -= lower[j, p, r] * solved[r]
+                solved[p] = total / lower[j, p, p]
+                distance += solved[p] * solved[p]
+            if not distance <= gate:
+                continue
+            component[pairs] = j
+            measured[pairs] = z
+            likelihood[pairs] = constants[j] - 0.5 * distance
+            for a in range(dimension):
+                total = means[j, a]
+                for p in range(order):
+                    total += gains[j, a, p] * (measurements[z, p] - expected[j, p])
+                new_means[pairs, a] = total
+                for b in range(dimension):
+                    new_covariances[pairs, a, b] = updated[j, a, b]
+            pairs += 1
+    return (
+        component[:pairs],
+        measured[:pairs],
+        likelihood[:pairs],
+        new_means[:pairs],
+        new_covariances[:pairs],
+    )

@@ -1,0 +1,116 @@
+"""The Gaussian-mixture PHD recursion: update and extraction.
+
+[VM06] B.-N. Vo, W.-K. Ma, "The Gaussian mixture probability hypothesis density
+filter", IEEE Transactions on Signal Processing 54(11), 2006.
+[ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
+density filtering", 2021.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from tracker import kernels
+from tracker.gaussian_mixture import GaussianMixture, concatenate
+
+
+@dataclass(frozen=True, slots=True)
+class PhdUpdate:
+    """The intensity after one measurement set, and what fed it."""
+
+    posterior: GaussianMixture
+    """First the J predicted components as missed, then one for every gated pair."""
+    parents: Int[ndarray, " K"]
+    """The predicted component that each posterior component comes from."""
+    measurements: Int[ndarray, " K"]
+    """The measurement that updated it, -1 where it was missed."""
+    measurement_weights: Float[ndarray, " M"]
+    """W_z: the expected number of targets (0 … 1) that each measurement came from."""
+
+
+def update(
+    predicted: GaussianMixture,
+    measurements: Float[ndarray, "M m"],
+    *,
+    expected: Float[ndarray, "J m"],
+    jacobians: Float[ndarray, "J m d"],
+    noise: Float[ndarray, "N m m"],
+    detection_probability: float | Float[ndarray, " J"],
+    clutter_intensity: float | Float[ndarray, " M"],
+    gate: float = np.inf,
+) -> PhdUpdate:
+    """Update an intensity by one set of measurements, eq. (28)–(33) of [VM06].
+
+        v(x) = (1 - p_D) v'(x) + Σ_z Σ_j w_j(z) N(x; m_j(z), P_j)
+        w_j(z) = p_D,j w'_j q_j(z) / (κ(z) + Σ_l p_D,l w'_l q_l(z))
+
+    with q_j(z) = N(z; h(m_j), H P_j Hᵀ + R). This is recursion (10) of [ZW21];
+    the pseudocode printed there leaves out the division by the sum and keeps the
+    predicted covariance, which would let weights grow without bound: here both
+    follow the recursion.
+
+    Args:
+        predicted: v', J components.
+        measurements: z, one a row; none is allowed.
+        expected: h(m_j) for each component; for a linear model H m_j.
+        jacobians: H for each component.
+        noise: R, one for all measurements (N = 1) or one each (N = M).
+        detection_probability: p_D, one for all or one a component. Where it is
+            0 the component is left as it is.
+        clutter_intensity: κ(z) per unit of the measurement space.
+        gate: Squared Mahalanobis distance beyond which a pair is left out.
+    """
+    size, count = predicted.size, len(measurements)
+    p_d = np.broadcast_to(np.asarray(detection_probability, dtype=float), (size,))
+    missed = GaussianMixture(
+        predicted.weights * (1.0 - p_d), predicted.means, predicted.covariances, predicted.labels
+    )
+    if count == 0 or size == 0:
+        return PhdUpdate(
+            missed, np.arange(size), np.full(size, -1, dtype=np.int64), np.zeros(count)
+        )
+    parent, measured, log_likelihood, means, covariances = kernels.kalman_pairs(
+        predicted.means,
+        predicted.covariances,
+        np.ascontiguousarray(expected, dtype=float),
+        np.ascontiguousarray(jacobians, dtype=float),
+        np.ascontiguousarray(measurements, dtype=float),
+        np.ascontiguousarray(noise, dtype=float),
+        gate,
+    )
+    detectable = p_d[parent] * predicted.weights[parent] > 0.0
+    parent, measured, log_likelihood = (
+        parent[detectable],
+        measured[detectable],
+        log_likelihood[detectable],
+    )
+    kappa = np.broadcast_to(np.asarray(clutter_intensity, dtype=float), (count,))
+    with np.errstate(divide="ignore"):
+        log_kappa = np.log(kappa)
+    # in logarithms: without clutter a far measurement still goes to its nearest component
+    log_terms = np.log(p_d[parent] * predicted.weights[parent]) + log_likelihood
+    largest = np.maximum(log_kappa, np.full(count, -1e300))
+    np.maximum.at(largest, measured, log_terms)
+    sums = np.exp(log_kappa - largest)
+    terms = np.exp(log_terms - largest[measured])
+    np.add.at(sums, measured, terms)
+    weights = terms / sums[measured]
+    detected = GaussianMixture(
+        weights, means[detectable], covariances[detectable], predicted.labels[parent]
+    )
+    return PhdUpdate(
+        posterior=concatenate([missed, detected]),
+        parents=np.concatenate([np.arange(size), parent]),
+        measurements=np.concatenate([np.full(size, -1, dtype=np.int64), measured]),
+        measurement_weights=np.bincount(measured, weights, minlength=count),
+    )
+
+
+def extract(mixture: GaussianMixture, threshold: float) -> Int[ndarray, " K"]:
+    """Indices of the components whose weight is above ``threshold``, heaviest first ([ZW21] §2.4)."""
+    above = np.flatnonzero(mixture.weights > threshold)
+    return above[np.argsort(-mixture.weights[above], kind="stable")]

@@ -1,0 +1,140 @@
+"""What a sequence is: cameras, room, target, templates, boxes and truth, as values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+
+from tracker.camera import Camera
+
+
+class SequenceError(ValueError):
+    """A sequence cannot be read: the message names the file and field, what was expected and found."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Entrance:
+    """Where targets appear: a Gaussian in world metres."""
+
+    position: Float[ndarray, " 3"]
+    sigma: Float[ndarray, " 3"]
+    """Standard deviations, metres."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Room:
+    """The axis-aligned volume that people are tracked in, world metres."""
+
+    minimum: Float[ndarray, " 3"]
+    maximum: Float[ndarray, " 3"]
+    entrances: tuple[Entrance, ...] = ()
+
+    def contains(self, points: Float[ndarray, "N 3"], margin: float = 0.0) -> Bool[ndarray, " N"]:
+        """Whether each point lies inside, or at most ``margin`` metres outside."""
+        inside = (points >= self.minimum - margin) & (points <= self.maximum + margin)
+        return np.asarray(inside.all(axis=1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Template:
+    """A box whose colour histogram models a target."""
+
+    name: str
+    camera: str
+    frame: int
+    box: Float[ndarray, " 4"]
+    """left, top, width, height, pixels."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Detections:
+    """Boxes of an outside detector in one camera, sorted by step."""
+
+    frames: Int[ndarray, " D"]
+    boxes: Float[ndarray, "D 4"]
+    """left, top, width, height, pixels."""
+    scores: Float[ndarray, " D"]
+    """0 … 1; 1 where the file has none."""
+
+    def at(self, frame: int) -> slice:
+        """The rows of one step."""
+        first, last = np.searchsorted(self.frames, [frame, frame + 1])
+        return slice(int(first), int(last))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GroundTruth:
+    """Where people really were: one row a person a step, sorted by step and then id."""
+
+    frames: Int[ndarray, " G"]
+    ids: Int[ndarray, " G"]
+    positions: Float[ndarray, "G 3"]
+    """World metres."""
+    valid: Bool[ndarray, " G"]
+    """False where the person is there but the position is not certain."""
+
+    def at(self, frame: int) -> slice:
+        """The rows of one step."""
+        first, last = np.searchsorted(self.frames, [frame, frame + 1])
+        return slice(int(first), int(last))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """One camera of a sequence and where its pictures and boxes are."""
+
+    camera: Camera
+    video: Path | None = None
+    images: tuple[Path, ...] = ()
+    first_frame: int = 0
+    """The frame of the video or image list that is step 0."""
+    detections: Detections | None = None
+
+    @property
+    def has_pictures(self) -> bool:
+        """Whether there is a video or an image folder."""
+        return self.video is not None or bool(self.images)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sequence:
+    """A recorded multi-view sequence, checked and ready to run."""
+
+    name: str
+    folder: Path
+    fps: float
+    frames: int
+    """The number of steps."""
+    room: Room
+    target_half_extents: Float[ndarray, " 3"]
+    """Half width, depth and height of an upright target, metres."""
+    views: tuple[View, ...]
+    description: str = ""
+    templates: tuple[Template, ...] = ()
+    ground_truth: GroundTruth | None = None
+    digest: str = field(default="")
+    """Hash of sequence.toml and of the size and time of every file it names: part of the cache key."""
+
+    @property
+    def cameras(self) -> tuple[Camera, ...]:
+        """The cameras, in the order of the file."""
+        return tuple(view.camera for view in self.views)
+
+    @property
+    def has_pictures(self) -> bool:
+        """Whether every camera has pictures."""
+        return all(view.has_pictures for view in self.views)
+
+    @property
+    def has_detections(self) -> bool:
+        """Whether every camera has boxes of an outside detector."""
+        return all(view.detections is not None for view in self.views)
+
+    @property
+    def step_time(self) -> float:
+        """Seconds between two steps."""
+        return 1.0 / self.fps

@@ -1,0 +1,1 @@
+"""Stage 1: what each camera sees by itself. One protocol, one file a method."""

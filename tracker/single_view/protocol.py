@@ -1,0 +1,93 @@
+"""The face of every single-view method: a picture or boxes in, weighted boxes out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ViewResult:
+    """What stage 1 found in one camera at one step: what the fusion gets, and why.
+
+    All boxes are ``centre_x, centre_y, half_width, half_height`` in pixels.
+    """
+
+    boxes: Float[ndarray, "N 4"]
+    """What goes to the fusion: Y_k^i of [ZW21]."""
+    weights: Float[ndarray, " N"]
+    """Weight, existence probability or detector's score of each box."""
+    labels: Int[ndarray, " N"]
+    """Ids within this camera, -1 where the method has none."""
+    sigmas: Float[ndarray, "N 4"]
+    """How far each is to be trusted: standard deviations of horizontal centre, top, bottom and
+    width, pixels."""
+    estimates: Float[ndarray, "E 4"]
+    """The method's own 2D estimates, which it may or may not pass on."""
+    estimate_weights: Float[ndarray, " E"]
+    estimate_labels: Int[ndarray, " E"]
+    measurements: Float[ndarray, "M 4"]
+    """What the method's filter was given: peaks, foreground boxes or detections."""
+    measurement_scores: Float[ndarray, " M"]
+    """Likelihood or detector's score, 0 … 1."""
+    samples: Float[ndarray, "S 4"]
+    """Samples of the weighted intensity, float32; empty where the method has none."""
+    sample_weights: Float[ndarray, " S"]
+    """Their weights relative to the largest, float32."""
+    information: dict[str, float]
+    """Numbers worth showing of this step, by name."""
+
+    @staticmethod
+    def of_boxes(
+        boxes: Float[ndarray, "N 4"],
+        weights: Float[ndarray, " N"],
+        sigmas: Float[ndarray, "N 4"],
+    ) -> ViewResult:
+        """Boxes that are measurement, estimate and result at once, without labels."""
+        labels = np.full(len(boxes), -1, dtype=np.int64)
+        return ViewResult(
+            boxes=boxes,
+            weights=weights,
+            labels=labels,
+            sigmas=sigmas,
+            estimates=boxes,
+            estimate_weights=weights,
+            estimate_labels=labels,
+            measurements=boxes,
+            measurement_scores=weights,
+            samples=np.zeros((0, 4), dtype=np.float32),
+            sample_weights=np.zeros(0, dtype=np.float32),
+            information={},
+        )
+
+
+class SingleViewMethod(Protocol):
+    """One method, prepared for one camera of one sequence.
+
+    A method is made once per camera and run (that is where templates are read and
+    the background is learnt); its steps are pure: state in, state out.
+    """
+
+    needs_pictures: bool
+
+    def start(self) -> Any:
+        """The state before the first step."""
+        ...
+
+    def step(
+        self, state: Any, frame: int, picture: ndarray | None, rng: np.random.Generator
+    ) -> tuple[Any, ViewResult]:
+        """One step.
+
+        Args:
+            state: What the step before returned.
+            frame: The step, 0-based.
+            picture: (height, width, 3) uint8, BGR; None where the method needs none or
+                the frame is missing.
+            rng: The only source of randomness, made from seed, camera and step.
+        """
+        ...
