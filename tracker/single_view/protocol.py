@@ -24,8 +24,7 @@ class ViewResult:
     labels: Int[ndarray, " N"]
     """Ids within this camera, -1 where the method has none."""
     sigmas: Float[ndarray, "N 4"]
-    """How far each is to be trusted: standard deviations of horizontal centre, top, bottom and
-    width, pixels."""
+    """How far each is to be trusted: standard deviations of the same four numbers, pixels."""
     estimates: Float[ndarray, "E 4"]
     """The method's own 2D estimates, which it may or may not pass on."""
     estimate_weights: Float[ndarray, " E"]
