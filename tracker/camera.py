@@ -168,18 +168,16 @@ class Camera:
         directions = np.stack([u, v, np.ones_like(u)], axis=1) @ self.rotation
         return directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
+    def contains(self, pixels: Float[ndarray, "N 2"]) -> Bool[ndarray, " N"]:
+        """Whether each pixel lies inside the picture; NaN does not."""
+        size = np.array(self.image_size)
+        with np.errstate(invalid="ignore"):
+            return np.asarray(((pixels >= -0.5) & (pixels < size - 0.5)).all(axis=1))
+
     def sees(self, points: Float[ndarray, "N 3"]) -> Bool[ndarray, " N"]:
         """Whether each world point falls inside the picture."""
-        pixels, valid = self.project(points)
-        width, height = self.image_size
-        with np.errstate(invalid="ignore"):
-            inside = (
-                (pixels[:, 0] >= -0.5)
-                & (pixels[:, 0] < width - 0.5)
-                & (pixels[:, 1] >= -0.5)
-                & (pixels[:, 1] < height - 0.5)
-            )
-        return valid & inside
+        pixels, _ = self.project(points)
+        return self.contains(pixels)
 
     def project_boxes(
         self, centres: Float[ndarray, "N 3"], half_extents: Float[ndarray, " 3"]

@@ -93,10 +93,10 @@ class FusionParams(Params):
     ] = 0.5
     """Expected number of false boxes that a camera gives at each step."""
 
-    birth_weight: Annotated[
-        float, Field(ge=1e-6, le=1.0), ui("w_γ", unit="1/step", log=True)
-    ] = 0.02
-    """Expected number of people who come in at each entrance in one step."""
+    birth_rate: Annotated[
+        float, Field(ge=1e-4, le=10.0), ui("γ", unit="1/(entrance·s)", log=True)
+    ] = 0.5
+    """Expected number of people who come in at each entrance in one second."""
 
     motion_sigma: Annotated[
         float, Field(ge=0.01, le=3.0), ui("σ_w", unit="m/√s", step=0.01, log=True)

@@ -4,29 +4,35 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from tracker import __version__
-from tracker import fusion as fusion_methods
+from tracker import __version__, fusion, single_view
 from tracker import parameters as parameter_table
-from tracker import single_view as single_view_methods
 from tracker import trajectories as tracks_stage
 from tracker.fusion.protocol import FusionResult
 from tracker.parameters import RunParameters, Stage
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.protocol import ViewResult
+from tracker.single_view.protocol import SingleViewMethod, ViewResult
 from tracker.trajectories import Trajectories
 
 BLOCK = 5
-"""Steps that stage 1 hands over at a time: small enough to stream, large enough to pay."""
+"""Steps that a camera's stage 1 does at a time: few enough to stream, enough to pay."""
+
+PROGRESS_SECONDS = 0.05
+"""At most this often a run tells how far it is."""
+
+Cancel = Callable[[], bool]
 
 
 class Cancelled(Exception):
@@ -38,22 +44,24 @@ class Progress:
     """How far a run is."""
 
     stage: Stage
-    """The stage that is at work."""
+    """The first stage that had to be computed: the one that takes the time."""
     done: int
     """Steps whose tracks are ready, from step 0 on."""
     total: int
     seconds: float
     """Since the run began."""
+    fresh: int
+    """Steps that this run computed itself, rather than took from an earlier one."""
 
     @property
     def steps_per_second(self) -> float:
         """Mean speed so far."""
-        return self.done / self.seconds if self.seconds > 0.0 else 0.0
+        return self.fresh / self.seconds if self.seconds > 0.0 else 0.0
 
     @property
     def seconds_left(self) -> float | None:
         """Estimated from the mean speed; None before the first step."""
-        return (self.total - self.done) / self.steps_per_second if self.done else None
+        return (self.total - self.done) / self.steps_per_second if self.fresh else None
 
 
 @dataclass(eq=False)
@@ -66,8 +74,8 @@ class Run:
     sequence: Sequence
     parameters: RunParameters
     seed: int
-    key: str
-    """Hash of the sequence, all parameters, the seed and the version of the code's numbers."""
+    keys: dict[Stage, str]
+    """The cache key of each stage."""
     views: list[tuple[ViewResult, ...]] = field(default_factory=list)
     """Stage 1 of each step, one result a camera."""
     fused: list[FusionResult] = field(default_factory=list)
@@ -76,9 +84,18 @@ class Run:
     """Stage 3 of the steps below :attr:`done`."""
     done: int = 0
     """Steps whose three stages are ready."""
+    view_states: tuple[Any, ...] | None = None
+    """State of stage 1, one a camera, after the last step of :attr:`views`."""
+    fusion_state: Any = None
+    """State of stage 2 after the last step of :attr:`fused`."""
 
     def __post_init__(self) -> None:
         self.tracks = Trajectories.empty(len(self.sequence.views))
+
+    @property
+    def key(self) -> str:
+        """Hash of the sequence, all parameters, the seed and the version of the code's numbers."""
+        return self.keys["tracks"]
 
     @property
     def complete(self) -> bool:
@@ -86,11 +103,216 @@ class Run:
         return self.done == self.sequence.frames
 
 
-def stage_key(sequence: Sequence, parameters: RunParameters, seed: int, stage: Stage) -> str:
-    """The cache key of a stage: sequence, its own parameters and those before it, seed, version."""
+def stage_keys(sequence: Sequence, parameters: RunParameters, seed: int) -> dict[Stage, str]:
+    """The cache key of each stage: a hash of the sequence, seed and version and of the
+    parameters of the stage itself and of those before it."""
+    keys: dict[Stage, str] = {}
+    values: list[Any] = [__version__, sequence.digest, seed]
     stages: tuple[Stage, ...] = ("single_view", "fusion", "tracks")
-    values = [
-        parameter_table.stage_values(parameters, s) for s in stages[: stages.index(stage) + 1]
-    ]
-    text = json.dumps([__version__, sequence.digest, seed, values], sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+    for stage in stages:
+        values.append(parameter_table.stage_values(parameters, stage))
+        keys[stage] = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
+    return keys
+
+
+def default_parameters(sequence: Sequence) -> RunParameters:
+    """Which methods follow from what the sequence has: pictures with templates, or boxes.
+
+    Raises:
+        ValueError: If the sequence has neither.
+    """
+    if sequence.has_pictures and sequence.templates:
+        return RunParameters(single_view="colour_phd")
+    if sequence.has_detections:
+        return RunParameters(single_view="none")
+    if sequence.has_pictures:
+        return RunParameters(single_view="colour_phd")
+    raise ValueError(
+        f"{sequence.name}: every camera needs pictures (video or images), or every camera "
+        "needs detections; add what is missing to sequence.toml"
+    )
+
+
+def compute(
+    sequence: Sequence,
+    parameters: RunParameters,
+    *,
+    seed: int = 0,
+    reader: FrameReader | None = None,
+    previous: Run | None = None,
+    on_progress: Callable[[Run, Progress], None] | None = None,
+    cancelled: Cancel = lambda: False,
+) -> Run:
+    """Run the three stages over a sequence.
+
+    Args:
+        sequence: What to track in.
+        parameters: Methods and their numbers.
+        seed: Every camera and step draws from a generator of its own made of it, so
+            the result depends neither on threads nor on where a run was resumed.
+        reader: The pictures; one is opened for the run where none is given.
+        previous: A run, complete or not, whose stages are re-used as far as their
+            keys agree. It is left as it is.
+        on_progress: Called from this thread every so often, and at the end, with the
+            run so far: its steps below ``done`` may be read.
+        cancelled: Asked between steps.
+
+    Returns:
+        The complete run.
+
+    Raises:
+        Cancelled: If ``cancelled`` said so.
+        ValueError: If the methods do not fit the sequence.
+    """
+    run = Run(sequence, parameters, seed, stage_keys(sequence, parameters, seed))
+    _adopt(run, previous)
+    stage: Stage = "single_view"
+    if len(run.views) == sequence.frames:
+        stage = "fusion" if len(run.fused) < sequence.frames else "tracks"
+    begin = time.perf_counter()
+    first = len(run.fused)
+    last_told = begin
+    ids: dict[int, int] = {}
+    parts: list[Trajectories] = []
+
+    def publish() -> None:
+        parts.append(
+            tracks_stage.extract(
+                run.fused[run.done :],
+                cameras=len(sequence.views),
+                extraction_threshold=parameters.fusion.extraction_threshold,
+                first_frame=run.done,
+                ids=ids,
+            )
+        )
+        run.tracks = tracks_stage.concatenate(parts, len(sequence.views))
+        parts[:] = [run.tracks]
+        run.done = len(run.fused)
+        if on_progress is not None:
+            seconds = time.perf_counter() - begin
+            on_progress(
+                run, Progress(stage, run.done, sequence.frames, seconds, run.done - first)
+            )
+
+    publish()
+    method = fusion.create(sequence, parameters)
+    state = run.fusion_state if run.fused else method.start()
+    with ExitStack() as stack:
+        if len(run.views) < sequence.frames:
+            if reader is None:
+                reader = FrameReader(sequence)
+                stack.callback(reader.close)
+            steps = stack.enter_context(_SingleViews(run, reader, cancelled))
+        for frame in range(len(run.fused), sequence.frames):
+            if cancelled():
+                raise Cancelled
+            if frame == len(run.views):
+                views, view_states = next(steps)
+                run.views.append(views)
+                run.view_states = view_states
+            state, result = method.step(state, run.views[frame])
+            run.fused.append(result)
+            run.fusion_state = state
+            now = time.perf_counter()
+            if now - last_told > PROGRESS_SECONDS:
+                publish()
+                last_told = now
+    publish()
+    return run
+
+
+def _adopt(run: Run, previous: Run | None) -> None:
+    """Take over the columns of an earlier run whose keys agree."""
+    if previous is None:
+        return
+    if previous.keys["single_view"] == run.keys["single_view"]:
+        run.views, run.view_states = list(previous.views), previous.view_states
+    if previous.keys["fusion"] == run.keys["fusion"]:
+        run.fused, run.fusion_state = list(previous.fused), previous.fusion_state
+
+
+class _SingleViews:
+    """Stage 1 of all cameras, side by side in threads, handed over step by step in order."""
+
+    def __init__(self, run: Run, reader: FrameReader, cancelled: Cancel) -> None:
+        self._run = run
+        self._reader = reader
+        self._cancelled = cancelled
+        self._stopped = False
+        count = len(run.sequence.views)
+        self._pool = ThreadPoolExecutor(min(count, os.cpu_count() or 1), "single-view")
+        self._steps = self._iterate()
+
+    def __enter__(self) -> Iterator[tuple[tuple[ViewResult, ...], tuple[Any, ...]]]:
+        return self._steps
+
+    def __exit__(self, *_: object) -> None:
+        self._stopped = True  # a block under way ends after its step
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+    def _iterate(self) -> Iterator[tuple[tuple[ViewResult, ...], tuple[Any, ...]]]:
+        run = self._run
+        cameras = range(len(run.sequence.views))
+        makers = [self._pool.submit(self._prepare, c) for c in cameras]
+        workers = [maker.result() for maker in makers]
+        blocks: deque[list[Future[list[tuple[ViewResult, Any]]]]] = deque()
+        left = run.sequence.frames - len(run.views)
+        for _ in range(2):  # one block is computed while the one before is fused
+            blocks.append([self._pool.submit(worker.block) for worker in workers])
+        while left > 0:
+            parts = [future.result() for future in blocks.popleft()]
+            blocks.append([self._pool.submit(worker.block) for worker in workers])
+            if self._cancelled():
+                raise Cancelled
+            for step in zip(*parts, strict=True):
+                yield tuple(result for result, _ in step), tuple(state for _, state in step)
+            left -= len(parts[0])
+
+    def _prepare(self, camera: int) -> _CameraWorker:
+        run = self._run
+        method = single_view.create(
+            run.parameters.single_view, run.sequence, camera, run.parameters, self._reader
+        )
+        first = len(run.views)
+        state = run.view_states[camera] if run.view_states is not None else method.start()
+        return _CameraWorker(
+            method, state, camera, first, run, self._reader, lambda: self._stopped
+        )
+
+
+class _CameraWorker:
+    """Stage 1 of one camera: its blocks are done one after another, by whichever thread is free."""
+
+    def __init__(
+        self,
+        method: SingleViewMethod,
+        state: Any,
+        camera: int,
+        first: int,
+        run: Run,
+        reader: FrameReader,
+        stopped: Cancel,
+    ) -> None:
+        self._method = method
+        self._state = state
+        self._camera = camera
+        self._frame = first
+        self._frames = run.sequence.frames
+        self._seed = run.seed
+        self._stopped = stopped
+        self._pictures = reader.iterate(camera, first) if method.needs_pictures else None
+        self._turn = threading.Lock()
+
+    def block(self) -> list[tuple[ViewResult, Any]]:
+        """The next few steps: result and state of each; none at the end."""
+        with self._turn:
+            done: list[tuple[ViewResult, Any]] = []
+            for frame in range(self._frame, min(self._frame + BLOCK, self._frames)):
+                if self._stopped():
+                    break
+                picture = next(self._pictures, None) if self._pictures is not None else None
+                rng = np.random.default_rng((self._seed, self._camera, frame))
+                self._state, result = self._method.step(self._state, frame, picture, rng)
+                done.append((result, self._state))
+            self._frame += len(done)
+            return done

@@ -19,6 +19,7 @@ class Trajectories:
 
     frames: Int[ndarray, " N"]
     ids: Int[ndarray, " N"]
+    """Counted from 1, in the order of first appearance."""
     positions: Float[ndarray, "N 3"]
     """World metres."""
     existences: Float[ndarray, " N"]
@@ -29,6 +30,8 @@ class Trajectories:
     """Whether a box of each camera fed the target at this step; none: it is coasting."""
     components: Int[ndarray, " N"]
     """Index of the component in the step's posterior."""
+    labels: Int[ndarray, " N"]
+    """The component's label, of which the id is the short form."""
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -49,6 +52,7 @@ class Trajectories:
             sigmas=np.zeros((0, 3)),
             seen=np.zeros((0, cameras), dtype=bool),
             components=np.zeros(0, dtype=np.int64),
+            labels=np.zeros(0, dtype=np.int64),
         )
 
 
@@ -58,6 +62,7 @@ def extract(
     cameras: int,
     extraction_threshold: float,
     first_frame: int = 0,
+    ids: dict[int, int] | None = None,
 ) -> Trajectories:
     """The targets of each step: components above the threshold, one a label.
 
@@ -66,26 +71,34 @@ def extract(
     Args:
         results: The posterior of each step, from ``first_frame`` on.
         cameras: C.
-        extraction_threshold: T; a component is a target where its weight is above it.
+        extraction_threshold: T_e; a component is a target where its weight is above it.
         first_frame: The step of the first result.
+        ids: Label → id so far; new labels are added. To go on from an earlier
+            piece, pass the same one again.
     """
+    ids = {} if ids is None else ids
     rows: list[Trajectories] = []
     for offset, result in enumerate(results):
         chosen = phd.extract(result.posterior, extraction_threshold)
         if not len(chosen):
             continue
         labels, first = np.unique(result.posterior.labels[chosen], return_index=True)
-        components = chosen[first]
-        covariances = result.posterior.covariances[components]
+        for label in labels.tolist():
+            ids.setdefault(label, len(ids) + 1)
+        numbers = np.array([ids[label] for label in labels.tolist()], dtype=np.int64)
+        order = np.argsort(numbers)
+        components = chosen[first][order]
+        variances = np.diagonal(result.posterior.covariances[components], axis1=1, axis2=2)
         rows.append(
             Trajectories(
                 frames=np.full(len(labels), first_frame + offset, dtype=np.int64),
-                ids=labels,
+                ids=numbers[order],
                 positions=result.posterior.means[components, :3],
                 existences=result.posterior.weights[components],
-                sigmas=np.sqrt(np.einsum("nii->ni", covariances)[:, :3]),
+                sigmas=np.sqrt(variances[:, :3]),
                 seen=(result.sources[:, components] >= 0).T,
                 components=components,
+                labels=labels[order],
             )
         )
     return concatenate(rows, cameras)
