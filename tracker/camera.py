@@ -68,7 +68,7 @@ class Camera:
     @cached_property
     def centre(self) -> Float[ndarray, " 3"]:
         """The position of the lens, world metres."""
-        return -self.rotation.T @ self.translation
+        return np.asarray(-self.rotation.T @ self.translation)
 
     @cached_property
     def is_pinhole(self) -> bool:
@@ -89,7 +89,7 @@ class Camera:
 
     def to_camera(self, points: Float[ndarray, "N 3"]) -> Float[ndarray, "N 3"]:
         """World points (metres) in camera axes."""
-        return points @ self.rotation.T + self.translation
+        return np.asarray(points @ self.rotation.T + self.translation)
 
     def project(
         self, points: Float[ndarray, "N 3"]
@@ -166,7 +166,7 @@ class Camera:
                 u = u - (d * error_u - b * error_v) / determinant
                 v = v - (a * error_v - b * error_u) / determinant
         directions = np.stack([u, v, np.ones_like(u)], axis=1) @ self.rotation
-        return directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        return np.asarray(directions / np.linalg.norm(directions, axis=1, keepdims=True))
 
     def contains(self, pixels: Float[ndarray, "N 2"]) -> Bool[ndarray, " N"]:
         """Whether each pixel lies inside the picture; NaN does not."""

@@ -57,7 +57,7 @@ class GaussianMixture:
     @property
     def dimension(self) -> int:
         """The dimension d of the state."""
-        return self.means.shape[1]
+        return int(self.means.shape[1])
 
     @property
     def cardinality(self) -> float:
@@ -114,9 +114,7 @@ def prune(mixture: GaussianMixture, threshold: float) -> Int[ndarray, " K"]:
     return np.flatnonzero(mixture.weights >= threshold)
 
 
-def merge(
-    mixture: GaussianMixture, threshold: float
-) -> tuple[GaussianMixture, Int[ndarray, " K"]]:
+def merge(mixture: GaussianMixture, threshold: float) -> tuple[GaussianMixture, Int[ndarray, " K"]]:
     """Merge components that lie close to a heavier one, keeping the first two moments.
 
     Starting from the heaviest component l, every component i with

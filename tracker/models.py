@@ -61,7 +61,7 @@ def visible_area(camera: Camera, room: Room) -> float:
     picture, so that the clutter intensity stays finite for a camera that looks
     elsewhere.
     """
-    axes = [np.linspace(low, high, 12) for low, high in zip(room.minimum, room.maximum, strict=True)]
+    axes = np.linspace(room.minimum, room.maximum, 12).T
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     pixels, _ = camera.project(grid)
     pixels = pixels[camera.contains(pixels)]

@@ -103,9 +103,7 @@ class FusionParams(Params):
     ] = 0.4
     """How far a person strays in one second, along each axis (random walk)."""
 
-    measurement_sigma: Annotated[
-        float, Field(ge=0.1, le=10.0), ui("σ_v", step=0.1, log=True)
-    ] = 1.0
+    measurement_sigma: Annotated[float, Field(ge=0.1, le=10.0), ui("σ_v", step=0.1, log=True)] = 1.0
     """Factor on the noise that the single-view stage states for its boxes."""
 
     gate_probability: Annotated[float, Field(ge=0.5, le=1.0), ui("P_G", step=0.0001)] = 0.9999
@@ -229,9 +227,7 @@ METHODS: dict[str, tuple[str, ...]] = {
 
 PRESETS: dict[str, dict[str, Any]] = {
     "robust": {},
-    "published": {
-        key: p.published for key, p in PARAMETERS.items() if p.published is not None
-    },
+    "published": {key: p.published for key, p in PARAMETERS.items() if p.published is not None},
 }
 """Named sets of values, each against the defaults: ``robust`` is the defaults themselves."""
 
@@ -265,9 +261,7 @@ def with_values(parameters: RunParameters, changes: Mapping[str, Any]) -> RunPar
     for key, new in changes.items():
         if key in METHODS:
             if new not in METHODS[key]:
-                raise ParameterError(
-                    key, f"expected one of {', '.join(METHODS[key])}, got {new!r}"
-                )
+                raise ParameterError(key, f"expected one of {', '.join(METHODS[key])}, got {new!r}")
             data[key] = new
         elif key in PARAMETERS:
             group, name = key.split(".", 1)

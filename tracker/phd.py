@@ -111,6 +111,6 @@ def update(
 
 
 def extract(mixture: GaussianMixture, threshold: float) -> Int[ndarray, " K"]:
-    """Indices of the components whose weight is above ``threshold``, heaviest first ([ZW21] §2.4)."""
+    """Indices of the components heavier than ``threshold``, heaviest first ([ZW21] §2.4)."""
     above = np.flatnonzero(mixture.weights > threshold)
     return above[np.argsort(-mixture.weights[above], kind="stable")]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -190,9 +188,7 @@ def compute(
         run.done = len(run.fused)
         if on_progress is not None:
             seconds = time.perf_counter() - begin
-            on_progress(
-                run, Progress(stage, run.done, sequence.frames, seconds, run.done - first)
-            )
+            on_progress(run, Progress(stage, run.done, sequence.frames, seconds, run.done - first))
 
     publish()
     method = fusion.create(sequence, parameters)
@@ -232,36 +228,39 @@ def _adopt(run: Run, previous: Run | None) -> None:
 
 
 class _SingleViews:
-    """Stage 1 of all cameras, side by side in threads, handed over step by step in order."""
+    """Stage 1 of all cameras, each in a thread of its own, handed over step by step in order."""
 
     def __init__(self, run: Run, reader: FrameReader, cancelled: Cancel) -> None:
         self._run = run
         self._reader = reader
         self._cancelled = cancelled
         self._stopped = False
-        count = len(run.sequence.views)
-        self._pool = ThreadPoolExecutor(min(count, os.cpu_count() or 1), "single-view")
-        self._steps = self._iterate()
+        self._pools = [
+            ThreadPoolExecutor(1, f"single-view-{view.camera.name}") for view in run.sequence.views
+        ]
 
     def __enter__(self) -> Iterator[tuple[tuple[ViewResult, ...], tuple[Any, ...]]]:
-        return self._steps
+        return self._iterate()
 
     def __exit__(self, *_: object) -> None:
         self._stopped = True  # a block under way ends after its step
-        self._pool.shutdown(wait=True, cancel_futures=True)
+        for pool in self._pools:
+            pool.shutdown(wait=True, cancel_futures=True)
 
     def _iterate(self) -> Iterator[tuple[tuple[ViewResult, ...], tuple[Any, ...]]]:
-        run = self._run
-        cameras = range(len(run.sequence.views))
-        makers = [self._pool.submit(self._prepare, c) for c in cameras]
-        workers = [maker.result() for maker in makers]
+        preparing = [pool.submit(self._prepare, c) for c, pool in enumerate(self._pools)]
+        workers = [future.result() for future in preparing]
         blocks: deque[list[Future[list[tuple[ViewResult, Any]]]]] = deque()
-        left = run.sequence.frames - len(run.views)
-        for _ in range(2):  # one block is computed while the one before is fused
-            blocks.append([self._pool.submit(worker.block) for worker in workers])
+
+        def order_block() -> None:
+            pairs = zip(self._pools, workers, strict=True)
+            blocks.append([pool.submit(worker.block) for pool, worker in pairs])
+
+        order_block()
+        left = self._run.sequence.frames - len(self._run.views)
         while left > 0:
+            order_block()  # is computed while the one before is fused
             parts = [future.result() for future in blocks.popleft()]
-            blocks.append([self._pool.submit(worker.block) for worker in workers])
             if self._cancelled():
                 raise Cancelled
             for step in zip(*parts, strict=True):
@@ -273,22 +272,20 @@ class _SingleViews:
         method = single_view.create(
             run.parameters.single_view, run.sequence, camera, run.parameters, self._reader
         )
-        first = len(run.views)
         state = run.view_states[camera] if run.view_states is not None else method.start()
         return _CameraWorker(
-            method, state, camera, first, run, self._reader, lambda: self._stopped
+            method, state, camera, run, self._reader, stopped=lambda: self._stopped
         )
 
 
 class _CameraWorker:
-    """Stage 1 of one camera: its blocks are done one after another, by whichever thread is free."""
+    """Stage 1 of one camera, from where the run's column ends."""
 
     def __init__(
         self,
         method: SingleViewMethod,
         state: Any,
         camera: int,
-        first: int,
         run: Run,
         reader: FrameReader,
         stopped: Cancel,
@@ -296,23 +293,19 @@ class _CameraWorker:
         self._method = method
         self._state = state
         self._camera = camera
-        self._frame = first
+        self._frame = len(run.views)
         self._frames = run.sequence.frames
         self._seed = run.seed
         self._stopped = stopped
-        self._pictures = reader.iterate(camera, first) if method.needs_pictures else None
-        self._turn = threading.Lock()
+        self._pictures = reader.iterate(camera, self._frame) if method.needs_pictures else None
 
     def block(self) -> list[tuple[ViewResult, Any]]:
         """The next few steps: result and state of each; none at the end."""
-        with self._turn:
-            done: list[tuple[ViewResult, Any]] = []
-            for frame in range(self._frame, min(self._frame + BLOCK, self._frames)):
-                if self._stopped():
-                    break
-                picture = next(self._pictures, None) if self._pictures is not None else None
-                rng = np.random.default_rng((self._seed, self._camera, frame))
-                self._state, result = self._method.step(self._state, frame, picture, rng)
-                done.append((result, self._state))
-            self._frame += len(done)
-            return done
+        done: list[tuple[ViewResult, Any]] = []
+        while len(done) < BLOCK and self._frame < self._frames and not self._stopped():
+            picture = next(self._pictures, None) if self._pictures is not None else None
+            rng = np.random.default_rng((self._seed, self._camera, self._frame))
+            self._state, result = self._method.step(self._state, self._frame, picture, rng)
+            done.append((result, self._state))
+            self._frame += 1
+        return done

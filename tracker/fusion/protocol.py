@@ -23,7 +23,7 @@ class FusionResult:
     detection_probabilities: Float[ndarray, "C J"]
     """p_D that each camera was given for each component; 0 outside its picture."""
     sources: Int[ndarray, "C J"]
-    """The box (index into ``ViewResult.boxes``) of each camera that fed each component, -1 for none."""
+    """Index into ``ViewResult.boxes`` of the box that fed each component, -1 for none."""
     source_weights: Float[ndarray, "C J"]
     """The share of the component that its box made: an association probability, 0 … 1."""
     hidden_by: Int[ndarray, "C J"]

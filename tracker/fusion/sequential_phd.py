@@ -119,9 +119,7 @@ class SequentialPhd:
         view: ViewResult,
     ) -> tuple[GaussianMixture, _Evidence]:
         expected, jacobians, valid = camera.project_with_jacobian(mixture.means)
-        probability = self._parameters.detection_probability * (
-            valid & camera.contains(expected)
-        )
+        probability = self._parameters.detection_probability * (valid & camera.contains(expected))
         noise = np.zeros((len(view.boxes), 2, 2))
         noise[:, [0, 1], [0, 1]] = (self._parameters.measurement_sigma * view.sigmas[:, :2]) ** 2
         updated = phd.update(

@@ -13,7 +13,7 @@ from tracker.camera import Camera
 
 
 class SequenceError(ValueError):
-    """A sequence cannot be read: the message names the file and field, what was expected and found."""
+    """A sequence cannot be read; the message names file and field, expected and found."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,7 +117,7 @@ class Sequence:
     templates: tuple[Template, ...] = ()
     ground_truth: GroundTruth | None = None
     digest: str = field(default="")
-    """Hash of sequence.toml and of the size and time of every file it names: part of the cache key."""
+    """Hash of sequence.toml and of the size and time of every file it names, for cache keys."""
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
