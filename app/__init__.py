@@ -1,0 +1,1 @@
+"""The local web workbench around the engine, and the command line."""

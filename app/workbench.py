@@ -1,0 +1,374 @@
+"""The one store: sequence, parameters, playhead, selection, layers and the current run.
+
+Whoever changes something calls a method here; whoever shows something subscribes
+and reads a :class:`Snapshot`. Two kinds of news: a *change* says that a part of
+the state is another now (read it again), an *event* is a passing request that
+leaves no trace in the state.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any, Literal
+
+from tracker import parameters as table
+from tracker.parameters import ParameterError, RunParameters
+from tracker.pipeline import Progress, Run
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+
+Change = Literal[
+    "sequence", "opening", "parameters", "playhead", "selection", "run", "progress", "layers"
+]
+"""What is another now: ``run`` is a run's beginning and its end, ``progress`` its new steps."""
+
+RunPhase = Literal["idle", "computing", "done", "failed", "cancelled"]
+
+Level = Literal["info", "warn", "error"]
+
+LAYERS = ("boxes", "ellipsoids", "trails", "truth", "volume")
+"""The layers of the 3D view that can be switched."""
+
+CLAMPED_ORIGIN = "viser"
+"""Whose numbers are moved into their range rather than refused: viser clamps nothing itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunState:
+    """How far the run is that the parameters ask for."""
+
+    key: str = ""
+    """Of the run that is asked for; what is shown is of this run where its key is the same."""
+    state: RunPhase = "idle"
+    done: int = 0
+    total: int = 0
+    steps_per_second: float = 0.0
+    seconds_left: float | None = None
+    message: str = ""
+    error: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """A sequence that is being rendered or read."""
+
+    name: str
+    message: str
+    done: int = 0
+    total: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ViewRequest:
+    """Somebody wants to look through a camera in 3D; None is the free view."""
+
+    camera: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A transport key was pressed inside the 3D view."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """A sentence for the person in front of the page."""
+
+    level: Level
+    message: str
+    hint: str | None = None
+
+
+Event = ViewRequest | Command | Notice
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """The whole state at one moment; a value that can be read from any thread."""
+
+    version: int = 0
+    """Grows with every change."""
+    sequence: Sequence | None = None
+    sequence_key: str = ""
+    """Another for every content, so that pictures may be kept for ever."""
+    reader: FrameReader | None = None
+    opening: Opening | None = None
+    parameters: RunParameters = field(default_factory=RunParameters)
+    defaults: RunParameters = field(default_factory=RunParameters)
+    """The values that a reset returns to: of methods, those that fit the sequence."""
+    parameters_origin: str = ""
+    """Who changed the parameters last, so that nobody is told their own news."""
+    playhead: int = 0
+    playhead_origin: str = ""
+    selection: int | None = None
+    run: Run | None = None
+    """What is shown; steps below its ``done`` are there."""
+    run_state: RunState = RunState()
+    layers: Mapping[str, bool] = field(
+        default_factory=lambda: MappingProxyType(dict.fromkeys(LAYERS, True))
+    )
+
+    @property
+    def step_is_computed(self) -> bool:
+        """Whether the shown run has the playhead's step."""
+        return self.run is not None and self.playhead < self.run.done
+
+
+class Workbench:
+    """Thread-safe store; see the module's words."""
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+        self._snapshot = Snapshot()
+        self._last_good: Run | None = None
+        self._pending: list[Change] = []
+        self._subscribers: list[Callable[[Change], None]] = []
+        self._listeners: list[Callable[[Event], None]] = []
+
+    def snapshot(self) -> Snapshot:
+        """The state now."""
+        return self._snapshot
+
+    def subscribe(self, callback: Callable[[Change], None]) -> Callable[[], None]:
+        """Be told of changes, from the thread that makes them: the callback must return fast.
+
+        Returns:
+            A function that ends the subscription.
+        """
+        return self._register(self._subscribers, callback)
+
+    def subscribe_events(self, callback: Callable[[Event], None]) -> Callable[[], None]:
+        """Be told of events, from the thread that makes them: the callback must return fast."""
+        return self._register(self._listeners, callback)
+
+    def _register(self, registry: list[Any], callback: Any) -> Callable[[], None]:
+        with self._lock:
+            registry.append(callback)
+
+        def end() -> None:
+            with self._lock:
+                if callback in registry:
+                    registry.remove(callback)
+
+        return end
+
+    # what a person does
+
+    def set_parameters(self, changes: Mapping[str, Any], origin: str) -> RunParameters:
+        """Change some values by key, all or none.
+
+        Args:
+            changes: By key, numbers or text.
+            origin: Who asks; numbers of viser's sliders are clamped to their range.
+
+        Raises:
+            ParameterError: If a key does not exist or a value does not fit.
+        """
+        if origin.startswith(CLAMPED_ORIGIN):
+            changes = {key: clamp(key, value) for key, value in changes.items()}
+        with self._edit() as now:
+            return self._put_parameters(table.with_values(now.parameters, changes), origin)
+
+    def reset_parameters(
+        self, keys: Iterable[str] | None = None, origin: str = ""
+    ) -> RunParameters:
+        """Return some values, or all and the methods too, to what they are by default."""
+        with self._edit() as now:
+            wanted = (*table.METHODS, *table.PARAMETERS) if keys is None else tuple(keys)
+            for key in wanted:
+                if key not in table.METHODS and key not in table.PARAMETERS:
+                    table.with_values(now.parameters, {key: None})  # says what is wrong
+            changes = {key: table.value(now.defaults, key) for key in wanted}
+            return self._put_parameters(table.with_values(now.parameters, changes), origin)
+
+    def apply_preset(self, name: str, origin: str = "") -> RunParameters:
+        """Take a preset's values, and the defaults where it has none; the methods stay.
+
+        Raises:
+            ParameterError: If there is no such preset.
+        """
+        if name not in table.PRESETS:
+            known = ", ".join(table.PRESETS)
+            raise ParameterError("preset", f"expected one of {known}, got {name!r}")
+        with self._edit() as now:
+            methods = {key: table.value(now.parameters, key) for key in table.METHODS}
+            changes = {**methods, **table.PRESETS[name]}
+            return self._put_parameters(table.with_values(now.defaults, changes), origin)
+
+    def _put_parameters(self, parameters: RunParameters, origin: str) -> RunParameters:
+        if parameters != self._snapshot.parameters:
+            self._put("parameters", parameters=parameters, parameters_origin=origin)
+        return parameters
+
+    def seek(self, step: int, origin: str = "") -> int:
+        """Move the playhead, as far as the sequence goes; the step it is at now."""
+        with self._edit() as now:
+            sequence = now.sequence
+            last = sequence.frames - 1 if sequence is not None else 0
+            step = max(0, min(int(step), last))
+            if step != now.playhead:
+                self._put("playhead", playhead=step, playhead_origin=origin)
+            return step
+
+    def select(self, target: int | None) -> None:
+        """Select a track by its id, or none."""
+        with self._edit() as now:
+            if target != now.selection:
+                self._put("selection", selection=target)
+
+    @property
+    def layers(self) -> dict[str, bool]:
+        """The layers of the 3D view and whether each is on."""
+        return dict(self._snapshot.layers)
+
+    def set_layers(self, changes: Mapping[str, bool]) -> None:
+        """Switch some layers of the 3D view.
+
+        Raises:
+            ParameterError: If there is no such layer.
+        """
+        for name in changes:
+            if name not in LAYERS:
+                raise ParameterError(f"layers.{name}", f"expected one of {', '.join(LAYERS)}")
+        with self._edit() as now:
+            layers = {**now.layers, **{k: bool(v) for k, v in changes.items()}}
+            if layers != now.layers:
+                self._put("layers", layers=MappingProxyType(layers))
+
+    def view(self, camera: int | None) -> None:
+        """Ask the 3D view to look through a camera; None is the free view."""
+        self._tell(ViewRequest(camera))
+
+    def command(self, name: str) -> None:
+        """Relay a transport key that was pressed inside the 3D view to the pages."""
+        self._tell(Command(name))
+
+    def notify(self, level: Level, message: str, hint: str | None = None) -> None:
+        """Say one sentence to everyone who looks."""
+        self._tell(Notice(level, message, hint))
+
+    # what the jobs report
+
+    def set_opening(self, opening: Opening | None) -> None:
+        """How far the opening of a sequence is; None: it is over."""
+        with self._edit() as now:
+            if opening != now.opening:
+                self._put("opening", opening=opening)
+
+    def open(
+        self, sequence: Sequence, key: str, reader: FrameReader, parameters: RunParameters
+    ) -> FrameReader | None:
+        """Show another sequence, from its first step; the reader of the one before, to be closed.
+
+        Args:
+            sequence: It has been read and checked.
+            key: Another for every content.
+            reader: Its pictures.
+            parameters: Its default parameters.
+        """
+        with self._edit() as now:
+            before = now.reader
+            self._last_good = None
+            self._put(
+                "sequence",
+                sequence=sequence,
+                sequence_key=key,
+                reader=reader,
+                opening=None,
+                parameters=parameters,
+                defaults=parameters,
+                parameters_origin="",
+                playhead=0,
+                playhead_origin="",
+                selection=None,
+                run=None,
+                run_state=RunState(total=sequence.frames),
+            )
+            return before
+
+    def run_begins(self, key: str) -> None:
+        """The parameters ask for the run with this key: from now on only its news count."""
+        with self._edit() as now:
+            total = now.sequence.frames if now.sequence is not None else 0
+            self._put("run", run_state=RunState(key=key, state="computing", total=total))
+
+    def run_progresses(self, run: Run, progress: Progress) -> None:
+        """A run has new steps; from its first call on it is the one that is shown."""
+        with self._edit() as now:
+            if run.key != now.run_state.key:  # superseded
+                return
+            state = replace(
+                now.run_state,
+                done=progress.done,
+                total=progress.total,
+                steps_per_second=progress.steps_per_second,
+                seconds_left=progress.seconds_left,
+                message=progress.stage.replace("_", " "),
+            )
+            self._put("run" if now.run is not run else "progress", run=run, run_state=state)
+
+    def run_ends(
+        self, key: str, phase: Literal["done", "cancelled", "failed"], error: str | None = None
+    ) -> None:
+        """The run with this key is over; after a failure the last good one is shown again."""
+        with self._edit() as now:
+            if key != now.run_state.key:  # superseded
+                return
+            run = now.run
+            if phase == "failed":
+                run = self._last_good
+            elif phase == "done":
+                self._last_good = run
+            state = replace(now.run_state, state=phase, seconds_left=None, error=error)
+            self._put("run", run=run, run_state=state)
+
+    @contextmanager
+    def _edit(self) -> Iterator[Snapshot]:
+        """Hold the lock while the state is changed, and tell of it when the lock is free again.
+
+        A subscriber may hold a lock of its own and come back here from another
+        thread; telling under our lock would let the two wait for each other.
+        """
+        pending: list[Change] = []
+        with self._lock:
+            self._pending = pending
+            yield self._snapshot
+            subscribers = list(self._subscribers)
+        for change in pending:
+            for callback in subscribers:
+                callback(change)
+
+    def _put(self, change: Change, **values: Any) -> None:
+        self._snapshot = replace(self._snapshot, version=self._snapshot.version + 1, **values)
+        self._pending.append(change)
+
+    def _tell(self, event: Event) -> None:
+        with self._lock:
+            listeners = list(self._listeners)
+        for callback in listeners:
+            callback(event)
+
+
+def clamp(key: str, value: Any) -> Any:
+    """A number moved into the range of its parameter; what is no number is left to the check."""
+    parameter = table.PARAMETERS.get(key)
+    if parameter is None or parameter.kind not in ("float", "int"):
+        return value
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        return value
+    if not math.isfinite(number):
+        return value
+    if parameter.minimum is not None:
+        number = max(number, parameter.minimum)
+    if parameter.maximum is not None:
+        number = min(number, parameter.maximum)
+    return round(number) if parameter.kind == "int" else number
