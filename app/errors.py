@@ -1,0 +1,131 @@
+"""The one shape in which a failure reaches a person: what, where, and what to do."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel, ConfigDict
+from starlette.exceptions import HTTPException
+
+from tracker.parameters import ParameterError
+
+logger = logging.getLogger("app")
+
+
+class ErrorDetail(BaseModel):
+    """One failure."""
+
+    model_config = ConfigDict(use_attribute_docstrings=True)
+
+    code: str
+    """A word for programs."""
+    message: str
+    """One sentence for people: what was expected and what was found."""
+    field: str | None = None
+    """The parameter, field or file that it is about."""
+    hint: str | None = None
+    """What to do about it."""
+
+
+class ErrorBody(BaseModel):
+    """The body of every answer that is not a success."""
+
+    error: ErrorDetail
+
+
+class ApiError(Exception):
+    """A failure that has its words already."""
+
+    def __init__(
+        self,
+        status: int,
+        code: str,
+        message: str,
+        *,
+        field: str | None = None,
+        hint: str | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.status = status
+        self.detail = ErrorDetail(code=code, message=message, field=field, hint=hint)
+
+
+def body(detail: ErrorDetail) -> dict[str, Any]:
+    """The JSON of an error."""
+    return ErrorBody(error=detail).model_dump()
+
+
+def parameter_detail(error: ParameterError) -> ErrorDetail:
+    """A parameter that does not exist or does not fit; the message has its range."""
+    return ErrorDetail(
+        code="bad_parameter",
+        message=str(error),
+        field=error.key,
+        hint="GET /api/schema lists every parameter with its range.",
+    )
+
+
+def sentence(error: BaseException) -> str:
+    """An exception in one line: its own words where it has some."""
+    words = " ".join(str(error).split())
+    if isinstance(error, OSError) and error.strerror:
+        name = f"{error.filename}: " if error.filename else ""
+        return f"{name}{error.strerror}"
+    return words or type(error).__name__
+
+
+def install(app: FastAPI) -> None:
+    """Make every failure of the application answer in the one shape."""
+
+    @app.exception_handler(ApiError)
+    async def _api(_: Request, error: ApiError) -> JSONResponse:
+        return JSONResponse(body(error.detail), error.status)
+
+    @app.exception_handler(ParameterError)
+    async def _parameter(_: Request, error: ParameterError) -> JSONResponse:
+        return JSONResponse(body(parameter_detail(error)), 422)
+
+    @app.exception_handler(RequestValidationError)
+    async def _request(_: Request, error: RequestValidationError) -> JSONResponse:
+        first = error.errors()[0]
+        place = [str(part) for part in first["loc"]]
+        field = ".".join(place[1:]) or place[0]
+        detail = ErrorDetail(
+            code="bad_request",
+            message=f"{field}: {first['msg'][:1].lower()}{first['msg'][1:]}",
+            field=field,
+            hint="See /docs for what this address takes.",
+        )
+        return JSONResponse(body(detail), 422)
+
+    @app.exception_handler(HTTPException)
+    async def _http(request: Request, error: HTTPException) -> JSONResponse:
+        if error.status_code == 404:
+            detail = ErrorDetail(
+                code="not_found",
+                message=f"There is nothing at {request.url.path}.",
+                hint="See /docs for what there is.",
+            )
+        elif error.status_code == 405:
+            detail = ErrorDetail(
+                code="method_not_allowed",
+                message=f"{request.url.path} does not take {request.method}.",
+                hint="See /docs for what it takes.",
+            )
+        else:
+            detail = ErrorDetail(code="http_error", message=str(error.detail))
+        return JSONResponse(body(detail), error.status_code, headers=error.headers)
+
+    @app.exception_handler(Exception)
+    async def _unexpected(request: Request, error: Exception) -> JSONResponse:
+        logger.error("%s %s failed", request.method, request.url.path, exc_info=error)
+        detail = ErrorDetail(
+            code="internal",
+            message=f"The server failed: {type(error).__name__}: {sentence(error)}",
+            hint="The terminal shows where; what was open still is.",
+        )
+        return JSONResponse(body(detail), 500)

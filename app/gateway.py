@@ -1,0 +1,153 @@
+"""viser behind our port: its page under ``/viser/``, its socket proxied from ``/viser``.
+
+viser checks neither Host nor Origin and so listens on a private loopback port;
+everything reaches it through here, past our own checks. Its client asks for its
+socket at the address of its own page without the last slash.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hashlib
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import websockets
+from fastapi import APIRouter, Request, WebSocket, WebSocketDisconnect
+from fastapi.responses import RedirectResponse, Response
+from websockets.asyncio.client import ClientConnection, connect
+
+from app.errors import ApiError
+
+if TYPE_CHECKING:
+    import viser
+
+HAS_FOCUS = b"<script>Document.prototype.hasFocus=()=>true</script>"
+"""viser's client reconnects only while its document has the focus, which inside
+a frame it mostly has not."""
+
+START_SECONDS = 15.0
+"""How long a request waits for viser while it starts."""
+
+router = APIRouter(include_in_schema=False)
+
+
+class Gateway:
+    """viser's server, its page, and where its socket is."""
+
+    def __init__(self) -> None:
+        self._ready: asyncio.Event | None = None
+        self._port = 0
+        self._page = b""
+        self._etag = ""
+
+    def prepare(self) -> None:
+        """Called on the event loop that serves, before viser is there."""
+        self._ready = asyncio.Event()
+
+    def started(self, server: viser.ViserServer) -> None:
+        """viser listens; called on the event loop."""
+        import viser
+
+        page = Path(viser.__file__).parent / "client" / "build" / "index.html"
+        head, mark, rest = page.read_bytes().partition(b"<head>")
+        self._page = head + mark + HAS_FOCUS + rest
+        self._etag = f'"{hashlib.sha256(self._page).hexdigest()[:20]}"'
+        self._port = server.get_port()
+        if self._ready is not None:
+            self._ready.set()
+
+    async def port(self) -> int:
+        """viser's private port, as soon as it listens.
+
+        Raises:
+            ApiError: If it does not in time.
+        """
+        try:
+            if self._ready is None:
+                raise TimeoutError
+            await asyncio.wait_for(self._ready.wait(), START_SECONDS)
+        except TimeoutError:
+            raise ApiError(
+                503,
+                "viser_not_running",
+                "The 3D view is not running.",
+                hint="Look at the terminal for the reason, then start the workbench again.",
+            ) from None
+        return self._port
+
+    async def page(self, request: Request) -> Response:
+        """viser's client, which is one file."""
+        await self.port()
+        headers = {"cache-control": "no-cache", "etag": self._etag}
+        if request.headers.get("if-none-match") == self._etag:
+            return Response(status_code=304, headers=headers)
+        return Response(self._page, media_type="text/html; charset=utf-8", headers=headers)
+
+    async def relay(self, socket: WebSocket) -> None:
+        """Pass messages both ways until either side ends."""
+        try:
+            port = await self.port()
+            # viser's messages are packed already and come in windows of up to many megabytes
+            upstream = await connect(
+                f"ws://127.0.0.1:{port}",
+                subprotocols=[websockets.Subprotocol(p) for p in socket.scope["subprotocols"]],
+                compression=None,
+                ping_interval=None,
+                max_size=None,
+                open_timeout=5.0,
+                proxy=None,
+            )
+        except (ApiError, OSError, TimeoutError, websockets.InvalidHandshake):
+            await socket.close(1013, "the 3D view is not running")
+            return
+        async with upstream:
+            await socket.accept(upstream.subprotocol)
+            up = asyncio.create_task(_to_viser(socket, upstream))
+            down = asyncio.create_task(_to_browser(upstream, socket))
+            _, pending = await asyncio.wait({up, down}, return_when=asyncio.FIRST_COMPLETED)
+            for task in pending:
+                task.cancel()
+            await asyncio.gather(up, down, return_exceptions=True)
+        with contextlib.suppress(RuntimeError, WebSocketDisconnect):  # the browser went first
+            code = upstream.close_code
+            await socket.close(
+                code if code not in (None, 1005, 1006) else 1001, upstream.close_reason or ""
+            )
+
+
+async def _to_viser(socket: WebSocket, upstream: ClientConnection) -> None:
+    while (message := await socket.receive())["type"] == "websocket.receive":
+        data = message.get("bytes")
+        await upstream.send(data if data is not None else message["text"])
+
+
+async def _to_browser(upstream: ClientConnection, socket: WebSocket) -> None:
+    async for message in upstream:
+        if isinstance(message, bytes):
+            await socket.send_bytes(message)
+        else:
+            await socket.send_text(message)
+
+
+@router.get("/viser")
+async def _redirect() -> RedirectResponse:
+    return RedirectResponse("/viser/", 307)
+
+
+@router.get("/viser/")
+async def _page(request: Request) -> Response:
+    gateway: Gateway = request.app.state.gateway
+    return await gateway.page(request)
+
+
+@router.websocket("/viser")
+async def _socket(socket: WebSocket) -> None:
+    gateway: Gateway = socket.app.state.gateway
+    await gateway.relay(socket)
+
+
+@router.websocket("/viser/")
+async def _socket_with_slash(socket: WebSocket) -> None:
+    await _socket(socket)

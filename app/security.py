@@ -1,0 +1,191 @@
+"""Who may talk to the server: known hosts, writes and sockets of our own page, small bodies.
+
+Loopback keeps other machines out. The Host check keeps out pages whose name was
+made to point here; the Origin check keeps out writes and sockets of other pages
+in the same browser, those of the embedded 3D view included.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import json
+import socket
+from collections.abc import Iterable
+from urllib.parse import urlsplit
+
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.errors import ErrorDetail, body
+
+LARGEST_BODY = 1 << 20
+"""Bytes of a request's body; what people send are a few numbers."""
+
+READING = frozenset({"GET", "HEAD", "OPTIONS"})
+LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
+
+CONTENT_POLICY = (
+    "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; "
+    "object-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'self'"
+)
+"""Of the page itself: nothing from another host, and no other page may frame it."""
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a server bound to ``host`` is reached from this machine alone."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def allowed_hosts(host: str) -> frozenset[str]:
+    """The names under which a server bound to ``host`` may be asked."""
+    if is_loopback(host):
+        return LOOPBACK_NAMES | {host}
+    return LOOPBACK_NAMES | {host, socket.gethostname().lower(), socket.getfqdn().lower()}
+
+
+class Guard:
+    """ASGI middleware that refuses what is not ours, before anything else sees it."""
+
+    def __init__(
+        self, app: ASGIApp, *, hosts: Iterable[str], addresses_are_fine: bool = False
+    ) -> None:
+        """
+        Args:
+            app: What is guarded.
+            hosts: Names in the Host header that are answered, without port.
+            addresses_are_fine: Answer to any numeric address too: on a server that others may
+                reach, its own addresses are not known, and a number cannot be re-pointed.
+        """
+        self._app = app
+        self._hosts = frozenset(hosts)
+        self._addresses_are_fine = addresses_are_fine
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        headers = Headers(scope=scope)
+        refusal = self._refusal(scope, headers)
+        if refusal is None and scope["type"] == "http" and scope["method"] not in READING:
+            length = headers.get("content-length", "0")
+            if length.isdigit() and int(length) > LARGEST_BODY:
+                refusal = (413, _too_large())
+            receive = _limited(receive)
+        if refusal is not None:
+            await _refuse(scope, receive, send, *refusal)
+            return
+        try:
+            await self._app(scope, receive, _framed(send))
+        except BodyTooLarge:
+            await _refuse(scope, receive, send, 413, _too_large())
+
+    def _refusal(self, scope: Scope, headers: Headers) -> tuple[int, ErrorDetail] | None:
+        host = headers.get("host", "")
+        if not self._is_known(host):
+            return 421, ErrorDetail(
+                code="foreign_host",
+                message=f"This server does not answer to the host {host[:100]!r}.",
+                field="Host",
+                hint="Open it as http://localhost with its port, or start it with --host.",
+            )
+        origin = headers.get("origin")
+        writes = scope["type"] == "websocket" or scope["method"] not in READING
+        if writes and origin is not None and not _same_place(origin, host):
+            return 403, ErrorDetail(
+                code="foreign_origin",
+                message=f"A page of {origin[:100]!r} may not change anything here.",
+                field="Origin",
+                hint="Use the workbench's own page.",
+            )
+        return None
+
+    def _is_known(self, host: str) -> bool:
+        try:
+            name = urlsplit(f"//{host}").hostname
+        except ValueError:
+            return False
+        if name is None or "@" in host:
+            return False
+        if name in self._hosts:
+            return True
+        if not self._addresses_are_fine:
+            return False
+        try:
+            ipaddress.ip_address(name)
+        except ValueError:
+            return False
+        return True
+
+
+def _same_place(origin: str, host: str) -> bool:
+    """Whether an Origin header names the same host and port as the Host header."""
+    scheme, _, place = origin.partition("://")
+    return scheme in ("http", "https") and place.lower() == host.lower()
+
+
+class BodyTooLarge(Exception):
+    """A body without a stated length went past the limit."""
+
+
+def _too_large() -> ErrorDetail:
+    return ErrorDetail(
+        code="too_large",
+        message=f"The request's body is larger than {LARGEST_BODY} bytes.",
+        hint="Send the changes only.",
+    )
+
+
+def _limited(receive: Receive) -> Receive:
+    received = 0
+
+    async def counted() -> Message:
+        nonlocal received
+        message = await receive()
+        received += len(message.get("body", b""))
+        if received > LARGEST_BODY:
+            raise BodyTooLarge
+        return message
+
+    return counted
+
+
+def _framed(send: Send) -> Send:
+    """Tell the browser to take types as stated, and to let no other page frame ours."""
+
+    async def with_headers(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            message["headers"] = [
+                *message.get("headers", []),
+                (b"x-content-type-options", b"nosniff"),
+                (b"x-frame-options", b"SAMEORIGIN"),
+                (b"referrer-policy", b"same-origin"),
+                (b"cross-origin-resource-policy", b"same-origin"),
+            ]
+        await send(message)
+
+    return with_headers
+
+
+async def _refuse(
+    scope: Scope, receive: Receive, send: Send, status: int, detail: ErrorDetail
+) -> None:
+    payload = json.dumps(body(detail)).encode()
+    headers = [
+        (b"content-type", b"application/json"),
+        (b"content-length", str(len(payload)).encode()),
+        (b"connection", b"close"),
+    ]
+    kind = "http.response"
+    if scope["type"] == "websocket":
+        await receive()  # the request to connect
+        if "websocket.http.response" not in scope.get("extensions", {}):
+            await send({"type": "websocket.close", "code": 1008, "reason": detail.message[:120]})
+            return
+        kind = "websocket.http.response"
+    await send({"type": f"{kind}.start", "status": status, "headers": headers})
+    await send({"type": f"{kind}.body", "body": payload})
