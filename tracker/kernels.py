@@ -68,22 +68,26 @@ def merge_groups(
 def merge_moments(
     weights: ndarray, means: ndarray, covariances: ndarray, group: ndarray, count: int
 ) -> tuple[ndarray, ndarray, ndarray]:
-    """Weight, mean and covariance (spread of the means included) of each group."""
+    """Weight, mean and covariance (spread of the means included) of each group.
+
+    In a group without any weight all count the same.
+    """
     size, dimension = means.shape
     merged_weights = np.zeros(count)
     merged_means = np.zeros((count, dimension))
     merged_covariances = np.zeros((count, dimension, dimension))
+    members = np.zeros(count)
+    for i in range(size):
+        merged_weights[group[i]] += weights[i]
+        members[group[i]] += 1.0
     for i in range(size):
         g = group[i]
-        merged_weights[g] += weights[i]
+        share = weights[i] / merged_weights[g] if merged_weights[g] > 0.0 else 1.0 / members[g]
         for a in range(dimension):
-            merged_means[g, a] += weights[i] * means[i, a]
-    for g in range(count):
-        for a in range(dimension):
-            merged_means[g, a] /= merged_weights[g]
+            merged_means[g, a] += share * means[i, a]
     for i in range(size):
         g = group[i]
-        share = weights[i] / merged_weights[g]
+        share = weights[i] / merged_weights[g] if merged_weights[g] > 0.0 else 1.0 / members[g]
         for a in range(dimension):
             difference_a = means[i, a] - merged_means[g, a]
             for b in range(dimension):
