@@ -104,7 +104,7 @@ def predict(
     return GaussianMixture(
         mixture.weights * survival_probability,
         mixture.means @ transition.T,
-        covariances,
+        (covariances + covariances.transpose(0, 2, 1)) / 2.0,  # rounding leaves it askew
         mixture.labels,
     )
 
