@@ -122,6 +122,9 @@ def kalman_pairs(
         For each of the P pairs, measurement by measurement: component (P,),
         measurement (P,), log N(z; h, S) (P,), mean (P, d), covariance (P, d, d)
         in Joseph form, which stays symmetric and positive.
+
+    Raises:
+        numpy.linalg.LinAlgError: If the covariance of an innovation is not positive definite.
     """
     size, dimension = means.shape
     count, order = measurements.shape
@@ -161,6 +164,8 @@ def kalman_pairs(
                         for r in range(q):
                             total -= lower[j, p, r] * lower[j, q, r]
                         if p == q:
+                            if not total > 0.0:
+                                raise np.linalg.LinAlgError("H P H' + R is not positive definite")
                             lower[j, p, p] = math.sqrt(total)
                         else:
                             lower[j, p, q] = total / lower[j, q, q]
@@ -210,7 +215,7 @@ def kalman_pairs(
                     total -= lower[j, p, r] * solved[r]
                 solved[p] = total / lower[j, p, p]
                 distance += solved[p] * solved[p]
-            if not distance <= gate:
+            if not distance <= gate or distance == math.inf:
                 continue
             component[pairs] = j
             measured[pairs] = z
