@@ -63,6 +63,9 @@ def update(
             0 the component is left as it is.
         clutter_intensity: κ(z) per unit of the measurement space.
         gate: Squared Mahalanobis distance beyond which a pair is left out.
+
+    Raises:
+        numpy.linalg.LinAlgError: If H P Hᵀ + R is not positive definite.
     """
     size, count = predicted.size, len(measurements)
     p_d = np.broadcast_to(np.asarray(detection_probability, dtype=float), (size,))
@@ -73,35 +76,29 @@ def update(
         return PhdUpdate(
             missed, np.arange(size), np.full(size, -1, dtype=np.int64), np.zeros(count)
         )
+    detectable = np.flatnonzero(p_d * predicted.weights > 0.0)
     parent, measured, log_likelihood, means, covariances = kernels.kalman_pairs(
-        predicted.means,
-        predicted.covariances,
-        np.ascontiguousarray(expected, dtype=float),
-        np.ascontiguousarray(jacobians, dtype=float),
+        predicted.means[detectable],
+        predicted.covariances[detectable],
+        np.asarray(expected, dtype=float)[detectable],
+        np.asarray(jacobians, dtype=float)[detectable],
         np.ascontiguousarray(measurements, dtype=float),
         np.ascontiguousarray(noise, dtype=float),
         gate,
     )
-    detectable = p_d[parent] * predicted.weights[parent] > 0.0
-    parent, measured, log_likelihood = (
-        parent[detectable],
-        measured[detectable],
-        log_likelihood[detectable],
-    )
+    parent = detectable[parent]
     kappa = np.broadcast_to(np.asarray(clutter_intensity, dtype=float), (count,))
     with np.errstate(divide="ignore"):
         log_kappa = np.log(kappa)
     # in logarithms: without clutter a far measurement still goes to its nearest component
     log_terms = np.log(p_d[parent] * predicted.weights[parent]) + log_likelihood
-    largest = np.maximum(log_kappa, np.full(count, -1e300))
+    largest = np.maximum(log_kappa, np.finfo(float).min)
     np.maximum.at(largest, measured, log_terms)
     sums = np.exp(log_kappa - largest)
     terms = np.exp(log_terms - largest[measured])
     np.add.at(sums, measured, terms)
     weights = terms / sums[measured]
-    detected = GaussianMixture(
-        weights, means[detectable], covariances[detectable], predicted.labels[parent]
-    )
+    detected = GaussianMixture(weights, means, covariances, predicted.labels[parent])
     return PhdUpdate(
         posterior=concatenate([missed, detected]),
         parents=np.concatenate([np.arange(size), parent]),
