@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from filterpy.kalman import ExtendedKalmanFilter, KalmanFilter
+from filterpy.kalman import (  # type: ignore[import-untyped]
+    ExtendedKalmanFilter,
+    KalmanFilter,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
