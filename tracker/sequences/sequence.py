@@ -96,7 +96,7 @@ class View:
 
     @property
     def has_pictures(self) -> bool:
-        """Whether there is a video or an image folder."""
+        """Whether there is a video or a list of images."""
         return self.video is not None or bool(self.images)
 
 
@@ -118,6 +118,8 @@ class Sequence:
     ground_truth: GroundTruth | None = None
     digest: str = field(default="")
     """Hash of sequence.toml and of the size and time of every file it names, for cache keys."""
+    warnings: tuple[str, ...] = ()
+    """What is odd about it but does not keep it from running, one sentence each."""
 
     @property
     def cameras(self) -> tuple[Camera, ...]:

@@ -1,0 +1,180 @@
+"""Reading a TOML table field by field: every complaint is a sentence that names the field."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.sequences.sequence import SequenceError
+
+MISSING: Any = object()
+"""The default of a field that must be there."""
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """``; did you mean …?`` where a known word is near, else nothing."""
+    by_lower = {name.lower(): name for name in known}
+    near = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)
+    return f'; did you mean "{by_lower[near[0]]}"?' if near else ""
+
+
+def listed(words: Iterable[str]) -> str:
+    """``a, b and c``."""
+    all_words = list(words)
+    return " and ".join(
+        [", ".join(all_words[:-1]), *all_words[-1:]] if all_words[1:] else all_words
+    )
+
+
+def shown(value: Any) -> str:
+    """A value as a message shows it: short, in TOML's notation."""
+    text = "true" if value is True else "false" if value is False else repr(value)
+    if isinstance(value, str):
+        text = f'"{value}"'
+    return text if len(text) <= 60 else f"{text[:57]}…"
+
+
+class Fields:
+    """One table of the file. Unknown fields are refused at once, the others when they are read."""
+
+    def __init__(self, where: str, values: Any, known: Iterable[str]) -> None:
+        """Wrap one table.
+
+        Args:
+            where: File and table, as the messages begin.
+            values: What the file has there.
+            known: The fields that may occur.
+        """
+        self.where = where
+        self._known = tuple(known)
+        if not isinstance(values, dict):
+            raise SequenceError(f"{where}: expected a table of fields, found {shown(values)}")
+        self._values: dict[str, Any] = values
+        for name in values:
+            if name not in self._known:
+                hint = did_you_mean(name, set(self._known) - set(values))
+                hint = hint or f"; the fields here are {listed(self._known)}"
+                raise SequenceError(f'{where}: unknown field "{name}"{hint}')
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._values
+
+    def error(self, name: str, message: str) -> SequenceError:
+        """An error about one field."""
+        return SequenceError(f"{self.where}, {name}: {message}")
+
+    def _get(self, name: str, default: Any, expected: str) -> Any:
+        if name in self._values:
+            return self._values[name]
+        if default is MISSING:
+            raise SequenceError(f'{self.where}: field "{name}" is missing; it must be {expected}')
+        return default
+
+    def text(self, name: str, default: Any = MISSING) -> str:
+        """Some text on one line, not empty unless that is the default."""
+        value = self._get(name, default, "text in quotes")
+        if not isinstance(value, str):
+            raise self.error(name, f"expected text in quotes, found {shown(value)}")
+        if not value.strip() and value != default:
+            raise self.error(name, "expected some text, found none")
+        return " ".join(value.split())
+
+    def number(self, name: str, *, above: float, at_most: float) -> float:
+        """A finite number in (above, at_most]."""
+        expected = f"a number above {above:g} and at most {at_most:g}"
+        value = self._get(name, MISSING, expected)
+        if not _is_number(value) or not above < value <= at_most:
+            raise self.error(name, f"expected {expected}, found {shown(value)}")
+        return float(value)
+
+    def integer(
+        self, name: str, default: Any = MISSING, *, minimum: int = 0, maximum: int | None = None
+    ) -> int:
+        """A whole number in [minimum, maximum]."""
+        expected = f"a whole number of at least {minimum}"
+        if maximum is not None:
+            expected = f"a whole number from {minimum} to {maximum}"
+        value = self._get(name, default, expected)
+        good = isinstance(value, int) and not isinstance(value, bool) and value >= minimum
+        if not good or (maximum is not None and value > maximum):
+            raise self.error(name, f"expected {expected}, found {shown(value)}")
+        return int(value)
+
+    def vector(
+        self, name: str, length: int, what: str, *, positive: bool = False
+    ) -> Float[ndarray, " length"]:
+        """``length`` finite numbers."""
+        expected = f"{length} {'positive ' if positive else ''}numbers ({what})"
+        value = self._get(name, MISSING, f"a list of {expected}")
+        vector = self._numbers(name, value, expected)
+        if len(vector) != length:
+            raise self.error(name, f"expected {expected}, found {len(vector)}")
+        if positive and not (vector > 0.0).all():
+            raise self.error(name, f"expected {expected}, found {shown(value)}")
+        return vector
+
+    def numbers(self, name: str) -> Float[ndarray, " length"]:
+        """Finite numbers, any count; none where the field is missing."""
+        return self._numbers(name, self._get(name, [], ""), "a list of numbers")
+
+    def matrix(self, name: str, rows: int, columns: int) -> Float[ndarray, "rows columns"]:
+        """``rows`` lists of ``columns`` finite numbers."""
+        expected = f"{rows} rows of {columns} numbers"
+        value = self._get(name, MISSING, expected)
+        if not isinstance(value, list) or not all(isinstance(row, list) for row in value):
+            raise self.error(name, f"expected {expected}, found {shown(value)}")
+        lengths = [len(row) for row in value]
+        if lengths != [columns] * rows:
+            found = f"{len(value)} rows of {listed(str(n) for n in dict.fromkeys(lengths))}"
+            raise self.error(name, f"expected {expected}, found {found if value else 'none'}")
+        return np.array([self._numbers(name, row, expected) for row in value])
+
+    def table(self, name: str, known: Iterable[str], *, needed: bool = True) -> Fields | None:
+        """The table ``[name]``; None where it is missing and not needed."""
+        expected = f"a table that begins with the line [{name}]"
+        value = self._get(name, MISSING if needed else None, expected)
+        return None if value is None else Fields(f"{self.where}, [{name}]", value, known)
+
+    def tables(self, name: str, known: Iterable[str], header: str = "") -> list[Fields]:
+        """The tables in the list ``name``; none where it is missing.
+
+        Args:
+            name: The field.
+            known: The fields of each table.
+            header: How one is written, for the messages, for instance ``[[camera]]``.
+        """
+        value = self._get(name, [], "")
+        if not isinstance(value, list):
+            how = f"tables that begin with the line {header}" if header else "a list of tables"
+            raise self.error(name, f"expected {how}, found {shown(value)}")
+        word = header or name
+        known = tuple(known)
+        return [
+            Fields(f"{self.where}, {_called(word, number, item)}", item, known)
+            for number, item in enumerate(value, 1)
+        ]
+
+    def _numbers(self, name: str, value: Any, expected: str) -> Float[ndarray, " length"]:
+        if not isinstance(value, list):
+            raise self.error(name, f"expected {expected}, found {shown(value)}")
+        for item in value:
+            if not _is_number(item):
+                raise self.error(name, f"expected {expected}, found {shown(item)} among them")
+        return np.array(value, dtype=float)
+
+
+def _called(word: str, number: int, item: Any) -> str:
+    """A table by its name where it has one: ``camera "cam2"``, else ``camera 2``."""
+    name = item.get("name") if isinstance(item, dict) else None
+    plain = word.strip("[]")
+    return f'{plain} "{name}"' if isinstance(name, str) and name else f"{plain} {number}"
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -1,0 +1,274 @@
+"""The pictures of a sequence: any step of any camera, exactly, in any order, by many threads.
+
+Scrubbing asks for steps out of order, playing asks for one after the other, and the
+pipeline wants them all. The first two share a cache of bounded size, which a thread of
+its own keeps filled ahead of whoever plays; the pipeline decodes for itself.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from jaxtyping import UInt8
+from numpy import ndarray
+
+from tracker.sequences.sequence import Sequence, View
+from tracker.sequences.video import VideoDecoder, VideoError, index_video, read_image
+
+Picture = UInt8[ndarray, "h w 3"]
+
+CACHE_BYTES = 256 * 2**20
+"""Memory for decoded pictures, over all cameras: about 800 of 360x288."""
+
+AHEAD = 24
+"""Steps decoded ahead of one who plays: about a second."""
+
+BEHIND = 12
+"""Steps before the wanted one that are kept where somebody goes backwards."""
+
+NEAR = 4
+"""Steps: two requests no further apart than this are part of one walk, at up to this speed."""
+
+
+class FrameReader:
+    """The pictures of all cameras of one sequence. Thread-safe; close it, or use ``with``."""
+
+    def __init__(self, sequence: Sequence, *, cache_bytes: int = CACHE_BYTES) -> None:
+        """Prepare to read; files are opened when first needed.
+
+        Args:
+            sequence: Whose pictures.
+            cache_bytes: Bound on the memory of the pictures that are kept.
+        """
+        self._sequence = sequence
+        self._cache = _Cache(cache_bytes)
+        self._sources = [_Source(view) for view in sequence.views]
+        self._walks = [_Walk() for _ in sequence.views]
+        largest = max((w * h * 3 for w, h in (c.image_size for c in sequence.cameras)), default=1)
+        # reading ahead must never push out what is about to be shown
+        self._ahead = min(AHEAD, cache_bytes // (2 * max(1, len(sequence.views)) * largest))
+        self._wanted = threading.Condition()
+        self._closed = False
+        self._thread: threading.Thread | None = None
+
+    def __enter__(self) -> FrameReader:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def picture(self, camera: int, step: int) -> Picture | None:
+        """The picture of one camera at one step, BGR.
+
+        Several callers may be given the same array: do not write to it.
+
+        Args:
+            camera: Index into ``sequence.views``.
+            step: 0-based.
+
+        Returns:
+            None where the camera has no pictures, the file ends before, or the frame or
+            image cannot be decoded.
+
+        Raises:
+            IndexError: If there is no such camera.
+            ValueError: If the reader is closed.
+        """
+        source = self._sources[camera]
+        if not 0 <= step < self._sequence.frames or not source.view.has_pictures:
+            return None
+        with self._wanted:
+            if self._closed:
+                raise ValueError("this reader of pictures is closed; open the sequence again")
+            direction = self._walks[camera].move(step, self._sequence.frames, self._ahead)
+            if direction > 0:
+                self._start_reading_ahead()
+                self._wanted.notify()
+        found, picture = self._cache.get(camera, step)
+        if found:
+            return picture
+        with source.lock:
+            found, picture = self._cache.get(camera, step)  # read ahead meanwhile
+            if found:
+                return picture
+            if direction < 0:
+                self._read_behind(camera, step)
+            picture = source.read(step)
+            self._cache.put(camera, step, picture)
+        return picture
+
+    def iterate(self, camera: int, first: int = 0) -> Iterator[Picture | None]:
+        """The pictures of one camera from one step to the last, for the pipeline.
+
+        Decodes for itself, once through, beside and independent of :meth:`picture`.
+        Every array is new.
+        """
+        source = _Source(self._sequence.views[camera])
+        try:
+            for step in range(first, self._sequence.frames):
+                yield source.read(step)
+        finally:
+            source.close()
+
+    def close(self) -> None:
+        """Release files, memory and thread. Closing twice does no harm."""
+        with self._wanted:
+            self._closed = True
+            self._wanted.notify_all()
+        if self._thread is not None and self._thread is not threading.current_thread():
+            self._thread.join()
+        for source in self._sources:
+            with source.lock:
+                source.close()
+        self._cache.clear()
+
+    def _read_behind(self, camera: int, step: int) -> None:
+        """Keep some of the steps before, which a jump back decodes on its way."""
+        source = self._sources[camera]
+        for earlier in range(max(0, step - min(BEHIND, self._ahead)), step):
+            if not self._cache.has(camera, earlier):
+                self._cache.put(camera, earlier, source.read(earlier))
+
+    def _start_reading_ahead(self) -> None:
+        if self._thread is None:
+            self._thread = threading.Thread(
+                target=self._read_ahead, name="pictures-ahead", daemon=True
+            )
+            self._thread.start()
+
+    def _read_ahead(self) -> None:
+        """Decode what the walks are about to want, one picture at a time, the cameras in turn."""
+        camera = 0
+        while True:
+            with self._wanted:
+                while not self._closed and not any(walk.pending for walk in self._walks):
+                    self._wanted.wait()
+                if self._closed:
+                    return
+                turns = [(camera + 1 + i) % len(self._walks) for i in range(len(self._walks))]
+                camera = next(turn for turn in turns if self._walks[turn].pending)
+            source, walk = self._sources[camera], self._walks[camera]
+            with source.lock:
+                with self._wanted:  # the walk may have gone elsewhere while we waited
+                    step = walk.take()
+                if step is not None and not self._cache.has(camera, step):
+                    self._cache.put(camera, step, source.read(step))
+
+
+@dataclass(slots=True)
+class _Walk:
+    """How somebody moves through the steps of one camera, and what is to be read ahead."""
+
+    last: int | None = None
+    next_ahead: int = 0
+    end_ahead: int = 0
+
+    @property
+    def pending(self) -> bool:
+        """Whether there is something to read ahead."""
+        return self.next_ahead < self.end_ahead
+
+    def move(self, step: int, frames: int, ahead: int) -> int:
+        """Note a request: 1 if it continues forwards, −1 backwards, 0 where it is a jump."""
+        distance = 0 if self.last is None else step - self.last
+        self.last = step
+        if 0 < distance <= NEAR:
+            self.next_ahead = max(self.next_ahead, step + 1)
+            if self.next_ahead > step + ahead + 1:  # left over from elsewhere
+                self.next_ahead = step + 1
+            self.end_ahead = min(step + 1 + ahead, frames)
+            return 1
+        if distance != 0:
+            self.next_ahead = self.end_ahead = 0
+        return -1 if -NEAR <= distance < 0 else 0
+
+    def take(self) -> int | None:
+        """The next step to read ahead."""
+        if not self.pending:
+            return None
+        self.next_ahead += 1
+        return self.next_ahead - 1
+
+
+@dataclass(slots=True, eq=False)
+class _Source:
+    """Where the pictures of one camera come from: one open file, one thread at a time."""
+
+    view: View
+    lock: threading.Lock = field(default_factory=threading.Lock)
+    _decoder: VideoDecoder | None = None
+
+    def read(self, step: int) -> Picture | None:
+        """Decode one step; None where there is no picture of the camera's size."""
+        frame = self.view.first_frame + step
+        picture = None
+        if self.view.video is not None:
+            picture = self._read_video(frame)
+        elif frame < len(self.view.images):
+            picture = read_image(self.view.images[frame])
+        width, height = self.view.camera.image_size
+        return picture if picture is not None and picture.shape[:2] == (height, width) else None
+
+    def _read_video(self, frame: int) -> Picture | None:
+        if self._decoder is None:
+            assert self.view.video is not None
+            try:
+                self._decoder = VideoDecoder(index_video(self.view.video))
+            except (VideoError, OSError):  # gone or spoilt since the sequence was opened
+                return None
+        return self._decoder.read(frame)
+
+    def close(self) -> None:
+        """Release the file."""
+        if self._decoder is not None:
+            self._decoder.close()
+
+
+class _Cache:
+    """The pictures used last, within a number of bytes; also remembers which do not exist."""
+
+    _OVERHEAD = 200
+    """Bytes that an entry without a picture counts."""
+
+    def __init__(self, limit: int) -> None:
+        self._limit = limit
+        self._used = 0
+        self._pictures: OrderedDict[tuple[int, int], Picture | None] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def has(self, camera: int, step: int) -> bool:
+        """Whether it is there; does not count as use."""
+        with self._lock:
+            return (camera, step) in self._pictures
+
+    def get(self, camera: int, step: int) -> tuple[bool, Picture | None]:
+        """Whether it is there, and the picture."""
+        key = (camera, step)
+        with self._lock:
+            if key not in self._pictures:
+                return False, None
+            self._pictures.move_to_end(key)
+            return True, self._pictures[key]
+
+    def put(self, camera: int, step: int, picture: Picture | None) -> None:
+        """Keep a picture, letting go of those not used for longest."""
+        key = (camera, step)
+        with self._lock:
+            self._used += self._size(picture) - (
+                self._size(self._pictures.pop(key)) if key in self._pictures else 0
+            )
+            self._pictures[key] = picture
+            while self._used > self._limit and self._pictures:
+                self._used -= self._size(self._pictures.popitem(last=False)[1])
+
+    def clear(self) -> None:
+        """Let go of everything."""
+        with self._lock:
+            self._pictures.clear()
+            self._used = 0
+
+    def _size(self, picture: Picture | None) -> int:
+        return self._OVERHEAD + (0 if picture is None else picture.nbytes)

@@ -1,0 +1,134 @@
+"""The files that a sequence names: found inside its folder, and its pictures checked on opening."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from tracker.sequences.fields import Fields, did_you_mean
+from tracker.sequences.sequence import SequenceError, View
+from tracker.sequences.video import VideoError, index_video, read_image
+
+
+def locate(folder: Path, fields: Fields, name: str) -> Path:
+    """The file that a field names.
+
+    Raises:
+        SequenceError: If it is not there, is no file, or lies outside the folder.
+    """
+    given = fields.text(name)
+    path = _inside(folder, given, fields, name)
+    if not path.exists():
+        siblings = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
+        hint = did_you_mean(path.name, siblings)
+        raise fields.error(name, f'there is no file "{given}" in the sequence folder{hint}')
+    if not path.is_file():
+        raise fields.error(name, f'expected a file, found the folder "{given}"')
+    return path
+
+
+def find_images(folder: Path, fields: Fields) -> tuple[Path, ...]:
+    """The pictures that the pattern ``images`` names, sorted by name.
+
+    Raises:
+        SequenceError: If there is none, or one lies outside the folder.
+    """
+    pattern = fields.text("images")
+    _inside(folder, pattern, fields, "images")
+    try:
+        images = sorted(path for path in folder.glob(pattern) if path.is_file())
+    except (ValueError, NotImplementedError) as error:
+        raise fields.error("images", f'"{pattern}" is not a file pattern ({error})') from None
+    if not images:
+        raise fields.error(
+            "images", f'no file matches "{pattern}"; expected a pattern such as "cam1/*.jpg"'
+        )
+    for path in images:
+        _inside(folder, path.relative_to(folder).as_posix(), fields, "images")
+    return tuple(images)
+
+
+def _inside(folder: Path, given: str, fields: Fields, name: str) -> Path:
+    """The path, which must stay in the folder, also where a symbolic link leads."""
+    path = folder / given
+    try:
+        leaves = Path(given).is_absolute() or not path.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError):  # a loop of links, or a name that cannot be
+        raise fields.error(name, f'"{given}" is not a path that can be followed') from None
+    if leaves or ".." in Path(given).parts:
+        how = " (by a symbolic link)" if not leaves or ".." not in Path(given).parts else ""
+        how = "" if Path(given).is_absolute() else how
+        raise fields.error(
+            name,
+            f'expected a path inside the sequence folder, found "{given}", which leaves it{how}; '
+            "copy the file into the folder",
+        )
+    return path
+
+
+def check_pictures(view: View, fields: Fields, frames: int) -> Iterable[str]:
+    """Open the video or the first image once: its size must fit the calibration.
+
+    Returns:
+        Warnings: pictures that end early, images whose names sort oddly.
+
+    Raises:
+        SequenceError: If it cannot be read, or has another size.
+    """
+    if view.video is not None:
+        try:
+            index = index_video(view.video)
+        except (VideoError, OSError) as error:
+            size = view.video.stat().st_size
+            raise fields.error(
+                "video",
+                f'"{view.video.name}" ({size:,} bytes) cannot be read as a video ({error}); '
+                "expected MP4, AVI or another format that FFmpeg decodes",
+            ) from None
+        _check_size(view, fields, index.size, "frame size")
+        return list(_short(view, index.frames, frames, "video"))
+    if view.images:
+        picture = read_image(view.images[0])
+        if picture is None:
+            raise fields.error("images", f'"{view.images[0].name}" cannot be read as a picture')
+        _check_size(view, fields, (picture.shape[1], picture.shape[0]), "image size")
+        warnings = list(_short(view, len(view.images), frames, "images"))
+        by_number = sorted(view.images, key=_by_number)
+        if by_number != list(view.images):
+            place = next(i for i, pair in enumerate(zip(by_number, view.images, strict=True))
+                         if pair[0] != pair[1])  # fmt: skip
+            warnings.append(
+                f'camera "{view.camera.name}": images are taken in the order of their names, so '
+                f'"{view.images[place].name}" comes before "{by_number[place].name}"; write the '
+                "numbers with leading zeros"
+            )
+        return warnings
+    return []
+
+
+def _check_size(view: View, fields: Fields, found: tuple[int, int], what: str) -> None:
+    expected = view.camera.image_size
+    if found != expected:
+        raise SequenceError(
+            f"{fields.where}: {what} {found[0]}×{found[1]} does not match calibration "
+            f"{expected[0]}×{expected[1]}; scale the calibration or the pictures"
+        )
+
+
+def _short(view: View, there: int, frames: int, what: str) -> Iterable[str]:
+    steps = max(0, there - view.first_frame)
+    if steps < frames:
+        missing = f"steps {steps} to {frames - 1} have" if frames - steps > 1 else (
+            f"step {steps} has")  # fmt: skip
+        offset = f" from frame {view.first_frame} on" if view.first_frame else ""
+        yield (
+            f'camera "{view.camera.name}": {what} end{"s" if what == "video" else ""} early: '
+            f"expected {frames} frames{offset}, found {steps}; {missing} no picture"
+        )
+
+
+def _by_number(path: Path) -> list[str | int]:
+    """Sorting key that takes digits as numbers."""
+    parts = re.split(r"(\d+)", path.as_posix())
+    return [int(part) if part.isdigit() else part for part in parts]

@@ -1,0 +1,425 @@
+"""A folder with a ``sequence.toml`` → a checked :class:`Sequence`.
+
+Whatever is wrong is told in one sentence that names the file, the line or the field,
+what was expected and what was found. What is odd but can be lived with becomes one of
+``Sequence.warnings``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.camera import Camera
+from tracker.sequences.csv_columns import Columns, read_columns
+from tracker.sequences.fields import Fields, did_you_mean, listed, shown
+from tracker.sequences.media import check_pictures, find_images, locate
+from tracker.sequences.sequence import (
+    Detections,
+    Entrance,
+    GroundTruth,
+    Room,
+    Sequence,
+    SequenceError,
+    Template,
+    View,
+)
+
+FILE = "sequence.toml"
+FORMAT = 1
+MOST_FRAMES = 10_000_000
+
+TOP = ("format", "name", "description", "fps", "frames", "room", "target", "camera", "template",
+       "ground_truth")  # fmt: skip
+POSE = ("K", "distortion", "R", "t")
+CAMERA = ("name", "image_size", "video", "images", "first_frame", "detections", *POSE, "projection")
+
+ROTATION_TOLERANCE = 2e-3
+"""How far R Rᵀ may be from the identity: entries written with three decimals pass."""
+
+
+@dataclass(frozen=True, slots=True)
+class SequenceSummary:
+    """What a list of sequences shows of one, read without opening its videos and tables."""
+
+    name: str
+    description: str
+    fps: float
+    frames: int
+    cameras: int
+
+
+@dataclass(slots=True)
+class _Reading:
+    """What is collected on the way through the file."""
+
+    folder: Path
+    frames: int
+    files: list[Path] = field(default_factory=list)
+    """Every file that sequence.toml names, in its order."""
+    warnings: list[str] = field(default_factory=list)
+
+
+def read_sequence(folder: Path | str) -> Sequence:
+    """Read and check a sequence folder.
+
+    Args:
+        folder: The folder, or the ``sequence.toml`` in it.
+
+    Raises:
+        SequenceError: In one sentence: file, line or field, expected, found, what to do.
+    """
+    folder, text = _find(Path(folder))
+    fields = _parse(folder, text)
+    reading = _Reading(folder, fields.integer("frames", minimum=1, maximum=MOST_FRAMES))
+    fps = fields.number("fps", above=0.0, at_most=1000.0)
+    room = _room(fields)
+    target = fields.table("target", ("half_extents",))
+    assert target is not None
+    half_extents = target.vector(
+        "half_extents", 3, "half width, depth and height in metres", positive=True
+    )
+    views = _views(fields, reading)
+    for view in views:
+        _check_sight(view.camera, room, reading)
+    templates = tuple(
+        _template(template, views, reading.frames)
+        for template in fields.tables(
+            "template", ("name", "camera", "frame", "box"), "[[template]]"
+        )
+    )
+    ground_truth = _ground_truth(fields, reading)
+    return Sequence(
+        name=fields.text("name"),
+        folder=folder,
+        fps=fps,
+        frames=reading.frames,
+        room=room,
+        target_half_extents=half_extents,
+        views=views,
+        description=fields.text("description", ""),
+        templates=templates,
+        ground_truth=ground_truth,
+        digest=_digest(text, reading),
+        warnings=tuple(reading.warnings),
+    )
+
+
+def read_summary(folder: Path | str) -> SequenceSummary:
+    """Read the head of a sequence's file only, quickly.
+
+    Raises:
+        SequenceError: As :func:`read_sequence`, for the fields it reads.
+    """
+    folder, text = _find(Path(folder))
+    fields = _parse(folder, text)
+    return SequenceSummary(
+        name=fields.text("name"),
+        description=fields.text("description", ""),
+        fps=fields.number("fps", above=0.0, at_most=1000.0),
+        frames=fields.integer("frames", minimum=1, maximum=MOST_FRAMES),
+        cameras=len(fields.tables("camera", CAMERA, "[[camera]]")),
+    )
+
+
+def _find(folder: Path) -> tuple[Path, str]:
+    """The folder and the text of its sequence.toml."""
+    if folder.name == FILE and folder.is_file():
+        folder = folder.parent
+    try:
+        if not folder.exists():
+            near = did_you_mean(folder.name, _names(folder.parent))
+            raise SequenceError(f"{folder}: there is no such folder{near}")
+        if not folder.is_dir():
+            raise SequenceError(f"{folder}: expected a folder with a {FILE} in it, found a file")
+        folder = folder.resolve()
+        if not (folder / FILE).is_file():
+            near = did_you_mean(FILE, _names(folder)) or f"; every sequence folder needs a {FILE}"
+            raise SequenceError(f"{folder}: there is no {FILE} in this folder{near}")
+        return folder, (folder / FILE).read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise SequenceError(
+            f"{folder}: cannot be read ({error.strerror}); check its permissions"
+        ) from None
+    except UnicodeDecodeError as error:
+        line = error.object.count(b"\n", 0, error.start) + 1
+        raise SequenceError(
+            f"{folder.name}/{FILE}, line {line}: expected text in UTF-8, found byte "
+            f"0x{error.object[error.start]:02x}; save the file as UTF-8"
+        ) from None
+
+
+def _names(folder: Path) -> list[str]:
+    return [path.name for path in folder.iterdir()] if folder.is_dir() else []
+
+
+def _parse(folder: Path, text: str) -> Fields:
+    where = f"{folder.name}/{FILE}"
+    try:
+        values = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        problem, _, place = str(error).rstrip(")").rpartition(" (at ")
+        place = f", {place}" if problem else ""
+        problem = problem or str(error)
+        raise SequenceError(f"{where}{place}: is not valid TOML: {problem.lower()}") from None
+    version = values.get("format", FORMAT)
+    if version != FORMAT:
+        raise SequenceError(
+            f"{where}, format: expected {FORMAT}, the only format this program reads, "
+            f"found {shown(version)}"
+        )
+    fields = Fields(where, values, TOP)
+    fields.integer("format", minimum=FORMAT, maximum=FORMAT)
+    return fields
+
+
+def _room(fields: Fields) -> Room:
+    room = fields.table("room", ("min", "max", "entrances"))
+    assert room is not None
+    minimum = room.vector("min", 3, "x, y, z in metres")
+    maximum = room.vector("max", 3, "x, y, z in metres")
+    for axis, low, high in zip("xyz", minimum, maximum, strict=True):
+        if low >= high:
+            raise room.error(
+                "max", f"expected {axis} above that of min, {low:g}, found {high:g}; swap them"
+            )
+    entrances = tuple(
+        Entrance(
+            entrance.vector("position", 3, "x, y, z in metres"),
+            entrance.vector("sigma", 3, "standard deviations in metres", positive=True),
+        )
+        for entrance in room.tables("entrances", ("position", "sigma"))
+    )
+    return Room(minimum, maximum, entrances)
+
+
+def _views(fields: Fields, reading: _Reading) -> tuple[View, ...]:
+    tables = fields.tables("camera", CAMERA, "[[camera]]")
+    if not tables:
+        raise fields.error("camera", "expected at least one table [[camera]], found none")
+    views: list[View] = []
+    for camera in tables:
+        name = camera.text("name")
+        if any(character in name for character in ',"#'):
+            raise camera.error(
+                "name", f"expected no comma, quote or # (it heads CSV columns), found {shown(name)}"
+            )
+        if name in [view.camera.name for view in views]:
+            raise camera.error("name", "two cameras have this name; rename one of them")
+        views.append(_view(name, camera, reading))
+    return tuple(views)
+
+
+def _view(name: str, fields: Fields, reading: _Reading) -> View:
+    size = fields.vector("image_size", 2, "width and height in pixels", positive=True)
+    if (size != np.floor(size)).any() or (size > 65535).any():
+        raise fields.error("image_size", "expected two whole numbers of pixels, at most 65535")
+    image_size = (int(size[0]), int(size[1]))
+    if "video" in fields and "images" in fields:
+        raise fields.error("images", "expected a video or images, found both; remove one")
+    video = None
+    if "video" in fields:
+        video = locate(reading.folder, fields, "video")
+    images = find_images(reading.folder, fields) if "images" in fields else ()
+    detections = None
+    if "detections" in fields:
+        path = locate(reading.folder, fields, "detections")
+        detections = _detections(path, reading)
+    view = View(
+        camera=_camera(name, image_size, fields),
+        video=video,
+        images=images,
+        first_frame=fields.integer("first_frame", 0),
+        detections=detections,
+    )
+    reading.warnings += check_pictures(view, fields, reading.frames)
+    reading.files += images if video is None else (video,)
+    return view
+
+
+def _camera(name: str, image_size: tuple[int, int], fields: Fields) -> Camera:
+    if "projection" in fields:
+        both = [key for key in POSE if key in fields]
+        if both:
+            raise fields.error(
+                "projection", f"stands in place of {listed(both)}; remove one or the other"
+            )
+        try:
+            return Camera.from_projection(name, image_size, fields.matrix("projection", 3, 4))
+        except ValueError as error:
+            raise fields.error("projection", str(error)) from None
+    missing = [key for key in ("K", "R", "t") if key not in fields]
+    if missing:
+        raise SequenceError(
+            f"{fields.where}: the calibration is incomplete: expected K, R and t, or projection; "
+            f"{listed(missing)} {'is' if len(missing) == 1 else 'are'} missing"
+        )
+    return Camera(
+        name,
+        image_size,
+        _intrinsics(fields),
+        _rotation(fields),
+        fields.vector("t", 3, "metres, in camera axes"),
+        _distortion(fields),
+    )
+
+
+def _intrinsics(fields: Fields) -> Float[ndarray, "3 3"]:
+    matrix = fields.matrix("K", 3, 3)
+    form = "[[fx, s, cx], [0, fy, cy], [0, 0, 1]] in pixels"
+    if matrix[1, 0] or matrix[2, 0] or matrix[2, 1] or matrix[2, 2] != 1.0:
+        turned = "; it looks transposed" if matrix[0, 2] == matrix[1, 2] == 0.0 else ""
+        raise fields.error("K", f"expected {form}, found {shown(matrix.tolist())}{turned}")
+    if matrix[0, 0] <= 0.0 or matrix[1, 1] <= 0.0:
+        found = f"{matrix[0, 0]:g} and {matrix[1, 1]:g}"
+        raise fields.error("K", f"expected focal lengths fx and fy above 0 pixels, found {found}")
+    return matrix
+
+
+def _rotation(fields: Fields) -> Float[ndarray, "3 3"]:
+    matrix = fields.matrix("R", 3, 3)
+    error = float(np.abs(matrix @ matrix.T - np.eye(3)).max())
+    determinant = float(np.linalg.det(matrix))
+    if error > ROTATION_TOLERANCE:
+        raise fields.error(
+            "R",
+            "expected a rotation (R Rᵀ = 1, determinant 1), found "
+            f"R Rᵀ off by {error:.2g} and determinant {determinant:.4g}; "
+            "write it with more digits or calibrate again",
+        )
+    if determinant < 0.0:
+        raise fields.error(
+            "R",
+            "expected a rotation (determinant 1), found a reflection (determinant −1); "
+            "one axis points the wrong way: camera axes are x right, y down, z ahead",
+        )
+    return matrix
+
+
+def _distortion(fields: Fields) -> Float[ndarray, " 5"]:
+    given = fields.numbers("distortion")
+    if len(given) not in (0, 4, 5, 8, 12, 14):
+        raise fields.error(
+            "distortion", f"expected 4 or 5 numbers (k1 k2 p1 p2 [k3]), found {len(given)}"
+        )
+    if given[5:].any():
+        raise fields.error(
+            "distortion",
+            f"expected at most 5 numbers other than 0 (k1 k2 p1 p2 k3), found {len(given)}; "
+            "calibrate with the plain lens model",
+        )
+    return np.concatenate([given[:5], np.zeros(max(0, 5 - len(given)))])
+
+
+def _check_sight(camera: Camera, room: Room, reading: _Reading) -> None:
+    """Warn where a camera sees nothing of the room: usually a pose the wrong way round."""
+    steps = np.linspace(0.0, 1.0, 13)
+    grid = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
+    if not camera.sees(room.minimum + grid * (room.maximum - room.minimum)).any():
+        reading.warnings.append(
+            f'camera "{camera.name}" sees nothing of the room: check that R and t lead from world '
+            "to camera (x_cam = R x_world + t), that t is in metres, and [room]"
+        )
+
+
+def _template(fields: Fields, views: tuple[View, ...], frames: int) -> Template:
+    name, camera = fields.text("name"), fields.text("camera")
+    by_name = {view.camera.name: view for view in views}
+    if camera not in by_name:
+        hint = did_you_mean(camera, by_name)
+        raise fields.error(
+            "camera", f"expected one of {listed(by_name)}, found {shown(camera)}{hint}"
+        )
+    if not by_name[camera].has_pictures:
+        raise fields.error(
+            "camera", f'camera "{camera}" has neither video nor images to take it from'
+        )
+    box = fields.vector("box", 4, "left, top, width, height in pixels")
+    left, top, width, height = box
+    if width <= 0.0 or height <= 0.0:
+        raise fields.error(
+            "box", f"expected width and height above 0, found {width:g} × {height:g}"
+        )
+    full_width, full_height = by_name[camera].camera.image_size
+    slack = 1.0  # a box drawn by hand may end on the border's outer edge
+    if (
+        min(left, top) < -slack
+        or left + width > full_width + slack
+        or top + height > full_height + slack
+    ):
+        raise fields.error(
+            "box",
+            f"expected a box inside the {full_width}×{full_height} picture, found x from {left:g} "
+            f"to {left + width:g} and y from {top:g} to {top + height:g}",
+        )
+    frame = fields.integer("frame", minimum=0, maximum=frames - 1)
+    return Template(name, camera, frame, box)
+
+
+def _detections(path: Path, reading: _Reading) -> Detections:
+    columns = _columns(
+        path,
+        reading,
+        needed=("frame", "left", "top", "width", "height"),
+        optional={"score": 1.0},
+    )
+    frames = columns.whole("frame", 0, reading.frames - 1, "the step")
+    for name in ("width", "height"):
+        columns.require(name, columns.values[name] > 0.0, "a size above 0 pixels")
+    scores = columns.values["score"]
+    columns.require("score", (scores >= 0.0) & (scores <= 1.0), "a score from 0 to 1")
+    order = np.argsort(frames, kind="stable")
+    boxes = columns.stacked("left", "top", "width", "height")
+    return Detections(frames[order], boxes[order], scores[order])
+
+
+def _columns(
+    path: Path, reading: _Reading, *, needed: tuple[str, ...], optional: Mapping[str, float]
+) -> Columns:
+    reading.files.append(path)
+    where = f"{reading.folder.name}/{path.relative_to(reading.folder).as_posix()}"
+    return read_columns(path, where, needed=needed, optional=optional)
+
+
+def _ground_truth(fields: Fields, reading: _Reading) -> GroundTruth | None:
+    table = fields.table("ground_truth", ("file",), needed=False)
+    if table is None:
+        return None
+    path = locate(reading.folder, table, "file")
+    columns = _columns(
+        path,
+        reading,
+        needed=("frame", "id", "x", "y", "z"),
+        optional={"valid": 1.0},
+    )
+    frames = columns.whole("frame", 0, reading.frames - 1, "the step")
+    ids = columns.whole("id", 0, None, "the person")
+    valid = columns.whole("valid", 0, 1, "1 certain, 0 not")
+    order = np.lexsort([ids, frames])
+    same = (np.diff(frames[order]) == 0) & (np.diff(ids[order]) == 0)
+    if same.any():
+        first, second = order[np.argmax(same)], order[np.argmax(same) + 1]
+        raise columns.error(
+            int(columns.lines[second]),
+            "id",
+            f"person {ids[second]} is at step {frames[second]} already in line "
+            f"{columns.lines[first]}; expected one row a person a step",
+        )
+    positions = columns.stacked("x", "y", "z")
+    return GroundTruth(frames[order], ids[order], positions[order], valid[order] == 1)
+
+
+def _digest(text: str, reading: _Reading) -> str:
+    digest = hashlib.sha256(text.encode())
+    for path in reading.files:
+        status = path.stat()
+        name = path.relative_to(reading.folder).as_posix()
+        digest.update(f"{name} {status.st_size} {status.st_mtime_ns}\n".encode())
+    return digest.hexdigest()[:16]

@@ -1,0 +1,245 @@
+"""One video file, frame-exact: frame k is the k-th picture that decoding from the start gives.
+
+A container answers "go to frame k" with an estimate: frame rate times time. With a
+varying frame rate, a stream that starts late or a missing index the estimate is wrong
+by a few frames, or by seconds. So the time stamps of all frames are read first, without
+decoding (milliseconds for a minute of video), and wherever a jump lands, the time stamp
+of the decoded picture says which frame it is. Files whose time stamps cannot tell (some
+AVI and MPEG files) are never jumped in: they are decoded from their start.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+# broken frames are reported by who reads them, in words; FFmpeg's own lines would litter stderr
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+
+import cv2
+import numpy as np
+from jaxtyping import Int, UInt8
+from numpy import ndarray
+
+cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)
+
+DECODED_TO_VERIFY = 24
+"""Frames decoded from the start to see whether the time stamps hold; more than any reordering."""
+
+SHORT_RUN = 32
+"""Frames: nearer than this, decoding forward is never slower than a jump."""
+
+
+class VideoError(ValueError):
+    """A file cannot be read as a video."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VideoIndex:
+    """What a video file holds, without its pictures. F frames."""
+
+    path: Path
+    size: tuple[int, int]
+    """Width and height in pixels."""
+    frames: int
+    """F, counted, not what the header claims: a file may be cut short."""
+    times: Int[ndarray, " F"] | None
+    """Time stamps, microseconds, ascending; None where they do not identify the frames."""
+    keys: Int[ndarray, " K"]
+    """The frames that decode by themselves: where a jump can land."""
+
+
+def index_video(path: Path) -> VideoIndex:
+    """Read what a video file holds; a file that has not changed is read once.
+
+    Raises:
+        VideoError: If no frame of it can be decoded.
+    """
+    status = path.stat()
+    return _index_video(path, status.st_size, status.st_mtime_ns)
+
+
+@lru_cache(maxsize=64)
+def _index_video(path: Path, bytes_: int, changed: int) -> VideoIndex:
+    stamps, is_key = _scan(path)
+    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    try:
+        decoded = list(_first_times(capture, DECODED_TO_VERIFY))
+        if not decoded:
+            raise VideoError("no picture in it can be decoded")
+        size = (
+            int(capture.get(cv2.CAP_PROP_FRAME_WIDTH)),
+            int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT)),
+        )
+        frames = len(stamps)
+        if frames < len(decoded):  # no packets to count: count pictures
+            frames = len(decoded)
+            while capture.grab():
+                frames += 1
+    finally:
+        capture.release()
+    order = np.argsort(stamps, kind="stable")
+    times = stamps[order]
+    exact = (
+        len(times) == frames
+        and bool((np.diff(times) > 0).all())
+        and _in_order(times, np.array(decoded, dtype=np.int64))
+    )
+    return VideoIndex(
+        path=path,
+        size=size,
+        frames=frames,
+        times=times if exact else None,
+        keys=np.flatnonzero(is_key[order]) if exact else np.zeros(1, dtype=np.int64),
+    )
+
+
+def _scan(path: Path) -> tuple[Int[ndarray, " F"], ndarray]:
+    """Time stamp and key flag of every packet, in the file's order, without decoding."""
+    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_FORMAT, -1])
+    stamps: list[int] = []
+    keys: list[bool] = []
+    try:
+        while capture.grab():
+            stamps.append(_time(capture))
+            keys.append(capture.get(cv2.CAP_PROP_LRF_HAS_KEY_FRAME) > 0.0)
+    finally:
+        capture.release()
+    return np.array(stamps, dtype=np.int64), np.array(keys, dtype=bool)
+
+
+def _first_times(capture: cv2.VideoCapture, count: int) -> Iterator[int]:
+    for _ in range(count):
+        if capture.grab():
+            yield _time(capture)
+
+
+def _time(capture: cv2.VideoCapture) -> int:
+    """Time stamp of the packet or picture just read, microseconds."""
+    return round(capture.get(cv2.CAP_PROP_POS_MSEC) * 1000.0)
+
+
+def _in_order(times: Int[ndarray, " F"], decoded: Int[ndarray, " D"]) -> bool:
+    """Whether decoding begins with frame 0 and only ever drops frames."""
+    places = np.searchsorted(times, decoded)
+    known = bool((times[np.minimum(places, len(times) - 1)] == decoded).all())
+    return known and int(places[0]) == 0 and bool((np.diff(places) > 0).all())
+
+
+class VideoDecoder:
+    """One open decoder of one file: frames in any order, cheapest in ascending order.
+
+    Not thread-safe: one thread at a time.
+    """
+
+    def __init__(self, index: VideoIndex) -> None:
+        self._index = index
+        self._times = index.times
+        self._capture: cv2.VideoCapture | None = None
+        self._at = -1
+        """The frame grabbed last; -1 before the first."""
+        self._broken = False
+        """Whether the frame grabbed last could not be decoded."""
+
+    def __enter__(self) -> VideoDecoder:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def position(self) -> int:
+        """The frame that was read last, -1 before the first."""
+        return self._at
+
+    def read(self, frame: int) -> UInt8[ndarray, "h w 3"] | None:
+        """The picture of one frame, BGR, a new array.
+
+        Returns:
+            None where the file ends before it, or the frame cannot be decoded.
+        """
+        if not 0 <= frame < self._index.frames:
+            return None
+        if self._capture is None or frame < self._at or self._jump_pays(frame):
+            self._jump(frame)
+        self._advance_to(frame)
+        if self._at != frame or self._broken or self._capture is None:
+            return None
+        good, picture = self._capture.retrieve()
+        return np.asarray(picture, dtype=np.uint8) if good else None
+
+    def close(self) -> None:
+        """Release the file. A later :meth:`read` opens it again."""
+        if self._capture is not None:
+            self._capture.release()
+            self._capture = None
+
+    def _jump_pays(self, frame: int) -> bool:
+        """Whether a key frame lies between here and there, far enough ahead."""
+        if self._times is None or frame - self._at <= SHORT_RUN:
+            return False
+        keys = self._index.keys
+        last_key = int(keys[np.searchsorted(keys, frame, side="right") - 1])
+        return last_key > self._at + 1
+
+    def _jump(self, frame: int) -> None:
+        """Bring the decoder to ``frame`` or before it, as near as the file allows."""
+        back = 0
+        while self._times is not None and frame - back > SHORT_RUN:
+            if self._capture is None:
+                self._open()
+            assert self._capture is not None
+            self._capture.set(cv2.CAP_PROP_POS_MSEC, self._times[frame - back] / 1000.0)
+            if self._capture.grab():
+                landed = self._frame_of(_time(self._capture))
+                if landed is not None and landed <= frame:
+                    self._at, self._broken = landed, False
+                    return
+            back = max(SHORT_RUN, 4 * back)
+        self._open()
+
+    def _open(self) -> None:
+        self.close()
+        self._capture = cv2.VideoCapture(str(self._index.path), cv2.CAP_FFMPEG)
+        self._at, self._broken = -1, False
+
+    def _advance_to(self, frame: int) -> None:
+        """Decode forward until ``frame``, or the first frame after it that can be decoded."""
+        assert self._capture is not None
+        while self._at < frame:
+            if self._times is None:  # every attempt is one frame, decodable or not
+                self._broken = not self._capture.grab()
+                self._at += 1
+                continue
+            # a broken frame fails once and the next attempt gives the next frame; at the end
+            # of the file every attempt fails
+            good = any(self._capture.grab() for _ in range(self._index.frames - self._at))
+            landed = self._frame_of(_time(self._capture)) if good else self._index.frames
+            if landed is None or landed <= self._at:
+                self._distrust()
+            else:
+                self._at = landed
+
+    def _frame_of(self, time: int) -> int | None:
+        """The frame with this time stamp."""
+        assert self._times is not None
+        place = int(np.searchsorted(self._times, time))
+        return place if place < len(self._times) and self._times[place] == time else None
+
+    def _distrust(self) -> None:
+        """The file's time stamps contradict each other: from now on count from its start."""
+        self._times = None
+        self._open()
+
+
+def read_image(path: Path) -> UInt8[ndarray, "h w 3"] | None:
+    """One picture file, BGR; None where it is missing or not a picture."""
+    with contextlib.suppress(OSError, cv2.error):
+        data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
+        picture = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
+        return None if picture is None else np.asarray(picture, dtype=np.uint8)
+    return None
