@@ -1,0 +1,288 @@
+"""The one matching protocol: which estimate belongs to which true position at a step.
+
+At each step, estimates and people are paired one to one so that
+
+    Σ over pairs (1 − d / (2 gate))  is largest,  d <= gate in every pair:
+
+a pair counts from 1 (no distance) down to 1/2 (at the gate), so a second pair is
+nearly always worth more than a closer one. This is the score that TrackEval makes
+of 3D positions with a zero distance of twice the gate and a threshold of 1/2.
+
+Rows of the truth with ``valid = 0`` are "don't care". In this order, at each step:
+
+1. estimates and *valid* people are paired as above;
+2. the estimates left over and the don't-care rows are paired as above; an estimate
+   that finds one is set aside: it is neither right nor wrong;
+3. all don't-care rows are set aside: missing one is no miss.
+
+A certain position comes first because an uncertain one must never take away an
+estimate that the certain one could claim. All figures see what remains.
+
+Distances: Euclidean in 3D (metres, the default); Euclidean on the ground plane
+(metres); or (1 − GIoU)/2 of the two upright boxes, 0 for equal boxes, 1/2 for
+touching ones, towards 1 far apart [RTGSRS19].
+
+[RTGSRS19] Rezatofighi et al., "Generalized intersection over union", CVPR 2019.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+from scipy.optimize import linear_sum_assignment
+
+from tracker.evaluation.settings import Distance
+from tracker.sequences.sequence import GroundTruth
+
+
+class Tracks(Protocol):
+    """Labelled positions by columns, in any order: a run's trajectories, or a file's."""
+
+    @property
+    def frames(self) -> Int[ndarray, " N"]:
+        """The step of each row."""
+
+    @property
+    def ids(self) -> Int[ndarray, " N"]:
+        """The target of each row."""
+
+    @property
+    def positions(self) -> Float[ndarray, "N 3"]:
+        """World metres."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rows:
+    """Labelled positions sorted by step and then id, each id at most once a step."""
+
+    frames: Int[ndarray, " N"]
+    ids: Int[ndarray, " N"]
+    positions: Float[ndarray, "N 3"]
+    offsets: Int[ndarray, " S+1"]
+    """Rows ``offsets[t]`` up to ``offsets[t + 1]`` are those of step t."""
+    names: Int[ndarray, " K"]
+    """Every id once, ascending."""
+    indices: Int[ndarray, " N"]
+    """The place of each row's id in :attr:`names`."""
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    @property
+    def steps(self) -> int:
+        """The number of steps, those without rows included."""
+        return len(self.offsets) - 1
+
+    @property
+    def counts(self) -> Int[ndarray, " S"]:
+        """The number of rows at each step."""
+        return np.diff(self.offsets)
+
+    def at(self, step: int) -> slice:
+        """The rows of one step."""
+        return slice(int(self.offsets[step]), int(self.offsets[step + 1]))
+
+    def select(self, rows: ndarray) -> Rows:
+        """Some of the rows, by mask or ascending index; an id without rows disappears."""
+        return _sorted_rows(self.frames[rows], self.ids[rows], self.positions[rows], self.steps)
+
+
+def _sorted_rows(frames: ndarray, ids: ndarray, positions: ndarray, steps: int) -> Rows:
+    names, indices = np.unique(ids, return_inverse=True)
+    offsets = np.searchsorted(frames, np.arange(steps + 1))
+    return Rows(frames, ids, positions, offsets, names, indices.reshape(-1))
+
+
+def to_rows(
+    frames: Int[ndarray, " N"],
+    ids: Int[ndarray, " N"],
+    positions: Float[ndarray, "N 3"],
+    steps: int,
+) -> tuple[Rows, Int[ndarray, " M"]]:
+    """Sort columns of any order; leave out what cannot be scored.
+
+    Left out are rows outside the steps 0 … ``steps`` − 1, rows whose position is
+    not finite, and every row after the first that repeats an id within a step.
+
+    Returns:
+        The rows, and for each the index of the column entry that it came from.
+    """
+    frames = np.asarray(frames, dtype=np.int64).reshape(-1)
+    ids = np.asarray(ids, dtype=np.int64).reshape(-1)
+    positions = np.asarray(positions, dtype=float).reshape(-1, 3)
+    usable = (frames >= 0) & (frames < steps) & np.isfinite(positions).all(axis=1)
+    kept = np.flatnonzero(usable)
+    kept = kept[np.lexsort((ids[kept], frames[kept]))]
+    repeated = np.zeros(len(kept), dtype=bool)
+    repeated[1:] = (np.diff(frames[kept]) == 0) & (np.diff(ids[kept]) == 0)
+    kept = kept[~repeated]
+    return _sorted_rows(frames[kept], ids[kept], positions[kept], steps), kept
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measure:
+    """A distance and its gate."""
+
+    distance: Distance
+    gate: float
+    half_extents: Float[ndarray, " 3"]
+    """Of the upright boxes, metres; only the box distance needs them."""
+
+    def between(
+        self, first: Float[ndarray, "N 3"], second: Float[ndarray, "N 3"]
+    ) -> Float[ndarray, " N"]:
+        """The distance of each pair of positions."""
+        apart = first - second
+        if self.distance == "ground":
+            return np.asarray(np.hypot(apart[:, 0], apart[:, 1]))
+        if self.distance == "position":
+            return np.asarray(np.sqrt(np.einsum("nk,nk->n", apart, apart)))
+        apart, size = np.abs(apart), 2.0 * self.half_extents
+        shared = np.maximum(size - apart, 0.0).prod(axis=1)
+        union, hull = 2.0 * size.prod() - shared, (size + apart).prod(axis=1)
+        return np.asarray((1.0 - (shared / union - (hull - union) / hull)) / 2.0)
+
+
+def distances_by_step(
+    truth: Rows, tracks: Rows, measure: Measure
+) -> tuple[Float[ndarray, "G E"], ...]:
+    """The distance of every person to every estimate, one matrix a step."""
+    rows, columns = truth.counts, tracks.counts
+    sizes = rows * columns
+    ends = np.cumsum(sizes)
+    step = np.repeat(np.arange(truth.steps), sizes)
+    place = np.arange(len(step)) - np.repeat(ends - sizes, sizes)
+    first = truth.positions[truth.offsets[step] + place // np.maximum(columns[step], 1)]
+    second = tracks.positions[tracks.offsets[step] + place % np.maximum(columns[step], 1)]
+    flat = measure.between(first, second)
+    return tuple(
+        flat[end - size : end].reshape(g, e)
+        for end, size, g, e in zip(
+            ends.tolist(), sizes.tolist(), rows.tolist(), columns.tolist(), strict=True
+        )
+    )
+
+
+def assign(
+    distances: Float[ndarray, "G E"], gate: float
+) -> tuple[Int[ndarray, " M"], Int[ndarray, " M"]]:
+    """The pairs of one step: rows and columns of the distance matrix, at most one of each."""
+    if not distances.size:
+        none = np.zeros(0, dtype=np.int64)
+        return none, none
+    score = np.where(distances <= gate, 1.0 - distances / (2.0 * gate), 0.0)
+    rows, columns = linear_sum_assignment(score, maximize=True)
+    paired = score[rows, columns] > 0.0
+    return rows[paired], columns[paired]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """Truth and estimates as the figures see them: what is "don't care" is set aside."""
+
+    truth: Rows
+    """The valid true positions."""
+    tracks: Rows
+    """The estimates that count."""
+    distances: tuple[Float[ndarray, "G E"], ...]
+    """One matrix a step."""
+    measure: Measure
+    ignored: Rows
+    """The estimates that matched a don't-care row."""
+    dont_care: Rows
+    """The true positions that are not certain."""
+    left_out: int
+    """Estimates that could not be scored (see :func:`to_rows`)."""
+
+    @property
+    def steps(self) -> int:
+        """The number of steps compared."""
+        return self.truth.steps
+
+
+def prepare(
+    truth: GroundTruth | None,
+    tracks: Tracks,
+    measure: Measure,
+    *,
+    steps: int,
+    ignore_gate: float | None = None,
+) -> Comparison:
+    """Sort both sides and set aside what is "don't care", as the module's protocol says.
+
+    Args:
+        truth: None is a truth without rows.
+        tracks: Estimates, in any order.
+        measure: Distance and gate.
+        steps: Steps 0 … ``steps`` − 1 are compared.
+        ignore_gate: The gate towards don't-care rows; the measure's own, if none.
+    """
+    everyone, sources = to_rows(
+        truth.frames if truth else np.zeros(0),
+        truth.ids if truth else np.zeros(0),
+        truth.positions if truth else np.zeros((0, 3)),
+        steps,
+    )
+    valid = np.asarray(truth.valid, dtype=bool)[sources] if truth else np.zeros(0, dtype=bool)
+    people, dont_care = everyone.select(valid), everyone.select(~valid)
+    estimates, _ = to_rows(tracks.frames, tracks.ids, tracks.positions, steps)
+    distances = distances_by_step(people, estimates, measure)
+    keep = np.ones(len(estimates), dtype=bool)
+    if len(dont_care):
+        to_dont_care = distances_by_step(dont_care, estimates, measure)
+        for step in np.flatnonzero(dont_care.counts * estimates.counts):
+            claimed = assign(distances[step], measure.gate)[1]
+            free = np.setdiff1d(np.arange(distances[step].shape[1]), claimed)
+            ignored = assign(to_dont_care[step][:, free], ignore_gate or measure.gate)[1]
+            keep[estimates.offsets[step] + free[ignored]] = False
+        distances = tuple(
+            matrix[:, keep[estimates.at(step)]] for step, matrix in enumerate(distances)
+        )
+    return Comparison(
+        truth=people,
+        tracks=estimates.select(keep),
+        distances=distances,
+        measure=measure,
+        ignored=estimates.select(~keep),
+        dont_care=dont_care,
+        left_out=len(np.asarray(tracks.frames)) - len(estimates),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Matches:
+    """Pairs of a person and an estimate, by columns, sorted by step."""
+
+    truth_rows: Int[ndarray, " M"]
+    """Rows of :attr:`Comparison.truth`."""
+    track_rows: Int[ndarray, " M"]
+    """Rows of :attr:`Comparison.tracks`."""
+
+    def __len__(self) -> int:
+        return len(self.truth_rows)
+
+
+def gather(
+    comparison: Comparison, pairs: list[tuple[Int[ndarray, " M"], Int[ndarray, " M"]]]
+) -> Matches:
+    """Pairs of rows and columns, one entry a step, as :class:`Matches`."""
+    truth_rows = [
+        rows + offset
+        for (rows, _), offset in zip(pairs, comparison.truth.offsets[:-1].tolist(), strict=True)
+    ]
+    track_rows = [
+        columns + offset
+        for (_, columns), offset in zip(pairs, comparison.tracks.offsets[:-1].tolist(), strict=True)
+    ]
+    none = [np.zeros(0, dtype=np.int64)]
+    return Matches(np.concatenate(none + truth_rows), np.concatenate(none + track_rows))
+
+
+def match(comparison: Comparison) -> Matches:
+    """Pair each step by itself. Without people or without estimates there are no pairs."""
+    gate = comparison.measure.gate
+    return gather(comparison, [assign(distances, gate) for distances in comparison.distances])

@@ -1,0 +1,85 @@
+"""Position errors in metres and the number of people, whoever the tracks say they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from tracker.evaluation.matching import Comparison, Matches, match
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Positions:
+    """Errors of the pairs of the matching protocol, each step by itself."""
+
+    matches: Matches
+    errors: Float[ndarray, " M"]
+    """Distance of each pair in metres: in 3D, or on the ground plane where that is chosen."""
+    by_person: Float[ndarray, "K S"]
+    """The error of each person at each step; NaN where there is no pair."""
+    found: Int[ndarray, " K"]
+    """Steps at which each person has an estimate within the near distance of his own."""
+    present: Int[ndarray, " K"]
+    """Steps at which each person is there."""
+    stray: Int[ndarray, " S"]
+    """Estimates at each step without a person of their own within the near distance."""
+
+    @property
+    def mean(self) -> float | None:
+        """Of all pairs, metres; None without pairs."""
+        return float(self.errors.mean()) if len(self.errors) else None
+
+    @property
+    def percentile_95(self) -> float | None:
+        """95 of 100 pairs are nearer than this, metres; None without pairs."""
+        return float(np.percentile(self.errors, 95)) if len(self.errors) else None
+
+    @property
+    def found_share(self) -> float | None:
+        """Share of all true positions found within the near distance; None without people."""
+        people = int(self.present.sum())
+        return float(self.found.sum()) / people if people else None
+
+
+def positions(comparison: Comparison, near: Comparison) -> Positions:
+    """Score the positions.
+
+    Args:
+        comparison: Truth and estimates with the gate of the evaluation.
+        near: The same with the near distance as its gate: found are the people
+            whom its own pairing reaches, stray are the estimates that it leaves
+            (don't-care rows still take what lies within the evaluation's gate).
+    """
+    matches = match(comparison)
+    truth, tracks = comparison.truth, comparison.tracks
+    apart = truth.positions[matches.truth_rows] - tracks.positions[matches.track_rows]
+    if comparison.measure.distance == "ground":
+        apart = apart[:, :2]
+    errors = np.linalg.norm(apart, axis=1)
+    by_person = np.full((len(truth.names), comparison.steps), np.nan)
+    by_person[truth.indices[matches.truth_rows], truth.frames[matches.truth_rows]] = errors
+    close = match(near)
+    found_at = np.bincount(near.truth.frames[close.truth_rows], minlength=near.steps)
+    return Positions(
+        matches=matches,
+        errors=errors,
+        by_person=by_person,
+        found=np.bincount(near.truth.indices[close.truth_rows], minlength=len(near.truth.names)),
+        present=np.bincount(truth.indices, minlength=len(truth.names)),
+        stray=near.tracks.counts - found_at,
+    )
+
+
+def cardinality_error(comparison: Comparison) -> tuple[float | None, float | None]:
+    """Mean of |estimates − people| over the steps, and of estimates − people (the bias).
+
+    Don't-care rows and the estimates that matched them count on neither side.
+    None without steps.
+    """
+    if not comparison.steps:
+        return None, None
+    surplus = comparison.tracks.counts - comparison.truth.counts
+    return float(np.abs(surplus).mean()), float(surplus.mean())

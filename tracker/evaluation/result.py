@@ -1,0 +1,118 @@
+"""What an evaluation gives back: figures, series over time, rows by person and track."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+
+from tracker.evaluation.figures import SOURCES, Figure
+from tracker.evaluation.pixels import CameraScore
+from tracker.evaluation.settings import EvaluationSettings
+from tracker.evaluation.tables import PersonRow, TrackRow
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Series:
+    """What changes over time, one value a step."""
+
+    ospa: Float[ndarray, " S"]
+    ospa_localisation: Float[ndarray, " S"]
+    ospa_cardinality: Float[ndarray, " S"]
+    """The p-th powers of the two parts sum to that of OSPA."""
+    ospa2: Float[ndarray, " S"]
+    gospa: Float[ndarray, " S"]
+    gospa_localisation: Float[ndarray, " S"]
+    gospa_missed: Float[ndarray, " S"]
+    gospa_false: Float[ndarray, " S"]
+    """The three parts are p-th powers and sum to that of GOSPA."""
+    truth: Int[ndarray, " S"]
+    """People with a certain position."""
+    estimates: Int[ndarray, " S"]
+    """Estimates that count."""
+    dont_care: Int[ndarray, " S"]
+    """People whose position is not certain."""
+    ignored: Int[ndarray, " S"]
+    """Estimates that matched one of those."""
+    matches: Int[ndarray, " S"]
+    misses: Int[ndarray, " S"]
+    false_positives: Int[ndarray, " S"]
+    id_switches: Int[ndarray, " S"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pairs:
+    """Who was paired with which track, by CLEAR's pairing, sorted by step."""
+
+    steps: Int[ndarray, " M"]
+    people: Int[ndarray, " M"]
+    tracks: Int[ndarray, " M"]
+    distances: Float[ndarray, " M"]
+    """In the unit of the distance."""
+    switch: Bool[ndarray, " M"]
+    """Whether this pair is an identity switch."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evaluation:
+    """Truth against tracks."""
+
+    settings: EvaluationSettings
+    steps: int
+    has_truth: bool
+    """Whether there is any true position; without one most figures are undefined."""
+    figures: tuple[Figure, ...]
+    series: Series
+    errors: dict[int, Float[ndarray, " S"]]
+    """The position error of each person over time, metres; NaN where there is no pair."""
+    people: tuple[PersonRow, ...]
+    tracks: tuple[TrackRow, ...]
+    cameras: tuple[CameraScore, ...]
+    pairs: Pairs
+    notes: tuple[str, ...]
+    """What a reader of the figures must know beside them."""
+
+    def __getitem__(self, key: str) -> float | int | None:
+        """The value of one figure."""
+        return next(figure.value for figure in self.figures if figure.definition.key == key)
+
+    def to_json(self) -> dict[str, Any]:
+        """Everything as plain lists, numbers and text; undefined values are None."""
+        return {
+            "settings": self.settings.model_dump(),
+            "steps": self.steps,
+            "has_truth": self.has_truth,
+            "figures": [
+                {
+                    **{k: v for k, v in asdict(figure.definition).items() if k != "stated"},
+                    "value": figure.value,
+                    "unit": figure.unit,
+                    "stated": figure.stated,
+                    "source": SOURCES.get(figure.definition.source, ""),
+                }
+                for figure in self.figures
+            ],
+            "series": {f.name: _plain(getattr(self.series, f.name)) for f in fields(Series)},
+            "errors": {str(name): _plain(values) for name, values in self.errors.items()},
+            "people": [asdict(row) for row in self.people],
+            "tracks": [asdict(row) for row in self.tracks],
+            "cameras": [
+                {"camera": score.camera, "people": score.people, "estimates": score.estimates}
+                | {name: getattr(score, name) for name in _CAMERA_FIGURES}
+                for score in self.cameras
+            ],
+            "pairs": {f.name: _plain(getattr(self.pairs, f.name)) for f in fields(Pairs)},
+            "notes": list(self.notes),
+        }
+
+
+_CAMERA_FIGURES = ("error", "error_95", "overlap", "found_share", "false_per_picture")
+
+
+def _plain(values: ndarray) -> list[Any]:
+    if values.dtype.kind != "f":
+        return list(values.tolist())
+    return [value if np.isfinite(value) else None for value in values.tolist()]
