@@ -33,6 +33,23 @@ START_SECONDS = 15.0
 router = APIRouter(include_in_schema=False)
 
 
+def start_viser() -> viser.ViserServer:
+    """viser on a free private port of this machine, silent, and without its public tunnel."""
+    import rich
+    import viser
+    from viser import _messages
+
+    console = rich.get_console()
+    was_quiet, console.quiet = console.quiet, True  # it would print its private address
+    try:
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    finally:
+        console.quiet = was_quiet
+    # a client may ask for a public address through a third party's server: never here
+    server._websock_server.unregister_handler(_messages.ShareUrlRequest)
+    return server
+
+
 class Gateway:
     """viser's server, its page, and where its socket is."""
 

@@ -1,0 +1,223 @@
+"""The application: routes, page, 3D view and jobs, put together for as long as it runs."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket as sockets
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import uvicorn
+from fastapi import FastAPI
+from fastapi.responses import FileResponse, Response
+from fastapi.staticfiles import StaticFiles
+from fastapi_offline import FastAPIOffline
+from starlette.types import Scope
+
+from app import api, errors, gateway, stream
+from app.errors import sentence
+from app.gateway import Gateway
+from app.jobs import Jobs
+from app.paths import static_folder
+from app.pictures import Pictures
+from app.results import Timelines
+from app.security import CONTENT_POLICY, Guard, allowed_hosts, is_loopback
+from app.stream import Stream
+from app.workbench import Workbench
+from tracker import __version__
+
+if TYPE_CHECKING:
+    import viser
+
+logger = logging.getLogger("app")
+
+LARGEST_SOCKET_MESSAGE = 64 << 20
+"""Bytes: viser's client may send a rendered picture of itself."""
+
+ASK_AGAIN = "no-cache"
+"""The page's files are kept by the browser but checked by their ETag each time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What a server is started with."""
+
+    host: str = "127.0.0.1"
+    sequence: str | None = None
+    """Opened at once, in the background."""
+    data: Path | None = None
+    """Its folders are sequences that can be chosen."""
+    seed: int = 0
+    with_viser: bool = True
+
+
+def create_app(settings: Settings) -> FastAPI:
+    """The whole application; it owns threads from its start to its end."""
+    app: FastAPI = FastAPIOffline(
+        title="multiview-phd",
+        version=__version__,
+        description="Tracks of several people in 3D from calibrated cameras, and their tuning.",
+        redoc_url=None,
+        static_url="/docs-files",  # the page of the routes loads nothing from another host
+        lifespan=_lifespan,
+    )
+    app.state.settings = settings
+    app.add_middleware(
+        Guard,
+        hosts=allowed_hosts(settings.host),
+        addresses_are_fine=not is_loopback(settings.host),
+    )
+    errors.install(app)
+    app.include_router(api.router)
+    app.include_router(stream.router)
+    app.include_router(gateway.router)
+    folder = static_folder()
+
+    @app.get("/", include_in_schema=False)
+    async def page() -> Response:
+        return FileResponse(
+            folder / "index.html",
+            headers={"cache-control": ASK_AGAIN, "content-security-policy": CONTENT_POLICY},
+        )
+
+    app.mount("/static", _PageFiles(directory=folder), name="static")
+    return app
+
+
+class _PageFiles(StaticFiles):
+    """The page's files with an ETag, checked each time: an update shows at once."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        response = await super().get_response(path, scope)
+        response.headers["cache-control"] = ASK_AGAIN
+        return response
+
+
+@asynccontextmanager
+async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+    settings: Settings = app.state.settings
+    workbench = app.state.workbench = Workbench()
+    jobs = app.state.jobs = Jobs(workbench, data=settings.data, seed=settings.seed)
+    pictures = app.state.pictures = Pictures(workbench)
+    app.state.timelines = Timelines()
+    told = app.state.stream = Stream(workbench)
+    door = app.state.gateway = Gateway()
+    told.start()
+    room = _Room(workbench)
+    if settings.with_viser:
+        door.prepare()
+        # the page is served meanwhile; requests for the 3D view wait
+        starting = asyncio.create_task(_start_viser(room, door, workbench))
+    if settings.sequence is not None:
+        jobs.open(settings.sequence).add_done_callback(_say_failure(settings.sequence))
+    try:
+        yield
+    finally:
+        if settings.with_viser:
+            await asyncio.gather(starting, return_exceptions=True)
+        told.stop()
+        pictures.close()
+        await asyncio.gather(asyncio.to_thread(jobs.close), asyncio.to_thread(room.close))
+
+
+def _say_failure(name: str) -> Callable[..., None]:
+    def say(future: object) -> None:
+        error = future.exception()  # type: ignore[attr-defined]
+        if error is not None:
+            logger.error("%s cannot be opened: %s", name, sentence(error))
+
+    return say
+
+
+async def _start_viser(room: _Room, door: Gateway, workbench: Workbench) -> None:
+    try:
+        door.started(await asyncio.to_thread(room.open))
+    except Exception as error:
+        logger.exception("the 3D view did not start")
+        workbench.notify(
+            "error",
+            f"The 3D view did not start: {sentence(error)}",
+            "Cameras, timeline and export work without it.",
+        )
+
+
+class _Room:
+    """viser's server with what is in it."""
+
+    def __init__(self, workbench: Workbench) -> None:
+        self._workbench = workbench
+        self._parts: list[Callable[[], object]] = []
+
+    def open(self) -> viser.ViserServer:
+        """Start viser on a private loopback port and build scene and sliders in it."""
+        from app.controls import Controls
+        from app.scene import Scene
+
+        server = gateway.start_viser()
+        self._parts.append(server.stop)
+        self._parts.append(Scene(server, self._workbench).close)
+        self._parts.append(Controls(server, self._workbench).close)
+        return server
+
+    def close(self) -> None:
+        """Take it down in the opposite order."""
+        for part in reversed(self._parts):
+            part()
+
+
+def bind(host: str, port: int) -> sockets.socket:
+    """A listening socket.
+
+    Raises:
+        OSError: If the port is taken or the host is not this machine's.
+    """
+    family, _, _, _, address = sockets.getaddrinfo(
+        host, port, type=sockets.SOCK_STREAM, flags=sockets.AI_PASSIVE
+    )[0]
+    listener = sockets.socket(family, sockets.SOCK_STREAM)
+    try:
+        listener.setsockopt(sockets.SOL_SOCKET, sockets.SO_REUSEADDR, 1)
+        listener.bind(address)
+        listener.listen(128)
+    except OSError:
+        listener.close()
+        raise
+    return listener
+
+
+def serve(app: FastAPI, listener: sockets.socket, on_ready: Callable[[], None]) -> None:
+    """Serve until Ctrl-C, which ends it within a second or two.
+
+    Args:
+        app: From :func:`create_app`.
+        listener: From :func:`bind`.
+        on_ready: Called as soon as requests are answered.
+    """
+    config = uvicorn.Config(
+        app,
+        log_level="warning",
+        access_log=False,
+        lifespan="on",
+        ws="websockets-sansio",
+        # viser's messages are packed already, ours are small: compressing only costs time
+        ws_per_message_deflate=False,
+        ws_max_size=LARGEST_SOCKET_MESSAGE,
+        timeout_graceful_shutdown=1,
+        server_header=False,
+    )
+    _Server(config, on_ready).run(sockets=[listener])
+
+
+class _Server(uvicorn.Server):
+    def __init__(self, config: uvicorn.Config, on_ready: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._on_ready = on_ready
+
+    async def startup(self, sockets: list[sockets.socket] | None = None) -> None:
+        await super().startup(sockets=sockets)
+        if self.started:
+            self._on_ready()
