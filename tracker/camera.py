@@ -46,7 +46,8 @@ class Camera:
             ValueError: If the left 3×3 part of P is singular.
         """
         left = projection[:, :3]
-        if abs(np.linalg.det(left)) < 1e-12 * max(1.0, float(np.abs(left).max())) ** 3:
+        # P may bear any scale, so the determinant is judged against the entries
+        if abs(np.linalg.det(left)) <= 1e-12 * float(np.abs(left).max()) ** 3:
             raise ValueError("its left 3×3 part is singular, so it is not a camera")
         # RQ decomposition through QR of the row-reversed transpose
         q, r = np.linalg.qr(left[::-1].T)

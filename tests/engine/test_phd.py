@@ -1,13 +1,12 @@
 """The PHD update: its laws, and the Kalman filter as its simplest case."""
 
+# mypy: disable-error-code="import-untyped"
+
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from filterpy.kalman import (  # type: ignore[import-untyped]
-    ExtendedKalmanFilter,
-    KalmanFilter,
-)
+from filterpy.kalman import ExtendedKalmanFilter, KalmanFilter
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray

@@ -18,6 +18,8 @@ hypothesiser, PHD updater). What differs by design, and what the test does about
   list of differences is complete.
 """
 
+# mypy: disable-error-code="import-untyped"
+
 from __future__ import annotations
 
 from datetime import datetime, timedelta

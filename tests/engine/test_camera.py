@@ -1,0 +1,215 @@
+"""The camera: projection against OpenCV, its derivative, its inverse, and where it ends."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy import ndarray
+from numpy.testing import assert_allclose, assert_array_equal
+
+from tests.engine.synthetic import BARREL, CAMERAS, HALF_EXTENTS, ROOM, look_at
+from tracker.camera import NEAREST_DEPTH, Camera
+
+PINHOLE = look_at("pinhole", (-3.0, -3.0, 2.5), distortion=np.zeros(5))
+CUSHION = look_at("cushion", (-3.0, 3.0, 2.5), distortion=np.array([0.1, -0.02, 0.001, 0.002, 0]))
+SIXTH = look_at("sixth", (3.0, 3.0, 2.5), distortion=np.array([-0.3, 0.12, 0.003, 0, -0.03]))
+LENSES = pytest.mark.parametrize(
+    "camera", [*CAMERAS, PINHOLE, CUSHION, SIXTH], ids=lambda c: c.name
+)
+
+
+def room_points(count: int, seed: int = 0) -> ndarray:
+    """Points all over the tracking volume."""
+    return np.random.default_rng(seed).uniform(ROOM.minimum, ROOM.maximum, (count, 3))
+
+
+def through_opencv(camera: Camera, points: ndarray) -> ndarray:
+    """The same projection by OpenCV."""
+    rotation, _ = cv2.Rodrigues(camera.rotation)
+    pixels, _ = cv2.projectPoints(
+        points, rotation, camera.translation, camera.intrinsics, camera.distortion
+    )
+    return np.asarray(pixels).reshape(-1, 2)
+
+
+@LENSES
+def test_projection_agrees_with_opencv(camera: Camera) -> None:
+    points = room_points(500)
+    pixels, valid = camera.project(points)
+    assert valid.sum() > 400
+    assert_allclose(pixels[valid], through_opencv(camera, points)[valid], atol=1e-8)
+
+
+@LENSES
+def test_the_jacobian_is_the_slope_of_the_projection(camera: Camera) -> None:
+    points = room_points(200)
+    pixels, jacobians, valid = camera.project_with_jacobian(points)
+    again, valid_again = camera.project(points)
+    assert_array_equal(pixels, again)
+    assert_array_equal(valid, valid_again)
+    step = 1e-6
+    for axis in range(3):
+        shift = step * np.eye(3)[axis]
+        ahead, behind = camera.project(points + shift)[0], camera.project(points - shift)[0]
+        slope = (ahead - behind) / (2.0 * step)
+        assert_allclose(jacobians[valid, :, axis], slope[valid], rtol=1e-5, atol=1e-4)
+
+
+@LENSES
+def test_a_pixel_back_projected_and_projected_is_itself(camera: Camera) -> None:
+    width, height = camera.image_size
+    across, down = np.linspace(-0.5, width - 0.5, 41), np.linspace(-0.5, height - 0.5, 31)
+    pixels = np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 2)
+    rays = camera.back_project(pixels)
+    assert_allclose(np.linalg.norm(rays, axis=1), 1.0)
+    for distance in (0.5, 4.0, 30.0):
+        again, valid = camera.project(camera.centre + distance * rays)
+        assert valid.all()
+        assert_allclose(again, pixels, atol=1e-3)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_a_point_lies_on_the_ray_of_its_pixel(seed: int) -> None:
+    for camera in CAMERAS:
+        points = room_points(5, seed)
+        points = points[camera.sees(points)]
+        rays = camera.back_project(camera.project(points)[0])
+        offsets = points - camera.centre
+        along = np.einsum("ni,ni->n", offsets, rays)
+        assert (along > 0.0).all()
+        assert_allclose(camera.centre + along[:, None] * rays, points, atol=1e-5)
+
+
+def random_rotation(rng: np.random.Generator) -> ndarray:
+    """Any direction."""
+    q, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    return np.asarray(q * np.sign(np.linalg.det(q)))
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from((1.0, -1.0, 1e-6, -3e4)))
+def test_a_projection_matrix_is_split_into_what_made_it(seed: int, scale: float) -> None:
+    rng = np.random.default_rng(seed)
+    focal = rng.uniform(200.0, 3000.0)
+    intrinsics = np.array(
+        [[focal, rng.normal(), rng.uniform(0, 2000)], [0, 1.1 * focal, 500], [0, 0, 1]]
+    )
+    rotation, translation = random_rotation(rng), rng.normal(size=3) * 5.0
+    matrix = intrinsics @ np.column_stack([rotation, translation])
+    camera = Camera.from_projection("p", (1920, 1080), scale * matrix)
+    assert_allclose(camera.intrinsics, intrinsics, rtol=1e-6, atol=1e-6)
+    assert_allclose(camera.rotation, rotation, atol=1e-8)
+    assert_allclose(camera.translation, translation, atol=1e-7)
+    assert camera.is_pinhole
+    points = camera.centre + rng.normal([0.0, 0.0, 5.0], 1.0, (20, 3)) @ rotation
+    homogeneous = np.column_stack([points, np.ones(20)]) @ matrix.T
+    pixels, valid = camera.project(points)
+    assert valid.sum() > 10
+    assert_allclose(pixels[valid], (homogeneous[:, :2] / homogeneous[:, 2:])[valid], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "left",
+    [
+        np.zeros((3, 3)),
+        np.ones((3, 3)),
+        np.diag([1.0, 1.0, 0.0]),
+        1e-5 * np.array([[1.0, 2, 3], [2, 4, 6], [0, 0, 1]]),
+    ],
+)
+def test_a_singular_projection_matrix_is_refused(left: ndarray) -> None:
+    with pytest.raises(ValueError, match="singular"):
+        Camera.from_projection("p", (640, 480), np.column_stack([left, np.ones(3)]))
+
+
+@LENSES
+def test_what_is_behind_the_camera_is_not_drawn(camera: Camera) -> None:
+    ahead = camera.rotation[2]
+    distances = np.array([-10.0, -0.1, 0.0, NEAREST_DEPTH * 0.99, NEAREST_DEPTH * 1.01, 2.0])
+    points = camera.centre + distances[:, None] * ahead
+    pixels, jacobians, valid = camera.project_with_jacobian(points)
+    assert_array_equal(valid, [False, False, False, False, True, True])
+    assert np.isnan(pixels[~valid]).all()
+    assert not jacobians[~valid].any()
+    assert_array_equal(camera.sees(points), valid)
+
+
+@pytest.mark.parametrize("camera", [*CAMERAS, SIXTH], ids=lambda c: c.name)
+def test_what_is_far_aside_is_not_folded_back_into_the_picture(camera: Camera) -> None:
+    middle = np.array(camera.image_size) / 2.0
+    centre_ray = camera.back_project(middle[None])[0]
+    folded = 0
+    for direction in np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False):
+        aside = np.cos(direction) * camera.rotation[0] + np.sin(direction) * camera.rotation[1]
+        angles = np.radians(np.linspace(0.0, 89.0, 90))[:, None]
+        points = camera.centre + 3.0 * (np.cos(angles) * centre_ray + np.sin(angles) * aside)
+        naive = through_opencv(camera, points)
+        seen = camera.sees(points)
+        pixels, valid = camera.project(points)
+        last = int(np.flatnonzero(seen).max())
+        assert seen[: last + 1].all()  # once out of the picture, out for good
+        folded += int(camera.contains(naive)[last + 1 :].sum())
+        # and while it holds, farther aside is farther out
+        outward = np.linalg.norm(pixels[valid] - pixels[0], axis=1)
+        assert (np.diff(outward) > 0.0).all()
+    assert folded > 0, "this lens does not fold, so the test shows nothing"
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_the_box_of_a_target_holds_its_middle(seed: int) -> None:
+    points = room_points(20, seed)
+    for camera in (*CAMERAS, PINHOLE, CUSHION):
+        for half_extents in (HALF_EXTENTS, np.array([0.3, 0.3, 0.84])):
+            boxes, visible = camera.project_boxes(points, half_extents)
+            whole = np.isfinite(boxes).all(axis=1)
+            assert not visible[~whole].any()
+            pixels, valid = camera.project(points)
+            assert valid[whole].all()
+            low, high = boxes[whole, :2], boxes[whole, :2] + boxes[whole, 2:]
+            assert (low < pixels[whole]).all()
+            assert (pixels[whole] < high).all()
+            # a target whose middle is in the picture has a box there
+            assert visible[whole & camera.contains(pixels)].all()
+
+
+def test_a_box_is_visible_where_it_overlaps_the_picture() -> None:
+    width, height = PINHOLE.image_size
+    across = np.linspace(-width, 2 * width, 61)
+    pixels = np.stack([across, np.full(61, height / 2.0)], axis=1)
+    points = PINHOLE.centre + 4.0 * PINHOLE.back_project(pixels)
+    boxes, visible = PINHOLE.project_boxes(points, HALF_EXTENTS)
+    overlap = (boxes[:, 0] < width - 0.5) & (boxes[:, 0] + boxes[:, 2] > -0.5)
+    assert_array_equal(visible, overlap)
+    partly = visible & ~PINHOLE.contains(pixels)
+    assert partly.any(), "a target half outside still shows"
+
+
+def test_a_target_partly_behind_the_lens_has_no_box() -> None:
+    camera = look_at("near", (0.0, -0.2, 1.0), (0.0, 5.0, 1.0))
+    centres = np.array([[0.0, 0.0, 1.0], [0.0, 3.0, 1.0], [0.0, -3.0, 1.0]])
+    boxes, visible = camera.project_boxes(centres, np.array([0.3, 0.3, 0.84]))
+    assert_array_equal(visible, [False, True, False])
+    assert_array_equal(np.isfinite(boxes).all(axis=1), [False, True, False])
+    assert camera.project(centres)[1].tolist() == [True, True, False]
+
+
+def test_no_points() -> None:
+    none = np.zeros((0, 3))
+    pixels, jacobians, valid = CAMERAS[0].project_with_jacobian(none)
+    assert (pixels.shape, jacobians.shape, valid.shape) == ((0, 2), (0, 2, 3), (0,))
+    assert CAMERAS[0].project(none)[0].shape == (0, 2)
+    assert CAMERAS[0].sees(none).shape == (0,)
+    assert CAMERAS[0].back_project(np.zeros((0, 2))).shape == (0, 3)
+    boxes, visible = CAMERAS[0].project_boxes(none, HALF_EXTENTS)
+    assert (boxes.shape, visible.shape) == ((0, 4), (0,))
+
+
+def test_the_edge_of_the_picture_is_half_a_pixel_beyond_the_outer_centres() -> None:
+    edge = np.array([[-0.5, -0.5], [-0.51, 0], [359.49, 287.49], [359.5, 0], [np.nan, 0]])
+    assert_array_equal(CAMERAS[0].contains(edge), [True, False, True, False, False])
+
+
+def test_the_centre_is_where_the_camera_was_put() -> None:
+    assert_allclose(look_at("here", (1.0, -2.0, 3.0), distortion=BARREL).centre, [1.0, -2.0, 3.0])
