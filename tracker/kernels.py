@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
@@ -18,8 +18,7 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 def _kernel(function: _F) -> _F:
     """Compile on the first call, keep the machine code on disk, release the interpreter."""
-    compiled: _F = numba.njit(cache=True, nogil=True)(function)
-    return compiled
+    return cast(_F, numba.njit(cache=True, nogil=True)(function))
 
 
 @_kernel
@@ -235,3 +234,64 @@ def kalman_pairs(
         new_means[:pairs],
         new_covariances[:pairs],
     )
+
+
+@_kernel
+def belief_propagation(
+    missed: ndarray, detected: ndarray, unexplained: ndarray, tolerance: float, iterations: int
+) -> tuple[ndarray, ndarray]:
+    """Messages between targets and measurements until they settle.
+
+    Args:
+        missed: (n,) weight of each target's miss.
+        detected: (n, M) weight of each pair, 0 outside the gate.
+        unexplained: (M,) weight of each measurement being nobody's.
+        tolerance: Largest change of a message at which to stop.
+        iterations: At most this many.
+
+    Returns:
+        (n, 1 + M) probabilities of a miss and of each measurement for every target, and
+        (M,) the probability that no target made the measurement.
+    """
+    targets, count = detected.shape
+    to_target = np.empty((targets, count))
+    to_measurement = np.zeros((targets, count))
+    for j in range(count):
+        for i in range(targets):
+            to_target[i, j] = 1.0 / unexplained[j]
+    for _ in range(iterations):
+        for i in range(targets):
+            total = missed[i]
+            for j in range(count):
+                total += detected[i, j] * to_target[i, j]
+            for j in range(count):
+                if detected[i, j] > 0.0:
+                    rest = max(total - detected[i, j] * to_target[i, j], 1e-300)
+                    to_measurement[i, j] = detected[i, j] / rest
+        change = 0.0
+        for j in range(count):
+            total = unexplained[j]
+            for i in range(targets):
+                total += to_measurement[i, j]
+            for i in range(targets):
+                new = 1.0 / max(total - to_measurement[i, j], 1e-300)
+                change = max(change, abs(new - to_target[i, j]) * unexplained[j])
+                to_target[i, j] = new
+        if change < tolerance:
+            break
+    rows = np.empty((targets, 1 + count))
+    columns = np.empty(count)
+    for i in range(targets):
+        total = missed[i]
+        rows[i, 0] = missed[i]
+        for j in range(count):
+            rows[i, 1 + j] = detected[i, j] * to_target[i, j]
+            total += rows[i, 1 + j]
+        for j in range(1 + count):
+            rows[i, j] /= max(total, 1e-300)
+    for j in range(count):
+        total = unexplained[j]
+        for i in range(targets):
+            total += to_measurement[i, j]
+        columns[j] = unexplained[j] / total
+    return rows, columns

@@ -19,7 +19,7 @@ from pydantic.fields import FieldInfo
 
 Stage = Literal["single_view", "fusion", "tracks"]
 SingleViewName = Literal["colour_phd", "none"]
-FusionName = Literal["sequential_phd"]
+FusionName = Literal["sequential_phd", "multi_bernoulli"]
 
 
 def ui(
@@ -98,10 +98,57 @@ class FusionParams(Params):
     ] = 0.5
     """Expected number of people who come in at each entrance in one second."""
 
+    measurement: Annotated[
+        Literal["centre", "box", "box_and_width"], ui("z", published="centre")
+    ] = "centre"
+    """What is used of a box: its centre; its horizontal centre, top and bottom; and its width."""
+
+    motion: Annotated[
+        Literal["random_walk", "constant_velocity"], ui("F", published="random_walk")
+    ] = "random_walk"
+    """How people move between two steps."""
+
     motion_sigma: Annotated[
         float, Field(ge=0.01, le=3.0), ui("σ_w", unit="m/√s", step=0.01, log=True)
     ] = 0.4
-    """How far a person strays in one second, along each axis (random walk)."""
+    """Random walk: how far a person strays in one second, along each axis."""
+
+    acceleration_sigma: Annotated[
+        float, Field(ge=0.05, le=10.0), ui("σ_a", unit="m/s per √s", step=0.05, log=True)
+    ] = 1.0
+    """Constant velocity: how much a person's speed changes in one second, along each axis."""
+
+    vertical_share: Annotated[float, Field(ge=0.01, le=1.0), ui("σ_z/σ_x", step=0.01)] = 0.2
+    """Constant velocity: how lively the height is, relative to the ground plane."""
+
+    velocity_memory: Annotated[
+        float, Field(ge=0.1, le=100.0), ui("τ", unit="s", step=0.1, log=True)
+    ] = 2.0
+    """Constant velocity: time after which a person who is not seen has slowed to a third."""
+
+    start_velocity: Annotated[float, Field(ge=0.0, le=5.0), ui("σ_v0", unit="m/s", step=0.1)] = 0.7
+    """Constant velocity: spread of a newcomer's speed along each axis."""
+
+    birth: Annotated[
+        Literal["entrances", "measurements", "both"], ui("γ(x)", published="entrances")
+    ] = "entrances"
+    """Where people may appear: at the entrances, where boxes of two cameras agree, or both."""
+
+    misses: Annotated[Literal["per_camera", "per_person"], ui("1−p_D", published="per_camera")] = (
+        "per_camera"
+    )
+    """Sequential PHD: whether a camera's miss forgets what the cameras before it saw."""
+
+    occlusion: Annotated[float, Field(ge=0.0, le=1.0), ui("ρ", step=0.05, published=0.0)] = 0.0
+    """How surely a camera misses a person who is wholly covered by another."""
+
+    duplicate_distance: Annotated[float, Field(ge=0.0, le=2.0), ui("d_2", step=0.05)] = 0.5
+    """Tracks nearer than this share of a target's width, without a box each, are one person."""
+
+    room_margin: Annotated[
+        float, Field(ge=0.0, le=5.0), ui("m", unit="m", step=0.05, stage="tracks")
+    ] = 0.1
+    """How far outside the room's volume a person is still reported."""
 
     measurement_sigma: Annotated[float, Field(ge=0.1, le=10.0), ui("σ_v", step=0.1, log=True)] = 1.0
     """Factor on the noise that the single-view stage states for its boxes."""

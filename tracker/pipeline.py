@@ -179,6 +179,8 @@ def compute(
                 run.fused[run.done :],
                 cameras=len(sequence.views),
                 extraction_threshold=parameters.fusion.extraction_threshold,
+                room=sequence.room,
+                margin=parameters.fusion.room_margin,
                 first_frame=run.done,
                 ids=ids,
             )

@@ -11,6 +11,7 @@ from numpy import ndarray
 
 from tracker import phd
 from tracker.fusion.protocol import FusionResult
+from tracker.sequences.sequence import Room
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,6 +62,8 @@ def extract(
     *,
     cameras: int,
     extraction_threshold: float,
+    room: Room | None = None,
+    margin: float = np.inf,
     first_frame: int = 0,
     ids: dict[int, int] | None = None,
 ) -> Trajectories:
@@ -72,6 +75,8 @@ def extract(
         results: The posterior of each step, from ``first_frame`` on.
         cameras: C.
         extraction_threshold: T_e; a component is a target where its weight is above it.
+        room: Where people are tracked; None for everywhere.
+        margin: Metres beyond the room's volume within which a target still counts.
         first_frame: The step of the first result.
         ids: Label → id so far; new labels are added. To go on from an earlier
             piece, pass the same one again.
@@ -80,6 +85,8 @@ def extract(
     rows: list[Trajectories] = []
     for offset, result in enumerate(results):
         chosen = phd.extract(result.posterior, extraction_threshold)
+        if room is not None:
+            chosen = chosen[room.contains(result.posterior.means[chosen, :3], margin)]
         if not len(chosen):
             continue
         labels, first = np.unique(result.posterior.labels[chosen], return_index=True)

@@ -12,18 +12,17 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
-from scipy.stats import chi2
 
 from tracker import gaussian_mixture, models, phd
-from tracker.camera import Camera
+from tracker.fusion.measurement_births import CameraEvidence
+from tracker.fusion.model import CONFIRMED, FusionModel
 from tracker.fusion.protocol import FusionResult
+from tracker.fusion.record import Record
 from tracker.gaussian_mixture import GaussianMixture
 from tracker.parameters import FusionParams
+from tracker.phd import PhdUpdate
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
-
-CONFIRMED_WEIGHT = 0.5
-"""A component heavier than this stands for a person, so no second one may bear its label."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,117 +33,161 @@ class SequentialPhdState:
     next_label: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Evidence:
-    """What each camera said of each component; carried through update and merging."""
+@dataclass(slots=True, eq=False)
+class _Work:
+    """One step while the cameras update it one after another."""
 
-    detection_probabilities: Float[ndarray, "C J"]
-    sources: Int[ndarray, "C J"]
-    source_weights: Float[ndarray, "C J"]
-
-    @staticmethod
-    def none(cameras: int, size: int) -> _Evidence:
-        return _Evidence(
-            np.zeros((cameras, size)),
-            np.full((cameras, size), -1, dtype=np.int64),
-            np.zeros((cameras, size)),
-        )
-
-    def take(self, indices: ndarray) -> _Evidence:
-        return _Evidence(
-            self.detection_probabilities[:, indices],
-            self.sources[:, indices],
-            self.source_weights[:, indices],
-        )
+    mixture: GaussianMixture
+    record: Record
+    next_label: int
+    sure: dict[int, float]
+    """Predicted weight of each label, where it is enough to hide others."""
+    evidence: list[CameraEvidence]
 
 
 class SequentialPhd:
     """Fusion by the sequential-sensor GM-PHD filter ([ZW21] §2.4).
 
-    State (x, y, z) in metres, random walk. The intensity is predicted once, with
-    births at the entrances; then camera 1's boxes update it, the result is the
-    prior for camera 2, and so on. The measurement is the centre of a box,
-    through the calibrated camera with its lens, linearised at each component.
+    The intensity is predicted once, with births; then camera 1's boxes update it,
+    the result is the prior for camera 2, and so on. The published scheme takes the
+    centre of a box, a random walk of (x, y, z), births at the entrances only, one
+    p_D inside the picture and the plain recursion of camera after camera; each is
+    one value of a parameter, and the ``published`` preset sets them all.
     """
 
     def __init__(self, sequence: Sequence, parameters: FusionParams) -> None:
         self._parameters = parameters
-        self._cameras = sequence.cameras
-        self._noise = models.random_walk_noise(parameters.motion_sigma, sequence.step_time, 3)
-        self._births = models.entrance_births(
-            sequence.room, parameters.birth_rate * sequence.step_time
-        )
-        self._clutter = [
-            parameters.clutter_rate / models.visible_area(camera, sequence.room)
-            for camera in self._cameras
-        ]
-        self._gate = float(chi2.ppf(parameters.gate_probability, df=2))
+        self._model = FusionModel(sequence, parameters)
 
     def start(self) -> SequentialPhdState:
         """Nobody is in the room."""
-        return SequentialPhdState(GaussianMixture.empty(3), next_label=1)
+        return SequentialPhdState(GaussianMixture.empty(self._model.motion.dimension), 1)
 
     def step(
         self, state: SequentialPhdState, views: Many[ViewResult]
     ) -> tuple[SequentialPhdState, FusionResult]:
         """Predict one step ahead and update with every camera's boxes, in the cameras' order."""
-        survivors = gaussian_mixture.predict(
-            state.mixture, np.eye(3), self._noise, self._parameters.survival_probability
-        )
-        births = models.label_births(self._births, state.next_label)
-        mixture = gaussian_mixture.concatenate([survivors, births])
-        next_label = state.next_label + births.size
-        previous = dict(zip(survivors.labels.tolist(), survivors.means, strict=True))
-
-        evidence = _Evidence.none(len(self._cameras), mixture.size)
-        for index, (camera, view) in enumerate(zip(self._cameras, views, strict=True)):
-            mixture, evidence = self._update(mixture, evidence, index, camera, view)
-        labels, next_label = _one_person_a_label(mixture, previous, next_label)
+        p = self._parameters
+        mixture = self._model.motion.predict(state.mixture, p.survival_probability)
+        previous = dict(zip(mixture.labels.tolist(), mixture.means[:, :3], strict=True))
+        sure = _confirmed_labels(mixture)
+        next_label = state.next_label
+        if p.birth != "measurements":
+            births = models.label_births(self._model.births, next_label)
+            next_label += births.size
+            mixture = gaussian_mixture.concatenate([mixture, births])
+        work = _Work(mixture, Record.blank(len(views), mixture.size), next_label, sure, evidence=[])
+        for index, view in enumerate(views):
+            self._update(work, index, view)
+        if p.birth != "entrances":
+            self._add_newborns(work)
+        inside = self._model.stays(work.mixture)
+        mixture, record = work.mixture.take(inside), work.record.take(inside)
+        labels, next_label = _one_person_a_label(mixture, previous, work.next_label)
         mixture = GaussianMixture(mixture.weights, mixture.means, mixture.covariances, labels)
-        result = FusionResult(
-            posterior=mixture,
-            detection_probabilities=evidence.detection_probabilities,
-            sources=evidence.sources,
-            source_weights=evidence.source_weights,
-            hidden_by=np.full(evidence.sources.shape, -1, dtype=np.int64),
-        )
-        return SequentialPhdState(mixture, next_label), result
+        return SequentialPhdState(mixture, next_label), record.result(mixture)
 
-    def _update(
-        self,
-        mixture: GaussianMixture,
-        evidence: _Evidence,
-        index: int,
-        camera: Camera,
-        view: ViewResult,
-    ) -> tuple[GaussianMixture, _Evidence]:
-        expected, jacobians, valid = camera.project_with_jacobian(mixture.means)
-        probability = self._parameters.detection_probability * (valid & camera.contains(expected))
-        noise = np.zeros((len(view.boxes), 2, 2))
-        noise[:, [0, 1], [0, 1]] = (self._parameters.measurement_sigma * view.sigmas[:, :2]) ** 2
+    def _update(self, work: _Work, index: int, view: ViewResult) -> None:
+        """The update by the boxes of one camera, and its reduction."""
+        p, model, mixture = self._parameters, self._model, work.mixture
+        values, noises = model.target.measured(view, p.measurement_sigma)
+        expected = model.target.expected(model.cameras[index], mixture.means)
+        occluders = np.array([work.sure.get(label, 0.0) for label in mixture.labels.tolist()])
+        seen = model.visible(index, expected, mixture, occluders)
         updated = phd.update(
             mixture,
-            view.boxes[:, :2],
-            expected=np.where(valid[:, None], expected, 0.0),
-            jacobians=jacobians,
-            noise=noise,
-            detection_probability=probability,
-            clutter_intensity=self._clutter[index],
-            gate=self._gate,
+            values,
+            expected=expected.values,
+            jacobians=expected.jacobians,
+            noise=noises,
+            detection_probability=seen.detection_probabilities,
+            clutter_intensity=model.clutter[index],
+            gate=model.gate,
         )
-        evidence = evidence.take(updated.parents)
-        evidence.detection_probabilities[index] = probability[updated.parents]
-        evidence.sources[index] = updated.measurements
-        evidence.source_weights[index] = np.where(
-            updated.measurements >= 0, updated.posterior.weights, 0.0
+        posterior = updated.posterior
+        if p.misses == "per_person":
+            posterior = _miss_per_person(mixture, updated, seen.detection_probabilities)
+        parents, sources = updated.parents, updated.measurements
+        record = work.record.take(parents)
+        record.detection_probabilities[index] = seen.detection_probabilities[parents]
+        record.hidden_by[index] = seen.hidden_by[parents]
+        record.sources[index] = sources
+        record.source_weights[index] = np.where(sources >= 0, posterior.weights, 0.0)
+        work.mixture, leaders = gaussian_mixture.reduce(
+            posterior,
+            pruning_threshold=p.pruning_threshold,
+            merging_threshold=p.merging_threshold,
+            max_components=p.max_components,
         )
-        reduced, leaders = gaussian_mixture.reduce(
-            updated.posterior,
-            pruning_threshold=self._parameters.pruning_threshold,
-            merging_threshold=self._parameters.merging_threshold,
-            max_components=self._parameters.max_components,
+        work.record = record.take(leaders)
+        work.evidence.append(
+            CameraEvidence(
+                rays=model.cameras[index].back_project(view.boxes[:, :2]),
+                values=values,
+                noises=noises,
+                unexplained=1.0 - updated.measurement_weights,
+                clutter_intensity=model.clutter[index],
+            )
         )
-        return reduced, evidence.take(leaders)
+
+    def _add_newborns(self, work: _Work) -> None:
+        """Components where unexplained boxes of several cameras agree on a place."""
+        found = self._model.newborns.propose(work.evidence)
+        if not found:
+            return
+        born = GaussianMixture(
+            np.array([newborn.existence for newborn in found]),
+            np.stack([newborn.position for newborn in found]),
+            np.stack([newborn.covariance for newborn in found]),
+            np.zeros(len(found), dtype=np.int64),
+        )
+        born = models.label_births(self._model.motion.at_rest(born), work.next_label)
+        work.next_label += born.size
+        first = work.mixture.size
+        work.mixture = gaussian_mixture.concatenate([work.mixture, born])
+        work.record = work.record.extended(born.size)
+        sources = np.stack([newborn.sources for newborn in found], axis=1)
+        work.record.sources[:, first:] = sources
+        work.record.source_weights[:, first:] = sources >= 0
+        work.record.detection_probabilities[:, first:] = self._parameters.detection_probability
+
+
+def _confirmed_labels(mixture: GaussianMixture) -> dict[int, float]:
+    """The labels that stand for a person, with their weight."""
+    sure = np.flatnonzero(mixture.weights > CONFIRMED)
+    return dict(zip(mixture.labels[sure].tolist(), mixture.weights[sure].tolist(), strict=True))
+
+
+def _miss_per_person(
+    predicted: GaussianMixture, updated: PhdUpdate, detection_probability: Float[ndarray, " J"]
+) -> GaussianMixture:
+    """Scale the missed components so that the order of the cameras does not matter.
+
+    The PHD takes the number of people as Poisson, so one camera's miss multiplies
+    a weight by 1 − p_D whatever the cameras before saw. Taken as one person who is
+    there with probability r, the components of one label keep
+
+        w ← w (1 − p_D) / (1 − r p_D) · (1 − D)
+
+    with D the share of the label that this camera's boxes explain. For one person
+    alone that is Bayes' rule for existence, which asks for no order.
+    """
+    size = predicted.size
+    labels, label = np.unique(predicted.labels, return_inverse=True)
+    weights = updated.posterior.weights.copy()
+    there = np.zeros(len(labels))
+    np.add.at(there, label, predicted.weights * detection_probability)
+    explained = np.zeros(len(labels))
+    np.add.at(explained, label[updated.parents[size:]], weights[size:])
+    factor = (1.0 - np.minimum(explained, 1.0)) / np.maximum(1.0 - np.minimum(there, 1.0), 1e-9)
+    # a lone, certain label that nobody could have missed keeps at most what it had
+    weights[:size] = np.minimum(weights[:size] * factor[label], predicted.weights)
+    return GaussianMixture(
+        weights,
+        updated.posterior.means,
+        updated.posterior.covariances,
+        updated.posterior.labels,
+    )
 
 
 def _one_person_a_label(
@@ -156,13 +199,13 @@ def _one_person_a_label(
     were born as one component go on as two tracks from the step they part.
     """
     labels = mixture.labels.copy()
-    confirmed = np.flatnonzero(mixture.weights > CONFIRMED_WEIGHT)
+    confirmed = np.flatnonzero(mixture.weights > CONFIRMED)
     for label in np.unique(labels[confirmed]).tolist():
         bearers = confirmed[labels[confirmed] == label]
         if len(bearers) < 2:
             continue
-        place = previous.get(label, mixture.means[bearers[0]])
-        distances = np.linalg.norm(mixture.means[bearers] - place, axis=1)
+        place = previous.get(label, mixture.means[bearers[0], :3])
+        distances = np.linalg.norm(mixture.means[bearers, :3] - place, axis=1)
         for other in np.delete(bearers, int(np.argmin(distances))):
             labels[other] = next_label
             next_label += 1

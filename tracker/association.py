@@ -1,0 +1,60 @@
+"""Which measurement belongs to which target: marginal probabilities by belief propagation.
+
+[WL14] J. L. Williams, R. Lau, "Approximate evaluation of marginal association
+probabilities with belief propagation", IEEE Transactions on Aerospace and
+Electronic Systems 50(4), 2014.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker import kernels
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Marginals:
+    """Marginal association probabilities of n targets and M measurements."""
+
+    detected: Float[ndarray, "n M"]
+    """P(target i made measurement j)."""
+    missed: Float[ndarray, " n"]
+    """P(target i made none); with :attr:`detected` a row sums to 1."""
+    unexplained: Float[ndarray, " M"]
+    """P(no target made measurement j): it is clutter or somebody new."""
+
+
+def marginals(
+    missed: Float[ndarray, " n"],
+    detected: Float[ndarray, "n M"],
+    unexplained: Float[ndarray, " M"],
+    *,
+    tolerance: float = 1e-6,
+    iterations: int = 200,
+) -> Marginals:
+    """Marginals of the one-to-one association, by loopy belief propagation ([WL14]_).
+
+        μ_ij = w_ij / (w_i0 + Σ_{j'≠j} w_ij' ν_j'i),  ν_ji = 1 / (ρ_j + Σ_{i'≠i} μ_i'j)
+        P(i ← j) ∝ w_ij ν_ji,  P(i misses) ∝ w_i0,  P(j unexplained) = ρ_j / (ρ_j + Σ_i μ_ij)
+
+    The messages converge to a unique point; on a tree they are exact.
+
+    Args:
+        missed: w_i0, the weight of target i being missed, > 0 or with a row that is not 0.
+        detected: w_ij, the weight of target i having made measurement j; 0 outside the gate.
+        unexplained: ρ_j, clutter and newborn intensity at measurement j, > 0.
+        tolerance: Largest change of a message at which the iteration stops.
+        iterations: At most this many.
+    """
+    row, column = kernels.belief_propagation(
+        np.ascontiguousarray(missed, dtype=float),
+        np.ascontiguousarray(detected, dtype=float),
+        np.ascontiguousarray(unexplained, dtype=float),
+        tolerance,
+        iterations,
+    )
+    return Marginals(row[:, 1:], row[:, 0], column)

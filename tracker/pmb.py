@@ -1,0 +1,94 @@
+"""The track-oriented Poisson multi-Bernoulli recursion: the update of the detected targets.
+
+[W15] J. L. Williams, "Marginal multi-Bernoulli filters: RFS derivation of MHT,
+JIPDA, and association-based MeMBer", IEEE Transactions on Aerospace and
+Electronic Systems 51(3), 2015: TOMB/P.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker import association, kernels
+from tracker.association import Marginals
+from tracker.gaussian_mixture import GaussianMixture
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PmbUpdate:
+    """The Bernoulli tracks after one measurement set, and the association that made them."""
+
+    tracks: GaussianMixture
+    """Weights are existence probabilities; one component a track, in the order given."""
+    marginals: Marginals
+
+
+def update(
+    tracks: GaussianMixture,
+    measurements: Float[ndarray, "M m"],
+    *,
+    expected: Float[ndarray, "n m"],
+    jacobians: Float[ndarray, "n m d"],
+    noise: Float[ndarray, "N m m"],
+    detection_probability: Float[ndarray, " n"],
+    unexplained_intensity: Float[ndarray, " M"],
+    gate: float,
+) -> PmbUpdate:
+    """Update every track by the measurements that may be its own ([W15] TOMB/P).
+
+        w_i0 = 1 − r_i + r_i (1 − p_i),   w_ij = r_i p_i q_i(z_j)
+
+    With the marginal association probabilities P, existence becomes
+    r' = Σ_j P(i ← j) + P(i misses) r_i (1 − p_i) / w_i0, and the density is the
+    mixture of the updated and the missed Gaussians, kept as one Gaussian of its
+    mean and covariance.
+
+    Args:
+        tracks: n Bernoullis: existence as weight, Gaussian, label.
+        measurements: z, one a row; none is allowed.
+        expected: h(m_i).
+        jacobians: H_i.
+        noise: R, one for all measurements (N = 1) or one each (N = M).
+        detection_probability: p_i of each track.
+        unexplained_intensity: ρ_j = κ(z_j) + e_j, clutter and newborns at each measurement.
+        gate: Squared Mahalanobis distance beyond which a pair is left out.
+    """
+    size, count = tracks.size, len(measurements)
+    p_d, existence = detection_probability, tracks.weights
+    survived = existence * (1.0 - p_d)
+    missed = 1.0 - existence + survived
+    pairs = np.zeros((size, count))
+    if count == 0 or size == 0:
+        marginal = Marginals(pairs, np.ones(size), np.ones(count))
+        weights = survived / np.maximum(missed, 1e-300)
+        return PmbUpdate(
+            GaussianMixture(weights, tracks.means, tracks.covariances, tracks.labels), marginal
+        )
+    track, measured, log_likelihood, means, covariances = kernels.kalman_pairs(
+        tracks.means,
+        tracks.covariances,
+        np.ascontiguousarray(expected),
+        np.ascontiguousarray(jacobians),
+        np.ascontiguousarray(measurements),
+        np.ascontiguousarray(noise),
+        gate,
+    )
+    pairs[track, measured] = existence[track] * p_d[track] * np.exp(log_likelihood)
+    marginal = association.marginals(missed, pairs, unexplained_intensity)
+    kept = marginal.missed * survived / np.maximum(missed, 1e-300)
+    # the missed hypothesis first, so that no group is ever empty
+    new_existence, new_means, new_covariances = kernels.merge_moments(
+        np.concatenate([np.maximum(kept, 1e-12), marginal.detected[track, measured]]),
+        np.concatenate([tracks.means, means]),
+        np.concatenate([tracks.covariances, covariances]),
+        np.concatenate([np.arange(size), track]),
+        size,
+    )
+    return PmbUpdate(
+        GaussianMixture(np.minimum(new_existence, 1.0), new_means, new_covariances, tracks.labels),
+        marginal,
+    )
