@@ -1,0 +1,72 @@
+// @ts-check
+/**
+ * What happens to tracks, as a list of steps to jump to.
+ * @typedef {import("./types.js").TrackLane} TrackLane
+ * @typedef {{step: number, id: number, kind: "birth" | "death" | "long miss"}} TrackEvent
+ */
+
+/** Steps without a box from any camera that make a miss long, in seconds. */
+export const LONG_MISS = 0.6;
+
+/**
+ * @param {TrackLane} track
+ * @param {number} fps
+ * @returns {[number, number][]} spans, inclusive
+ */
+export function longMisses({ spans }, fps) {
+  return spans.flatMap(([from, to, kind]) =>
+    kind === "coasting" && to - from + 1 >= LONG_MISS * fps ? [/** @type {[number, number]} */ ([from, to])] : [],
+  );
+}
+
+/**
+ * @param {TrackLane[]} tracks
+ * @param {{fps: number, done: number}} run
+ * @returns {TrackEvent[]} by step, then id
+ */
+export function eventsOf(tracks, { fps, done }) {
+  /** @type {TrackEvent[]} */
+  const events = [];
+  for (const track of tracks) {
+    if (track.first > 0) events.push({ step: track.first, id: track.id, kind: "birth" });
+    // A track that reaches the newest step has not ended.
+    if (track.last < done - 1) events.push({ step: track.last, id: track.id, kind: "death" });
+    for (const [from] of longMisses(track, fps)) events.push({ step: from, id: track.id, kind: "long miss" });
+  }
+  return events.sort((a, b) => a.step - b.step || a.id - b.id);
+}
+
+/**
+ * The nearest event after or before a step.
+ * @param {TrackEvent[]} events  by step
+ * @param {number} step
+ * @param {-1 | 1} direction
+ * @returns {TrackEvent | undefined}
+ */
+export function nextEvent(events, step, direction) {
+  if (direction > 0) return events.find((event) => event.step > step);
+  return [...events].reverse().find((event) => event.step < step);
+}
+
+/**
+ * Share of its life in which a camera saw the track.
+ * @param {TrackLane} track
+ * @returns {number} 0 … 1
+ */
+export function seenShare({ first, last, spans }) {
+  const seen = spans.reduce((sum, [from, to, kind]) => sum + (kind === "seen" ? to - from + 1 : 0), 0);
+  return seen / Math.max(1, last - first + 1);
+}
+
+/**
+ * What a track is doing at a step.
+ * @param {TrackLane} track
+ * @param {number} step
+ * @returns {"not yet" | "ended" | "seen" | "coasting"}
+ */
+export function stateAt({ first, last, spans }, step) {
+  if (step < first) return "not yet";
+  if (step > last) return "ended";
+  const span = spans.find(([from, to]) => step >= from && step <= to);
+  return span?.[2] ?? "coasting";
+}

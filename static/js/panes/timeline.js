@@ -1,0 +1,250 @@
+// @ts-check
+/** The timeline: one axis for range bar, ruler, lanes and strips, and one playhead over them. */
+import { panned, secondsOf, stepAt, xOf, zoomed } from "../clock.js";
+import { fill, h, idTag, write } from "../dom.js";
+import { hatch, prepare } from "../draw/canvas.js";
+import { drawLanes, drawRange, drawRuler } from "../draw/lanes.js";
+import { drawCardinality } from "../draw/strips.js";
+import { seenShare } from "../events.js";
+import { faded, palette } from "../palette.js";
+import { mountTransport } from "./transport.js";
+
+/**
+ * @typedef {import("../types.js").PageState} PageState
+ * @typedef {import("../types.js").TrackLane} TrackLane
+ */
+
+/**
+ * @param {HTMLElement} root
+ * @param {import("../store.js").Store<PageState>} store
+ * @param {object} on
+ * @param {import("../commands.js").Actions} on.actions
+ * @param {(step: number) => void} on.seek
+ * @param {(id: number | null) => void} on.select
+ * @param {() => number[]} on.loadedSteps
+ */
+export function mountTimeline(root, store, on) {
+  const lanes = h("div", { class: "lanes", tabindex: -1, "aria-label": "Tracks" });
+  const people = h("span", { class: "r" });
+  const sign = (/** @type {string} */ word, /** @type {string} */ token, /** @type {number} */ width) => {
+    const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+    svg.setAttribute("viewBox", "0 0 12 8");
+    svg.innerHTML = `<path d="M0 4h12" stroke="var(--${token})" stroke-width="${width}"/>`;
+    return h("span", { class: "lg" }, svg, word);
+  };
+  const truthSign = sign("truth", "p-truth", 3);
+  const gutter = h(
+    "div",
+    { class: "gut" },
+    h("div", { class: "gr over" }),
+    h("div", { class: "gr ruler" }, h("span", {}, "tracks"), h("span", { class: "r sub" }, "seen")),
+    lanes,
+    h("div", { class: "gr strip" }, h("span", { class: "n" }, "People"), people, h("span", { class: "brk" }), truthSign, sign("estimate", "p-est", 1.25)),
+  );
+  const fixed = h("canvas", { "aria-hidden": "true" });
+  const seekBar = h("input", { class: "seek", type: "range", min: 0, max: 0, step: 1, value: 0, "aria-label": "Step" });
+  const head = h("div", { class: "ph" }, h("b", {}, "0"));
+  const wanted = h("div", { class: "ph wanted", hidden: true });
+  const empty = h("div", { class: "empty" });
+  const plot = h("div", { class: "plot" }, fixed, empty, seekBar, wanted, head);
+  root.append(mountTransport(store, on.actions, on.seek), gutter, plot);
+
+  /** @type {import("../clock.js").View} */
+  let view = { first: 0, last: 1, width: 1 };
+  let frames = 0;
+  let asked = false;
+  let spoken = 0;
+
+  const token = (/** @type {string} */ name) => parseFloat(getComputedStyle(document.documentElement).getPropertyValue(`--${name}`));
+
+  function measure() {
+    view = { ...view, width: Math.max(1, plot.clientWidth - token("pad-end")) };
+    draw();
+    placeHead();
+  }
+
+  function draw() {
+    if (asked) return;
+    asked = true;
+    requestAnimationFrame(() => {
+      asked = false;
+      paint();
+    });
+  }
+
+  /** @returns {TrackLane[]} */
+  function shownTracks() {
+    return store.get().timeline?.tracks ?? [];
+  }
+
+  function paint() {
+    const { timeline, run, range, selection, hover, server, loop } = store.get();
+    const ink = palette();
+    const height = plot.clientHeight;
+    const g = prepare(fixed, plot.clientWidth, height);
+    const over = { y: 0, height: token("h-over") };
+    const ruler = { y: over.height, height: token("h-ruler") };
+    const laneHeight = token("h-lane");
+    const block = { y: ruler.y + ruler.height, height: laneHeight * token("n-lanes") };
+    const strip = { y: block.y + block.height, height: token("h-strip") };
+    if (frames < 1) return;
+    if (loop && (range[0] !== null || range[1] !== null)) {
+      const x0 = xOf(Math.max(view.first, range[0] ?? 0), view);
+      const x1 = xOf(Math.min(view.last, range[1] ?? frames - 1), view);
+      g.fillStyle = faded(ink.get("accent"), 0.07);
+      if (x1 > x0) g.fillRect(x0, ruler.y, x1 - x0, height - ruler.y);
+    }
+    const done = run?.done ?? 0;
+    const fps = server?.sequence?.fps ?? 25;
+    drawLanes(g, block, view, { tracks: shownTracks(), scroll: lanes.scrollTop, laneHeight, done, fps, selection, hover: hover?.id ?? null }, ink);
+    drawRange(g, over, view, { loaded: on.loadedSteps(), done, frames }, ink);
+    drawRuler(g, ruler, view, { range }, ink);
+    drawCardinality(g, strip, view, { count: timeline?.count ?? [], truth: timeline?.truth ?? null }, ink);
+    if (done < frames) {
+      const x = Math.max(0, xOf(done, view));
+      hatch(g, x, block.y, view.width - x, height - block.y - 2, ink.get("line"), 6);
+    }
+  }
+
+  /** The playhead moves by transform alone; nothing is drawn again while it plays. */
+  function placeHead() {
+    const { shown, step, server, result, timeline, playing } = store.get();
+    const at = Math.max(0, shown);
+    const x = xOf(at, view);
+    head.hidden = frames < 1 || x < -1 || x > view.width + 1;
+    head.style.transform = `translateX(${Math.round(x)}px)`;
+    const label = /** @type {HTMLElement} */ (head.firstElementChild);
+    write(label, String(at));
+    label.style.marginLeft = `${Math.max(0, 17 - x)}px`;
+    wanted.hidden = step === shown || Math.abs(xOf(step, view) - x) < 2;
+    wanted.style.transform = `translateX(${Math.round(xOf(step, view))}px)`;
+    if (seekBar.valueAsNumber !== step) seekBar.value = String(step);
+    const now = performance.now();
+    if (!playing || now - spoken > 1000) {
+      spoken = now;
+      const fps = server?.sequence?.fps ?? 25;
+      const count = result?.computed ? `, ${result.tracks.length} people` : "";
+      seekBar.setAttribute("aria-valuetext", `step ${at} of ${frames}, ${secondsOf(at, fps)} s${count}`);
+    }
+    const estimate = timeline?.count[at];
+    const truth = timeline?.truth?.[at];
+    fill(people, estimate === undefined ? "–" : estimate, truth !== undefined && h("span", { class: "sub" }, ` of ${truth}`));
+  }
+
+  /** @type {Map<number, {element: HTMLElement, share: HTMLElement}>} */
+  const labels = new Map();
+  function listLanes() {
+    const tracks = shownTracks();
+    const ids = new Set(tracks.map((track) => track.id));
+    for (const [id, { element }] of labels) {
+      if (!ids.has(id)) {
+        element.remove();
+        labels.delete(id);
+      }
+    }
+    const selection = store.get().selection;
+    tracks.forEach((track, index) => {
+      let label = labels.get(track.id);
+      if (!label) {
+        const share = h("span", { class: "r" });
+        const element = h(
+          "button",
+          {
+            class: "gr lane",
+            "aria-label": `Track ${track.id}`,
+            onclick: () => on.select(track.id),
+            onpointerenter: () => store.set({ hover: { id: track.id, camera: -1 } }),
+            onpointerleave: () => store.set({ hover: null }),
+          },
+          idTag(track.id),
+          share,
+        );
+        label = { element, share };
+        labels.set(track.id, label);
+      }
+      label.element.setAttribute("aria-pressed", String(track.id === selection));
+      write(label.share, `${Math.round(seenShare(track) * 100)} %`);
+      if (lanes.children[index] !== label.element) lanes.insertBefore(label.element, lanes.children[index] ?? null);
+    });
+    const { run, server } = store.get();
+    const idle = tracks.length === 0 && Boolean(server?.sequence);
+    write(empty, !idle ? "" : run?.state === "computing" ? "" : run?.state === "failed" ? "The run failed before a track was found." : "No track was found with these parameters.");
+    empty.style.top = `${token("h-over") + token("h-ruler") + 8}px`;
+  }
+
+  plot.addEventListener("pointerdown", (event) => {
+    if (event.button !== 0 || frames < 1) return;
+    event.preventDefault();
+    plot.setPointerCapture(event.pointerId);
+    const box = plot.getBoundingClientRect();
+    const lane = Math.floor((event.clientY - box.top - token("h-over") - token("h-ruler") + lanes.scrollTop) / token("h-lane"));
+    const inLanes = event.clientY - box.top > token("h-over") + token("h-ruler") && event.clientY - box.top < token("h-over") + token("h-ruler") + lanes.clientHeight;
+    const track = shownTracks()[lane];
+    const at = stepAt(event.clientX - box.left, view);
+    if (inLanes && track && at >= track.first && at <= track.last) on.select(track.id);
+    store.set({ playing: 0 });
+    on.seek(at);
+  });
+  plot.addEventListener("pointermove", (event) => {
+    if (!plot.hasPointerCapture(event.pointerId)) return;
+    on.seek(stepAt(event.clientX - plot.getBoundingClientRect().left, view));
+  });
+  plot.addEventListener(
+    "wheel",
+    (event) => {
+      event.preventDefault();
+      const box = plot.getBoundingClientRect();
+      const overLanes = event.clientY - box.top > token("h-over") + token("h-ruler") && lanes.scrollHeight > lanes.clientHeight;
+      if (overLanes && !event.ctrlKey && !event.shiftKey) lanes.scrollTop += event.deltaY;
+      else if (event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY)) {
+        const pixels = event.deltaX || event.deltaY;
+        view = panned(view, (pixels / view.width) * (view.last - view.first), frames);
+      } else view = zoomed(view, Math.exp(event.deltaY * 0.0015), event.clientX - box.left, frames);
+      draw();
+      placeHead();
+    },
+    { passive: false },
+  );
+  plot.addEventListener("dblclick", () => {
+    view = { ...view, first: 0, last: Math.max(1, frames - 1) };
+    draw();
+    placeHead();
+  });
+  seekBar.addEventListener("input", () => on.seek(seekBar.valueAsNumber));
+  lanes.addEventListener("scroll", draw);
+
+  store.on(["server"], ({ server }) => {
+    const now = server?.sequence?.frames ?? 0;
+    truthSign.hidden = !server?.sequence?.has_truth;
+    if (now === frames) return;
+    frames = now;
+    view = { ...view, first: 0, last: Math.max(1, frames - 1) };
+    seekBar.max = String(Math.max(0, frames - 1));
+    measure();
+  });
+  store.on(["timeline", "run"], () => {
+    listLanes();
+    draw();
+    placeHead();
+  });
+  store.on(["selection"], () => {
+    listLanes();
+    const { selection } = store.get();
+    if (selection !== null) labels.get(selection)?.element.scrollIntoView({ block: "nearest" });
+    draw();
+  });
+  store.on(["range", "loop", "hover", "theme"], draw);
+  store.on(["shown", "step"], placeHead);
+  let waiting = false;
+  store.on(["loaded"], () => {
+    // Pictures arrive many times a second; the bar needs a few of them only.
+    if (waiting) return;
+    waiting = true;
+    setTimeout(() => {
+      waiting = false;
+      draw();
+    }, 200);
+  });
+  new ResizeObserver(measure).observe(plot);
+  measure();
+}

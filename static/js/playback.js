@@ -1,0 +1,255 @@
+// @ts-check
+/**
+ * From the step that is asked for to the step that is painted.
+ *
+ * `step` is what is wanted, `shown` what stands on the screen. A step is painted when its
+ * pictures and its result are there: all cameras, overlays, readout and playhead in one
+ * animation frame. Until then the last whole step stays.
+ */
+import { getJson } from "./api.js";
+import { createCache } from "./cache.js";
+import { advance, clampStep, playedRange, prefetchWindow } from "./clock.js";
+import { createPictures, pictureName, PICTURE_BUDGET } from "./pictures.js";
+
+/**
+ * @typedef {import("./types.js").StepResult} StepResult
+ * @typedef {import("./types.js").PageState} PageState
+ * @typedef {import("./pictures.js").Picture} Picture
+ *
+ * @typedef {object} Frame  what is painted at once
+ * @property {number} step
+ * @property {(Picture | undefined)[]} pictures  by camera; undefined where it is not loaded and will not be
+ * @property {StepResult | null} result
+ * @property {boolean} stale  the result is of the run before, shown faintly until the new one is there
+ */
+
+const RESULTS_KEPT = 600;
+
+/**
+ * @param {import("./store.js").Store<PageState>} store
+ * @param {(step: number) => void} sendSeek
+ */
+export function createPlayback(store, sendSeek) {
+  /** @type {((frame: Frame) => void)[]} */
+  const painters = [];
+  let frameAsked = false;
+  let dirty = true;
+  let windowDirty = true;
+  let lastTick = 0;
+  let rest = 0;
+  let lastSent = -1;
+  /** @type {Set<number>} */
+  const waits = new Set();
+
+  const pictures = createPictures(() => {
+    store.set({ loaded: store.get().loaded + 1 });
+    ask();
+  });
+
+  const results = createCache({
+    load: async (name, signal) => {
+      const [, step, samples] = name.split("/");
+      /** @type {StepResult} */
+      const result = await getJson(`/api/step/${step}${samples ? "?samples=1" : ""}`, { signal });
+      if (name !== resultName(result.run, result.step, Boolean(samples))) {
+        throw new Error(`asked for ${name}, the server shows run ${result.run} by now`);
+      }
+      return result;
+    },
+    sizeOf: () => 1,
+    budget: RESULTS_KEPT,
+    parallel: 2,
+    arrived: () => ask(),
+    failed: () => {
+      later();
+      return undefined;
+    },
+  });
+
+  /**
+   * @param {string} run
+   * @param {number} step
+   * @param {boolean} samples
+   */
+  function resultName(run, step, samples) {
+    return `${run || "none"}/${step}${samples ? "/samples" : ""}`;
+  }
+
+  /** Try again after something failed that may come back. */
+  function later() {
+    const wait = window.setTimeout(() => {
+      waits.delete(wait);
+      windowDirty = true;
+      ask();
+    }, 500);
+    waits.add(wait);
+  }
+
+  function ask() {
+    if (frameAsked) return;
+    frameAsked = true;
+    requestAnimationFrame(tick);
+  }
+
+  /** @param {PageState} state */
+  function refreshWindow(state) {
+    windowDirty = false;
+    const { server, run, step, speed, playing, layers2d } = state;
+    const sequence = server?.sequence;
+    if (!sequence) {
+      pictures.want([]);
+      results.want([]);
+      return;
+    }
+    const bytes = sequence.cameras.reduce((sum, c) => sum + (c.has_pictures ? c.width * c.height * 4 : 0), 0);
+    const how = { frames: sequence.frames, fps: sequence.fps, speed, direction: playing };
+    const most = Math.min(400, Math.floor((PICTURE_BUDGET * 0.9) / Math.max(1, bytes)));
+    const steps = prefetchWindow(step, { ...how, most });
+    pictures.want(
+      steps.flatMap((k) =>
+        sequence.cameras.flatMap((camera, index) =>
+          camera.has_pictures ? [pictureName({ sequence: sequence.key, camera: index, step: k })] : [],
+        ),
+      ),
+    );
+    const done = run?.done ?? 0;
+    const useful = steps.filter((k) => k === step || k < done);
+    results.want(useful.slice(0, RESULTS_KEPT / 2).map((k) => resultName(run?.key ?? "", k, layers2d.samples)));
+  }
+
+  /**
+   * @param {PageState} state
+   * @param {number} step
+   * @returns {Frame | null} null while something that will come is missing
+   */
+  function assemble(state, step) {
+    const sequence = state.server?.sequence;
+    if (!sequence) return null;
+    const lost = state.link === "lost";
+    const found = sequence.cameras.map((camera, index) =>
+      camera.has_pictures
+        ? pictures.get(pictureName({ sequence: sequence.key, camera: index, step }))
+        : { bitmap: null, missing: null },
+    );
+    if (!lost && found.some((picture) => picture === undefined)) return null;
+    const key = state.run?.key ?? "";
+    const result =
+      results.get(resultName(key, step, state.layers2d.samples)) ??
+      results.get(resultName(key, step, !state.layers2d.samples));
+    if (result) return { step, pictures: found, result, stale: false };
+    if (state.result && state.shown === step && state.result.step === step && state.result.cameras.length === sequence.cameras.length) {
+      return { step, pictures: found, result: state.result, stale: true };
+    }
+    return lost ? { step, pictures: found, result: null, stale: false } : null;
+  }
+
+  /** @param {number} now */
+  function tick(now) {
+    frameAsked = false;
+    let state = store.get();
+    const sequence = state.server?.sequence;
+    if (!sequence) return;
+    if (state.playing && state.step === state.shown) {
+      const [first, last] = playedRange(state.range, sequence.frames);
+      const how = { fps: sequence.fps, speed: state.speed, direction: state.playing, first, last, loop: state.loop };
+      const next = advance({ step: state.step, rest }, lastTick ? (now - lastTick) / 1000 : 0, how);
+      rest = next.rest;
+      lastTick = now;
+      if (next.step !== state.step) windowDirty = true;
+      store.set({ step: next.step, playing: next.ended ? 0 : state.playing });
+      state = store.get();
+    }
+    if (windowDirty) refreshWindow(state);
+    if (state.step !== state.shown || dirty) {
+      const frame = assemble(state, state.step);
+      if (frame) {
+        dirty = frame.stale;
+        for (const paint of painters) paint(frame);
+        // Tracks of a stale result belong to the run before: only the pictures keep them, faintly.
+        store.set({ shown: state.step, result: frame.result });
+      }
+    }
+    if (state.step !== lastSent) {
+      lastSent = state.step;
+      sendSeek(state.step);
+    }
+    if (state.playing) ask();
+  }
+
+  store.on(["server", "run"], (state) => {
+    const done = state.run?.done ?? 0;
+    for (const name of [...results.names()]) {
+      const result = results.get(name);
+      if (result && !result.computed && (result.run !== state.run?.key || result.step < done)) results.forget(name);
+    }
+    const shown = state.result;
+    if (!shown || shown.run !== state.run?.key || (!shown.computed && shown.step < done)) dirty = true;
+    windowDirty = true;
+    ask();
+  });
+  store.on(["step", "playing", "speed", "layers2d", "link"], () => {
+    windowDirty = true;
+    ask();
+  });
+  store.on(["playing"], () => {
+    lastTick = 0;
+    rest = 0;
+  });
+
+  return {
+    /** @param {(frame: Frame) => void} painter */
+    onPaint(painter) {
+      painters.push(painter);
+    },
+    /** Paint the shown step again: sizes, layers, selection or theme changed. */
+    repaint() {
+      dirty = true;
+      ask();
+    },
+    /**
+     * A result that came by itself.
+     * @param {StepResult} result
+     */
+    receive(result) {
+      const samples = result.cameras.some((camera) => (camera.samples?.length ?? 0) > 0);
+      results.put(resultName(result.run, result.step, samples), result);
+      if (result.step === store.get().step) dirty = true;
+      ask();
+    },
+    /** @param {number} step */
+    seek(step) {
+      const frames = store.get().server?.sequence?.frames ?? 0;
+      if (frames > 0) store.set({ step: clampStep(step, frames) });
+    },
+    /**
+     * Another tab or the 3D view moved the playhead.
+     * @param {number} step
+     */
+    follow(step) {
+      lastSent = step;
+      store.set({ step, playing: 0 });
+    },
+    /** Forget everything of the sequence before. */
+    clear() {
+      pictures.clear();
+      results.clear();
+      lastSent = -1;
+      dirty = true;
+      windowDirty = true;
+      ask();
+    },
+    /** @returns {number[]} steps with the pictures of all cameras */
+    loadedSteps() {
+      const sequence = store.get().server?.sequence;
+      if (!sequence) return [];
+      const cameras = sequence.cameras.filter((camera) => camera.has_pictures).length;
+      /** @type {Map<number, number>} */
+      const counts = new Map();
+      for (const name of pictures.names()) {
+        const step = Number(name.slice(name.lastIndexOf("/") + 1));
+        counts.set(step, (counts.get(step) ?? 0) + 1);
+      }
+      return [...counts].filter(([, count]) => count === cameras).map(([step]) => step);
+    },
+  };
+}

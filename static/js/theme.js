@@ -1,0 +1,13 @@
+// @ts-check
+// Runs before the first paint, so that the page never flashes in the other theme.
+{
+  /** @type {string | null} */
+  let chosen = null;
+  try {
+    chosen = localStorage.getItem("theme");
+  } catch {
+    // Storage may be switched off; the system's wish is a good default then.
+  }
+  const light = matchMedia("(prefers-color-scheme: light)").matches;
+  document.documentElement.dataset.theme = chosen ?? (light ? "light" : "dark");
+}

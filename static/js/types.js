@@ -1,0 +1,150 @@
+// @ts-check
+/**
+ * What comes over the wire and what the page keeps. Types only.
+ * Steps are 0-based; boxes are `[left, top, width, height]` in pixels; positions are metres.
+ *
+ * @typedef {[number, number, number, number]} Box
+ * @typedef {{code: string, message: string, field: string | null, hint: string | null}} ApiFailure
+ *
+ * @typedef {object} CameraInfo
+ * @property {string} name
+ * @property {number} width
+ * @property {number} height
+ * @property {boolean} has_pictures
+ * @property {boolean} has_detections
+ *
+ * @typedef {object} SequenceInfo
+ * @property {string} key  changes with the content, so that pictures may be cached for ever
+ * @property {string} name
+ * @property {string} description
+ * @property {number} fps
+ * @property {number} frames
+ * @property {boolean} has_pictures
+ * @property {boolean} has_detections
+ * @property {boolean} has_truth
+ * @property {CameraInfo[]} cameras
+ * @property {number} templates
+ *
+ * @typedef {object} RunState
+ * @property {string} key
+ * @property {"idle" | "computing" | "done" | "failed" | "cancelled"} state
+ * @property {number} done  steps that are computed
+ * @property {number} total
+ * @property {number | null} steps_per_second
+ * @property {number | null} seconds_left
+ * @property {string | null} message
+ * @property {ApiFailure | null} error
+ *
+ * @typedef {object} ServerState
+ * @property {number} version
+ * @property {SequenceInfo | null} sequence
+ * @property {{name: string, message: string, done: number, total: number} | null} opening
+ * @property {Record<string, any>} parameters
+ * @property {string[]} changed
+ * @property {{single_view: string, fusion_method: string}} methods
+ * @property {number} playhead
+ * @property {number | null} selection
+ * @property {RunState} run
+ * @property {{path: string}} viser
+ * @property {Record<string, boolean>} [layers]
+ * @property {number | null} [view]
+ *
+ * @typedef {object} TrackInView
+ * @property {number} id
+ * @property {Box | null} box
+ * @property {boolean} seen
+ * @property {number | null} detection_probability
+ * @property {number | null} source  index of the box that fed it, -1 where none did
+ * @property {number | null} hidden_by
+ * @property {boolean} visible
+ * @property {string | null} reason
+ * @property {[number, number] | null} centre
+ *
+ * @typedef {object} CameraStep
+ * @property {string} name
+ * @property {{box: Box, score: number}[]} measurements
+ * @property {{box: Box, weight: number, label: number}[]} estimates
+ * @property {[number, number, number][]} [samples]
+ * @property {TrackInView[]} tracks
+ * @property {{id: number, box: Box | null, valid: boolean}[]} truth
+ *
+ * @typedef {object} StepResult
+ * @property {string} run
+ * @property {number} step
+ * @property {boolean} computed
+ * @property {CameraStep[]} cameras
+ * @property {{id: number, position: number[], sigma: number[], existence: number, seen: boolean[]}[]} tracks
+ * @property {{id: number, position: number[], valid: boolean}[]} truth
+ * @property {number} components
+ * @property {number} cardinality
+ *
+ * @typedef {[number, number, "seen" | "coasting"]} Span  from and to are inclusive
+ * @typedef {{id: number, first: number, last: number, spans: Span[]}} TrackLane
+ *
+ * @typedef {object} Timeline
+ * @property {string} run
+ * @property {number} done
+ * @property {number} frames
+ * @property {number[]} cardinality
+ * @property {number[]} count
+ * @property {number[] | null} truth
+ * @property {TrackLane[]} tracks
+ *
+ * @typedef {object} Parameter
+ * @property {string} key
+ * @property {string} group
+ * @property {string} name
+ * @property {string} label
+ * @property {string} help
+ * @property {string} symbol
+ * @property {string} unit
+ * @property {string} kind
+ * @property {any} default
+ *
+ * @typedef {object} Schema
+ * @property {{name: string, help: string}[]} groups
+ * @property {Parameter[]} parameters
+ * @property {{single_view: string[], fusion_method: string[]}} methods
+ * @property {Record<string, Record<string, any>>} presets
+ *
+ * @typedef {object} SequenceEntry
+ * @property {string} name
+ * @property {string} description
+ * @property {"rendered" | "folder"} kind
+ * @property {number} cameras
+ * @property {number} frames
+ * @property {boolean} ready
+ * @property {string | null} [error]
+ *
+ * @typedef {{id: number, level: "info" | "warn" | "error", title: string, text: string, again?: () => void}} Note
+ *
+ * @typedef {object} PageState
+ * @property {"connecting" | "open" | "lost"} link
+ * @property {number} lostAt  milliseconds since 1970
+ * @property {number} retryAt  milliseconds since 1970
+ * @property {ServerState | null} server
+ * @property {RunState | null} run  the newest progress, also between two states
+ * @property {Schema | null} schema
+ * @property {SequenceEntry[]} sequences
+ * @property {Timeline | null} timeline  always of the run in `run`
+ * @property {number} step  what is asked for
+ * @property {number} shown  what is painted
+ * @property {StepResult | null} result  of the painted step
+ * @property {number} loaded  counts up whenever a picture arrives or leaves
+ * @property {0 | 1 | -1} playing
+ * @property {number} speed
+ * @property {boolean} loop
+ * @property {[number | null, number | null]} range  in and out points
+ * @property {number | null} selection
+ * @property {{id: number, camera: number} | null} hover
+ * @property {Record<string, boolean>} layers2d
+ * @property {Record<string, boolean>} layers3d
+ * @property {number} view3d  -1 is the free view, otherwise a camera's index
+ * @property {number | null} large  the camera that is shown large; null: all alike
+ * @property {"tracks" | "changes" | "runs"} tab
+ * @property {string} theme
+ * @property {boolean} singleKeys
+ * @property {Note[]} notes
+ */
+
+export {};
