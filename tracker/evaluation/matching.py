@@ -8,15 +8,18 @@ a pair counts from 1 (no distance) down to 1/2 (at the gate), so a second pair i
 nearly always worth more than a closer one. This is the score that TrackEval makes
 of 3D positions with a zero distance of twice the gate and a threshold of 1/2.
 
-Rows of the truth with ``valid = 0`` are "don't care". In this order, at each step:
+Rows of the truth with ``valid = 0`` are "don't care". At each step, before any figure:
 
-1. estimates and *valid* people are paired as above;
-2. the estimates left over and the don't-care rows are paired as above; an estimate
-   that finds one is set aside: it is neither right nor wrong;
+1. estimates are paired with *all* rows, don't-care ones included, as above, but a
+   don't-care row lies twice as far as it seems: it counts 1 − d / gate;
+2. an estimate paired with a don't-care row is set aside: it is neither right nor wrong;
 3. all don't-care rows are set aside: missing one is no miss.
 
-A certain position comes first because an uncertain one must never take away an
-estimate that the certain one could claim. All figures see what remains.
+So an uncertain position takes an estimate away from a certain one only where it is
+less than half as far. Without that handicap it would often take what belongs to the
+certain one; with certain rows served first throughout, a person whose own estimate
+is missing would be given his uncertain neighbour's, and two identity switches with
+it. All figures see what remains, and pair it by their own definitions.
 
 Distances: Euclidean in 3D (metres, the default); Euclidean on the ground plane
 (metres); or (1 − GIoU)/2 of the two upright boxes, 0 for equal boxes, 1/2 for
@@ -180,6 +183,16 @@ def assign(
     return rows[paired], columns[paired]
 
 
+def _on_dont_care(
+    certain: Float[ndarray, "G E"], uncertain: Float[ndarray, "D E"], gate: float
+) -> Int[ndarray, " I"]:
+    """The estimates (columns) of one step that are paired with a don't-care row."""
+    score = np.concatenate([1.0 - certain / (2.0 * gate), 1.0 - uncertain / gate])
+    score[np.concatenate([certain, uncertain]) > gate] = 0.0
+    rows, columns = linear_sum_assignment(score, maximize=True)
+    return np.asarray(columns[(rows >= len(certain)) & (score[rows, columns] > 0.0)])
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
     """Truth and estimates as the figures see them: what is "don't care" is set aside."""
@@ -210,7 +223,6 @@ def prepare(
     measure: Measure,
     *,
     steps: int,
-    ignore_gate: float | None = None,
 ) -> Comparison:
     """Sort both sides and set aside what is "don't care", as the module's protocol says.
 
@@ -219,7 +231,6 @@ def prepare(
         tracks: Estimates, in any order.
         measure: Distance and gate.
         steps: Steps 0 … ``steps`` − 1 are compared.
-        ignore_gate: The gate towards don't-care rows; the measure's own, if none.
     """
     everyone, sources = to_rows(
         truth.frames if truth else np.zeros(0),
@@ -233,12 +244,10 @@ def prepare(
     distances = distances_by_step(people, estimates, measure)
     keep = np.ones(len(estimates), dtype=bool)
     if len(dont_care):
-        to_dont_care = distances_by_step(dont_care, estimates, measure)
+        uncertain = distances_by_step(dont_care, estimates, measure)
         for step in np.flatnonzero(dont_care.counts * estimates.counts):
-            claimed = assign(distances[step], measure.gate)[1]
-            free = np.setdiff1d(np.arange(distances[step].shape[1]), claimed)
-            ignored = assign(to_dont_care[step][:, free], ignore_gate or measure.gate)[1]
-            keep[estimates.offsets[step] + free[ignored]] = False
+            ignored = _on_dont_care(distances[step], uncertain[step], measure.gate)
+            keep[estimates.offsets[step] + ignored] = False
         distances = tuple(
             matrix[:, keep[estimates.at(step)]] for step, matrix in enumerate(distances)
         )

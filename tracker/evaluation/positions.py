@@ -8,7 +8,15 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.evaluation.matching import Comparison, Matches, match
+from tracker.evaluation.matching import (
+    Comparison,
+    Matches,
+    Measure,
+    assign,
+    distances_by_step,
+    gather,
+    match,
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,32 +52,38 @@ class Positions:
         return float(self.found.sum()) / people if people else None
 
 
-def positions(comparison: Comparison, near: Comparison) -> Positions:
+def positions(comparison: Comparison, *, near: float) -> Positions:
     """Score the positions.
 
     Args:
         comparison: Truth and estimates with the gate of the evaluation.
-        near: The same with the near distance as its gate: found are the people
-            whom its own pairing reaches, stray are the estimates that it leaves
-            (don't-care rows still take what lies within the evaluation's gate).
+        near: Metres. Found are the people whom a pairing with this for its gate
+            reaches, stray are the estimates that it leaves.
     """
+    truth, tracks, measure = comparison.truth, comparison.tracks, comparison.measure
+    metres = Measure(
+        "ground" if measure.distance == "ground" else "position", near, measure.half_extents
+    )
+    distances = (
+        distances_by_step(truth, tracks, metres)
+        if measure.distance == "box"
+        else comparison.distances
+    )
+    close = gather(comparison, [assign(matrix, near) for matrix in distances])
     matches = match(comparison)
-    truth, tracks = comparison.truth, comparison.tracks
-    apart = truth.positions[matches.truth_rows] - tracks.positions[matches.track_rows]
-    if comparison.measure.distance == "ground":
-        apart = apart[:, :2]
-    errors = np.linalg.norm(apart, axis=1)
+    errors = metres.between(
+        truth.positions[matches.truth_rows], tracks.positions[matches.track_rows]
+    )
     by_person = np.full((len(truth.names), comparison.steps), np.nan)
     by_person[truth.indices[matches.truth_rows], truth.frames[matches.truth_rows]] = errors
-    close = match(near)
-    found_at = np.bincount(near.truth.frames[close.truth_rows], minlength=near.steps)
+    found_at = np.bincount(truth.frames[close.truth_rows], minlength=comparison.steps)
     return Positions(
         matches=matches,
         errors=errors,
         by_person=by_person,
-        found=np.bincount(near.truth.indices[close.truth_rows], minlength=len(near.truth.names)),
+        found=np.bincount(truth.indices[close.truth_rows], minlength=len(truth.names)),
         present=np.bincount(truth.indices, minlength=len(truth.names)),
-        stray=near.tracks.counts - found_at,
+        stray=tracks.counts - found_at,
     )
 
 

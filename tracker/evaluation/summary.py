@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence as Items
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -65,15 +64,7 @@ def evaluate(
     size = np.zeros(3) if half_extents is None else np.asarray(half_extents, dtype=float)
     measure = Measure(settings.distance, settings.effective_gate, size)
     comparison = prepare(truth, tracks, measure, steps=steps)
-    flat: Literal["ground", "position"] = "ground" if settings.distance == "ground" else "position"
-    near = prepare(
-        truth,
-        tracks,
-        Measure(flat, settings.near, size),
-        steps=steps,
-        ignore_gate=max(settings.gate, settings.near),
-    )
-    return _score(comparison, near, settings, size, cameras)
+    return _score(comparison, settings, size, cameras)
 
 
 def evaluate_sequence(
@@ -103,7 +94,6 @@ def evaluate_sequence(
 
 def _score(
     comparison: Comparison,
-    near: Comparison,
     settings: EvaluationSettings,
     half_extents: Float[ndarray, " 3"],
     cameras: Items[Camera],
@@ -113,7 +103,7 @@ def _score(
     osp, gsp = ospa(comparison, **cost), gospa(comparison, **cost)
     window = ospa2(comparison, **cost, window=settings.window)
     whole = ospa2_whole(comparison, **cost)
-    pos = positions(comparison, near)
+    pos = positions(comparison, near=settings.near)
     views = pixels(comparison, cameras, half_extents, overlap=settings.overlap)
     surplus, bias = cardinality_error(comparison)
     pictures = _all_cameras(views)
