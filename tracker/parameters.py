@@ -322,8 +322,8 @@ def _unknown(key: str) -> str:
     import difflib
 
     near = difflib.get_close_matches(key, [*PARAMETERS, *METHODS], n=1, cutoff=0.5)
-    hint = f"; did you mean {near[0]}?" if near else ""
-    return f"there is no such parameter{hint} `multiview-phd parameters` lists them all"
+    hint = f"did you mean {near[0]}? " if near else ""
+    return f"there is no such parameter; {hint}`multiview-phd parameters` lists them all"
 
 
 def _checked(parameter: Parameter, new: Any) -> Any:
@@ -339,6 +339,8 @@ def _checked(parameter: Parameter, new: Any) -> Any:
             raise ParameterError(parameter.key, f"expected true or false, got {new!r}")
         return known
     try:
+        if isinstance(new, bool):
+            raise TypeError
         number = float(new)
     except (TypeError, ValueError):
         raise ParameterError(parameter.key, f"expected a number, got {new!r}") from None
