@@ -238,7 +238,7 @@ def export_tracks(bench: Bench) -> Response:
         )
     done, tracks = run.done, run.tracks
     stream = io.StringIO(newline="")
-    export.write_tracks_csv(stream, run.sequence, tracks, run.parameters, run.seed)
+    export.write_tracks_csv(stream, run.sequence, tracks, run.parameters, run.seed, done=done)
     return Response(
         stream.getvalue(),
         media_type="text/csv; charset=utf-8",

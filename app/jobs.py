@@ -50,6 +50,13 @@ class _Wanted:
     stopped_by_person: bool = False
 
 
+def locate(name: str, data: Path | None) -> str:
+    """The folder under the data folder that a name of the list stands for, else the name."""
+    if data is not None and (data / name / "sequence.toml").is_file():
+        return str(data / name)
+    return name
+
+
 class Jobs:
     """Opens sequences and computes runs in threads of its own; reports to the workbench."""
 
@@ -102,15 +109,17 @@ class Jobs:
 
         def progress(done: int, total: int) -> None:
             nonlocal told_at
-            if cancelled.is_set():
-                raise Cancelled
             now = time.monotonic()
+            if cancelled.is_set():
+                return
             if now - told_at >= OPENING_TELLS_SECONDS or done == total:
                 told_at = now
                 self._workbench.set_opening(Opening(name, "rendering", done, total))
 
         try:
-            sequence = library.open_sequence(self._place(name), progress=progress)
+            sequence = library.open_sequence(
+                locate(name, self._data), progress=progress, cancelled=cancelled.is_set
+            )
             parameters = pipeline.default_parameters(sequence)
             reader = FrameReader(sequence)
             with self._condition:
@@ -119,10 +128,11 @@ class Jobs:
                     raise Cancelled
                 self._opening = None
             before = self._workbench.open(sequence, sequence.digest[:16], reader, parameters)
-        except Cancelled:
-            future.set_exception(Cancelled("another sequence was asked for"))
         except Exception as error:
-            if not isinstance(error, (ValueError, OSError)):
+            if cancelled.is_set():
+                future.set_exception(Cancelled("another sequence was asked for"))
+                return
+            if not isinstance(error, ValueError | OSError):
                 logger.exception("opening %s failed", name)
             self._opening_failed(name, cancelled, error)
             future.set_exception(error)
@@ -130,12 +140,6 @@ class Jobs:
             if before is not None:
                 self._close_when_unused(before)
             future.set_result(None)
-
-    def _place(self, name: str) -> str:
-        """The folder under the data folder that a name of the list stands for, else the name."""
-        if self._data is not None and (self._data / name / "sequence.toml").is_file():
-            return str(self._data / name)
-        return name
 
     def _opening_failed(self, name: str, cancelled: threading.Event, error: Exception) -> None:
         with self._condition:
@@ -236,7 +240,7 @@ class Jobs:
             if wanted.stopped_by_person:
                 workbench.run_ends(wanted.key, "cancelled")
         except Exception as error:
-            if not isinstance(error, (ValueError, OSError)):
+            if not isinstance(error, ValueError | OSError):
                 logger.exception("a run failed")
             words = sentence(error)
             workbench.run_ends(wanted.key, "failed", words)

@@ -64,7 +64,10 @@ class Pictures:
             self._under_way[key] = job
             job.add_done_callback(lambda done: self._keep(key, done))
         # a page that gives up must not cancel what another one waits for
-        jpeg = await asyncio.shield(self._under_way[key])
+        try:
+            jpeg = await asyncio.shield(self._under_way[key])
+        except ValueError:  # closed meanwhile: another sequence is open now
+            raise _missing("That sequence is not open any more.", "Load the page again.") from None
         if jpeg is None:
             name = sequence.views[camera].camera.name
             raise _missing(

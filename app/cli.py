@@ -1,0 +1,305 @@
+"""The command line: serve, track, sequences, render, parameters.
+
+Status 0 for success, 1 for a failure told in one line on standard error, 2 for
+wrong usage, 130 after Ctrl-C. The engine is imported by the command that needs it.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import sys
+import textwrap
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from app.flags import (
+    Arguments,
+    Parameters,
+    Render,
+    Sequences,
+    Serve,
+    Track,
+    describe_range,
+    parse,
+    show,
+)
+from tracker import parameters as table
+from tracker.parameters import ParameterError
+
+FAILURE, USAGE, INTERRUPTED = 1, 2, 130
+
+TRACEBACK = "MULTIVIEW_PHD_TRACEBACK"
+"""Environment variable: with any value, an unexpected failure shows where it happened."""
+
+
+class CommandError(Exception):
+    """A failure with its sentence."""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run one command; returns the exit status."""
+    try:
+        return _run(parse(arguments))
+    except ParameterError as error:
+        _say(str(error))
+        return USAGE
+    except KeyboardInterrupt:
+        _say("interrupted; nothing was written")
+        return INTERRUPTED
+    except BrokenPipeError:  # whoever read our output has enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except Exception as error:
+        if os.environ.get(TRACEBACK):
+            raise
+        _say(_sentence(error))
+        return FAILURE
+
+
+def _run(command: Arguments) -> int:
+    match command:
+        case Serve():
+            return _serve(command)
+        case Track():
+            _track(command)
+        case Sequences():
+            _sequences(command)
+        case Render():
+            _render(command)
+        case Parameters():
+            _parameters()
+    return 0
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(f"multiview-phd: {text}\n")
+    sys.stderr.flush()
+
+
+def _sentence(error: Exception) -> str:
+    words = " ".join(str(error).split())
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    if isinstance(error, ValueError | CommandError):
+        return words
+    return f"unexpected {type(error).__name__}: {words}; set {TRACEBACK}=1 to see where"
+
+
+# serve
+
+
+def _serve(command: Serve) -> int:
+    _check_data(command.data)
+    from app import server
+    from app.jobs import locate
+    from app.security import is_loopback
+    from tracker.sequences import library, rendering
+
+    place = locate(command.sequence, command.data)
+    if place not in rendering.ROOMS:
+        library.open_sequence(place)  # what cannot be read is told here, before a page is open
+    listener = _listen(command)
+    port = listener.getsockname()[1]
+    host = f"[{command.host}]" if ":" in command.host else command.host
+    shown = "127.0.0.1" if command.host == "0.0.0.0" else "[::1]" if host == "[::]" else host
+    address = f"http://{shown}:{port}"
+    if not is_loopback(command.host):
+        _say(f"anyone who reaches {command.host} can change what you see")
+
+    def ready() -> None:
+        sys.stdout.write(f"multiview-phd: {address} (Ctrl-C ends it)\n")
+        sys.stdout.flush()
+        if command.open:
+            import webbrowser
+
+            threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+
+    app = server.create_app(
+        server.Settings(host=command.host, sequence=command.sequence, data=command.data)
+    )
+    try:
+        server.serve(app, listener, ready)
+    except KeyboardInterrupt:
+        _leave(0)
+    return 0
+
+
+def _listen(command: Serve) -> Any:
+    from app import server
+
+    try:
+        return server.bind(command.host, command.port)
+    except OSError as error:
+        if error.errno != errno.EADDRINUSE:
+            raise CommandError(
+                f"cannot listen on {command.host}:{command.port}: {error.strerror}"
+            ) from None
+    for port in range(command.port + 1, min(command.port + 100, 65536)):
+        try:
+            server.bind(command.host, port).close()
+        except OSError:
+            continue
+        raise CommandError(f"port {command.port} is taken by another program; try --port {port}")
+    raise CommandError(f"port {command.port} is taken by another program; try --port 0")
+
+
+def _leave(status: int) -> None:
+    """End now, even where a thread is still in the middle of a step that nothing can interrupt."""
+    deadline = time.monotonic() + 0.3
+    while time.monotonic() < deadline:
+        if all(t.daemon or t is threading.main_thread() for t in threading.enumerate()):
+            return
+        time.sleep(0.02)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)
+
+
+def _check_data(data: Path | None) -> None:
+    if data is not None and not data.is_dir():
+        raise CommandError(f"--data {data}: expected a folder, found none")
+
+
+# track
+
+
+def _track(command: Track) -> None:
+    changes = command.changes()
+    table.with_values(table.RunParameters(), changes)  # wrong usage shows before any work
+    output = command.output
+    if output.is_dir():
+        raise CommandError(f"--output {output}: expected a file to write, found a folder")
+    if not output.parent.is_dir():
+        raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
+
+    from tracker import export, pipeline
+    from tracker.sequences import library
+
+    with _Bar("rendering", "frame") as rendering:
+        sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    parameters = table.with_values(pipeline.default_parameters(sequence), changes)
+    begin = time.perf_counter()
+    with _Bar("tracking", "step") as tracking:
+        tracking.at(0, sequence.frames)
+        run = pipeline.compute(
+            sequence,
+            parameters,
+            seed=command.seed,
+            on_progress=lambda _, progress: tracking.at(progress.done, progress.total),
+        )
+    seconds = time.perf_counter() - begin
+    export.save_tracks_csv(output, sequence, run.tracks, parameters, command.seed)
+    targets = len(set(run.tracks.ids.tolist()))
+    _say(
+        f"{sequence.frames} steps, {targets} tracks, {sequence.frames / seconds:.0f} steps/s "
+        f"({sequence.frames / seconds / sequence.fps:.1f} × real time), written to {output}"
+    )
+
+
+class _Bar:
+    """A progress bar on standard error, there from the first step on, and only for people."""
+
+    def __init__(self, words: str, unit: str) -> None:
+        self._words = words
+        self._unit = unit
+        self._bar: Any = None
+
+    def __enter__(self) -> _Bar:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+    def at(self, done: int, total: int) -> None:
+        """So far."""
+        if self._bar is None:
+            from tqdm import tqdm
+
+            self._bar = tqdm(
+                total=total, desc=self._words, unit=self._unit, disable=None, file=sys.stderr
+            )
+        self._bar.update(done - self._bar.n)
+
+
+# the rest
+
+
+def _sequences(command: Sequences) -> None:
+    _check_data(command.data)
+    from tracker.sequences import library
+
+    rows = [
+        (
+            entry.name,
+            entry.kind,
+            "" if entry.cameras is None else str(entry.cameras),
+            "" if entry.frames is None else str(entry.frames),
+            "no" if entry.error else "yes" if entry.ready else "when opened",
+            entry.error or entry.description,
+        )
+        for entry in library.available(command.data)
+    ]
+    _print_table(("name", "kind", "cameras", "steps", "ready", "description"), rows)
+
+
+def _render(command: Render) -> None:
+    from tracker.sequences import rendering
+
+    if command.name not in rendering.ROOMS:
+        known = ", ".join(rendering.ROOMS)
+        raise CommandError(f"NAME: expected one of {known}, got {command.name!r}")
+    if command.cameras not in (2, 3):
+        raise ParameterError("--cameras", f"expected 2 or 3, got {command.cameras}")
+    if command.folder.exists():
+        raise CommandError(f"{command.folder} exists; name a folder that does not")
+    with _Bar("rendering", "frame") as bar:
+        rendering.render(
+            command.name,
+            command.folder,
+            cameras=command.cameras,
+            seed=command.seed,
+            progress=bar.at,
+        )
+    _say(f"{command.name} with {command.cameras} cameras, written to {command.folder}")
+
+
+def _parameters() -> None:
+    methods = {
+        "single_view": "Method of stage 1 (--single-view).",
+        "fusion_method": "Method of stage 2 (--fusion).",
+    }
+    defaults = table.RunParameters()
+    rows = [
+        (key, "", "|".join(choices), "", show(table.value(defaults, key)), methods[key])
+        for key, choices in table.METHODS.items()
+    ]
+    rows += [
+        (p.key, p.symbol, describe_range(p), p.unit, show(p.default), p.help)
+        for p in table.PARAMETERS.values()
+    ]
+    _print_table(("key", "symbol", "range", "unit", "default", "help"), rows)
+
+
+def _print_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Aligned columns; on a terminal the last one is wrapped, in a file every row is a line."""
+    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)][:-1]
+    indent = sum(widths) + 2 * len(widths)
+    wrap: Callable[[str], list[str]] = lambda text: [text]  # noqa: E731
+    if sys.stdout.isatty():
+        room = shutil.get_terminal_size().columns - indent - 1
+        wrap = lambda text: textwrap.wrap(text, max(room, 30)) or [""]  # noqa: E731
+    for row in (head, *rows):
+        cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=False)]
+        first, *others = wrap(row[-1])
+        sys.stdout.write("  ".join([*cells, first]).rstrip() + "\n")
+        sys.stdout.writelines(" " * indent + line + "\n" for line in others)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

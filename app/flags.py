@@ -1,0 +1,202 @@
+"""The command line's arguments as types; each parameter's flag is made from its definition.
+
+Nothing here imports the engine: ``--help`` is there at once.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from dataclasses import dataclass, field, make_dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+from tyro.conf import Positional, UseAppendAction, arg, subcommand
+
+from tracker import parameters as table
+from tracker.parameters import METHODS, PRESETS, Parameter, ParameterError
+
+DEFAULT_SEQUENCE = "room44-3p"
+
+
+def has_screen() -> bool:
+    """Whether a browser can be shown."""
+    if sys.platform.startswith(("win", "darwin")):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+@dataclass
+class Serve:
+    """Start the workbench and serve its page on this machine."""
+
+    sequence: Annotated[
+        Positional[str], arg(metavar="SEQUENCE", help="A built-in room's name or a folder.")
+    ] = DEFAULT_SEQUENCE
+    host: str = "127.0.0.1"
+    """Address to listen on. Anything but this machine's own lets others change what you see."""
+    port: int = 8000
+    """Port to listen on."""
+    open: bool = field(default_factory=has_screen)
+    """Open the page in a browser; by default where there is a screen."""
+    data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None
+    """Folder whose folders are sequences that can be chosen on the page."""
+
+
+@dataclass
+class Track:
+    """Track the people of a sequence and write their tracks as CSV."""
+
+    sequence: Annotated[
+        Positional[str], arg(metavar="SEQUENCE", help="A built-in room's name or a folder.")
+    ]
+    output: Annotated[Path, arg(aliases=["-o"])]
+    """The file to write. It appears when it is complete."""
+    single_view: Annotated[
+        str | None,
+        arg(metavar="|".join(METHODS["single_view"]), help_behavior_hint="(default: what fits)"),
+    ] = None
+    """Method of stage 1."""
+    fusion_method: Annotated[
+        str | None,
+        arg(
+            name="fusion",
+            metavar="|".join(METHODS["fusion_method"]),
+            help_behavior_hint="(default: what fits)",
+        ),
+    ] = None
+    """Method of stage 2."""
+    preset: Annotated[
+        str | None, arg(metavar="|".join(PRESETS), help_behavior_hint="(default: robust)")
+    ] = None
+    """Named values to start from."""
+    set: Annotated[
+        UseAppendAction[tuple[str, ...]],
+        arg(metavar="KEY=VALUE", help_behavior_hint="(repeatable)"),
+    ] = ()
+    """One parameter, as in --set fusion.survival_probability=0.98; `parameters` lists the keys."""
+    seed: int = 0
+    """Seed of all randomness; the same seed gives the same tracks."""
+
+    def changes(self) -> dict[str, Any]:
+        """The values asked for, by key: preset, then ``--set``, then flags.
+
+        Raises:
+            ParameterError: If the preset or a ``--set`` is not as it must be.
+        """
+        changes: dict[str, Any] = {}
+        if self.preset is not None:
+            if self.preset not in PRESETS:
+                known = ", ".join(PRESETS)
+                raise ParameterError("--preset", f"expected one of {known}, got {self.preset!r}")
+            changes.update(PRESETS[self.preset])
+        for item in self.set:
+            key, mark, text = item.partition("=")
+            if not mark:
+                raise ParameterError("--set", f"expected KEY=VALUE, got {item!r}")
+            changes[key.strip()] = text.strip()
+        for key, chosen in (
+            ("single_view", self.single_view),
+            ("fusion_method", self.fusion_method),
+        ):
+            if chosen is not None:
+                changes[key] = chosen
+        for key in table.PARAMETERS:
+            group, name = key.split(".", 1)
+            value = getattr(getattr(self, group), name)
+            if value is not None:
+                changes[key] = value
+        return changes
+
+
+@dataclass
+class Sequences:
+    """List the sequences that can be opened by name."""
+
+    data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None
+    """Folder whose folders are sequences too."""
+
+
+@dataclass
+class Render:
+    """Render a built-in room into a folder, as an ordinary sequence."""
+
+    name: Annotated[Positional[str], arg(metavar="NAME", help="`sequences` lists the names.")]
+    folder: Annotated[Positional[Path], arg(metavar="FOLDER", help="It must not exist yet.")]
+    cameras: int = 2
+    """Two as in the paper, or three."""
+    seed: int = 0
+    """Seed of the noise."""
+
+
+@dataclass
+class Parameters:
+    """List every parameter with its range, unit, default and meaning."""
+
+
+def describe_range(parameter: Parameter) -> str:
+    """What a parameter may be, in words and without its unit: a range or its choices."""
+    if parameter.kind == "choice":
+        return "|".join(parameter.choices)
+    if parameter.kind == "bool":
+        return "true|false"
+    return f"{parameter.minimum:g} … {parameter.maximum:g}"
+
+
+def show(value: Any) -> str:
+    """A value as it is typed."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _flag(parameter: Parameter) -> tuple[str, Any, Any]:
+    metavar = {"float": "FLOAT", "int": "INT"}.get(parameter.kind, describe_range(parameter))
+    bounds = f", {describe_range(parameter)} {parameter.unit}".rstrip()
+    if parameter.kind not in ("float", "int"):
+        bounds = ""  # the choices stand in the flag's own line
+    annotation = Annotated[
+        str | None,
+        arg(
+            metavar=metavar,
+            help=f"{parameter.help} {parameter.symbol}{bounds}.",
+            help_behavior_hint=f"(default: {show(parameter.default)})",
+        ),
+    ]
+    return parameter.name, annotation, field(default=None)
+
+
+def _track_with_flags() -> Any:
+    """``Track`` with a flag for every parameter: ``--fusion.survival-probability`` and so on."""
+    groups: list[tuple[str, Any, Any]] = []
+    for group, text in table.GROUPS.items():
+        flags = [_flag(p) for p in table.PARAMETERS.values() if p.group == group]
+        kind = make_dataclass(f"{group.title().replace('_', '')}Flags", flags)
+        kind.__doc__ = text
+        groups.append((group, kind, field(default_factory=kind)))
+    with_flags = make_dataclass("TrackWithFlags", groups, bases=(Track,))
+    with_flags.__doc__ = Track.__doc__
+    return with_flags
+
+
+Arguments = Serve | Track | Sequences | Render | Parameters
+
+
+def parse(arguments: list[str] | None = None) -> Arguments:
+    """The command and its arguments. Wrong usage ends the program with status 2."""
+    track: Any = _track_with_flags()
+    commands: Any = (
+        Annotated[Serve, subcommand("serve")]
+        | Annotated[track, subcommand("track")]
+        | Annotated[Sequences, subcommand("sequences")]
+        | Annotated[Render, subcommand("render")]
+        | Annotated[Parameters, subcommand("parameters")]
+    )
+    parsed: Arguments = tyro.cli(
+        commands,
+        prog="multiview-phd",
+        description="Track several people in 3D from calibrated cameras.",
+        args=arguments,
+    )
+    return parsed
