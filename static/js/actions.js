@@ -1,6 +1,6 @@
 // @ts-check
 /** What a person can do: the page's own state at once, the server's by request. */
-import { ApiError, sendJson } from "./api.js";
+import { ApiError, request, sendJson } from "./api.js";
 import { SPEEDS, clampStep } from "./clock.js";
 import { eventsOf, nextEvent } from "./events.js";
 
@@ -8,6 +8,21 @@ import { eventsOf, nextEvent } from "./events.js";
  * @typedef {import("./types.js").PageState} PageState
  * @typedef {import("./commands.js").Actions} Actions
  */
+
+/**
+ * Save what an address gives, once it is known that it gives it.
+ * @param {string} path
+ * @param {string} fallback  name of the file where the answer has none
+ */
+async function download(path, fallback) {
+  const response = await request(path);
+  const named = /filename="?([^";]+)"?/.exec(response.headers.get("content-disposition") ?? "");
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(await response.blob());
+  link.download = named?.[1] ?? fallback;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+}
 
 /**
  * @param {object} parts
@@ -72,18 +87,18 @@ export function createActions({ store, seek, send, help, receive }) {
     select,
     open: (/** @type {string} */ name) => ask("POST", "/api/sequence", { name }),
     change: changeTo,
-    reset: (/** @type {string[] | undefined} */ keys) => ask("POST", "/api/parameters/reset", keys ? { keys } : {}),
+    reset: (/** @type {string[]} */ ...keys) => ask("POST", "/api/parameters/reset", keys.length ? { keys } : {}),
     preset: (/** @type {string} */ name) => ask("POST", "/api/parameters/preset", { name }),
     cancel: () => ask("POST", "/api/run/cancel"),
+    runAgain: () => ask("POST", "/api/run"),
     chooseView(/** @type {number} */ camera) {
       store.set({ view3d: camera });
-      const view = camera < 0 ? "free" : (store.get().server?.sequence?.cameras[camera]?.name ?? "free");
-      void ask("POST", "/api/view", { view });
+      void ask("POST", "/api/view", { camera: camera < 0 ? null : camera });
     },
     toggleLayer3d(/** @type {string} */ layer) {
       const layers3d = { ...store.get().layers3d, [layer]: !store.get().layers3d[layer] };
       store.set({ layers3d });
-      void ask("PATCH", "/api/layers", { [layer]: layers3d[layer] });
+      void ask("PATCH", "/api/layers", { changes: { [layer]: layers3d[layer] } });
     },
     toggleLayer2d(/** @type {string} */ layer) {
       const { layers2d } = store.get();
@@ -162,8 +177,8 @@ export function createActions({ store, seek, send, help, receive }) {
       store.set({ range: next, loop: next[0] !== null || next[1] !== null });
     },
     toEvent(direction) {
-      const { timeline, server, run, step } = store.get();
-      const events = eventsOf(timeline?.tracks ?? [], { fps: server?.sequence?.fps ?? 25, done: run?.done ?? 0 });
+      const { timeline, server, step } = store.get();
+      const events = eventsOf(timeline?.tracks ?? [], { fps: server?.sequence?.fps ?? 25, done: timeline?.done ?? 0 });
       const event = nextEvent(events, step, direction);
       if (!event) return;
       store.set({ playing: 0 });
@@ -196,19 +211,7 @@ export function createActions({ store, seek, send, help, receive }) {
     },
     clear: () => select(null),
     exportTracks() {
-      void (async () => {
-        try {
-          const response = await fetch("/api/export/tracks.csv", { method: "HEAD" });
-          if (response.status === 0) throw new Error("no answer");
-        } catch {
-          tell(new ApiError(0, { code: "unreachable", message: "The tracks cannot be exported: the server does not answer.", field: null, hint: "Start it again; parameters are kept there." }));
-          return;
-        }
-        const link = document.createElement("a");
-        link.href = "/api/export/tracks.csv";
-        link.download = "";
-        link.click();
-      })();
+      void download("/api/export/tracks.csv", "tracks.csv").catch(tell);
     },
     toggleTheme: () => store.set({ theme: store.get().theme === "dark" ? "light" : "dark" }),
     help,

@@ -6,7 +6,7 @@
  */
 
 /** Steps without a box from any camera that make a miss long, in seconds. */
-export const LONG_MISS = 0.6;
+export const LONG_MISS = 1.5;
 
 /**
  * @param {TrackLane} track

@@ -42,6 +42,7 @@ const store = createStore(
     run: null,
     schema: null,
     sequences: [],
+    basis: "",
     timeline: null,
     step: 0,
     shown: -1,
@@ -78,20 +79,14 @@ const { actions, page } = createActions({
 });
 
 const element = (/** @type {string} */ selector) => /** @type {HTMLElement} */ (document.querySelector(selector));
-const retry = () => stream.retry();
-mountTop(element(".top"), store, { ...page, ...actions });
-mountNotes(element(".notes"), store, { retry, reset: (key) => page.reset([key]) });
-mountView3d(element(".view"), store, { toggleLayer: page.toggleLayer3d, chooseView: page.chooseView, retry });
-mountCameras(element(".cams"), store, {
-  onPaint: playback.onPaint,
-  repaint: playback.repaint,
-  toggleLayer: page.toggleLayer2d,
-  chooseCamera: actions.chooseCamera,
-  select: page.select,
-});
-mountSide(element(".side"), store, { ...page, seek: playback.seek, exportTracks: actions.exportTracks, toEvent: actions.toEvent, undo: actions.undo });
-mountTimeline(element(".time"), store, { actions, seek: playback.seek, select: page.select, loadedSteps: playback.loadedSteps });
-toggleHelp = mountHelp(store);
+const context = { store, playback, actions, page, retry: () => stream.retry() };
+mountTop(element(".top"), context);
+mountNotes(element(".notes"), context);
+mountView3d(element(".view"), context);
+mountCameras(element(".cams"), context);
+mountSide(element(".side"), context);
+mountTimeline(element(".time"), context);
+toggleHelp = mountHelp(context);
 
 /** The place of the address is gone to once, when its sequence is open. */
 let place = start.place;
@@ -115,7 +110,7 @@ function receiveState(server) {
     const cameras = server.sequence?.cameras.length ?? 0;
     const large = place.camera !== null && place.camera < cameras ? place.camera : cameras > 2 ? 0 : null;
     const known = place.selection !== null && here ? place.selection : server.selection;
-    store.set({ timeline: null, result: null, shown: -1, step: 0, playing: 0, range: [null, null], loop: false, hover: null, large, selection: known });
+    store.set({ basis: "", timeline: null, result: null, shown: -1, step: 0, playing: 0, range: [null, null], loop: false, hover: null, large, selection: known });
     if (server.sequence) store.set({ step: Math.max(0, Math.min(server.sequence.frames - 1, step)) });
     if (server.sequence && (!place.sequence || place.sequence === server.sequence.name)) {
       place = { sequence: null, step: null, selection: null, camera: null };
@@ -124,11 +119,18 @@ function receiveState(server) {
     page.remember(before.parameters, server.parameters);
     if (before.selection !== server.selection) store.set({ selection: server.selection });
   }
-  const newRun = store.get().run?.key !== server.run.key;
   store.set({ server, run: server.run, ...(server.layers ? { layers3d: { ...store.get().layers3d, ...server.layers } } : {}) });
-  if (newRun) store.set({ timeline: null });
-  if (newRun || server.run.done !== store.get().timeline?.done) fetchTimeline();
   if (first || before?.opening?.name !== server.opening?.name) fetchSequences();
+}
+
+/**
+ * The server shows this run from now on.
+ * @param {string} run
+ */
+function showRun(run) {
+  if (run === store.get().basis) return;
+  store.set({ basis: run, timeline: null });
+  void fetchTimeline();
 }
 
 let timelineBusy = false;
@@ -142,9 +144,8 @@ async function fetchTimeline() {
     if (!store.get().server?.sequence) break;
     try {
       const timeline = await getJson("/api/timeline");
-      // Lanes of another run than the one that is shown would mix the two.
-      if (timeline.run === store.get().run?.key) store.set({ timeline });
-      else if (timeline.run !== store.get().server?.run.key) timelineAgain = false;
+      // Lanes of another run than the one that is shown would mix the two; its own news is on the way.
+      if (timeline.run === store.get().basis) store.set({ timeline });
     } catch {
       break;
     }
@@ -183,9 +184,11 @@ function receive(message) {
       if (message.origin !== origin && store.get().server?.sequence) playback.follow(message.step);
       break;
     case "step":
+      showRun(message.run);
       playback.receive(message);
       break;
     case "timeline":
+      showRun(message.run);
       void fetchTimeline();
       break;
     case "notice":

@@ -26,6 +26,15 @@ import { createPictures, pictureName, PICTURE_BUDGET } from "./pictures.js";
 const RESULTS_KEPT = 600;
 
 /**
+ * How many steps of the shown run are there.
+ * @param {Readonly<PageState>} state
+ * @returns {number}
+ */
+export function shownDone({ basis, run, timeline }) {
+  return run && basis === run.key ? run.done : (timeline?.done ?? 0);
+}
+
+/**
  * @param {import("./store.js").Store<PageState>} store
  * @param {(step: number) => void} sendSeek
  */
@@ -94,7 +103,7 @@ export function createPlayback(store, sendSeek) {
   /** @param {PageState} state */
   function refreshWindow(state) {
     windowDirty = false;
-    const { server, run, step, speed, playing, layers2d } = state;
+    const { server, basis, step, speed, playing, layers2d } = state;
     const sequence = server?.sequence;
     if (!sequence) {
       pictures.want([]);
@@ -112,9 +121,9 @@ export function createPlayback(store, sendSeek) {
         ),
       ),
     );
-    const done = run?.done ?? 0;
+    const done = shownDone(state);
     const useful = steps.filter((k) => k === step || k < done);
-    results.want(useful.slice(0, RESULTS_KEPT / 2).map((k) => resultName(run?.key ?? "", k, layers2d.samples)));
+    results.want(useful.slice(0, RESULTS_KEPT / 2).map((k) => resultName(basis, k, layers2d.samples)));
   }
 
   /**
@@ -132,15 +141,17 @@ export function createPlayback(store, sendSeek) {
         : { bitmap: null, missing: null },
     );
     if (!lost && found.some((picture) => picture === undefined)) return null;
-    const key = state.run?.key ?? "";
+    const { samples } = state.layers2d;
     const result =
-      results.get(resultName(key, step, state.layers2d.samples)) ??
-      results.get(resultName(key, step, !state.layers2d.samples));
-    if (result) return { step, pictures: found, result, stale: false };
-    if (state.result && state.shown === step && state.result.step === step && state.result.cameras.length === sequence.cameras.length) {
-      return { step, pictures: found, result: state.result, stale: true };
+      results.get(resultName(state.basis, step, samples)) ?? results.get(resultName(state.basis, step, !samples));
+    const computing = state.run?.state === "computing";
+    if (result?.computed) return { step, pictures: found, result, stale: computing && result.run !== state.run?.key };
+    // Until the new run comes to this step, the one before is faintly better than nothing.
+    const before = state.result;
+    if (computing && before?.computed && before.step === step && state.shown === step) {
+      return { step, pictures: found, result: before, stale: true };
     }
-    return lost ? { step, pictures: found, result: null, stale: false } : null;
+    return result || lost ? { step, pictures: found, result: result ?? null, stale: false } : null;
   }
 
   /** @param {number} now */
@@ -165,7 +176,6 @@ export function createPlayback(store, sendSeek) {
       if (frame) {
         dirty = frame.stale;
         for (const paint of painters) paint(frame);
-        // Tracks of a stale result belong to the run before: only the pictures keep them, faintly.
         store.set({ shown: state.step, result: frame.result });
       }
     }
@@ -176,14 +186,13 @@ export function createPlayback(store, sendSeek) {
     if (state.playing) ask();
   }
 
-  store.on(["server", "run"], (state) => {
-    const done = state.run?.done ?? 0;
+  store.on(["server", "run", "basis", "timeline"], (state) => {
+    const done = shownDone(state);
     for (const name of [...results.names()]) {
       const result = results.get(name);
-      if (result && !result.computed && (result.run !== state.run?.key || result.step < done)) results.forget(name);
+      if (result && !result.computed && (result.run !== state.basis || result.step < done)) results.forget(name);
     }
-    const shown = state.result;
-    if (!shown || shown.run !== state.run?.key || (!shown.computed && shown.step < done)) dirty = true;
+    dirty = true;
     windowDirty = true;
     ask();
   });

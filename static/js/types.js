@@ -32,8 +32,8 @@
  * @property {number} total
  * @property {number | null} steps_per_second
  * @property {number | null} seconds_left
- * @property {string | null} message
- * @property {ApiFailure | null} error
+ * @property {string | null} message  the stage that takes the time
+ * @property {string | null} error
  *
  * @typedef {object} ServerState
  * @property {number} version
@@ -64,7 +64,7 @@
  * @property {string} name
  * @property {{box: Box, score: number}[]} measurements
  * @property {{box: Box, weight: number, label: number}[]} estimates
- * @property {[number, number, number][]} [samples]
+ * @property {[number, number, number][] | null} [samples]
  * @property {TrackInView[]} tracks
  * @property {{id: number, box: Box | null, valid: boolean}[]} truth
  *
@@ -111,8 +111,8 @@
  * @property {string} name
  * @property {string} description
  * @property {"rendered" | "folder"} kind
- * @property {number} cameras
- * @property {number} frames
+ * @property {number | null} cameras
+ * @property {number | null} frames
  * @property {boolean} ready
  * @property {string | null} [error]
  *
@@ -126,7 +126,8 @@
  * @property {RunState | null} run  the newest progress, also between two states
  * @property {Schema | null} schema
  * @property {SequenceEntry[]} sequences
- * @property {Timeline | null} timeline  always of the run in `run`
+ * @property {string} basis  key of the run that the server shows: that in `run`, or while that has no step yet, one before
+ * @property {Timeline | null} timeline  always of the run `basis`
  * @property {number} step  what is asked for
  * @property {number} shown  what is painted
  * @property {StepResult | null} result  of the painted step
@@ -145,6 +146,13 @@
  * @property {string} theme
  * @property {boolean} singleKeys
  * @property {Note[]} notes
+ *
+ * @typedef {object} Context  what every pane is given
+ * @property {import("./store.js").Store<PageState>} store
+ * @property {ReturnType<typeof import("./playback.js").createPlayback>} playback
+ * @property {import("./commands.js").Actions} actions
+ * @property {ReturnType<typeof import("./actions.js").createActions>["page"]} page
+ * @property {() => void} retry  connect now
  */
 
 export {};

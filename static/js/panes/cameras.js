@@ -7,8 +7,6 @@ import { mosaic } from "../mosaic.js";
 import { pictureInk } from "../palette.js";
 
 /**
- * @typedef {import("../types.js").PageState} PageState
- * @typedef {import("../types.js").CameraStep} CameraStep
  * @typedef {import("../types.js").TrackInView} TrackInView
  * @typedef {import("../playback.js").Frame} Frame
  */
@@ -24,21 +22,15 @@ const LAYERS = [
 
 /**
  * @param {HTMLElement} root
- * @param {import("../store.js").Store<PageState>} store
- * @param {object} on
- * @param {(painter: (frame: Frame) => void) => void} on.onPaint
- * @param {() => void} on.repaint
- * @param {(layer: string) => void} on.toggleLayer
- * @param {(index: number) => void} on.chooseCamera
- * @param {(id: number | null) => void} on.select
+ * @param {import("../types.js").Context} context
  */
-export function mountCameras(root, store, on) {
+export function mountCameras(root, { store, page, actions, playback }) {
   /** @type {Record<string, HTMLButtonElement>} */
   const chips = {};
   for (const [layer, word, sign, command] of LAYERS) {
     chips[layer] = h(
       "button",
-      { class: "chip end", ...tipOf(command), onclick: () => on.toggleLayer(layer) },
+      { class: "chip end", ...tipOf(command), onclick: () => page.toggleLayer2d(layer) },
       icon(sign, "", "0 0 14 10"),
       h("span", {}, word),
     );
@@ -80,11 +72,11 @@ export function mountCameras(root, store, on) {
         "aria-label": `Camera ${camera.name}: make large`,
         onclick: () => {
           const id = store.get().hover?.id;
-          if (id !== undefined) on.select(id);
-          else on.chooseCamera(index);
+          if (id !== undefined) page.select(id);
+          else actions.chooseCamera(index);
         },
         onkeydown: (/** @type {KeyboardEvent} */ event) => {
-          if (event.key === "Enter") on.chooseCamera(index);
+          if (event.key === "Enter") actions.chooseCamera(index);
         },
         onpointermove: (/** @type {PointerEvent} */ event) => point(index, event),
         onpointerleave: () => store.set({ hover: null }),
@@ -138,7 +130,7 @@ export function mountCameras(root, store, on) {
           layers: state.layers2d,
           selection: state.selection,
           hover: state.hover?.id ?? null,
-          opacity: next.stale ? 0.4 : 1,
+          opacity: next.stale ? 0.45 : 1,
           ink,
         });
       }
@@ -206,7 +198,7 @@ export function mountCameras(root, store, on) {
       const camera = server?.sequence?.cameras[index];
       card.hidden = !track?.box || !view || !camera || places[index].width <= 260;
       if (card.hidden || !track?.box || !view || !camera) return;
-      fillCard(card, track, view);
+      fillCard(card, track);
       const { width, height } = places[index];
       const scale = width / camera.width;
       const left = track.box[0] * scale - card.offsetWidth - 8;
@@ -219,11 +211,9 @@ export function mountCameras(root, store, on) {
   /**
    * @param {HTMLElement} card
    * @param {TrackInView} track
-   * @param {CameraStep} view
    */
-  function fillCard(card, track, view) {
+  function fillCard(card, track) {
     const whole = frame?.result?.tracks.find((t) => t.id === track.id);
-    const box = track.source !== null && track.source >= 0 ? view.estimates[track.source] : undefined;
     fill(
       card,
       h("h3", {}, idTag(track.id), track.seen ? "seen" : "coasting"),
@@ -238,7 +228,7 @@ export function mountCameras(root, store, on) {
         [
           h("dt", {}, "fed by"),
           track.seen
-            ? h("dd", {}, `box ${(track.source ?? 0) + 1}`, box && h("small", {}, ` weight ${box.weight.toFixed(2)}`))
+            ? h("dd", {}, `box ${(track.source ?? 0) + 1}`)
             : h("dd", {}, "no box here"),
         ],
         whole && [h("dt", {}, "at"), h("dd", {}, whole.position.map((v) => v.toFixed(2)).join("  "), h("small", {}, " m"))],
@@ -260,17 +250,18 @@ export function mountCameras(root, store, on) {
     }
   }
 
-  on.onPaint(paint);
+  playback.onPaint(paint);
   store.on(["server"], (state) => {
     if ((state.server?.sequence?.key ?? "") !== sequenceKey) build();
     header();
   });
   store.on(["layers2d"], () => {
     header();
-    on.repaint();
+    playback.repaint();
   });
   store.on(["large"], arrange);
-  store.on(["selection", "hover"], on.repaint);
+  store.on(["selection", "hover"], playback.repaint);
   new ResizeObserver(arrange).observe(root);
+  addEventListener("resize", arrange);
   header();
 }

@@ -2,8 +2,6 @@
 /** What differs from the defaults: each with its reset, and all of it as a command. */
 import { chooser, fill, h, icon, show, symbolNodes, tipOf } from "../dom.js";
 
-/** @typedef {import("../types.js").PageState} PageState */
-
 /**
  * The command line that makes the same run.
  * @param {string} sequence
@@ -21,22 +19,21 @@ export function commandLine(sequence, parameters, changed) {
 }
 
 /**
- * @param {HTMLElement} panel
- * @param {import("../store.js").Store<PageState>} store
- * @param {import("./side.js").SideActions} actions
+ * @param {HTMLElement} root
+ * @param {import("../types.js").Context} context
  */
-export function mountChanges(panel, store, actions) {
+export function mountChanges(root, { store, page, actions }) {
   const body = h("tbody", {});
   const head = h("tr", {}, ["Stage", "Parameter"].map((word) => h("th", { scope: "col" }, word)), ["Default", "Now", ""].map((word) => h("th", { scope: "col", class: "num" }, word)));
   const table = h("div", { class: "scroll" }, h("table", { "aria-label": "Changed parameters" }, h("thead", {}, head), body));
   const nothing = h("div", { class: "scroll", hidden: true }, h("div", { class: "blank" }, h("h3", {}, "All parameters stand at their defaults"), h("p", {}, "Move a slider in the panel of the 3D view; what differs is listed here.")));
-  const presets = chooser({ label: "Preset", box: true, choose: actions.preset });
-  const resetAll = h("button", { class: "btn up end", "data-tip": "All to their defaults", onclick: () => actions.reset() }, icon("i-reset", "s"), "Reset all");
+  const presets = chooser({ label: "Preset", box: true, choose: page.preset });
+  const resetAll = h("button", { class: "btn up end", "data-tip": "All to their defaults", onclick: () => page.reset() }, icon("i-reset", "s"), "Reset all");
   const undo = h("button", { class: "btn up end", ...tipOf("undo", "Undo the last change"), onclick: actions.undo }, "Undo");
   const code = h("code", {});
   const copied = (/** @type {HTMLButtonElement} */ button, /** @type {string} */ word, /** @type {() => string} */ text) => {
     button.addEventListener("click", async () => {
-      const done = await actions.copy(text());
+      const done = await page.copy(text());
       const label = button.lastChild;
       if (!label) return;
       label.textContent = done ? "Copied" : "Not allowed";
@@ -52,7 +49,7 @@ export function mountChanges(panel, store, actions) {
     const { server } = store.get();
     return JSON.stringify(Object.fromEntries((server?.changed ?? []).map((key) => [key, server?.parameters[key]])), null, 2);
   };
-  panel.append(
+  root.append(
     table,
     nothing,
     h("div", { class: "foot" }, h("span", {}, "preset"), presets.root, h("span", { class: "grow" }), undo, resetAll),
@@ -89,7 +86,7 @@ export function mountChanges(panel, store, actions) {
           h("td", {}, name),
           h("td", { class: "num q" }, parameter ? show(parameter.default) : "–"),
           h("td", { class: "num" }, show(server?.parameters[key]), unit && h("span", { class: "q opt-1" }, unit)),
-          h("td", { class: "num" }, h("button", { class: "btn", disabled: locked, "aria-label": `Reset ${parameter?.label ?? key}`, onclick: () => actions.reset([key]) }, icon("i-reset", "s"), "reset")),
+          h("td", { class: "num" }, h("button", { class: "btn", disabled: locked, "aria-label": `Reset ${parameter?.label ?? key}`, onclick: () => page.reset(key) }, icon("i-reset", "s"), "reset")),
         );
       }),
     );

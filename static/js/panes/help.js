@@ -3,13 +3,11 @@
 import { COMMANDS, keyLabel } from "../commands.js";
 import { h, icon } from "../dom.js";
 
-/** @typedef {import("../types.js").PageState} PageState */
-
 /**
- * @param {import("../store.js").Store<PageState>} store
+ * @param {import("../types.js").Context} context
  * @returns {() => void} opens or closes it
  */
-export function mountHelp(store) {
+export function mountHelp({ store }) {
   const groups = [...new Set(COMMANDS.map((command) => command.group))];
   const rows = (/** @type {string} */ group) => {
     const commands = COMMANDS.filter((c) => c.group === group && !/^camera-[2-9]$/.test(c.name));

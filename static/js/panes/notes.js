@@ -2,16 +2,11 @@
 /** Notes under the top bar: what happened, what still works, what to do next. */
 import { fill, h, icon } from "../dom.js";
 
-/** @typedef {import("../types.js").PageState} PageState */
-
 /**
  * @param {HTMLElement} root
- * @param {import("../store.js").Store<PageState>} store
- * @param {object} on
- * @param {() => void} on.retry
- * @param {(key: string) => void} on.reset
+ * @param {import("../types.js").Context} context
  */
-export function mountNotes(root, store, on) {
+export function mountNotes(root, { store, page, retry }) {
   /** @type {string} */
   let dismissed = "";
   /** @type {ReturnType<typeof setInterval> | undefined} */
@@ -37,7 +32,7 @@ export function mountNotes(root, store, on) {
     h("button", { class: "btn icon end", "aria-label": "Dismiss", "data-tip": "Dismiss", onclick: act }, icon("i-close"));
 
   function render() {
-    const { link, lostAt, retryAt, run, notes, server, schema } = store.get();
+    const { link, lostAt, retryAt, run, basis, notes, server } = store.get();
     /** @type {HTMLElement[]} */
     const all = [];
     if (link === "lost") {
@@ -46,20 +41,17 @@ export function mountNotes(root, store, on) {
       const wait = seconds > 0 ? `Next try in ${seconds} s.` : "Trying now.";
       all.push(
         note("bad", `No connection since ${since}`, `What was loaded can still be looked at; parameters are locked until the server is back. ${wait}`, [
-          h("button", { class: "btn box", onclick: on.retry }, "Try now"),
+          h("button", { class: "btn box", onclick: retry }, "Try now"),
         ]),
       );
     }
     if (run?.state === "failed" && dismissed !== run.key) {
-      const field = run.error?.field ?? "";
-      const parameter = schema?.parameters.find((p) => p.key === field);
-      const words = [run.error?.message ?? run.message ?? "", run.error?.hint ?? ""];
-      words.push(run.done > 0 ? `Steps 0 to ${run.done - 1} are shown and can be exported.` : "Change a parameter, or choose another method.");
+      const words = [run.error ?? "The terminal says more."];
+      words.push(basis && basis !== run.key ? "The run before is still shown." : "Change a parameter, or choose another method.");
       all.push(
-        note("bad", `The run stopped at step ${run.done}`, words.filter(Boolean).join(" "), [
-          parameter && server?.changed.includes(field)
-            ? h("button", { class: "btn box", onclick: () => on.reset(field) }, `Reset ${parameter.label.toLowerCase()}`)
-            : null,
+        note("bad", `The run stopped at step ${run.done}`, words.join(" "), [
+          server?.changed.length ? h("button", { class: "btn box", onclick: () => page.reset() }, "Reset all parameters") : null,
+          h("button", { class: "btn box", onclick: page.runAgain }, "Try again"),
           close(() => {
             dismissed = run.key;
             render();
@@ -84,6 +76,6 @@ export function mountNotes(root, store, on) {
     if (store.get().link === "lost" && !root.contains(document.activeElement)) render();
   }
 
-  store.on(["link", "retryAt", "run", "notes", "schema"], render);
+  store.on(["link", "retryAt", "run", "basis", "notes"], render);
   render();
 }

@@ -4,18 +4,16 @@ import { fill, h, icon, show } from "../dom.js";
 import { rateText, runWords } from "./top.js";
 
 /**
- * @typedef {import("../types.js").PageState} PageState
  * @typedef {{key: string, number: number, at: string, sequence: string, state: string, done: number, total: number, speed: string, changes: number, parameters: Record<string, any>}} PastRun
  */
 
 const MOST_RUNS = 50;
 
 /**
- * @param {HTMLElement} panel
- * @param {import("../store.js").Store<PageState>} store
- * @param {import("./side.js").SideActions} actions
+ * @param {HTMLElement} root
+ * @param {import("../types.js").Context} context
  */
-export function mountRuns(panel, store, actions) {
+export function mountRuns(root, { store, page, actions }) {
   /** @type {PastRun[]} */
   let past = [];
   let counted = 0;
@@ -24,7 +22,7 @@ export function mountRuns(panel, store, actions) {
   const head = h("tr", {}, words.map(([word, kind]) => h("th", { scope: "col", class: kind }, word)));
   const facts = h("span", {});
   const csv = h("button", { class: "btn up end", "data-tip": "Tracks of the current run, with all parameters", onclick: actions.exportTracks }, icon("i-export", "s"), "tracks.csv");
-  panel.append(
+  root.append(
     h("div", { class: "scroll" }, h("table", { "aria-label": "Runs" }, h("thead", {}, head), body)),
     h("div", { class: "foot" }, facts, h("span", { class: "grow" }), csv),
   );
@@ -82,7 +80,7 @@ export function mountRuns(panel, store, actions) {
             { class: "num" },
             now
               ? h("span", { class: "q" }, "current")
-              : h("button", { class: "btn", disabled: !same || link !== "open", title: same ? "Set all parameters to those of this run" : "Open its sequence first", onclick: () => actions.change(entry.parameters) }, "use again"),
+              : h("button", { class: "btn", disabled: !same || link !== "open", title: same ? "Set all parameters to those of this run" : "Open its sequence first", onclick: () => page.change(entry.parameters) }, "use again"),
           ),
         );
       }),

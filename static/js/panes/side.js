@@ -5,20 +5,7 @@ import { mountChanges } from "./changes.js";
 import { mountRuns } from "./runs.js";
 import { mountTracks } from "./tracks.js";
 
-/**
- * @typedef {import("../types.js").PageState} PageState
- *
- * @typedef {object} SideActions
- * @property {(id: number | null) => void} select
- * @property {(step: number) => void} seek
- * @property {(changes: Record<string, any>) => void} change
- * @property {(keys?: string[]) => void} reset
- * @property {(name: string) => void} preset
- * @property {() => void} exportTracks
- * @property {(direction: -1 | 1) => void} toEvent
- * @property {(text: string) => Promise<boolean>} copy
- * @property {() => void} undo
- */
+/** @typedef {import("../types.js").PageState} PageState */
 
 /** @type {[PageState["tab"], string][]} */
 const TABS = [
@@ -29,10 +16,10 @@ const TABS = [
 
 /**
  * @param {HTMLElement} root
- * @param {import("../store.js").Store<PageState>} store
- * @param {SideActions} actions
+ * @param {import("../types.js").Context} context
  */
-export function mountSide(root, store, actions) {
+export function mountSide(root, context) {
+  const { store } = context;
   const count = h("span", { class: "count", hidden: true });
   /** @type {Record<string, {tab: HTMLButtonElement, panel: HTMLElement}>} */
   const parts = {};
@@ -59,9 +46,9 @@ export function mountSide(root, store, actions) {
     store.set({ tab: next });
     parts[next].tab.focus();
   });
-  mountTracks(parts.tracks.panel, store, actions);
-  mountChanges(parts.changes.panel, store, actions);
-  mountRuns(parts.runs.panel, store, actions);
+  mountTracks(parts.tracks.panel, context);
+  mountChanges(parts.changes.panel, context);
+  mountRuns(parts.runs.panel, context);
 
   function choose() {
     const { tab: chosen } = store.get();

@@ -7,23 +7,19 @@ import { drawLanes, drawRange, drawRuler } from "../draw/lanes.js";
 import { drawCardinality } from "../draw/strips.js";
 import { seenShare } from "../events.js";
 import { faded, palette } from "../palette.js";
+import { shownDone } from "../playback.js";
 import { mountTransport } from "./transport.js";
 
 /**
- * @typedef {import("../types.js").PageState} PageState
  * @typedef {import("../types.js").TrackLane} TrackLane
  */
 
 /**
  * @param {HTMLElement} root
- * @param {import("../store.js").Store<PageState>} store
- * @param {object} on
- * @param {import("../commands.js").Actions} on.actions
- * @param {(step: number) => void} on.seek
- * @param {(id: number | null) => void} on.select
- * @param {() => number[]} on.loadedSteps
+ * @param {import("../types.js").Context} context
  */
-export function mountTimeline(root, store, on) {
+export function mountTimeline(root, context) {
+  const { store, page, playback } = context;
   const lanes = h("div", { class: "lanes", tabindex: -1, "aria-label": "Tracks" });
   const people = h("span", { class: "r" });
   const sign = (/** @type {string} */ word, /** @type {string} */ token, /** @type {number} */ width) => {
@@ -47,7 +43,7 @@ export function mountTimeline(root, store, on) {
   const wanted = h("div", { class: "ph wanted", hidden: true });
   const empty = h("div", { class: "empty" });
   const plot = h("div", { class: "plot" }, fixed, empty, seekBar, wanted, head);
-  root.append(mountTransport(store, on.actions, on.seek), gutter, plot);
+  root.append(mountTransport(context), gutter, plot);
 
   /** @type {import("../clock.js").View} */
   let view = { first: 0, last: 1, width: 1 };
@@ -78,7 +74,7 @@ export function mountTimeline(root, store, on) {
   }
 
   function paint() {
-    const { timeline, run, range, selection, hover, server, loop } = store.get();
+    const { timeline, range, selection, hover, server, loop } = store.get();
     const ink = palette();
     const height = plot.clientHeight;
     const g = prepare(fixed, plot.clientWidth, height);
@@ -94,10 +90,10 @@ export function mountTimeline(root, store, on) {
       g.fillStyle = faded(ink.get("accent"), 0.07);
       if (x1 > x0) g.fillRect(x0, ruler.y, x1 - x0, height - ruler.y);
     }
-    const done = run?.done ?? 0;
+    const done = shownDone(store.get());
     const fps = server?.sequence?.fps ?? 25;
     drawLanes(g, block, view, { tracks: shownTracks(), scroll: lanes.scrollTop, laneHeight, done, fps, selection, hover: hover?.id ?? null }, ink);
-    drawRange(g, over, view, { loaded: on.loadedSteps(), done, frames }, ink);
+    drawRange(g, over, view, { loaded: playback.loadedSteps(), done, frames }, ink);
     drawRuler(g, ruler, view, { range }, ink);
     drawCardinality(g, strip, view, { count: timeline?.count ?? [], truth: timeline?.truth ?? null }, ink);
     if (done < frames) {
@@ -152,7 +148,7 @@ export function mountTimeline(root, store, on) {
           {
             class: "gr lane",
             "aria-label": `Track ${track.id}`,
-            onclick: () => on.select(track.id),
+            onclick: () => page.select(track.id),
             onpointerenter: () => store.set({ hover: { id: track.id, camera: -1 } }),
             onpointerleave: () => store.set({ hover: null }),
           },
@@ -181,13 +177,13 @@ export function mountTimeline(root, store, on) {
     const inLanes = event.clientY - box.top > token("h-over") + token("h-ruler") && event.clientY - box.top < token("h-over") + token("h-ruler") + lanes.clientHeight;
     const track = shownTracks()[lane];
     const at = stepAt(event.clientX - box.left, view);
-    if (inLanes && track && at >= track.first && at <= track.last) on.select(track.id);
+    if (inLanes && track && at >= track.first && at <= track.last) page.select(track.id);
     store.set({ playing: 0 });
-    on.seek(at);
+    playback.seek(at);
   });
   plot.addEventListener("pointermove", (event) => {
     if (!plot.hasPointerCapture(event.pointerId)) return;
-    on.seek(stepAt(event.clientX - plot.getBoundingClientRect().left, view));
+    playback.seek(stepAt(event.clientX - plot.getBoundingClientRect().left, view));
   });
   plot.addEventListener(
     "wheel",
@@ -210,7 +206,7 @@ export function mountTimeline(root, store, on) {
     draw();
     placeHead();
   });
-  seekBar.addEventListener("input", () => on.seek(seekBar.valueAsNumber));
+  seekBar.addEventListener("input", () => playback.seek(seekBar.valueAsNumber));
   lanes.addEventListener("scroll", draw);
 
   store.on(["server"], ({ server }) => {
@@ -222,7 +218,7 @@ export function mountTimeline(root, store, on) {
     seekBar.max = String(Math.max(0, frames - 1));
     measure();
   });
-  store.on(["timeline", "run"], () => {
+  store.on(["timeline", "run", "basis"], () => {
     listLanes();
     draw();
     placeHead();

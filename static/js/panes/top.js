@@ -3,36 +3,29 @@
 import { chooser, fill, h, icon, tipOf, write } from "../dom.js";
 
 /**
- * @typedef {import("../types.js").PageState} PageState
  * @typedef {import("../types.js").RunState} RunState
  */
 
 /**
  * @param {HTMLElement} root
- * @param {import("../store.js").Store<PageState>} store
- * @param {object} on
- * @param {(name: string) => void} on.open
- * @param {(changes: Record<string, any>) => void} on.change
- * @param {() => void} on.cancel
- * @param {() => void} on.exportTracks
- * @param {() => void} on.toggleTheme
- * @param {() => void} on.help
+ * @param {import("../types.js").Context} context
  */
-export function mountTop(root, store, on) {
-  const sequence = chooser({ label: "Sequence", box: true, choose: on.open });
+export function mountTop(root, { store, page, actions }) {
+  const sequence = chooser({ label: "Sequence", box: true, choose: page.open });
   const facts = h("span", { class: "sub opt-1" });
-  const single = chooser({ label: "Single-view method", word: "single view", choose: (v) => on.change({ single_view: v }) });
-  const fusion = chooser({ label: "Fusion method", word: "fusion", choose: (v) => on.change({ fusion_method: v }) });
+  const single = chooser({ label: "Single-view method", word: "single view", choose: (v) => page.change({ single_view: v }) });
+  const fusion = chooser({ label: "Fusion method", word: "fusion", choose: (v) => page.change({ fusion_method: v }) });
   const dot = h("span", { class: "dot" });
   const word = h("span", {});
   const bar = h("span", { class: "bar opt-2", role: "progressbar", "aria-label": "Progress", "aria-valuemin": 0 }, h("i", {}));
   const number = h("span", { class: "n" });
   const rate = h("span", { class: "sub t opt-1" });
-  const cancel = h("button", { class: "btn", onclick: on.cancel, "data-tip": "Stop; what is computed stays" }, "Cancel");
+  const cancel = h("button", { class: "btn", onclick: page.cancel, "data-tip": "Stop; what is computed stays" }, "Cancel");
+  const again = h("button", { class: "btn", onclick: page.runAgain, "data-tip": "Compute the steps that are missing" }, "Go on");
   const spoken = h("span", { class: "vh", role: "status" });
   const csv = h(
     "button",
-    { class: "btn", ...tipOf("export"), onclick: on.exportTracks },
+    { class: "btn", ...tipOf("export"), onclick: actions.exportTracks },
     icon("i-export"),
     h("span", { class: "opt-1" }, "Export CSV"),
   );
@@ -44,15 +37,15 @@ export function mountTop(root, store, on) {
     single.root,
     fusion.root,
     h("span", { class: "rule" }),
-    h("div", { class: "status" }, dot, word, bar, number, rate, cancel),
+    h("div", { class: "status" }, dot, word, bar, number, rate, cancel, again),
     spoken,
     h("span", { class: "grow" }),
     h(
       "span",
       { class: "group" },
       csv,
-      h("button", { class: "btn icon end", "aria-label": "Dark or light", ...tipOf("theme"), onclick: on.toggleTheme }, icon("i-theme")),
-      h("button", { class: "btn icon end", "aria-label": "Help and keys", ...tipOf("help"), onclick: on.help }, icon("i-help")),
+      h("button", { class: "btn icon end", "aria-label": "Dark or light", ...tipOf("theme"), onclick: actions.toggleTheme }, icon("i-theme")),
+      h("button", { class: "btn icon end", "aria-label": "Help and keys", ...tipOf("help"), onclick: actions.help }, icon("i-help")),
     ),
   );
 
@@ -60,7 +53,8 @@ export function mountTop(root, store, on) {
     const { server, sequences, schema, link } = store.get();
     const open = server?.opening?.name ?? server?.sequence?.name ?? "";
     const option = (/** @type {import("../types.js").SequenceEntry} */ entry) => {
-      const count = entry.error ? "cannot be read" : `${entry.cameras} cameras, ${entry.frames} steps`;
+      const size = entry.cameras && entry.frames ? `${entry.cameras} cameras, ${entry.frames} steps` : entry.kind;
+      const count = entry.error ? "cannot be read" : size;
       const wait = entry.kind === "rendered" && !entry.ready ? ", rendered on first use" : "";
       return h("option", { value: entry.name, title: entry.error ?? entry.description }, `${entry.name}  ·  ${count}${wait}`);
     };
@@ -103,6 +97,7 @@ export function mountTop(root, store, on) {
     const busy = Boolean(opening) || run?.state === "computing";
     bar.hidden = link === "lost" || !busy;
     cancel.hidden = link !== "open" || run?.state !== "computing" || Boolean(opening);
+    again.hidden = link !== "open" || run?.state !== "cancelled" || Boolean(opening);
     number.hidden = rate.hidden = link === "lost" || (!opening && !run?.total);
     if (link === "lost") say("bad", "not connected");
     else if (!server) say("", "connecting");
@@ -127,7 +122,7 @@ export function mountTop(root, store, on) {
     bar.style.setProperty("--part", String(total > 0 ? done / total : 0));
     bar.setAttribute("aria-valuemax", String(total));
     bar.setAttribute("aria-valuenow", String(done));
-    fill(number, h("b", {}, done), `/${total}`);
+    fill(number, total > 0 && [h("b", {}, done), `/${total}`]);
   }
 
   store.on(["server", "sequences", "schema", "link"], choices);

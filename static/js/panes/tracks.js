@@ -4,7 +4,6 @@ import { fill, h, icon, idTag, tipOf, write } from "../dom.js";
 import { eventsOf, nextEvent, seenShare, stateAt } from "../events.js";
 
 /**
- * @typedef {import("../types.js").PageState} PageState
  * @typedef {import("../types.js").TrackLane} TrackLane
  * @typedef {{row: HTMLTableRowElement, cells: HTMLElement[]}} Row
  * @typedef {{name: string, word: string, number: boolean, give: string, value: (track: TrackLane, at: {step: number, done: number}) => number | string}} Column
@@ -27,11 +26,10 @@ const COLUMNS = [
 ];
 
 /**
- * @param {HTMLElement} panel
- * @param {import("../store.js").Store<PageState>} store
- * @param {import("./side.js").SideActions} actions
+ * @param {HTMLElement} root
+ * @param {import("../types.js").Context} context
  */
-export function mountTracks(panel, store, actions) {
+export function mountTracks(root, { store, page, actions, playback }) {
   let sortBy = "born";
   let downward = false;
   /** @type {Map<number, Row>} */
@@ -59,7 +57,7 @@ export function mountTracks(panel, store, actions) {
     h("button", { class: "btn icon up end", "aria-label": "Previous event", ...tipOf("previous-event", "Previous event"), onclick: () => actions.toEvent(-1) }, icon("i-prev", "s")),
     h("button", { class: "btn icon up end", "aria-label": "Next event", ...tipOf("next-event", "Next event"), onclick: () => actions.toEvent(1) }, icon("i-next", "s")),
   );
-  panel.append(scroll, foot, nothing);
+  root.append(scroll, foot, nothing);
   nothing.style.top = "0";
 
   /** @param {string} name */
@@ -77,13 +75,13 @@ export function mountTracks(panel, store, actions) {
       "tr",
       {
         tabindex: 0,
-        onclick: () => actions.select(store.get().selection === track.id ? null : track.id),
+        onclick: () => page.select(store.get().selection === track.id ? null : track.id),
         ondblclick: () => {
-          actions.select(track.id);
-          actions.seek(track.first);
+          page.select(track.id);
+          playback.seek(track.first);
         },
         onkeydown: (/** @type {KeyboardEvent} */ event) => {
-          if (event.key === "Enter") actions.select(track.id);
+          if (event.key === "Enter") page.select(track.id);
           const next = event.key === "ArrowDown" ? row.nextElementSibling : event.key === "ArrowUp" ? row.previousElementSibling : null;
           if (next instanceof HTMLElement) {
             event.preventDefault();
@@ -101,7 +99,7 @@ export function mountTracks(panel, store, actions) {
   function list() {
     const { timeline, server, run, shown } = store.get();
     const fps = server?.sequence?.fps ?? 25;
-    const done = run?.done ?? 0;
+    const done = timeline?.done ?? 0;
     const column = COLUMNS.find((c) => c.name === sortBy) ?? COLUMNS[0];
     const key = (/** @type {TrackLane} */ track) => Number(column.value(track, { step: Math.max(0, shown), done }));
     const tracks = [...(timeline?.tracks ?? [])].sort((a, b) => (key(a) - key(b) || a.id - b.id) * (downward ? -1 : 1));
@@ -140,9 +138,9 @@ export function mountTracks(panel, store, actions) {
 
   /** What changes with the playhead: written only where it differs. */
   function now() {
-    const { timeline, result, run, shown, selection, server } = store.get();
+    const { timeline, result, basis, shown, selection, server } = store.get();
     const step = Math.max(0, shown);
-    const current = result && result.run === run?.key ? result : null;
+    const current = result && result.run === basis ? result : null;
     const whole = new Map(current?.tracks.map((track) => [track.id, track]));
     for (const track of timeline?.tracks ?? []) {
       const entry = rows.get(track.id);
@@ -152,7 +150,7 @@ export function mountTracks(panel, store, actions) {
       write(entry.cells[1], state);
       const here = whole.get(track.id);
       write(entry.cells[6], here ? here.existence.toFixed(2) : "–");
-      write(entry.cells[7], here ? here.position.map((v) => v.toFixed(2)).join("  ") : "–");
+      write(entry.cells[7], here ? here.position.map((v) => v.toFixed(2).replace("-", "−")).join("  ") : "–");
       entry.row.classList.toggle("gone", !alive);
       entry.row.setAttribute("aria-selected", String(track.id === selection));
     }
@@ -166,7 +164,7 @@ export function mountTracks(panel, store, actions) {
         ? server?.sequence ? "not computed at this step" : ""
         : `${count}${truth === undefined || truth === null ? "" : ` of ${truth}`} people at step ${step}${hidden > 0 ? ` · ${hidden} more tracks` : ""}`,
     );
-    const event = nextEvent(eventsOf(timeline?.tracks ?? [], { fps, done: run?.done ?? 0 }), step, 1);
+    const event = nextEvent(eventsOf(timeline?.tracks ?? [], { fps, done: timeline?.done ?? 0 }), step, 1);
     fill(upcoming, event ? ["next: ", h("b", {}, `${event.kind} of ${event.id}, step ${event.step}`)] : "no later event");
   }
 

@@ -4,11 +4,6 @@ import { SPEEDS, parseStep, secondsOf } from "../clock.js";
 import { commandOf } from "../commands.js";
 import { chooser, fill, h, icon, tipOf, write } from "../dom.js";
 
-/**
- * @typedef {import("../types.js").PageState} PageState
- * @typedef {import("../commands.js").Actions} Actions
- */
-
 const LEGEND = [
   ["seen", '<path d="M0 2h16v6H0z" fill="currentColor"/>'],
   ["coasting", '<path d="M0 5h16" stroke="currentColor" stroke-width="2" stroke-dasharray="2.500 2"/>'],
@@ -17,12 +12,8 @@ const LEGEND = [
   ["death", '<path d="M6 2.500h5v5H6z" fill="currentColor"/>'],
 ];
 
-/**
- * @param {import("../store.js").Store<PageState>} store
- * @param {Actions} actions
- * @param {(step: number) => void} seek
- */
-export function mountTransport(store, actions, seek) {
+/** @param {import("../types.js").Context} context */
+export function mountTransport({ store, actions, playback }) {
   /**
    * @param {string} name
    * @param {string} sign
@@ -60,7 +51,7 @@ export function mountTransport(store, actions, seek) {
     if (event.key !== "Enter") return;
     const sequence = store.get().server?.sequence;
     const wanted = sequence ? parseStep(typed.value, sequence.fps, sequence.frames) : null;
-    if (wanted !== null) seek(wanted);
+    if (wanted !== null) playback.seek(wanted);
     close();
   });
 

@@ -2,8 +2,6 @@
 /** The 3D pane: viser's page inside ours, with its layers and view points. */
 import { fill, h, icon, tipOf } from "../dom.js";
 
-/** @typedef {import("../types.js").PageState} PageState */
-
 /** @type {[string, string, string, string][]} layer, word, sign, tip */
 const LAYERS = [
   ["boxes", "boxes", "l-cube", "Upright boxes of the estimates"],
@@ -15,20 +13,16 @@ const LAYERS = [
 
 /**
  * @param {HTMLElement} root
- * @param {import("../store.js").Store<PageState>} store
- * @param {object} on
- * @param {(layer: string) => void} on.toggleLayer
- * @param {(camera: number) => void} on.chooseView  -1 is the free view
- * @param {() => void} on.retry
+ * @param {import("../types.js").Context} context
  */
-export function mountView3d(root, store, on) {
+export function mountView3d(root, { store, page, retry }) {
   /** @type {Record<string, HTMLButtonElement>} */
   const chips = {};
   for (const [layer, word, sign, tip] of LAYERS) {
     const key = layer === "truth" || layer === "trails" ? tipOf(layer)["data-key"] : "";
     chips[layer] = h(
       "button",
-      { class: "chip end", "data-tip": tip, "data-key": key, onclick: () => on.toggleLayer(layer) },
+      { class: "chip end", "data-tip": tip, "data-key": key, onclick: () => page.toggleLayer3d(layer) },
       icon(sign, "", "0 0 14 10"),
       h("span", {}, word),
     );
@@ -79,7 +73,7 @@ export function mountView3d(root, store, on) {
     blank.hidden = reachable && link !== "lost";
     if (blank.hidden) return;
     if (link === "lost") {
-      fill(blank, icon("i-plug", "l"), h("h3", {}, "3D view lost"), h("p", {}, "Pictures and results that were loaded can still be looked at."), h("button", { class: "btn box", onclick: on.retry }, "Try now"));
+      fill(blank, icon("i-plug", "l"), h("h3", {}, "3D view lost"), h("p", {}, "Pictures and results that were loaded can still be looked at."), h("button", { class: "btn box", onclick: retry }, "Try now"));
     } else if (tries > 0) {
       fill(blank, icon("i-plug", "l"), h("h3", {}, "The 3D view does not answer"), h("p", {}, "Pictures, timeline and tables still work. It is tried again by itself."), h("button", { class: "btn box", onclick: load }, "Try now"));
     } else fill(blank, h("p", {}, server ? "Loading the 3D view" : "Connecting"));
@@ -101,7 +95,7 @@ export function mountView3d(root, store, on) {
               class: "start",
               "data-tip": index ? `Look through ${sequence?.cameras[index - 1].name}` : "Free view",
               "data-key": index ? "" : "0",
-              onclick: () => on.chooseView(index - 1),
+              onclick: () => page.chooseView(index - 1),
             },
             name,
           ),

@@ -1,0 +1,142 @@
+// Store, address, cache, events and the places of the pictures.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { createCache } from "../../static/js/cache.js";
+import { eventsOf, longMisses, nextEvent, seenShare, stateAt } from "../../static/js/events.js";
+import { mosaic } from "../../static/js/mosaic.js";
+import { createStore } from "../../static/js/store.js";
+import { readPlace, writePlace } from "../../static/js/url.js";
+
+const turn = () => new Promise((resolve) => setImmediate(resolve));
+
+test("the store tells a listener once a turn, of its own keys only", async () => {
+  const store = createStore({ step: 0, theme: "dark" });
+  const told = [];
+  const off = store.on(["step"], ({ step }) => told.push(step));
+  store.set({ step: 1 });
+  store.set({ step: 2 });
+  store.set({ theme: "light" });
+  await turn();
+  assert.deepEqual(told, [2]);
+  store.set({ step: 2 });
+  await turn();
+  assert.deepEqual(told, [2]);
+  off();
+  store.set({ step: 3 });
+  await turn();
+  assert.deepEqual(told, [2]);
+});
+
+test("a listener may change the store; that is told in the next turn", async () => {
+  const store = createStore({ a: 0, b: 0 });
+  const told = [];
+  store.on(["a"], ({ a }) => store.set({ b: a * 2 }));
+  store.on(["b"], ({ b }) => told.push(b));
+  store.set({ a: 4 });
+  await turn();
+  assert.deepEqual(told, [8]);
+});
+
+test("the address round-trips and names what it does not know", () => {
+  const place = { sequence: "room 44/ü&x", step: 264, selection: 7, camera: 1 };
+  assert.deepEqual(readPlace(writePlace(place)), { place, unknown: [] });
+  const none = { sequence: null, step: null, selection: null, camera: null };
+  assert.equal(writePlace(none), "");
+  assert.deepEqual(readPlace(""), { place: none, unknown: [] });
+  assert.deepEqual(readPlace("?step=-4&sel=x&cam=0&zoom=3"), { place: none, unknown: ["zoom"] });
+});
+
+/** A cache whose requests are answered by hand. */
+function manual({ budget = 100, parallel = 2 } = {}) {
+  const asked = new Map();
+  const disposed = [];
+  const arrived = [];
+  const cache = createCache({
+    load: (name, signal) =>
+      new Promise((resolve, reject) => {
+        asked.set(name, { resolve: () => resolve({ name, size: 10 }), reject });
+        signal.addEventListener("abort", () => reject(new Error("aborted")));
+      }),
+    sizeOf: ({ size }) => size,
+    budget,
+    parallel,
+    arrived: (name) => arrived.push(name),
+    dispose: ({ name }) => disposed.push(name),
+    failed: () => undefined,
+  });
+  return { cache, asked, disposed, arrived };
+}
+
+test("the most urgent is asked for first, a few at a time", async () => {
+  const { cache, asked, arrived } = manual();
+  cache.want(["c", "a", "b"]);
+  assert.deepEqual([...asked.keys()], ["c", "a"]);
+  asked.get("a").resolve();
+  await turn();
+  assert.deepEqual([...asked.keys()], ["c", "a", "b"]);
+  assert.deepEqual(arrived, ["a"]);
+  assert.equal(cache.get("a").name, "a");
+  assert.equal(cache.get("c"), undefined);
+});
+
+test("what is not wanted any more is aborted and never arrives", async () => {
+  const { cache, asked, arrived } = manual();
+  cache.want(["old"]);
+  const answer = asked.get("old");
+  cache.want(["new"]);
+  answer.resolve();
+  await turn();
+  assert.equal(cache.get("old"), undefined);
+  asked.get("new").resolve();
+  await turn();
+  assert.deepEqual(arrived, ["new"]);
+});
+
+test("the budget is kept; what is wanted stays, what was used last stays longest", async () => {
+  const { cache, disposed } = manual({ budget: 30 });
+  for (const name of ["a", "b", "c"]) cache.put(name, { name, size: 10 });
+  cache.get("a");
+  cache.put("d", { name: "d", size: 10 });
+  assert.deepEqual(disposed, ["b"]);
+  cache.clear();
+  assert.deepEqual([...cache.names()], []);
+  assert.equal(disposed.length, 4);
+});
+
+const TRACK = { id: 3, first: 10, last: 99, spans: [[10, 39, "seen"], [40, 79, "coasting"], [80, 89, "seen"], [90, 99, "coasting"]] };
+
+test("events: births, deaths and long misses, in order", () => {
+  const events = eventsOf([TRACK, { id: 1, first: 0, last: 199, spans: [[0, 199, "seen"]] }], { fps: 25, done: 200 });
+  assert.deepEqual(events.map((e) => [e.step, e.kind]), [[10, "birth"], [40, "long miss"], [99, "death"]]);
+  assert.equal(nextEvent(events, 10, 1).step, 40);
+  assert.equal(nextEvent(events, 10, -1), undefined);
+  assert.equal(nextEvent(events, 200, -1).step, 99);
+  assert.deepEqual(eventsOf([], { fps: 25, done: 0 }), []);
+  assert.equal(eventsOf([TRACK], { fps: 25, done: 100 }).some((e) => e.kind === "death"), false);
+});
+
+test("what a track is at a step, and how much of it was seen", () => {
+  assert.deepEqual([5, 10, 40, 99, 100].map((step) => stateAt(TRACK, step)), ["not yet", "seen", "coasting", "coasting", "ended"]);
+  assert.equal(seenShare(TRACK), 40 / 90);
+  assert.deepEqual(longMisses(TRACK, 25), [[40, 79]]);
+});
+
+test("pictures keep their shape, stay inside and do not overlap", () => {
+  for (const count of [1, 2, 3, 4, 5, 7, 9]) {
+    for (const large of [null, 0, count - 1]) {
+      for (const aspect of [5 / 4, 4 / 3, 16 / 9]) {
+        const { cells, height } = mosaic(Array(count).fill(aspect), large, { width: 610, most: 338, gap: 4 });
+        assert.equal(cells.length, count);
+        assert.ok(height <= 340, `${count} cameras: ${height}`);
+        for (const [index, a] of cells.entries()) {
+          assert.ok(a.width > 20 && a.x >= 3 && a.y >= 3 && a.x + a.width <= 608 && a.y + a.height <= height - 2);
+          assert.ok(Math.abs(a.width / a.height - aspect) < 0.06);
+          for (const b of cells.slice(index + 1)) {
+            assert.ok(a.x + a.width <= b.x || b.x + b.width <= a.x || a.y + a.height <= b.y || b.y + b.height <= a.y);
+          }
+        }
+      }
+    }
+  }
+  assert.deepEqual(mosaic([], null, { width: 610, most: 338, gap: 4 }), { cells: [], height: 0 });
+});
