@@ -1,0 +1,296 @@
+"""A rendered room written as an ordinary sequence folder, whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.camera import Camera
+from tracker.sequences.rendering.paths import FRAMES_PER_SECOND
+from tracker.sequences.rendering.render import Studio
+from tracker.sequences.rendering.rooms import (
+    CAMERAS,
+    ROOMS,
+    TARGET_HALF_EXTENTS,
+    VOLUME_MAXIMUM,
+    VOLUME_MINIMUM,
+    RoomSpec,
+)
+from tracker.sequences.rendering.scene import Scene
+
+VERSION = 1
+"""Grows when the same call would give other pictures or files."""
+VISIBILITY_FILE = "visibility.csv"
+_QUALITY = 92
+_TEMPLATES_PER_VIEW = 3
+
+
+class RenderCancelled(Exception):
+    """Rendering was stopped on request; nothing was written."""
+
+
+def render(
+    name: str,
+    folder: Path,
+    *,
+    cameras: int = 2,
+    seed: int = 0,
+    frames: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> None:
+    """Render a built-in room into a new sequence folder.
+
+    The folder appears under its name only when it is complete: until then the
+    files are in a hidden folder beside it, which is removed on any failure.
+
+    Args:
+        name: One of :data:`ROOMS`.
+        folder: Where to write; an existing sequence folder there is replaced.
+        cameras: 2 or 3.
+        seed: Of the sensor's noise. The people walk the same way with every seed,
+            and the same seed gives the same pictures.
+        frames: Number of steps from the beginning, all by default.
+        progress: Called with the steps done and the number of steps.
+        cancelled: Asked now and then; rendering stops when it says so.
+
+    Raises:
+        ValueError: If there is no such room, or a number is out of range.
+        FileExistsError: If ``folder`` exists and is not a sequence folder.
+        RenderCancelled: If ``cancelled`` said so.
+    """
+    if name not in ROOMS:
+        raise ValueError(f'there is no built-in room "{name}"; choose one of {", ".join(ROOMS)}')
+    spec = ROOMS[name]
+    if not 2 <= cameras <= len(CAMERAS):
+        raise ValueError(f"cameras must be 2 … {len(CAMERAS)}, got {cameras}")
+    count = spec.frames if frames is None else frames
+    if not 1 <= count <= spec.frames:
+        raise ValueError(f"frames must be 1 … {spec.frames} in {name}, got {frames}")
+    folder = Path(folder)
+    _check_replaceable(folder)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    work = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    try:
+        _write(spec, work, cameras, seed, count, progress, cancelled or (lambda: False))
+        os.chmod(work, 0o755)
+        _check_replaceable(folder)
+        if folder.exists():
+            old = Path(tempfile.mkdtemp(prefix=f".{folder.name}-old-", dir=folder.parent))
+            folder.rename(old / "old")
+            work.rename(folder)
+            shutil.rmtree(old, ignore_errors=True)
+        else:
+            work.rename(folder)
+    except BaseException:
+        shutil.rmtree(work, ignore_errors=True)
+        raise
+
+
+def read_visibility(folder: Path) -> Float[ndarray, "F P C"]:
+    """How much of each person each camera sees at every step of a rendered sequence.
+
+    Args:
+        folder: A folder written by :func:`render`.
+
+    Returns:
+        The visible share (0 … 1) of the silhouette within the target box, by step,
+        person (id minus 1) and camera; NaN where the person is not in the truth.
+
+    Raises:
+        FileNotFoundError: If the folder has no ``visibility.csv``.
+    """
+    table = np.loadtxt(Path(folder) / VISIBILITY_FILE, delimiter=",", skiprows=1, ndmin=2)
+    if not table.size:
+        return np.full((0, 0, 0), np.nan)
+    index = table[:, :3].astype(int) - [0, 1, 0]
+    shares = np.full(tuple(index.max(axis=0) + 1), np.nan)
+    shares[tuple(index.T)] = table[:, 3]
+    return shares
+
+
+def _check_replaceable(folder: Path) -> None:
+    if not folder.exists():
+        return
+    if not folder.is_dir() or (any(folder.iterdir()) and not (folder / "sequence.toml").exists()):
+        raise FileExistsError(
+            f"{folder} exists and is not a sequence folder; choose another name or remove it"
+        )
+
+
+def _write(
+    spec: RoomSpec,
+    work: Path,
+    cameras: int,
+    seed: int,
+    frames: int,
+    progress: Callable[[int, int], None] | None,
+    cancelled: Callable[[], bool],
+) -> None:
+    if progress is not None:
+        progress(0, frames)
+    if cancelled():
+        raise RenderCancelled(spec.name)
+    studio = Studio(spec, CAMERAS[:cameras], seed)
+    writers = []
+    visible = np.zeros((frames, len(spec.people), cameras))
+    try:
+        for camera in studio.cameras:
+            path = work / f"{camera.name}.avi"
+            writer = cv2.VideoWriter(
+                str(path),
+                cv2.CAP_OPENCV_MJPEG,
+                cv2.VideoWriter.fourcc(*"MJPG"),
+                FRAMES_PER_SECOND,
+                camera.image_size,
+            )
+            writers.append(writer)
+            if not writer.isOpened():
+                raise OSError(f"{path}: OpenCV cannot write Motion-JPEG video here")
+            writer.set(cv2.VIDEOWRITER_PROP_QUALITY, _QUALITY)
+        for drawn in studio.draw_all(frames):
+            if cancelled():
+                raise RenderCancelled(spec.name)
+            for writer, pictures in zip(writers, drawn.pictures, strict=True):
+                for picture in pictures:
+                    writer.write(picture)
+            done = drawn.first + len(drawn.visible)
+            visible[drawn.first : done] = drawn.visible
+            if progress is not None:
+                progress(done, frames)
+    finally:
+        for writer in writers:
+            writer.release()
+    _write_truth(work / "ground_truth.csv", studio.scene, frames)
+    _write_visibility(work / VISIBILITY_FILE, studio.scene, visible)
+    templates = choose_templates(studio.scene, studio.cameras, visible)
+    (work / "sequence.toml").write_text(
+        _describe(spec, studio.cameras, frames, studio.scene, templates), encoding="utf-8"
+    )
+
+
+def _write_truth(path: Path, scene: Scene, frames: int) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        rows = csv.writer(file)
+        rows.writerow(["frame", "id", "x", "y", "z"])
+        for step in range(frames):
+            for number, figure in enumerate(scene.figures):
+                if figure.inside[step]:
+                    x, y, z = figure.centres[step]
+                    rows.writerow([step, number + 1, f"{x:.5f}", f"{y:.5f}", f"{z:.5f}"])
+
+
+def _write_visibility(path: Path, scene: Scene, visible: ndarray) -> None:
+    frames, people, cameras = visible.shape
+    with path.open("w", newline="", encoding="utf-8") as file:
+        rows = csv.writer(file)
+        rows.writerow(["frame", "id", "camera", "visible"])
+        for step in range(frames):
+            for number in range(people):
+                if scene.figures[number].inside[step]:
+                    for camera in range(cameras):
+                        share = visible[step, number, camera]
+                        rows.writerow([step, number + 1, camera, f"{share:.4f}"])
+
+
+def choose_templates(
+    scene: Scene, cameras: Sequence[Camera], visible: ndarray
+) -> list[tuple[int, int, int, ndarray]]:
+    """Boxes that show each person whole, of good size, and from different sides.
+
+    Returns:
+        Person, camera, step, and the box (left, top, width, height) in pixels.
+    """
+    chosen = []
+    frames = len(visible)
+    for person, figure in enumerate(scene.figures):
+        for number, camera in enumerate(cameras):
+            boxes, whole = camera.project_boxes(figure.centres[:frames], TARGET_HALF_EXTENTS)
+            good = whole & figure.inside[:frames] & (visible[:, person, number] > 0.985)
+            good &= figure.inside[:frames]
+            if not good.any():
+                continue
+            heights = boxes[:, 3]
+            good &= heights >= np.median(heights[good])
+            toward = camera.centre[:2] - figure.centres[:frames, :2]
+            view = np.arctan2(toward[:, 1], toward[:, 0]) - figure.path.heading[:frames]
+            for wanted in np.linspace(0.0, np.pi, _TEMPLATES_PER_VIEW):
+                # 0 shows the front, pi the back
+                turned = np.abs(np.abs((view + np.pi) % (2.0 * np.pi) - np.pi) - wanted)
+                step = int(np.argmin(np.where(good, turned, np.inf)))
+                if good[step]:
+                    chosen.append((person, number, step, boxes[step]))
+                    good[max(0, step - 15) : step + 15] = False
+    return chosen
+
+
+def _numbers(values: ndarray) -> str:
+    return "[" + ", ".join(f"{float(v):.10g}" for v in values) + "]"
+
+
+def _describe(
+    spec: RoomSpec,
+    cameras: Sequence[Camera],
+    frames: int,
+    scene: Scene,
+    templates: Sequence[tuple[int, int, int, ndarray]],
+) -> str:
+    height = float(np.mean([f.centres[f.inside, 2].mean() for f in scene.figures]))
+    lines = [
+        "format = 1",
+        f'name = "{spec.name}"',
+        f'description = "{spec.description}"',
+        f"fps = {FRAMES_PER_SECOND}",
+        f"frames = {frames}",
+        "",
+        "[room]                       # the volume people are tracked in: metres, z up",
+        f"min = {_numbers(VOLUME_MINIMUM)}",
+        f"max = {_numbers(VOLUME_MAXIMUM)}",
+        "entrances = [                # where people come in (mean, standard deviation), metres",
+    ]
+    for x, y, door in ((spec.back_door, 1.4, "back"), (1.4, spec.front_door, "front")):
+        place = _numbers(np.array([x, y, round(height, 2)]))
+        lines.append(f"  {{ position = {place}, sigma = [0.25, 0.25, 0.08] }},   # {door} door")
+    lines += [
+        "]",
+        "",
+        "[target]                     # what is tracked: head and torso, as an upright box",
+        f"half_extents = {_numbers(TARGET_HALF_EXTENTS)}",
+    ]
+    for camera in cameras:
+        lines += [
+            "",
+            "[[camera]]",
+            f'name = "{camera.name}"',
+            f"image_size = [{camera.image_size[0]}, {camera.image_size[1]}]",
+            f'video = "{camera.name}.avi"',
+            f"K = [{', '.join(_numbers(row) for row in camera.intrinsics)}]",
+            f"distortion = {_numbers(camera.distortion)}",
+            f"R = [{', '.join(_numbers(row) for row in camera.rotation)}]",
+            f"t = {_numbers(camera.translation)}",
+        ]
+    for person, number, step, box in templates:
+        lines += [
+            "",
+            "[[template]]                 # a box whose colours are a model of the person",
+            f'name = "person{person + 1}"',
+            f'camera = "{cameras[number].name}"',
+            f"frame = {step}",
+            f"box = {_numbers(np.round(box, 2))}     # left, top, width, height in pixels",
+        ]
+    lines += [
+        "",
+        "[ground_truth]               # exact, from the people's poses",
+        'file = "ground_truth.csv"',
+        "",
+    ]
+    return "\n".join(lines)

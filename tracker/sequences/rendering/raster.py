@@ -1,0 +1,454 @@
+"""The compiled loops of the renderer: rays through the room, bodies into the pictures.
+
+Arrays in, arrays out, without the interpreter's lock, so that threads share the
+work. Colours are linear red, green, blue until the last step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numba
+import numpy as np
+from numpy import ndarray
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+BOX, BALL, CYLINDER = 0, 1, 2
+"""Kinds of solids: the cube, ball and upright cylinder of half size 1 in their own axes."""
+NOBODY = 255
+"""In an owner map: a pixel that shows the room."""
+
+
+def _kernel(function: _F) -> _F:
+    """Compile on the first call, keep the machine code on disk, release the interpreter."""
+    options: Any = {"cache": True, "nogil": True, "fastmath": {"contract", "arcp", "nsz"}}
+    compiled: _F = numba.njit(**options)(function)
+    return compiled
+
+
+@_kernel
+def cast(
+    origins: ndarray,
+    directions: ndarray,
+    limits: ndarray,
+    kinds: ndarray,
+    inverses: ndarray,
+    bounds: ndarray,
+    any_hit: bool,
+) -> tuple[ndarray, ndarray]:
+    """The first solid on each ray.
+
+    Args:
+        origins: (N, 3), metres.
+        directions: (N, 3), unit vectors.
+        limits: (N,), the length of each ray, metres.
+        kinds: (P,), BOX, BALL or CYLINDER.
+        inverses: (P, 3, 4), from the world to each solid's own axes.
+        bounds: (P, 4), centre and radius of a ball around each solid.
+        any_hit: Stop at any solid rather than the nearest, for shadows.
+
+    Returns:
+        The distance (N,) and the index of the solid (N,), -1 where there is none.
+    """
+    count = origins.shape[0]
+    distances = np.empty(count, dtype=np.float32)
+    solids = np.full(count, -1, dtype=np.int32)
+    for n in range(count):
+        ox, oy, oz = origins[n, 0], origins[n, 1], origins[n, 2]
+        dx, dy, dz = directions[n, 0], directions[n, 1], directions[n, 2]
+        best = limits[n]
+        for p in range(kinds.shape[0]):
+            cx, cy, cz = bounds[p, 0] - ox, bounds[p, 1] - oy, bounds[p, 2] - oz
+            along = cx * dx + cy * dy + cz * dz
+            radius2 = bounds[p, 3] * bounds[p, 3]
+            squared = cx * cx + cy * cy + cz * cz
+            if squared > radius2 and (along < 0.0 or squared - along * along > radius2):
+                continue
+            m = inverses[p]
+            ax = m[0, 0] * ox + m[0, 1] * oy + m[0, 2] * oz + m[0, 3]
+            ay = m[1, 0] * ox + m[1, 1] * oy + m[1, 2] * oz + m[1, 3]
+            az = m[2, 0] * ox + m[2, 1] * oy + m[2, 2] * oz + m[2, 3]
+            bx = m[0, 0] * dx + m[0, 1] * dy + m[0, 2] * dz
+            by = m[1, 0] * dx + m[1, 1] * dy + m[1, 2] * dz
+            bz = m[2, 0] * dx + m[2, 1] * dy + m[2, 2] * dz
+            if kinds[p] == 0:
+                near, far = -1e30, 1e30
+                if abs(bx) > 1e-12:
+                    s, e = (-1.0 - ax) / bx, (1.0 - ax) / bx
+                    near, far = max(near, min(s, e)), min(far, max(s, e))
+                elif abs(ax) > 1.0:
+                    continue
+                if abs(by) > 1e-12:
+                    s, e = (-1.0 - ay) / by, (1.0 - ay) / by
+                    near, far = max(near, min(s, e)), min(far, max(s, e))
+                elif abs(ay) > 1.0:
+                    continue
+                if abs(bz) > 1e-12:
+                    s, e = (-1.0 - az) / bz, (1.0 - az) / bz
+                    near, far = max(near, min(s, e)), min(far, max(s, e))
+                elif abs(az) > 1.0:
+                    continue
+                t = near
+                if near > far or near < 1e-4:
+                    continue
+            else:
+                a = bx * bx + by * by
+                b = ax * bx + ay * by
+                c = ax * ax + ay * ay - 1.0
+                if kinds[p] == 1:
+                    a += bz * bz
+                    b += az * bz
+                    c += az * az
+                t = -1.0
+                inner = b * b - a * c
+                if inner > 0.0 and a > 1e-14:
+                    t = (-b - math.sqrt(inner)) / a
+                if kinds[p] == 2:
+                    if t > 0.0 and abs(az + t * bz) > 1.0:
+                        t = -1.0
+                    if t <= 0.0 and abs(bz) > 1e-12:
+                        s = ((1.0 if bz < 0.0 else -1.0) - az) / bz
+                        hx, hy = ax + s * bx, ay + s * by
+                        if s > 0.0 and hx * hx + hy * hy < 1.0:
+                            t = s
+                if t < 1e-4:
+                    continue
+            if t < best:
+                best = t
+                solids[n] = p
+                if any_hit:
+                    break
+        distances[n] = best
+    return distances, solids
+
+
+@_kernel
+def place_bodies(
+    vertices: ndarray,
+    normals: ndarray,
+    bones: ndarray,
+    shares: ndarray,
+    openness: ndarray,
+    rest: ndarray,
+    rotations: ndarray,
+    joints: ndarray,
+    lamps: ndarray,
+    ambient: ndarray,
+) -> tuple[ndarray, ndarray]:
+    """Move a body's vertices with its bones and light them.
+
+    Each vertex follows up to two bones, blended linearly; light is the sum over
+    the lamps, softened as for a source of some size, and an ambient part that
+    changes from the floor's glow below to the ceiling's above.
+
+    Args:
+        vertices: (V, 3) of the upright body, with ``normals`` (V, 3), ``bones``
+            (V, 2), ``shares`` (V,) and ``openness`` (V,) as in ``Body``.
+        rest: (B, 3), joints of the upright body.
+        rotations: (F, B, 3, 3), with ``joints`` (F, B, 3).
+        lamps: (L, 9): position, direction, and power by colour.
+        ambient: (2, 3): light from below and from above.
+
+    Returns:
+        World positions (F, V, 3) and light (F, V, 3).
+    """
+    frames = rotations.shape[0]
+    size = vertices.shape[0]
+    world = np.empty((frames, size, 3))
+    light = np.empty((frames, size, 3), dtype=np.float32)
+    place = np.empty(3)
+    normal = np.empty(3)
+    for f in range(frames):
+        for v in range(size):
+            for i in range(3):
+                place[i] = 0.0
+                normal[i] = 0.0
+            for k in range(2):
+                weight = shares[v] if k == 1 else 1.0 - shares[v]
+                if weight == 0.0:
+                    continue
+                bone = bones[v, k]
+                for i in range(3):
+                    moved = joints[f, bone, i]
+                    turned = 0.0
+                    for j in range(3):
+                        moved += rotations[f, bone, i, j] * (vertices[v, j] - rest[bone, j])
+                        turned += rotations[f, bone, i, j] * normals[v, j]
+                    place[i] += weight * moved
+                    normal[i] += weight * turned
+            length = math.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2) + 1e-12
+            for i in range(3):
+                normal[i] /= length
+                world[f, v, i] = place[i]
+            up = 0.5 + 0.5 * normal[2]
+            for c in range(3):
+                light[f, v, c] = openness[v] * (ambient[0, c] * (1.0 - up) + ambient[1, c] * up)
+            for n in range(lamps.shape[0]):
+                tx = lamps[n, 0] - place[0]
+                ty = lamps[n, 1] - place[1]
+                tz = lamps[n, 2] - place[2]
+                distance2 = tx * tx + ty * ty + tz * tz
+                distance = math.sqrt(distance2)
+                facing = (normal[0] * tx + normal[1] * ty + normal[2] * tz) / distance
+                facing = max(0.0, (facing + 0.15) / 1.15)
+                leaving = -(lamps[n, 3] * tx + lamps[n, 4] * ty + lamps[n, 5] * tz) / distance
+                if leaving <= 0.0:
+                    continue
+                reached = facing * leaving / (distance2 + 0.05) * (0.35 + 0.65 * openness[v])
+                for c in range(3):
+                    light[f, v, c] += lamps[n, 6 + c] * reached
+    return world, light
+
+
+@_kernel
+def floor_shadows(
+    balls: ndarray, lamps: ndarray, rows: int, columns: int, origin: ndarray, cell: float
+) -> ndarray:
+    """The share of light that reaches the floor under people made of balls.
+
+    Each ball throws, for each lamp, a round shadow around the point where the
+    line from the lamp through the ball meets the floor, wider and paler the
+    higher the ball; and under it a dark spot where it comes near the floor.
+
+    Args:
+        balls: (F, N, 4): centre and radius; radius 0 for none.
+        lamps: (L, 4): position, and the share of the floor's light that it gives.
+        rows, columns: Size of the floor's grid.
+        origin: (2,), x and y of the first cell, metres.
+        cell: Size of a cell, metres.
+
+    Returns:
+        (F, rows, columns), 1 where nobody takes any light.
+    """
+    frames = balls.shape[0]
+    field = np.ones((frames, rows, columns), dtype=np.float32)
+    for f in range(frames):
+        for n in range(balls.shape[1]):
+            x, y, z, radius = balls[f, n]
+            if radius == 0.0:
+                continue
+            z = max(z, radius)
+            for lamp in range(lamps.shape[0] + 1):
+                if lamp < lamps.shape[0]:
+                    stretch = z / (lamps[lamp, 2] - z)
+                    cx = x + (x - lamps[lamp, 0]) * stretch
+                    cy = y + (y - lamps[lamp, 1]) * stretch
+                    width = radius * (1.0 + stretch) * 0.8 + 0.20 * stretch
+                    ratio = radius * (1.0 + stretch) / width
+                    depth = lamps[lamp, 3] * min(0.8, 0.62 * ratio * ratio)
+                else:
+                    cx, cy = x, y
+                    width = 0.8 * radius + 0.55 * z
+                    depth = 0.42 * (radius / (radius + z)) ** 1.2
+                if depth < 0.004:
+                    continue
+                reach = 2.2 * width
+                first_column = max(0, int((cx - reach - origin[0]) / cell))
+                last_column = min(columns - 1, int((cx + reach - origin[0]) / cell) + 1)
+                first_row = max(0, int((cy - reach - origin[1]) / cell))
+                last_row = min(rows - 1, int((cy + reach - origin[1]) / cell) + 1)
+                for row in range(first_row, last_row + 1):
+                    dy = origin[1] + row * cell - cy
+                    for column in range(first_column, last_column + 1):
+                        dx = origin[0] + column * cell - cx
+                        s = (dx * dx + dy * dy) / (reach * reach)
+                        if s < 1.0:
+                            field[f, row, column] *= 1.0 - depth * (1.0 - s) ** 3
+    return field
+
+
+@_kernel
+def draw(
+    points: ndarray,
+    light: ndarray,
+    texture_points: ndarray,
+    triangles: ndarray,
+    owners: ndarray,
+    vertex_ranges: ndarray,
+    present: ndarray,
+    boxes: ndarray,
+    texture: ndarray,
+    room: ndarray,
+    room_fine: ndarray,
+    depth_fine: ndarray,
+    floor_points: ndarray,
+    shadows: ndarray,
+    vignette: ndarray,
+    curve: ndarray,
+    grain: ndarray,
+    offsets: ndarray,
+) -> tuple[ndarray, ndarray]:
+    """Pictures of one camera with the people in them.
+
+    The people are drawn twice as fine as the picture, with a depth buffer that
+    begins with the room's own depths, and averaged; then come the floor's
+    shadows, the lens's vignette, the tone curve and the sensor's noise.
+
+    Args:
+        points: (F, V, 3): column and row in the fine picture, depth in metres;
+            NaN where behind the lens.
+        light: (F, V, 3), with ``texture_points`` (V, 2), ``triangles`` (T, 3) and
+            the ``owners`` (T,) of the triangles: people first, then doors.
+        vertex_ranges: (O, 2), first and last + 1 vertex of each owner.
+        present: (F, O), who is drawn.
+        boxes: (F, P, 4): left, top, right, bottom of each person's target in fine
+            pixels, for the visible share.
+        texture: (H, W, 3).
+        room: (h, w, 3) picture of the empty room, ``room_fine`` (2h, 2w, 3) and
+            ``depth_fine`` (2h, 2w) the same twice as fine.
+        floor_points: (h, w, 2), column and row in the shadow grid, negative off
+            the floor.
+        shadows: (F, rows, columns).
+        vignette: (h, w).
+        curve: (K,), picture value 0 … 255 of light from 0 to 1.
+        grain: (N, N, 3), noise of unit size.
+        offsets: (F, 2), where in the grain each picture begins.
+
+    Returns:
+        Pictures (F, h, w, 3), 8 bit, blue-green-red, and for every person
+        (F, P, 2) the number of fine pixels of its silhouette inside its box, and
+        how many of those are visible.
+    """
+    frames = points.shape[0]
+    height, width = room.shape[:2]
+    people = boxes.shape[1]
+    pictures = np.empty((frames, height, width, 3), dtype=np.uint8)
+    counts = np.zeros((frames, people, 2), dtype=np.int32)
+    depth = np.empty((2 * height, 2 * width), dtype=np.float32)
+    owner_map = np.empty((2 * height, 2 * width), dtype=np.uint8)
+    covered = np.empty((2 * height, 2 * width), dtype=np.uint8)
+    colour = np.empty((2 * height, 2 * width, 3), dtype=np.float32)
+    fresh = np.empty((height, width), dtype=np.uint8)
+    windows = np.empty((vertex_ranges.shape[0], 4), dtype=np.int64)
+    top_value = curve.shape[0] - 1
+    grain_size = grain.shape[0]
+    for f in range(frames):
+        fresh[:] = 0
+        for o in range(vertex_ranges.shape[0]):
+            windows[o] = 0
+            if not present[f, o]:
+                continue
+            low_x, low_y, high_x, high_y = 1e9, 1e9, -1e9, -1e9
+            for v in range(vertex_ranges[o, 0], vertex_ranges[o, 1]):
+                x, y = points[f, v, 0], points[f, v, 1]
+                if x == x:
+                    low_x, high_x = min(low_x, x), max(high_x, x)
+                    low_y, high_y = min(low_y, y), max(high_y, y)
+            if low_x > high_x:
+                continue
+            windows[o, 0] = max(0, int(low_x) // 2)
+            windows[o, 1] = max(0, int(low_y) // 2)
+            windows[o, 2] = max(0, min(width, int(max(high_x, -4.0)) // 2 + 2))
+            windows[o, 3] = max(0, min(height, int(max(high_y, -4.0)) // 2 + 2))
+            for y in range(windows[o, 1], windows[o, 3]):
+                for x in range(windows[o, 0], windows[o, 2]):
+                    fresh[y, x] = 1
+                    for b in range(2 * y, 2 * y + 2):
+                        for a in range(2 * x, 2 * x + 2):
+                            depth[b, a] = depth_fine[b, a]
+                            owner_map[b, a] = 255
+                            covered[b, a] = 0
+        for t in range(triangles.shape[0]):
+            o = owners[t]
+            if not present[f, o]:
+                continue
+            i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+            x0, y0 = points[f, i, 0], points[f, i, 1]
+            x1, y1 = points[f, j, 0], points[f, j, 1]
+            x2, y2 = points[f, k, 0], points[f, k, 1]
+            # counter-clockwise seen from outside is clockwise where rows go down
+            area = (x2 - x0) * (y1 - y0) - (x1 - x0) * (y2 - y0)
+            if not area > 1e-9:
+                continue
+            left = max(2 * windows[o, 0], math.ceil(min(x0, x1, x2)))
+            right = min(2 * windows[o, 2] - 1, math.floor(max(x0, x1, x2)))
+            first = max(2 * windows[o, 1], math.ceil(min(y0, y1, y2)))
+            last = min(2 * windows[o, 3] - 1, math.floor(max(y0, y1, y2)))
+            z0, z1, z2 = points[f, i, 2], points[f, j, 2], points[f, k, 2]
+            for y in range(first, last + 1):
+                for x in range(left, right + 1):
+                    w0 = ((x2 - x) * (y1 - y) - (x1 - x) * (y2 - y)) / area
+                    w1 = ((x0 - x) * (y2 - y) - (x2 - x) * (y0 - y)) / area
+                    w2 = 1.0 - w0 - w1
+                    if w0 < 0.0 or w1 < 0.0 or w2 < 0.0:
+                        continue
+                    if o < people:
+                        covered[y, x] |= 1 << o
+                    z = w0 * z0 + w1 * z1 + w2 * z2
+                    if z >= depth[y, x]:
+                        continue
+                    depth[y, x] = z
+                    owner_map[y, x] = o
+                    u = (
+                        w0 * texture_points[i, 0]
+                        + w1 * texture_points[j, 0]
+                        + w2 * texture_points[k, 0]
+                    )
+                    v = (
+                        w0 * texture_points[i, 1]
+                        + w1 * texture_points[j, 1]
+                        + w2 * texture_points[k, 1]
+                    )
+                    column, row = int(u), int(v)
+                    p, q = u - column, v - row
+                    for c in range(3):
+                        value = (1.0 - q) * (
+                            (1.0 - p) * texture[row, column, c] + p * texture[row, column + 1, c]
+                        ) + q * (
+                            (1.0 - p) * texture[row + 1, column, c]
+                            + p * texture[row + 1, column + 1, c]
+                        )
+                        colour[y, x, c] = value * (
+                            w0 * light[f, i, c] + w1 * light[f, j, c] + w2 * light[f, k, c]
+                        )
+        for o in range(people):
+            if not present[f, o] or not boxes[f, o, 0] == boxes[f, o, 0]:
+                continue
+            first = max(2 * windows[o, 1], math.ceil(boxes[f, o, 1]))
+            last = min(2 * windows[o, 3] - 1, math.floor(boxes[f, o, 3]))
+            left = max(2 * windows[o, 0], math.ceil(boxes[f, o, 0]))
+            right = min(2 * windows[o, 2] - 1, math.floor(boxes[f, o, 2]))
+            for y in range(first, last + 1):
+                for x in range(left, right + 1):
+                    if covered[y, x] >> o & 1:
+                        counts[f, o, 0] += 1
+                        if owner_map[y, x] == o:
+                            counts[f, o, 1] += 1
+        rows, columns = shadows.shape[1:]
+        for y in range(height):
+            for x in range(width):
+                factor = np.float32(1.0)
+                u, v = floor_points[y, x, 0], floor_points[y, x, 1]
+                if u >= 0.0:
+                    column, row = int(u), int(v)
+                    if column < columns - 1 and row < rows - 1:
+                        p, q = u - column, v - row
+                        factor = (1.0 - q) * (
+                            (1.0 - p) * shadows[f, row, column] + p * shadows[f, row, column + 1]
+                        ) + q * (
+                            (1.0 - p) * shadows[f, row + 1, column]
+                            + p * shadows[f, row + 1, column + 1]
+                        )
+                for c in range(3):
+                    if fresh[y, x]:
+                        value = np.float32(0.0)
+                        for b in range(2 * y, 2 * y + 2):
+                            for a in range(2 * x, 2 * x + 2):
+                                if owner_map[b, a] == 255:
+                                    value += 0.25 * factor * room_fine[b, a, c]
+                                else:
+                                    value += 0.25 * min(colour[b, a, c], np.float32(1.5))
+                    else:
+                        value = factor * room[y, x, c]
+                    value *= vignette[y, x]
+                    shown = curve[min(top_value, int(value * top_value))]
+                    speck = grain[
+                        (y + offsets[f, 0]) % grain_size, (x + offsets[f, 1]) % grain_size, c
+                    ]
+                    # photon noise: largest in the middle greys after the tone curve
+                    shown += speck * (1.1 + 0.010 * shown * (1.0 - shown / 300.0))
+                    pictures[f, y, x, 2 - c] = np.uint8(min(255.0, max(0.0, shown + 0.5)))
+    return pictures, counts

@@ -1,0 +1,237 @@
+"""Pictures of a scene, step by step, for every camera; threads share the steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, UInt8
+from numpy import ndarray
+
+from tracker.camera import Camera
+from tracker.sequences.rendering.background import (
+    AMBIENT,
+    FINE,
+    Background,
+    Tracer,
+    lamp_table,
+    render_background,
+)
+from tracker.sequences.rendering.interior import LEFT, NEAR, Interior, furnish
+from tracker.sequences.rendering.raster import draw, floor_shadows, place_bodies
+from tracker.sequences.rendering.rooms import TARGET_HALF_EXTENTS, RoomSpec
+from tracker.sequences.rendering.scene import Figure, Scene, script, shadow_balls
+
+BATCH = 20
+"""Steps drawn by one thread at a time."""
+_CELL = 0.04
+_GRAIN = 512
+_EXPOSURE = 2.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawn:
+    """A few steps of all cameras."""
+
+    first: int
+    pictures: tuple[UInt8[ndarray, "F h w 3"], ...]
+    """For each camera, blue-green-red."""
+    visible: Float[ndarray, "F P C"]
+    """Share of each person's silhouette within its target box that each camera sees."""
+
+
+class Studio:
+    """A room lit and traced for some cameras, ready to draw any of its steps."""
+
+    def __init__(self, spec: RoomSpec, cameras: Sequence[Camera], seed: int) -> None:
+        self.scene: Scene = script(spec)
+        self.cameras = tuple(cameras)
+        self.seed = seed
+        interior = furnish(spec.decor, spec.back_door, spec.front_door)
+        tracer = Tracer(interior)
+        with ThreadPoolExecutor(max_workers=2) as pool:
+            self.backgrounds: list[Background] = list(
+                pool.map(lambda camera: render_background(tracer, camera), self.cameras)
+            )
+        self._lamps = lamp_table(interior)
+        self._shade_lamps = _shade_lamps(interior)
+        self._origin = np.array([LEFT - 0.5, NEAR - 0.2])
+        self._grid = (160, 136)
+        self._floor_points = [
+            np.nan_to_num((b.floor - self._origin) / _CELL, nan=-1.0).astype(np.float32)
+            for b in self.backgrounds
+        ]
+        bodies = [f.body for f in self.scene.figures] + [d.body for d in self.scene.leaves]
+        sizes = np.cumsum([0] + [len(b.vertices) for b in bodies])
+        self._ranges = np.stack([sizes[:-1], sizes[1:]], axis=1)
+        width = max(b.texture.shape[1] for b in bodies)
+        tops = np.cumsum([0] + [b.texture.shape[0] for b in bodies])
+        self._texture = np.zeros((int(tops[-1]), width, 3), dtype=np.float32)
+        points = []
+        for body, top in zip(bodies, tops[:-1], strict=True):
+            rows, columns = body.texture.shape[:2]
+            self._texture[top : top + rows, :columns] = body.texture
+            points.append(body.texture_points + np.array([0.0, float(top)]))
+        self._texture_points = np.concatenate(points).astype(np.float32)
+        self._triangles = np.concatenate(
+            [b.triangles + start for b, start in zip(bodies, sizes[:-1], strict=True)]
+        )
+        self._owners = np.repeat(
+            np.arange(len(bodies), dtype=np.int32), [len(b.triangles) for b in bodies]
+        )
+        rng = np.random.default_rng([seed, 1])
+        self._grain = rng.standard_normal((_GRAIN, _GRAIN, 3), dtype=np.float32)
+        self._curve = _tone_curve()
+        self._vignettes = [_vignette(camera) for camera in self.cameras]
+
+    def draw(self, first: int, last: int) -> Drawn:
+        """The steps ``first … last - 1`` of all cameras."""
+        steps = slice(first, last)
+        scene = self.scene
+        worlds, lights, present = [], [], []
+        for figure in scene.figures:
+            world, light = self._place(figure, steps)
+            worlds.append(world)
+            lights.append(light)
+            present.append(figure.drawn[steps])
+        for door in scene.leaves:
+            angle = door.angle[steps]
+            c, s, zero, one = np.cos(angle), np.sin(angle), 0.0 * angle, 1.0 + 0.0 * angle
+            turned = np.stack([c, -s, zero, s, c, zero, zero, zero, one], axis=1)
+            body = door.body
+            world, light = place_bodies(
+                body.vertices,
+                body.normals,
+                body.bones,
+                body.shares,
+                body.openness,
+                np.zeros((1, 3)),
+                np.ascontiguousarray(turned.reshape(-1, 1, 3, 3)),
+                np.tile(door.hinge, (last - first, 1, 1)),
+                self._lamps,
+                AMBIENT,
+            )
+            worlds.append(world)
+            lights.append(light)
+            present.append(np.ones(last - first, dtype=bool))
+        world = np.concatenate(worlds, axis=1)
+        light = np.concatenate(lights, axis=1)
+        balls = np.concatenate([shadow_balls(f, steps) for f in scene.figures], axis=1)
+        shadows = floor_shadows(balls, self._shade_lamps, *self._grid, self._origin, _CELL)
+        pictures, visible = [], []
+        for number in range(len(self.cameras)):
+            frames, seen = self._view(number, steps, world, light, present, shadows)
+            pictures.append(frames)
+            visible.append(seen)
+        return Drawn(first, tuple(pictures), np.stack(visible, axis=2))
+
+    def _place(self, figure: Figure, steps: slice) -> tuple[ndarray, ndarray]:
+        body = figure.body
+        world, light = place_bodies(
+            body.vertices,
+            body.normals,
+            body.bones,
+            body.shares,
+            body.openness,
+            figure.rest,
+            np.ascontiguousarray(figure.poses.rotations[steps]),
+            np.ascontiguousarray(figure.poses.joints[steps]),
+            self._lamps,
+            AMBIENT,
+        )
+        return world, light
+
+    def _view(
+        self,
+        number: int,
+        steps: slice,
+        world: ndarray,
+        light: ndarray,
+        present: list[ndarray],
+        shadows: ndarray,
+    ) -> tuple[ndarray, ndarray]:
+        camera, background = self.cameras[number], self.backgrounds[number]
+        frames, size = world.shape[:2]
+        flat = world.reshape(-1, 3)
+        pixels, _ = camera.project(flat)
+        depth = camera.to_camera(flat)[:, 2]
+        points = np.column_stack([(pixels + 0.5) * FINE - 0.5, depth]).reshape(frames, size, 3)
+        boxes, shares = [], []
+        for figure in self.scene.figures:
+            box, _ = camera.project_boxes(figure.centres[steps], TARGET_HALF_EXTENTS)
+            corners = np.concatenate([box[:, :2], box[:, :2] + box[:, 2:]], axis=1)
+            boxes.append((corners + 0.5) * FINE - 0.5)
+            limit = np.array(camera.image_size) - 0.5
+            cut = np.clip(corners.reshape(-1, 2, 2), -0.5, limit)
+            with np.errstate(invalid="ignore"):
+                shares.append(np.prod(cut[:, 1] - cut[:, 0], axis=1) / np.prod(box[:, 2:], axis=1))
+        offsets = np.stack(
+            [
+                np.random.default_rng([self.seed, number, step]).integers(0, _GRAIN, size=2)
+                for step in range(steps.start, steps.stop)
+            ]
+        )
+        pictures, counts = draw(
+            points,
+            light,
+            self._texture_points,
+            self._triangles,
+            self._owners,
+            self._ranges,
+            np.stack(present, axis=1),
+            np.stack(boxes, axis=1),
+            self._texture,
+            background.room,
+            background.room_fine,
+            background.depth_fine,
+            self._floor_points[number],
+            shadows,
+            self._vignettes[number],
+            self._curve,
+            self._grain,
+            offsets,
+        )
+        inside = np.nan_to_num(np.stack(shares, axis=1))
+        return pictures, inside * counts[:, :, 1] / np.maximum(counts[:, :, 0], 1)
+
+    def draw_all(self, frames: int, workers: int = 2) -> Iterator[Drawn]:
+        """All steps in order; some are drawn ahead by other threads."""
+        starts = range(0, frames, BATCH)
+        with ThreadPoolExecutor(max_workers=workers) as pool:
+            waiting: list[Future[Drawn]] = []
+            try:
+                for start in starts:
+                    waiting.append(pool.submit(self.draw, start, min(start + BATCH, frames)))
+                    if len(waiting) > 2 * workers:
+                        yield waiting.pop(0).result()
+                while waiting:
+                    yield waiting.pop(0).result()
+            finally:
+                for future in waiting:
+                    future.cancel()
+
+
+def _shade_lamps(interior: Interior) -> ndarray:
+    """The ceiling's panels as the floor sees them: position and share of its light."""
+    panels = interior.lamps[:2]
+    return np.array([[*lamp.centre, 0.40] for lamp in panels])
+
+
+def _tone_curve() -> Float[ndarray, " K"]:
+    """Picture value of light: exposure, a soft shoulder, and the sRGB curve."""
+    light = np.linspace(0.0, 1.0, 4096) * _EXPOSURE
+    shown = np.where(light < 0.5, light, 0.5 + 0.5 * np.tanh((light - 0.5) / 0.5))
+    curved = np.where(
+        shown <= 0.0031308, 12.92 * shown, 1.055 * np.maximum(shown, 1e-9) ** (1 / 2.4) - 0.055
+    )
+    return np.asarray(255.0 * curved, dtype=np.float32)
+
+
+def _vignette(camera: Camera) -> Float[ndarray, "h w"]:
+    width, height = camera.image_size
+    y, x = np.mgrid[0:height, 0:width]
+    cx, cy = camera.intrinsics[0, 2], camera.intrinsics[1, 2]
+    squared = ((x - cx) ** 2 + (y - cy) ** 2) / (cx**2 + cy**2)
+    return np.asarray(1.0 - 0.24 * squared + 0.02 * squared**2, dtype=np.float32)
