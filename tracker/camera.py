@@ -14,8 +14,12 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
+from tracker import kernels
+
 NEAREST_DEPTH = 0.05
 """Metres: a point nearer than this in front of the lens counts as behind the camera."""
+
+_LENS_ITERATIONS = 12
 
 _CORNER_SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 
@@ -147,25 +151,14 @@ class Camera:
         The lens model is inverted by Newton's method, to a thousandth of a pixel
         inside the picture.
         """
-        target = np.linalg.solve(
+        drawn = np.linalg.solve(
             self.intrinsics[:2, :2], (np.asarray(pixels, float) - self.intrinsics[:2, 2]).T
         ).T
-        u, v = target.T.copy()
         if not self.is_pinhole:
-            k1, k2, p1, p2, k3 = self.distortion
-            for _ in range(12):
-                r2 = u * u + v * v
-                radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-                slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2))
-                error_u = u * radial + 2.0 * p1 * u * v + p2 * (r2 + 2.0 * u * u) - target[:, 0]
-                error_v = v * radial + p1 * (r2 + 2.0 * v * v) + 2.0 * p2 * u * v - target[:, 1]
-                a = radial + u * u * slope + 2.0 * p1 * v + 6.0 * p2 * u
-                b = u * v * slope + 2.0 * p1 * u + 2.0 * p2 * v
-                d = radial + v * v * slope + 6.0 * p1 * v + 2.0 * p2 * u
-                determinant = a * d - b * b
-                determinant = np.where(np.abs(determinant) < 1e-9, np.inf, determinant)
-                u = u - (d * error_u - b * error_v) / determinant
-                v = v - (a * error_v - b * error_u) / determinant
+            drawn = kernels.undistort(
+                np.ascontiguousarray(drawn), self.distortion, _LENS_ITERATIONS
+            )
+        u, v = drawn.T
         directions = np.stack([u, v, np.ones_like(u)], axis=1) @ self.rotation
         return np.asarray(directions / np.linalg.norm(directions, axis=1, keepdims=True))
 

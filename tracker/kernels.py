@@ -295,3 +295,42 @@ def belief_propagation(
             total += to_measurement[i, j]
         columns[j] = unexplained[j] / total
     return rows, columns
+
+
+@_kernel
+def undistort(distorted: ndarray, distortion: ndarray, iterations: int) -> ndarray:
+    """Undo the radial-tangential lens model by Newton's method.
+
+    Args:
+        distorted: (N, 2), normalised image coordinates as the lens draws them.
+        distortion: (5,), k1 k2 p1 p2 k3.
+        iterations: At most so many; four or five are enough inside a picture.
+
+    Returns:
+        (N, 2), the coordinates that a pinhole would have drawn.
+    """
+    k1, k2, p1, p2, k3 = distortion
+    straight = distorted.copy()
+    for n in range(len(distorted)):
+        u, v = distorted[n, 0], distorted[n, 1]
+        for _ in range(iterations):
+            r2 = u * u + v * v
+            radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+            slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2))  # d radial / d(r²) · 2
+            error_u = u * radial + 2.0 * p1 * u * v + p2 * (r2 + 2.0 * u * u) - distorted[n, 0]
+            error_v = v * radial + p1 * (r2 + 2.0 * v * v) + 2.0 * p2 * u * v - distorted[n, 1]
+            a = radial + u * u * slope + 2.0 * p1 * v + 6.0 * p2 * u
+            b = u * v * slope + 2.0 * p1 * u + 2.0 * p2 * v
+            d = radial + v * v * slope + 6.0 * p1 * v + 2.0 * p2 * u
+            determinant = a * d - b * b
+            if abs(determinant) < 1e-9:
+                break
+            step_u = (d * error_u - b * error_v) / determinant
+            step_v = (a * error_v - b * error_u) / determinant
+            u -= step_u
+            v -= step_v
+            if step_u * step_u + step_v * step_v < 1e-24:
+                break
+        straight[n, 0] = u
+        straight[n, 1] = v
+    return straight

@@ -69,7 +69,8 @@ class SequentialPhd:
         """Predict one step ahead and update with every camera's boxes, in the cameras' order."""
         p = self._parameters
         mixture = self._model.motion.predict(state.mixture, p.survival_probability)
-        previous = dict(zip(mixture.labels.tolist(), mixture.means[:, :3], strict=True))
+        # heaviest first, so read from the end: a label's heaviest component has the last word
+        previous = dict(zip(mixture.labels[::-1].tolist(), mixture.means[::-1, :3], strict=True))
         sure = _confirmed_labels(mixture)
         next_label = state.next_label
         if p.birth != "measurements":
@@ -120,6 +121,8 @@ class SequentialPhd:
             max_components=p.max_components,
         )
         work.record = record.take(leaders)
+        if p.birth == "entrances":
+            return
         work.evidence.append(
             CameraEvidence(
                 rays=model.cameras[index].back_project(view.boxes[:, :2]),
