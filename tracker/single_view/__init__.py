@@ -1,1 +1,31 @@
 """Stage 1: what each camera sees by itself. One protocol, one file a method."""
+
+from __future__ import annotations
+
+from tracker.parameters import RunParameters
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.colour_phd import ColourPhd
+from tracker.single_view.none import DetectionBoxes
+from tracker.single_view.protocol import SingleViewMethod, ViewResult
+
+__all__ = ["SingleViewMethod", "ViewResult", "create"]
+
+
+def create(
+    name: str,
+    sequence: Sequence,
+    camera_index: int,
+    parameters: RunParameters,
+    reader: FrameReader,
+) -> SingleViewMethod:
+    """The single-view method of that name, prepared for one camera of a sequence.
+
+    Raises:
+        ValueError: If there is no such method, or the sequence lacks what it needs.
+    """
+    if name == "colour_phd":
+        return ColourPhd(sequence, camera_index, parameters.colour_phd, reader)
+    if name == "none":
+        return DetectionBoxes(sequence, camera_index, parameters.detection_boxes)
+    raise ValueError(f"single_view: expected colour_phd or none, got {name!r}")

@@ -1,0 +1,148 @@
+"""What in a picture is not the background: a model learnt from the clip itself.
+
+The background is the median of pictures spread over the clip, so no empty picture
+is needed; whoever stands in one place for more than half of the clip becomes part
+of it. Cameras that expose automatically change the whole picture: each frame's
+tone curve is estimated against the background, and the background is mapped to the
+frame's exposure, never the frame to the background, whose colours it would spoil.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+from numpy import ndarray
+
+from tracker import image_kernels
+
+LEVELS = 16
+"""Levels of the source at which a tone curve is measured."""
+
+SAMPLED_PIXELS = 6000
+"""About so many pixels a tone curve is measured on."""
+
+DARKEST_SHADOW, SHADOW_TINT = 0.65, 0.08
+"""A shadow leaves at least this share of the light, and nearly the same of each channel."""
+
+_ROOTS = np.rint(16.0 * np.sqrt(np.arange(256))).clip(0, 255).astype(np.uint8)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BackgroundModel:
+    """The empty scene as one camera sees it."""
+
+    picture: UInt8[ndarray, "h w 3"]
+    """BGR."""
+    spread: UInt8[ndarray, "h w"]
+    """Typical (median) deviation of a background pixel once exposures are aligned, on the
+    scale of 16 √level."""
+
+    @staticmethod
+    def learn(pictures: Iterable[UInt8[ndarray, "h w 3"]]) -> BackgroundModel | None:
+        """The median of pictures spread over the clip, all brought to one exposure.
+
+        Args:
+            pictures: BGR, of one size; 15 to 40 are enough.
+
+        Returns:
+            None where there is no picture.
+        """
+        stack = list(pictures)
+        if not stack:
+            return None
+        # the first median is blurred by the exposures, but good enough to align them by
+        reference = _median(stack)
+        aligned = [cv2.LUT(picture, tone_curve(picture, reference)) for picture in stack]
+        reference = _median(aligned)
+        roots = cv2.LUT(reference, _ROOTS)
+        deviations = [
+            cv2.absdiff(cv2.LUT(picture, _ROOTS), roots).max(axis=2) for picture in aligned
+        ]
+        return BackgroundModel(reference, _median(deviations))
+
+    def at_exposure_of(self, picture: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w 3"]:
+        """The background as it would look in a picture taken with this exposure."""
+        mapped: ndarray = cv2.LUT(self.picture, tone_curve(self.picture, picture))
+        return mapped
+
+    def foreground(
+        self, picture: UInt8[ndarray, "h w 3"], threshold: float
+    ) -> UInt8[ndarray, "h w"]:
+        """1 where a pixel is neither background nor shadow, 0 elsewhere; single pixels cleaned off.
+
+        Args:
+            picture: BGR, of the background's size.
+            threshold: Difference in the channel that differs most, on the scale 16 √level
+                (0 … 255); what a pixel varies by itself comes on top.
+        """
+        mask = image_kernels.foreground_mask(
+            picture,
+            self.at_exposure_of(picture),
+            self.spread,
+            threshold,
+            DARKEST_SHADOW,
+            SHADOW_TINT,
+        )
+        cleaned: ndarray = cv2.medianBlur(mask, 5)
+        return cleaned
+
+
+def tone_curve(
+    source: UInt8[ndarray, "h w 3"], target: UInt8[ndarray, "h w 3"]
+) -> UInt8[ndarray, "1 256 3"]:
+    """The look-up table, one a channel, that maps one picture to another's exposure.
+
+    At each of some levels of the source the median of the target's values there is
+    taken, which holds while less than half of those pixels show something else;
+    the levels between are interpolated and the curve never falls. Levels that the
+    source hardly has follow their neighbours' shift.
+    """
+    height, width = source.shape[:2]
+    stride = max(1, int(np.sqrt(height * width / SAMPLED_PIXELS)))
+    few = source[::stride, ::stride].reshape(-1, 3)
+    other = target[::stride, ::stride].reshape(-1, 3)
+    levels = np.arange(256)
+    curve = np.empty((1, 256, 3), dtype=np.uint8)
+    enough = max(4, len(few) // 400)
+    for channel in range(3):
+        group = few[:, channel].astype(np.intp) * LEVELS // 256
+        joint = np.bincount(group * 256 + other[:, channel], minlength=LEVELS * 256)
+        joint = joint.reshape(LEVELS, 256)
+        total = joint.sum(axis=1)
+        used = np.flatnonzero(total >= enough)
+        if not len(used):
+            curve[0, :, channel] = levels
+            continue
+        halves = np.cumsum(joint[used], axis=1) >= 0.5 * total[used, None]
+        medians = halves.argmax(axis=1).astype(float)
+        sums = np.bincount(group, weights=few[:, channel], minlength=LEVELS)
+        centres = sums[used] / total[used]
+        mapped = levels + np.interp(levels, centres, medians - centres)
+        curve[0, :, channel] = np.clip(np.rint(np.maximum.accumulate(mapped)), 0, 255)
+    return curve
+
+
+def integral(mask: UInt8[ndarray, "h w"]) -> Int[ndarray, "h1 w1"]:
+    """Sums above and to the left of each corner, for :func:`box_shares`."""
+    sums: ndarray = cv2.integral(mask)
+    return sums
+
+
+def box_shares(sums: Int[ndarray, "h1 w1"], edges: Float[ndarray, "N 4"]) -> Float[ndarray, " N"]:
+    """The share of foreground in rectangles given by left, top, right, bottom.
+
+    Of a rectangle partly outside the picture only what is inside counts; wholly
+    outside the share is 0.
+    """
+    shares: ndarray = image_kernels.box_means(sums, np.ascontiguousarray(edges, dtype=float))
+    return shares
+
+
+def _median(pictures: list[ndarray]) -> UInt8[ndarray, "h w *c"]:
+    middle = len(pictures) // 2
+    result: ndarray = np.partition(np.stack(pictures), middle, axis=0)[middle]
+    return result

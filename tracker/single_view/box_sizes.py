@@ -1,0 +1,165 @@
+"""How large a target can look at each place of a picture: the calibrated camera tells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+from scipy.stats import norm
+
+from tracker import models
+from tracker.camera import Camera
+from tracker.gaussian_mixture import GaussianMixture
+from tracker.sequences.sequence import Room
+
+CELLS = 24
+"""The picture is cut into about so many cells a side."""
+
+POSITIONS = 60_000
+"""Positions in the room that are projected."""
+
+BELOW_FLOOR = 0.1
+"""Metres that a target may reach below the room's volume."""
+
+
+def upright_boxes(
+    camera: Camera, positions: Float[ndarray, "N 3"], half_extents: Float[ndarray, " 3"]
+) -> tuple[Float[ndarray, "N 4"], Bool[ndarray, " N"]]:
+    """The picture boxes of upright targets that face the camera.
+
+    Centre: the picture of the target's centre. Half sizes: half the picture of its
+    width (the mean of the two horizontal extents, seen from the front) and of its
+    height. That is how a person draws a box around a head or a body; the bounds of
+    a solid block's corners are wider.
+
+    Args:
+        camera: The calibrated camera.
+        positions: World metres.
+        half_extents: Half width, depth and height, metres.
+
+    Returns:
+        ``centre_x, centre_y, half_width, half_height`` in pixels, NaN where invalid;
+        and whether all of it is in front of the lens and the centre in the picture.
+    """
+    right = camera.rotation[0] * [1.0, 1.0, 0.0]
+    norm = np.linalg.norm(right)
+    right = right / norm if norm > 1e-9 else np.array([1.0, 0.0, 0.0])
+    across = right * (half_extents[0] + half_extents[1]) / 2.0
+    up = np.array([0.0, 0.0, half_extents[2]])
+    points = np.concatenate(
+        [positions, positions - across, positions + across, positions - up, positions + up]
+    )
+    pixels, valid = camera.project(points)
+    centre, left, right_edge, low, high = pixels.reshape(5, -1, 2)
+    boxes = np.empty((len(positions), 4))
+    boxes[:, :2] = centre
+    boxes[:, 2] = np.linalg.norm(right_edge - left, axis=1) / 2.0
+    boxes[:, 3] = np.linalg.norm(high - low, axis=1) / 2.0
+    whole = valid.reshape(5, -1).all(axis=0)
+    boxes[~whole] = np.nan
+    return boxes, whole & camera.contains(boxes[:, :2])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BoxSizes:
+    """The sizes that targets anywhere in the room have, by the place of their centre."""
+
+    cell: float
+    """Side of a cell, pixels."""
+    columns: int
+    rows: int
+    starts: Int[ndarray, " cells1"]
+    """Where the sizes of each cell begin; one more at the end."""
+    sizes: Float[ndarray, "P 2"]
+    """Half width and half height, pixels, cell by cell."""
+
+    @staticmethod
+    def of(camera: Camera, room: Room, half_extents: Float[ndarray, " 3"]) -> BoxSizes:
+        """Project positions spread evenly over the room's volume."""
+        width, height = camera.image_size
+        cell = max(width, height) / CELLS
+        columns, rows = int(np.ceil(width / cell)), int(np.ceil(height / cell))
+        low = room.minimum.copy()
+        low[2] = min(low[2] + half_extents[2] - BELOW_FLOOR, room.maximum[2])
+        positions = low + _even_points(POSITIONS) * (room.maximum - low)
+        boxes, visible = upright_boxes(camera, positions, half_extents)
+        boxes = boxes[visible]
+        place = _cells(boxes[:, :2], cell, columns, rows)
+        order = np.argsort(place, kind="stable")
+        starts = np.searchsorted(place[order], np.arange(columns * rows + 1))
+        return BoxSizes(cell, columns, rows, starts, boxes[order, 2:])
+
+    def contains(self, centres: Float[ndarray, "N 2"]) -> Bool[ndarray, " N"]:
+        """Whether a target's centre can be there at all."""
+        place = _cells(centres, self.cell, self.columns, self.rows)
+        return np.asarray(self.starts[place + 1] > self.starts[place])
+
+    def draw(
+        self, centres: Float[ndarray, "N 2"], rng: np.random.Generator
+    ) -> tuple[Float[ndarray, "N 2"], Bool[ndarray, " N"]]:
+        """A plausible size at each place, and whether there is one (else NaN)."""
+        place = _cells(centres, self.cell, self.columns, self.rows)
+        first, count = self.starts[place], self.starts[place + 1] - self.starts[place]
+        chosen = first + (rng.random(len(centres)) * count).astype(np.int64)
+        sizes = np.full((len(centres), 2), np.nan)
+        possible = count > 0
+        sizes[possible] = self.sizes[chosen[possible]]
+        return sizes, possible
+
+    @property
+    def range(self) -> Float[ndarray, "2 2"]:
+        """Smallest and largest half width and half height, pixels; (1, 2) if nothing is seen."""
+        if not len(self.sizes):
+            return np.array([[1.0, 1.0], [2.0, 2.0]])
+        return np.array([self.sizes.min(axis=0), self.sizes.max(axis=0)])
+
+
+def _even_points(count: int) -> Float[ndarray, "N 3"]:
+    """Points that fill the unit cube evenly: the additive recurrence of the plastic number."""
+    growth = 1.2207440846057596  # the real root of x⁴ = x + 1
+    steps = np.arange(1, count + 1)[:, None] * growth ** -np.arange(1.0, 4.0)
+    return steps % 1.0
+
+
+def _cells(
+    centres: Float[ndarray, "N 2"], cell: float, columns: int, rows: int
+) -> Int[ndarray, " N"]:
+    """The cell of each place; places outside the picture go to the nearest one."""
+    column = np.clip((centres[:, 0] + 0.5) // cell, 0, columns - 1).astype(np.int64)
+    row = np.clip((centres[:, 1] + 0.5) // cell, 0, rows - 1).astype(np.int64)
+    return row * columns + column
+
+
+def entrance_boxes(
+    camera: Camera, room: Room, half_extents: Float[ndarray, " 3"], weight: float
+) -> GaussianMixture:
+    """The entrances as a camera sees them: one Gaussian over boxes for each it can see.
+
+    Mean and covariance are those of the boxes of targets drawn from the entrance.
+    A room without entrances gives one component of everything that can be seen.
+
+    Args:
+        camera: The calibrated camera.
+        room: Its entrances have mean and standard deviation in metres.
+        half_extents: Of a target, metres.
+        weight: Of each component.
+    """
+    births = models.entrance_births(room, weight)
+    normals = norm.ppf(_even_points(500))
+    means, covariances = [], []
+    for mean, covariance in zip(births.means, births.covariances, strict=True):
+        positions = mean + normals * np.sqrt(np.diag(covariance))
+        boxes, visible = upright_boxes(camera, positions, half_extents)
+        if visible.sum() < 10:
+            continue
+        means.append(boxes[visible].mean(axis=0))
+        spread = np.cov(boxes[visible].T)
+        covariances.append(spread + np.diag((0.1 * means[-1][[2, 3, 2, 3]]) ** 2))
+    return GaussianMixture(
+        weights=np.full(len(means), weight),
+        means=np.array(means).reshape(-1, 4),
+        covariances=np.array(covariances).reshape(-1, 4, 4),
+        labels=np.zeros(len(means), dtype=np.int64),
+    )
