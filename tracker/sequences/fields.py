@@ -100,6 +100,8 @@ class Fields:
         expected = f"a whole number of at least {minimum}"
         if maximum is not None:
             expected = f"a whole number from {minimum} to {maximum}"
+        if minimum == maximum:
+            expected = f"{minimum}"
         value = self._get(name, default, expected)
         good = isinstance(value, int) and not isinstance(value, bool) and value >= minimum
         if not good or (maximum is not None and value > maximum):

@@ -70,19 +70,18 @@ class FrameReader:
             step: 0-based.
 
         Returns:
-            None where the camera has no pictures, the file ends before, or the frame or
-            image cannot be decoded.
+            None where the camera has no pictures, the file ends before, the frame or
+            image cannot be decoded, or the reader is closed.
 
         Raises:
             IndexError: If there is no such camera.
-            ValueError: If the reader is closed.
         """
         source = self._sources[camera]
         if not 0 <= step < self._sequence.frames or not source.view.has_pictures:
             return None
         with self._wanted:
             if self._closed:
-                raise ValueError("this reader of pictures is closed; open the sequence again")
+                return None
             direction = self._walks[camera].move(step, self._sequence.frames, self._ahead)
             if direction > 0:
                 self._start_reading_ahead()
@@ -94,6 +93,8 @@ class FrameReader:
             found, picture = self._cache.get(camera, step)  # read ahead meanwhile
             if found:
                 return picture
+            if self._closed:
+                return None
             if direction < 0:
                 self._read_behind(camera, step)
             picture = source.read(step)

@@ -42,7 +42,7 @@ def find_images(folder: Path, fields: Fields) -> tuple[Path, ...]:
         raise fields.error("images", f'"{pattern}" is not a file pattern ({error})') from None
     if not images:
         raise fields.error(
-            "images", f'no file matches "{pattern}"; expected a pattern such as "cam1/*.jpg"'
+            "images", f'no file matches "{pattern}"; put the pictures there or correct the pattern'
         )
     for path in images:
         _inside(folder, path.relative_to(folder).as_posix(), fields, "images")
@@ -52,13 +52,13 @@ def find_images(folder: Path, fields: Fields) -> tuple[Path, ...]:
 def _inside(folder: Path, given: str, fields: Fields, name: str) -> Path:
     """The path, which must stay in the folder, also where a symbolic link leads."""
     path = folder / given
+    outright = Path(given).is_absolute() or ".." in Path(given).parts
     try:
-        leaves = Path(given).is_absolute() or not path.resolve().is_relative_to(folder.resolve())
-    except (OSError, RuntimeError, ValueError):  # a loop of links, or a name that cannot be
+        leaves = outright or not path.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError):  # a circle of links, or a name that cannot be
         raise fields.error(name, f'"{given}" is not a path that can be followed') from None
-    if leaves or ".." in Path(given).parts:
-        how = " (by a symbolic link)" if not leaves or ".." not in Path(given).parts else ""
-        how = "" if Path(given).is_absolute() else how
+    if leaves:
+        how = "" if outright else " (by a symbolic link)"
         raise fields.error(
             name,
             f'expected a path inside the sequence folder, found "{given}", which leaves it{how}; '
@@ -87,22 +87,22 @@ def check_pictures(view: View, fields: Fields, frames: int) -> Iterable[str]:
                 "expected MP4, AVI or another format that FFmpeg decodes",
             ) from None
         _check_size(view, fields, index.size, "frame size")
-        return list(_short(view, index.frames, frames, "video"))
+        return list(_short(view, index.frames, frames, "video has"))
     if view.images:
         picture = read_image(view.images[0])
         if picture is None:
             raise fields.error("images", f'"{view.images[0].name}" cannot be read as a picture')
         _check_size(view, fields, (picture.shape[1], picture.shape[0]), "image size")
-        warnings = list(_short(view, len(view.images), frames, "images"))
+        warnings = list(_short(view, len(view.images), frames, "images are"))
         by_number = sorted(view.images, key=_by_number)
-        if by_number != list(view.images):
-            place = next(i for i, pair in enumerate(zip(by_number, view.images, strict=True))
-                         if pair[0] != pair[1])  # fmt: skip
-            warnings.append(
-                f'camera "{view.camera.name}": images are taken in the order of their names, so '
-                f'"{view.images[place].name}" comes before "{by_number[place].name}"; write the '
-                "numbers with leading zeros"
-            )
+        for first, other in zip(by_number, view.images, strict=True):
+            if first != other:
+                warnings.append(
+                    f'camera "{view.camera.name}": images are taken in the order of their names, '
+                    f'so "{other.name}" comes before "{first.name}"; write the numbers with '
+                    "leading zeros"
+                )
+                break
         return warnings
     return []
 
@@ -119,12 +119,13 @@ def _check_size(view: View, fields: Fields, found: tuple[int, int], what: str) -
 def _short(view: View, there: int, frames: int, what: str) -> Iterable[str]:
     steps = max(0, there - view.first_frame)
     if steps < frames:
-        missing = f"steps {steps} to {frames - 1} have" if frames - steps > 1 else (
-            f"step {steps} has")  # fmt: skip
         offset = f" from frame {view.first_frame} on" if view.first_frame else ""
+        missing = (
+            f"steps {steps} to {frames - 1} have" if frames - steps > 1 else f"step {steps} has"
+        )
         yield (
-            f'camera "{view.camera.name}": {what} end{"s" if what == "video" else ""} early: '
-            f"expected {frames} frames{offset}, found {steps}; {missing} no picture"
+            f'camera "{view.camera.name}": the {what} too few: expected {frames} '
+            f"frames{offset}, found {steps}; {missing} no picture"
         )
 
 

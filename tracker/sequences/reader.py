@@ -14,10 +14,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
-from numpy import ndarray
 
-from tracker.camera import Camera
+from tracker.sequences.calibration import POSE, check_sight, read_camera
 from tracker.sequences.csv_columns import Columns, read_columns
 from tracker.sequences.fields import Fields, did_you_mean, listed, shown
 from tracker.sequences.media import check_pictures, find_images, locate
@@ -38,11 +36,7 @@ MOST_FRAMES = 10_000_000
 
 TOP = ("format", "name", "description", "fps", "frames", "room", "target", "camera", "template",
        "ground_truth")  # fmt: skip
-POSE = ("K", "distortion", "R", "t")
 CAMERA = ("name", "image_size", "video", "images", "first_frame", "detections", *POSE, "projection")
-
-ROTATION_TOLERANCE = 2e-3
-"""How far R Rᵀ may be from the identity: entries written with three decimals pass."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +82,7 @@ def read_sequence(folder: Path | str) -> Sequence:
     )
     views = _views(fields, reading)
     for view in views:
-        _check_sight(view.camera, room, reading)
+        reading.warnings += check_sight(view.camera, room)
     templates = tuple(
         _template(template, views, reading.frames)
         for template in fields.tables(
@@ -220,7 +214,10 @@ def _views(fields: Fields, reading: _Reading) -> tuple[View, ...]:
 def _view(name: str, fields: Fields, reading: _Reading) -> View:
     size = fields.vector("image_size", 2, "width and height in pixels", positive=True)
     if (size != np.floor(size)).any() or (size > 65535).any():
-        raise fields.error("image_size", "expected two whole numbers of pixels, at most 65535")
+        found = f"{size[0]:g} and {size[1]:g}"
+        raise fields.error(
+            "image_size", f"expected two whole numbers of pixels up to 65535, found {found}"
+        )
     image_size = (int(size[0]), int(size[1]))
     if "video" in fields and "images" in fields:
         raise fields.error("images", "expected a video or images, found both; remove one")
@@ -233,7 +230,7 @@ def _view(name: str, fields: Fields, reading: _Reading) -> View:
         path = locate(reading.folder, fields, "detections")
         detections = _detections(path, reading)
     view = View(
-        camera=_camera(name, image_size, fields),
+        camera=read_camera(name, image_size, fields),
         video=video,
         images=images,
         first_frame=fields.integer("first_frame", 0),
@@ -242,91 +239,6 @@ def _view(name: str, fields: Fields, reading: _Reading) -> View:
     reading.warnings += check_pictures(view, fields, reading.frames)
     reading.files += images if video is None else (video,)
     return view
-
-
-def _camera(name: str, image_size: tuple[int, int], fields: Fields) -> Camera:
-    if "projection" in fields:
-        both = [key for key in POSE if key in fields]
-        if both:
-            raise fields.error(
-                "projection", f"stands in place of {listed(both)}; remove one or the other"
-            )
-        try:
-            return Camera.from_projection(name, image_size, fields.matrix("projection", 3, 4))
-        except ValueError as error:
-            raise fields.error("projection", str(error)) from None
-    missing = [key for key in ("K", "R", "t") if key not in fields]
-    if missing:
-        raise SequenceError(
-            f"{fields.where}: the calibration is incomplete: expected K, R and t, or projection; "
-            f"{listed(missing)} {'is' if len(missing) == 1 else 'are'} missing"
-        )
-    return Camera(
-        name,
-        image_size,
-        _intrinsics(fields),
-        _rotation(fields),
-        fields.vector("t", 3, "metres, in camera axes"),
-        _distortion(fields),
-    )
-
-
-def _intrinsics(fields: Fields) -> Float[ndarray, "3 3"]:
-    matrix = fields.matrix("K", 3, 3)
-    form = "[[fx, s, cx], [0, fy, cy], [0, 0, 1]] in pixels"
-    if matrix[1, 0] or matrix[2, 0] or matrix[2, 1] or matrix[2, 2] != 1.0:
-        turned = "; it looks transposed" if matrix[0, 2] == matrix[1, 2] == 0.0 else ""
-        raise fields.error("K", f"expected {form}, found {shown(matrix.tolist())}{turned}")
-    if matrix[0, 0] <= 0.0 or matrix[1, 1] <= 0.0:
-        found = f"{matrix[0, 0]:g} and {matrix[1, 1]:g}"
-        raise fields.error("K", f"expected focal lengths fx and fy above 0 pixels, found {found}")
-    return matrix
-
-
-def _rotation(fields: Fields) -> Float[ndarray, "3 3"]:
-    matrix = fields.matrix("R", 3, 3)
-    error = float(np.abs(matrix @ matrix.T - np.eye(3)).max())
-    determinant = float(np.linalg.det(matrix))
-    if error > ROTATION_TOLERANCE:
-        raise fields.error(
-            "R",
-            "expected a rotation (R Rᵀ = 1, determinant 1), found "
-            f"R Rᵀ off by {error:.2g} and determinant {determinant:.4g}; "
-            "write it with more digits or calibrate again",
-        )
-    if determinant < 0.0:
-        raise fields.error(
-            "R",
-            "expected a rotation (determinant 1), found a reflection (determinant −1); "
-            "one axis points the wrong way: camera axes are x right, y down, z ahead",
-        )
-    return matrix
-
-
-def _distortion(fields: Fields) -> Float[ndarray, " 5"]:
-    given = fields.numbers("distortion")
-    if len(given) not in (0, 4, 5, 8, 12, 14):
-        raise fields.error(
-            "distortion", f"expected 4 or 5 numbers (k1 k2 p1 p2 [k3]), found {len(given)}"
-        )
-    if given[5:].any():
-        raise fields.error(
-            "distortion",
-            f"expected at most 5 numbers other than 0 (k1 k2 p1 p2 k3), found {len(given)}; "
-            "calibrate with the plain lens model",
-        )
-    return np.concatenate([given[:5], np.zeros(max(0, 5 - len(given)))])
-
-
-def _check_sight(camera: Camera, room: Room, reading: _Reading) -> None:
-    """Warn where a camera sees nothing of the room: usually a pose the wrong way round."""
-    steps = np.linspace(0.0, 1.0, 13)
-    grid = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
-    if not camera.sees(room.minimum + grid * (room.maximum - room.minimum)).any():
-        reading.warnings.append(
-            f'camera "{camera.name}" sees nothing of the room: check that R and t lead from world '
-            "to camera (x_cam = R x_world + t), that t is in metres, and [room]"
-        )
 
 
 def _template(fields: Fields, views: tuple[View, ...], frames: int) -> Template:

@@ -1,0 +1,221 @@
+"""The track file: one row a target a step, with the boxes it makes in every picture.
+
+The comment lines at the top say what made it: version, sequence, seed, methods and the
+value of every parameter, in words that ``multiview-phd track --set`` takes back.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+import secrets
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from tracker import __version__
+from tracker.parameters import METHODS, PARAMETERS, RunParameters, value
+from tracker.sequences.csv_columns import read_columns
+from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.trajectories import Trajectories
+
+PROGRAM = "multiview-phd"
+BOX = ("left", "top", "width", "height")
+COLUMNS = ("frame", "time", "id", "x", "y", "z", "existence", "sigma_x", "sigma_y", "sigma_z")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackFile:
+    """What a track file says. N rows, sorted by step and then id."""
+
+    frames: Int[ndarray, " N"]
+    times: Float[ndarray, " N"]
+    """Seconds."""
+    ids: Int[ndarray, " N"]
+    positions: Float[ndarray, "N 3"]
+    """World metres."""
+    existences: Float[ndarray, " N"]
+    sigmas: Float[ndarray, "N 3"]
+    """Standard deviation of the position along x, y and z, metres."""
+    boxes: Mapping[str, Float[ndarray, "N 4"]]
+    """For each camera left, top, width, height in pixels; NaN where its picture has no box."""
+    settings: Mapping[str, str]
+    """The comment lines ``# key = value``: sequence, seed, methods and parameters."""
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+
+def write_tracks_csv(
+    stream: TextIO,
+    sequence: Sequence,
+    tracks: Trajectories,
+    parameters: RunParameters,
+    seed: int,
+    *,
+    done: int | None = None,
+) -> None:
+    """Write the track file.
+
+    Positions have 4 decimals (a tenth of a millimetre), boxes 2, times 6.
+
+    Args:
+        stream: Text, opened with ``newline=""``; lines end with a single line feed.
+        sequence: What was tracked.
+        tracks: Its targets, by step and then id.
+        parameters: With which they were found.
+        seed: Of the run.
+        done: The number of steps computed; fewer than the sequence has are said at the top.
+    """
+    for line in _comments(sequence, parameters, seed, done):
+        stream.write(f"# {line}\n")
+    cameras = sequence.cameras
+    boxes = [f"{camera.name}_{side}" for camera in cameras for side in BOX]
+    csv.writer(stream, lineterminator="\n").writerow([*COLUMNS, *boxes])
+    columns = [
+        [f"{frame}" for frame in tracks.frames],
+        [f"{frame * sequence.step_time:.6f}" for frame in tracks.frames],
+        [f"{number}" for number in tracks.ids],
+        *_fixed(tracks.positions, 4),
+        *_fixed(tracks.existences[:, None], 4),
+        *_fixed(tracks.sigmas, 4),
+    ]
+    for camera in cameras:
+        pixels, visible = camera.project_boxes(tracks.positions, sequence.target_half_extents)
+        columns += _fixed(np.where(visible[:, None], pixels, np.nan), 2)
+    stream.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
+
+
+def _fixed(values: Float[ndarray, "N C"], decimals: int) -> Iterator[list[str]]:
+    """Columns of text with a fixed number of decimals; NaN is empty, and zero has no sign."""
+    rounded = np.round(values, decimals) + 0.0  # −0.0 + 0.0 is 0.0
+    for column in rounded.T:
+        yield [f"{number:.{decimals}f}" if number == number else "" for number in column.tolist()]
+
+
+def _comments(
+    sequence: Sequence, parameters: RunParameters, seed: int, done: int | None
+) -> Iterator[str]:
+    yield f"{PROGRAM} {__version__}"
+    if done is not None and done < sequence.frames:
+        yield f"partial: the first {done} of {sequence.frames} steps"
+    yield f"sequence = {' '.join(sequence.name.split())}"
+    yield f"seed = {seed}"
+    for key in (*METHODS, *PARAMETERS):
+        yield f"{key} = {_as_text(value(parameters, key))}"
+
+
+def _as_text(setting: Any) -> str:
+    return str(setting).lower() if isinstance(setting, bool) else str(setting)
+
+
+def save_tracks_csv(
+    path: Path | str,
+    sequence: Sequence,
+    tracks: Trajectories,
+    parameters: RunParameters,
+    seed: int,
+    *,
+    done: int | None = None,
+) -> None:
+    """Write the track file to disk: wholly or not at all, whatever interrupts it.
+
+    Args:
+        path: Replaced if it is there. A pipe or device is written to directly.
+        sequence, tracks, parameters, seed, done: As for :func:`write_tracks_csv`.
+
+    Raises:
+        OSError: With a sentence, if the file cannot be written.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise IsADirectoryError(f"{path}: expected a file to write, found a folder; add a name")
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"{path}: there is no folder {path.parent} to write it to")
+    if path.exists() and not path.is_file():
+        with path.open("w", encoding="utf-8", newline="") as stream:
+            write_tracks_csv(stream, sequence, tracks, parameters, seed, done=done)
+        return
+    path = path.resolve()  # a symbolic link stays, and what it names is replaced
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    try:
+        with temporary.open("x", encoding="utf-8", newline="") as stream:
+            write_tracks_csv(stream, sequence, tracks, parameters, seed, done=done)
+            stream.flush()
+            os.fsync(stream.fileno())
+        temporary.replace(path)
+    except OSError as error:
+        raise OSError(f"{path}: cannot be written ({error.strerror or error})") from None
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def read_tracks_csv(path: Path | str) -> TrackFile:
+    """Read a track file.
+
+    Raises:
+        SequenceError: In one sentence: file, line and column, expected, found.
+    """
+    path = Path(path)
+    header = _header(path)
+    cameras = [name.removesuffix("_left") for name in header if name.endswith("_left")]
+    sides = tuple(f"{camera}_{side}" for camera in cameras for side in BOX)
+    columns = read_columns(
+        path, path.name, needed=(*COLUMNS, *(s for s in sides if s not in header)), blank=sides
+    )
+    frames = columns.whole("frame", 0, None, "the step")
+    ids = columns.whole("id", 0, None, "the track")
+    order = np.lexsort([ids, frames])
+    same = (np.diff(frames[order]) == 0) & (np.diff(ids[order]) == 0)
+    if same.any():
+        first, second = order[np.argmax(same)], order[np.argmax(same) + 1]
+        raise columns.error(
+            int(columns.lines[second]),
+            "id",
+            f"track {ids[second]} is at step {frames[second]} already in line "
+            f"{columns.lines[first]}; expected one row a track a step",
+        )
+    return TrackFile(
+        frames=frames[order],
+        times=columns.values["time"][order],
+        ids=ids[order],
+        positions=columns.stacked("x", "y", "z")[order],
+        existences=columns.values["existence"][order],
+        sigmas=columns.stacked("sigma_x", "sigma_y", "sigma_z")[order],
+        boxes={
+            camera: columns.stacked(*(f"{camera}_{side}" for side in BOX))[order]
+            for camera in cameras
+        },
+        settings=_settings(path),
+    )
+
+
+def _header(path: Path) -> list[str]:
+    for line in _beginning(path):
+        if line.strip() and not line.startswith("#"):
+            return [cell.strip() for cell in next(csv.reader([line]))]
+    return []
+
+
+def _settings(path: Path) -> dict[str, str]:
+    settings = {}
+    for line in _beginning(path):
+        if not line.startswith("#"):
+            break
+        key, equals, setting = line[1:].partition("=")
+        if equals:
+            settings[key.strip()] = setting.strip()
+    return settings
+
+
+def _beginning(path: Path) -> Iterator[str]:
+    try:
+        with path.open(encoding="utf-8-sig", errors="replace") as stream:
+            yield from stream
+    except OSError as error:
+        raise SequenceError(f"{path}: cannot be read ({error.strerror})") from None

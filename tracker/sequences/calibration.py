@@ -1,0 +1,109 @@
+"""The calibration of one camera in ``sequence.toml``, checked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.camera import Camera
+from tracker.sequences.fields import Fields, listed, shown
+from tracker.sequences.sequence import Room, SequenceError
+
+POSE = ("K", "distortion", "R", "t")
+"""The fields that, without ``projection``, say how a camera sees."""
+
+ROTATION_TOLERANCE = 2e-3
+"""How far R Rᵀ may be from the identity: entries written with three decimals pass."""
+
+
+def read_camera(name: str, image_size: tuple[int, int], fields: Fields) -> Camera:
+    """The camera of one ``[[camera]]`` table.
+
+    Raises:
+        SequenceError: If the calibration is incomplete, of the wrong shape, or impossible.
+    """
+    if "projection" in fields:
+        both = [key for key in POSE if key in fields]
+        if both:
+            raise fields.error(
+                "projection", f"stands in place of {listed(both)}; remove one or the other"
+            )
+        try:
+            return Camera.from_projection(name, image_size, fields.matrix("projection", 3, 4))
+        except ValueError as error:
+            raise fields.error("projection", str(error)) from None
+    missing = [key for key in ("K", "R", "t") if key not in fields]
+    if missing:
+        raise SequenceError(
+            f"{fields.where}: the calibration is incomplete: expected K, R and t, or projection; "
+            f"{listed(missing)} {'is' if len(missing) == 1 else 'are'} missing"
+        )
+    return Camera(
+        name,
+        image_size,
+        _intrinsics(fields),
+        _rotation(fields),
+        fields.vector("t", 3, "metres, in camera axes"),
+        _distortion(fields),
+    )
+
+
+def _intrinsics(fields: Fields) -> Float[ndarray, "3 3"]:
+    matrix = fields.matrix("K", 3, 3)
+    form = "[[fx, s, cx], [0, fy, cy], [0, 0, 1]] in pixels"
+    if matrix[1, 0] or matrix[2, 0] or matrix[2, 1] or matrix[2, 2] != 1.0:
+        turned = "; it looks transposed" if matrix[0, 2] == matrix[1, 2] == 0.0 else ""
+        raise fields.error("K", f"expected {form}, found {shown(matrix.tolist())}{turned}")
+    if matrix[0, 0] <= 0.0 or matrix[1, 1] <= 0.0:
+        found = f"{matrix[0, 0]:g} and {matrix[1, 1]:g}"
+        raise fields.error("K", f"expected focal lengths fx and fy above 0 pixels, found {found}")
+    return matrix
+
+
+def _rotation(fields: Fields) -> Float[ndarray, "3 3"]:
+    matrix = fields.matrix("R", 3, 3)
+    error = float(np.abs(matrix @ matrix.T - np.eye(3)).max())
+    determinant = float(np.linalg.det(matrix))
+    if error > ROTATION_TOLERANCE:
+        raise fields.error(
+            "R",
+            "expected a rotation (R Rᵀ = 1, determinant 1), found "
+            f"R Rᵀ off by {error:.2g} and determinant {determinant:.4g}; "
+            "write it with more digits or calibrate again",
+        )
+    if determinant < 0.0:
+        raise fields.error(
+            "R",
+            "expected a rotation (determinant 1), found a reflection (determinant −1); "
+            "one axis points the wrong way: camera axes are x right, y down, z ahead",
+        )
+    return matrix
+
+
+def _distortion(fields: Fields) -> Float[ndarray, " 5"]:
+    given = fields.numbers("distortion")
+    if len(given) not in (0, 4, 5, 8, 12, 14):
+        raise fields.error(
+            "distortion", f"expected 4 or 5 numbers (k1 k2 p1 p2 [k3]), found {len(given)}"
+        )
+    if given[5:].any():
+        raise fields.error(
+            "distortion",
+            f"expected at most 5 numbers other than 0 (k1 k2 p1 p2 k3), found {len(given)}; "
+            "calibrate with the plain lens model",
+        )
+    return np.concatenate([given[:5], np.zeros(max(0, 5 - len(given)))])
+
+
+def check_sight(camera: Camera, room: Room) -> Iterator[str]:
+    """Warn where a camera sees nothing of the room: usually a pose the wrong way round."""
+    steps = np.linspace(0.0, 1.0, 13)
+    grid = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
+    if not camera.sees(room.minimum + grid * (room.maximum - room.minimum)).any():
+        yield (
+            f'camera "{camera.name}" sees nothing of the room: check that R and t lead from world '
+            "to camera (x_cam = R x_world + t), that t is in metres, and [room]"
+        )

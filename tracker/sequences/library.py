@@ -1,0 +1,157 @@
+"""Where sequences come from: the rendered rooms by name, any folder by its path."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from tracker.sequences.fields import did_you_mean, listed
+from tracker.sequences.reader import FILE, read_sequence, read_summary
+from tracker.sequences.sequence import Sequence, SequenceError
+
+DEFAULT_CAMERAS = 2
+"""Cameras of a rendered room that is opened by its name."""
+
+Told = Callable[[int, int], None]
+"""Called with the steps rendered so far and their number."""
+
+
+@dataclass(frozen=True, slots=True)
+class SequenceEntry:
+    """One line of the list of sequences."""
+
+    name: str
+    """What :func:`open_sequence` takes, or the folder's name under the data folder."""
+    description: str
+    kind: Literal["rendered", "folder"]
+    cameras: int
+    frames: int
+    ready: bool
+    """Whether it opens at once; a room that was never rendered does not."""
+    folder: Path
+    """Where it is, or will be once it is rendered."""
+    error: str | None = None
+    """Why it cannot be opened, in one sentence."""
+
+
+def cache_folder() -> Path:
+    """Where rendered rooms are kept: ``$MULTIVIEW_PHD_CACHE``, else the platform's place."""
+    own = os.environ.get("MULTIVIEW_PHD_CACHE")
+    if own:
+        return Path(own).expanduser().absolute()
+    if sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    elif sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    else:
+        given = Path(os.environ.get("XDG_CACHE_HOME", ""))
+        base = given if given.is_absolute() else Path.home() / ".cache"
+    return base / "multiview-phd"
+
+
+def available(data: Path | None = None) -> list[SequenceEntry]:
+    """The rendered rooms, then the sequence folders under ``data`` by name.
+
+    Only heads of files are read: what else is wrong with a folder shows on opening it.
+    """
+    from tracker.sequences.rendering import ROOMS  # imports the renderer only where it is needed
+
+    entries = [
+        SequenceEntry(
+            name=name,
+            description=room.description,
+            kind="rendered",
+            cameras=DEFAULT_CAMERAS,
+            frames=room.frames,
+            ready=(rendered_folder(name) / FILE).is_file(),
+            folder=rendered_folder(name),
+        )
+        for name, room in ROOMS.items()
+    ]
+    if data is not None and data.is_dir():
+        entries += [_entry(path.parent) for path in sorted(data.glob(f"*/{FILE}"))]
+    return entries
+
+
+def _entry(folder: Path) -> SequenceEntry:
+    description, cameras, frames, error = "", 0, 0, None
+    try:
+        summary = read_summary(folder)
+        description, cameras, frames = summary.description, summary.cameras, summary.frames
+    except SequenceError as problem:
+        error = str(problem)
+    return SequenceEntry(
+        name=folder.name,
+        description=description,
+        kind="folder",
+        cameras=cameras,
+        frames=frames,
+        ready=error is None,
+        folder=folder,
+        error=error,
+    )
+
+
+def rendered_folder(name: str, cameras: int = DEFAULT_CAMERAS) -> Path:
+    """Where a rendered room is kept; another version of the renderer has another place."""
+    from tracker.sequences.rendering import VERSION
+
+    return cache_folder() / "rooms" / f"version-{VERSION}" / f"{name}-{cameras}-cameras"
+
+
+def open_sequence(
+    name_or_folder: str | Path,
+    *,
+    progress: Told | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    cameras: int = DEFAULT_CAMERAS,
+) -> Sequence:
+    """Open a rendered room by its name, or a sequence folder.
+
+    A room that is not in the cache yet is rendered into it first. A folder of the same
+    name as a room is opened by a path with a separator, for instance ``./room44-3p``.
+
+    Args:
+        name_or_folder: Name of a room, or path of a folder.
+        progress: Called while rendering.
+        cancelled: Asked while rendering.
+        cameras: Of a rendered room.
+
+    Raises:
+        SequenceError: If there is no such sequence, or it cannot be read.
+        OSError: If a room cannot be written to the cache.
+    """
+    from tracker.sequences.rendering import ROOMS
+
+    name = str(name_or_folder)
+    if name in ROOMS:
+        return _open_room(name, progress, cancelled, cameras)
+    folder = Path(name_or_folder).expanduser()
+    if not folder.exists() and len(folder.parts) <= 1:
+        hint = did_you_mean(name, ROOMS)
+        raise SequenceError(
+            f'there is no sequence "{name}": expected one of the rendered rooms '
+            f"{listed(ROOMS)}, or the path of a folder with a {FILE}{hint}"
+        )
+    return read_sequence(folder)
+
+
+def _open_room(
+    name: str, progress: Told | None, cancelled: Callable[[], bool] | None, cameras: int
+) -> Sequence:
+    from tracker.sequences.rendering import render
+
+    folder = rendered_folder(name, cameras)
+    if folder.exists():
+        try:
+            return read_sequence(folder)
+        except SequenceError:
+            shutil.rmtree(folder)  # somebody spoilt it; it can always be rendered again
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    render(name, folder, cameras=cameras, progress=progress, cancelled=cancelled)
+    return read_sequence(folder)
