@@ -144,12 +144,23 @@ function drawTracks(g, tracks, { scale, selection, hover, ink, width }, roomy) {
   g.font = `600 ${roomy ? 11 : 10}px ${ink.font}`;
   g.textAlign = "center";
   g.textBaseline = "middle";
-  for (const { id, box } of tracks) {
+  /** @type {[number, number, number][]} */
+  const placed = [];
+  for (const { id, box } of [...tracks].reverse()) {
     const text = String(id);
     const wide = Math.max(size + 1, Math.ceil(g.measureText(text).width) + 6);
-    const x = Math.max(1, Math.min(width - wide - 1, Math.round(box[0] * scale) - 1));
     const above = Math.round(box[1] * scale) - size - 1;
     const y = above < 2 ? Math.max(2, Math.round(box[1] * scale) + 2) : above;
+    let x = Math.max(1, Math.min(width - wide - 1, Math.round(box[0] * scale) - 1));
+    // The nearest person's tag keeps its corner; the others step aside.
+    for (let k = 0; k < placed.length; k += 1) {
+      const [px, py, pw] = placed[k];
+      if (Math.abs(y - py) < size + 2 && x < px + pw + 2 && px < x + wide + 2 && px + pw + 2 + wide < width) {
+        x = px + pw + 2;
+        k = -1;
+      }
+    }
+    placed.push([x, y, wide]);
     g.fillStyle = "rgb(0 0 0 / .55)";
     g.fillRect(x - 1, y - 1, wide + 2, size + 2);
     g.fillStyle = ink.id(id);

@@ -46,7 +46,6 @@ export function mountCameras(root, { store, page, actions, playback }) {
       h("div", { class: "chips", role: "group", "aria-label": "Layers in the pictures" }, Object.values(chips)),
     ),
     body,
-    blank,
   );
 
   /** @type {{element: HTMLElement, canvas: HTMLCanvasElement, tag: HTMLElement, card: HTMLElement}[]} */
@@ -85,7 +84,7 @@ export function mountCameras(root, { store, page, actions, playback }) {
       write(tag.children[0], camera.name);
       return { element, canvas, tag, card };
     });
-    fill(body, cells.map((cell) => cell.element));
+    fill(body, cells.map((cell) => cell.element), blank);
     arrange();
   }
 
@@ -96,7 +95,7 @@ export function mountCameras(root, { store, page, actions, playback }) {
     const most = parseFloat(style.getPropertyValue("--h-cam")) * 1.1 + 8;
     const layout = mosaic(cameras.map((c) => c.width / c.height), large, { width: root.clientWidth, most, gap: 4 });
     places = layout.cells;
-    body.style.height = `${layout.height}px`;
+    body.style.height = `${layout.height || Math.round(most)}px`;
     cells.forEach(({ element }, index) => {
       const { x, y, width, height } = places[index];
       Object.assign(element.style, { left: `${x}px`, top: `${y}px`, width: `${width}px`, height: `${height}px` });
@@ -246,11 +245,16 @@ export function mountCameras(root, { store, page, actions, playback }) {
     blank.hidden = Boolean(sequence);
     if (!sequence) {
       const opening = server?.opening;
-      fill(blank, icon("i-folder", "l"), h("h3", {}, opening ? `Opening ${opening.name}` : "No sequence is open"), h("p", {}, opening ? opening.message : "Choose one at the top left: a rendered room needs no data."));
+      const [title, text] = opening
+        ? [`Opening ${opening.name}`, opening.total ? `${opening.message}, ${opening.done} of ${opening.total}` : opening.message]
+        : ["No sequence is open", "Choose one at the top left: a rendered room needs no data of yours."];
+      const part = opening?.total ? opening.done / opening.total : 0;
+      fill(blank, icon("i-folder", "l"), h("h3", {}, title), opening && h("span", { class: "bar", "--part": part }, h("i", {})), h("p", {}, text));
     }
   }
 
   playback.onPaint(paint);
+  build();
   store.on(["server"], (state) => {
     if ((state.server?.sequence?.key ?? "") !== sequenceKey) build();
     header();

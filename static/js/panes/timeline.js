@@ -33,7 +33,7 @@ export function mountTimeline(root, context) {
     "div",
     { class: "gut" },
     h("div", { class: "gr over" }),
-    h("div", { class: "gr ruler" }, h("span", {}, "tracks"), h("span", { class: "r sub" }, "seen")),
+    h("div", { class: "gr ruler" }, h("span", {}, "tracks"), h("span", { class: "r" }, "seen")),
     lanes,
     h("div", { class: "gr strip" }, h("span", { class: "n" }, "People"), people, h("span", { class: "brk" }), truthSign, sign("estimate", "p-est", 1.25)),
   );

@@ -56,7 +56,9 @@ export function mountTop(root, { store, page, actions }) {
       const size = entry.cameras && entry.frames ? `${entry.cameras} cameras, ${entry.frames} steps` : entry.kind;
       const count = entry.error ? "cannot be read" : size;
       const wait = entry.kind === "rendered" && !entry.ready ? ", rendered on first use" : "";
-      return h("option", { value: entry.name, title: entry.error ?? entry.description }, `${entry.name}  ·  ${count}${wait}`);
+      // The chosen one stands in the bar, where its name is enough.
+      const text = entry.name === open ? entry.name : `${entry.name}  ·  ${count}${wait}`;
+      return h("option", { value: entry.name, title: entry.error ?? entry.description }, text);
     };
     const groups = [
       ["Rendered rooms", sequences.filter((s) => s.kind === "rendered")],

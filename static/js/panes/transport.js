@@ -101,9 +101,11 @@ export function mountTransport({ store, actions, playback }) {
     play.querySelector("use")?.setAttribute("href", playing ? "#i-pause" : "#i-play");
     play.setAttribute("aria-label", playing ? "Pause" : "Play");
   });
+  const buttons = [...root.querySelectorAll("button"), speed.select];
   const marks = () => {
     const { loop: on, range: [from, to], server, speed: now } = store.get();
     const frames = server?.sequence?.frames ?? 1;
+    for (const button of buttons) button.toggleAttribute("disabled", !server?.sequence);
     loop.setAttribute("aria-pressed", String(on));
     write(loopText, from === null && to === null ? "all" : `${from ?? 0} – ${to ?? frames - 1}`);
     speed.select.value = String(now);

@@ -107,6 +107,7 @@ export function mountView3d(root, { store, page, retry }) {
 
   store.on(["server"], ({ server }) => {
     header();
+    cover();
     if (server && server.viser.path !== path) {
       path = server.viser.path;
       void load();
