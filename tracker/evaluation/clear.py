@@ -77,9 +77,9 @@ def clear(comparison: Comparison) -> Clear:
     estimate that were a pair at the step before stay one while the gate allows.
     A switch is counted when a person is paired with another id than when last
     paired, however long ago; an id that comes back to its person is no switch.
-    Steps at which there are no people at all, or no estimates at all, are not
-    part of the memory: a person paired before and after such a step is not
-    fragmented by it (as in TrackEval, which this equals).
+    As in TrackEval, which this equals, a person who leaves and comes back is
+    fragmented by that too, and steps without any people or without any estimates
+    are not part of the memory: nobody is fragmented by them.
 
     Without people, MOTA is None and every estimate a false positive. Without
     estimates, MOTA is 0, every person is mostly lost and MOTP is None.

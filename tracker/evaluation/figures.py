@@ -75,7 +75,7 @@ DEFINITIONS: tuple[Definition, ...] = (
     ),
     Definition(
         "fragmentations", "Fragmentations", "CLEAR", "", "lower", 0, _CLEAR,
-        "How often a person's pairing is taken up again after a gap.", "LHN09",
+        "How often a person's pairing is taken up again after a gap, absence included.", "LHN09",
     ),
     Definition(
         "mostly_tracked", "Mostly tracked", "CLEAR", "people", "higher", 0, _CLEAR,

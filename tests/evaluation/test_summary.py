@@ -1,0 +1,175 @@
+"""The figures as people see them: names, help, JSON, differences, and the time they take."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from tests.evaluation.scenes import (
+    HALF_EXTENTS,
+    as_truth,
+    by_hand,
+    perturbed,
+    recording,
+    scattered,
+    walks,
+)
+from tracker.evaluation import DEFINITIONS, EvaluationSettings, compare, evaluate
+from tracker.evaluation.difference import verdict
+from tracker.evaluation.figures import SOURCES, number
+from tracker.evaluation.summary import evaluate_sequence
+
+
+def test_every_figure_explains_itself():
+    keys = [definition.key for definition in DEFINITIONS]
+    assert len(set(keys)) == len(keys)
+    for definition in DEFINITIONS:
+        assert definition.help.endswith("."), definition.key
+        assert definition.source in {"", *SOURCES}, definition.key
+    assert {definition.source for definition in DEFINITIONS} - {""} == set(SOURCES)
+
+
+def test_every_setting_explains_itself():
+    for name, schema in EvaluationSettings.model_json_schema()["properties"].items():
+        assert schema["description"].endswith("."), name
+        assert schema["x-ui"]["symbol"], name
+        assert ("minimum" in schema and "maximum" in schema) or "enum" in schema, name
+    with pytest.raises(ValidationError, match="greater than or equal to"):
+        EvaluationSettings(gate=0.0)
+    with pytest.raises(ValidationError, match="Extra inputs"):
+        EvaluationSettings(gates=1.0)
+
+
+def test_settings_stand_beside_the_figures():
+    truth, tracks = by_hand()
+    settings = EvaluationSettings(gate=0.75, cutoff=2.0, order=2.0, window=1, near=0.2)
+    stated = {
+        f.definition.key: (f.unit, f.stated) for f in evaluate(truth, tracks, settings).figures
+    }
+    assert stated["mota"] == ("", "3D distance, gate 0.75 m")
+    assert stated["ospa"] == ("m", "3D distance, cut-off 2 m, order 2")
+    assert stated["ospa2"][1] == "3D distance, cut-off 2 m, order 2, window 1 step"
+    assert stated["gospa_missed"][0] == "m^2"
+    assert stated["found_share"][1] == "within 0.2 m"
+    boxes = evaluate(truth, tracks, EvaluationSettings(distance="box"), half_extents=HALF_EXTENTS)
+    by_key = {f.definition.key: (f.unit, f.stated) for f in boxes.figures}
+    assert by_key["motp"] == ("", "3D-box (1 − GIoU)/2, gate 0.5")
+    assert by_key["gospa_false"][0] == ""
+    assert by_key["position_error"][0] == "m"
+
+
+def test_json_holds_everything():
+    truth, tracks = by_hand()
+    result = evaluate(truth, tracks)
+    data = json.loads(json.dumps(result.to_json(), allow_nan=False))
+    assert [f["key"] for f in data["figures"]] == [d.key for d in DEFINITIONS]
+    assert data["figures"][0]["value"] == pytest.approx(0.375)
+    assert "CLEAR" in data["figures"][0]["source"]
+    assert all(len(values) == 4 for values in data["series"].values())
+    assert data["errors"]["1"][3] is None
+    assert data["pairs"]["people"] == [1, 2, 1, 1, 2, 2]
+    assert sum(data["pairs"]["switch"]) == 2
+    assert [row["id"] for row in data["tracks"]] == [10, 20, 30]
+
+
+def test_rows_of_people_and_tracks():
+    result = evaluate(*by_hand())
+    first, second = result.people
+    assert (first.steps, first.tracked, first.switches, first.status) == (4, 3, 1, "partly tracked")
+    assert (second.fragmentations, second.found_share) == (1, 0.5)
+    ten, _, ghost = result.tracks
+    assert (ten.first, ten.last, ten.steps, ten.matched, ten.person) == (0, 3, 4, 4, 1)
+    assert ten.person_share == 0.5
+    assert (ghost.kind, ghost.person, ghost.error) == ("false", None, None)
+
+
+def test_compare():
+    truth = walks(3)
+    rough = evaluate(truth, perturbed(truth, 1, noise=0.3, missing=0.3))
+    fine = evaluate(truth, perturbed(truth, 1, noise=0.05, missing=0.0, swaps=0, false=0))
+    rows = {row.key: row for row in compare(rough, fine)}
+    for key in ("mota", "idf1", "hota", "ospa", "gospa", "position_error", "misses"):
+        assert rows[key].verdict == "better", key
+    assert rows["mota"].difference == pytest.approx(fine["mota"] - rough["mota"])
+    assert {row.verdict for row in compare(fine, fine)} == {"same"}
+    back = {row.key: row.verdict for row in compare(fine, rough)}
+    assert back["mota"] == "worse"
+    assert all(row.comparable for row in rows.values())
+    other = evaluate(truth, perturbed(truth, 1), EvaluationSettings(gate=0.5))
+    by_key = {row.key: row for row in compare(rough, other)}
+    assert not by_key["mota"].comparable
+    assert by_key["found_share"].comparable
+    json.dumps([row.to_json() for row in rows.values()])
+
+
+@pytest.mark.parametrize(
+    ("direction", "a", "b", "expected"),
+    [
+        ("higher", 0.5, 0.6, "better"),
+        ("lower", 0.5, 0.6, "worse"),
+        ("lower", 0.5001, 0.5004, "same"),
+        ("zero", -0.5, 0.2, "better"),
+        ("zero", 0.1, -0.4, "worse"),
+        ("zero", 0.1, -0.1, "same"),
+        ("none", 1, 2, "different"),
+        ("higher", None, 0.2, "undefined"),
+        ("higher", None, None, "same"),
+    ],
+)
+def test_verdict(direction, a, b, expected: str):
+    assert verdict(direction, 3, a, b) == expected
+
+
+def test_numbers_are_written_alike():
+    assert number(0.12345, 3) == "0.123"
+    assert number(-0.0001, 3) == "0.000"
+    assert number(-2.5, 1, sign=True) == "−2.5"
+    assert number(7, 0, sign=True) == "+7"
+    assert number(None, 3) == "–"
+
+
+@pytest.mark.data
+def test_cameras_of_a_recording():
+    sequence = recording("cmc1")
+    truth = sequence.ground_truth
+    assert truth is not None
+    result = evaluate_sequence(sequence, perturbed(truth, 1, noise=0.05))
+    assert [score.camera for score in result.cameras] == [c.name for c in sequence.cameras]
+    for score in result.cameras:
+        assert score.people > 0
+        assert score.found_share is not None
+        assert score.found_share > 0.8
+        assert score.overlap is not None
+        assert score.overlap > 0.7
+    assert result["pixel_error"] > 0.0
+
+
+@pytest.mark.data
+def test_a_recording_is_evaluated_in_time():
+    sequence = recording("cmc2")
+    truth = sequence.ground_truth
+    assert truth is not None
+    tracks = perturbed(truth, 1)
+    assert least_seconds(lambda: evaluate_sequence(sequence, tracks)) < 2.0
+
+
+def test_many_steps_are_evaluated_in_time():
+    truth = as_truth(scattered(1, ids=3, steps=1500, share=1.0))
+    tracks = scattered(1, ids=3, steps=1500, share=1.0)
+    tracks = replace(tracks, positions=tracks.positions + np.array([0.1, 0.0, 0.0]))
+    assert least_seconds(lambda: evaluate(truth, tracks)) < 1.0
+
+
+def least_seconds(work) -> float:
+    """The fastest of three: the others were disturbed."""
+    times = []
+    for _ in range(3):
+        begin = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - begin)
+    return min(times)
