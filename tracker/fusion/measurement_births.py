@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
+from scipy.special import expit
 
 from tracker.camera import Camera
 from tracker.fusion.target_model import TargetModel
@@ -73,7 +74,11 @@ class MeasurementBirths:
         self._room = room
         self._model = model
         self._log_density = np.log(birth_rate / np.prod(room.maximum - room.minimum))
-        self._p_d = detection_probability
+        self._log_hit = float(np.log(detection_probability))
+        # at p_D = 1 no newcomer is ever missed
+        self._log_miss = (
+            float(np.log1p(-detection_probability)) if detection_probability < 1.0 else -np.inf
+        )
         self._gate = gate
         self._margin = margin
         self._largest_gap = largest_gap
@@ -122,7 +127,7 @@ class MeasurementBirths:
         if not points:
             return np.zeros((0, 3))
         all_points = np.concatenate(points)
-        return np.asarray(all_points)[self._room.contains(all_points, self._margin)]
+        return np.asarray(all_points[self._room.contains(all_points, self._margin)])
 
     def _fit(self, seed: ndarray, evidence: list[CameraEvidence]) -> Newborn | None:
         """The place that fits the seed's best box in every camera, and its odds."""
@@ -167,13 +172,13 @@ class MeasurementBirths:
             expected = self._model.expected(camera, position[None])
             seen = bool(camera.sees(position[None])[0])
             if sources[c] < 0:
-                log_odds += np.log(1.0 - self._p_d) if seen else 0.0
+                log_odds += self._log_miss if seen else 0.0
                 continue
             residual = evidence[c].values[sources[c]] - expected.values[0]
             noise = evidence[c].noises[sources[c]]
-            log_odds += np.log(self._p_d) - np.log(evidence[c].clutter_intensity)
+            log_odds += self._log_hit - np.log(evidence[c].clutter_intensity)
             log_odds -= 0.5 * (
                 residual @ np.linalg.solve(noise, residual)
                 + np.linalg.slogdet(2.0 * np.pi * noise)[1]
             )
-        return Newborn(position, covariance, float(1.0 / (1.0 + np.exp(-log_odds))), sources)
+        return Newborn(position, covariance, float(expit(log_odds)), sources)
