@@ -11,8 +11,10 @@ from tests.engine.synthetic import CAMERAS, ROOM, crossing, look_at, sequence, v
 from tracker import trajectories
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.sequential_phd import SequentialPhd
+from tracker.fusion.target_model import TargetModel
+from tracker.fusion.visibility import covered_shares
 from tracker.parameters import PRESETS, FusionParams, RunParameters, with_values
-from tracker.sequences.sequence import Sequence
+from tracker.sequences.sequence import Entrance, Room, Sequence
 from tracker.trajectories import Trajectories
 
 STEPS = 150
@@ -310,3 +312,37 @@ def test_the_room_of_the_tests_is_seen_by_all_its_cameras() -> None:
     corners = np.array(np.meshgrid(*np.array([ROOM.minimum, ROOM.maximum]).T)).reshape(3, -1).T
     middle = corners * [0.8, 0.8, 0.0] + [0.0, 0.0, 1.0]
     assert all(camera.sees(middle).all() for camera in CAMERAS)
+
+
+def test_a_person_hides_another_once() -> None:
+    front = look_at("front", (0.0, -4.0, 1.0), (0.0, 0.0, 1.0))
+    near, far = np.array([-0.05, -0.6, 1.0]), np.array([0.03, 0.6, 1.0])
+    whole = sequence(
+        [(0, np.tile(near, (60, 1))), (0, np.tile(far, (60, 1)))],
+        60,
+        (*CAMERAS[1:], front),
+        pixel_noise=0.0,
+        room=Room(
+            ROOM.minimum,
+            ROOM.maximum,
+            tuple(Entrance(place, np.full(3, 0.25)) for place in (near, far)),
+        ),
+    )
+    parameters = published(
+        occlusion=0.5, duplicate_distance=0.1, pruning_threshold=1e-8, misses="per_person"
+    )
+    model = TargetModel(whole.target_half_extents, "centre")
+    expected = [model.expected(front, place[None]) for place in (far, near)]
+    share = covered_shares(*expected)[0, 0]
+    assert 0.5 < share < 0.9
+    results = fuse(whole, parameters)
+    tracks = tracked(whole, results)
+    for frame in range(10, 60):
+        result, rows = results[frame], tracks.at(frame)
+        order = np.argsort(tracks.positions[rows][:, 1])  # the near one, the far one
+        components, labels = tracks.components[rows][order], tracks.labels[rows][order]
+        probability = result.detection_probabilities[2, components]
+        assert probability[0] == pytest.approx(0.98, abs=1e-6)
+        assert probability[1] == pytest.approx(0.98 * (1.0 - 0.5 * share), abs=0.04)
+        assert_array_equal(result.hidden_by[2, components], [-1, labels[0]])
+        assert_array_equal(result.hidden_by[:2, components], -1)

@@ -93,7 +93,7 @@ class SequentialPhd:
         p, model, mixture = self._parameters, self._model, work.mixture
         values, noises = model.target.measured(view, p.measurement_sigma)
         expected = model.target.expected(model.cameras[index], mixture.means)
-        occluders = np.array([work.sure.get(label, 0.0) for label in mixture.labels.tolist()])
+        occluders = _occluders(mixture, work.sure)
         seen = model.visible(index, expected, mixture, occluders)
         updated = phd.update(
             mixture,
@@ -159,6 +159,18 @@ def _confirmed_labels(mixture: GaussianMixture) -> dict[int, float]:
     """The labels that stand for a person, with their weight."""
     sure = np.flatnonzero(mixture.weights > CONFIRMED)
     return dict(zip(mixture.labels[sure].tolist(), mixture.weights[sure].tolist(), strict=True))
+
+
+def _occluders(mixture: GaussianMixture, sure: dict[int, float]) -> Float[ndarray, " J"]:
+    """The weight with which each component hides others, 0 for most.
+
+    A person hides others once: by the heaviest component of the label, which comes first.
+    """
+    weights = np.zeros(mixture.size)
+    left = dict(sure)
+    for component, label in enumerate(mixture.labels.tolist()):
+        weights[component] = left.pop(label, 0.0)
+    return weights
 
 
 def _miss_per_person(
