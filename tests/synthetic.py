@@ -43,7 +43,7 @@ def numbered_picture(number: int, size: tuple[int, int] = (192, 144), shade: int
     rng = np.random.default_rng(number)
     coarse = rng.integers(40, 200, (max(2, height // 24), max(2, width // 24), 3), dtype=np.uint8)
     picture = cv2.resize(coarse, size, interpolation=cv2.INTER_LINEAR)
-    picture[:, :, shade % 3] //= 2
+    picture[:, :, shade % 3] = picture[:, :, shade % 3] // 2
     side = width // BITS
     for bit in range(BITS):
         picture[:side, bit * side : (bit + 1) * side] = 255 if number >> bit & 1 else 0

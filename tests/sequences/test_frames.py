@@ -99,8 +99,9 @@ def test_iterating_and_scrubbing_give_the_same_pixels(reader: FrameReader) -> No
 def test_steps_that_do_not_exist_have_no_picture(reader: FrameReader) -> None:
     assert reader.picture(0, -1) is None
     assert reader.picture(0, FRAMES) is None
-    with pytest.raises(IndexError):
-        reader.picture(2, 0)
+    for camera in (2, -1):
+        with pytest.raises(IndexError, match="camera must be 0 … 1, got"):
+            reader.picture(camera, 0)
 
 
 def test_cameras_are_not_mixed_up(reader: FrameReader) -> None:

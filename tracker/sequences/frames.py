@@ -76,6 +76,8 @@ class FrameReader:
         Raises:
             IndexError: If there is no such camera.
         """
+        if not 0 <= camera < len(self._sources):
+            raise IndexError(f"camera must be 0 … {len(self._sources) - 1}, got {camera}")
         source = self._sources[camera]
         if not 0 <= step < self._sequence.frames or not source.view.has_pictures:
             return None

@@ -159,10 +159,10 @@ def _parse(folder: Path, text: str) -> Fields:
     try:
         values = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        problem, _, place = str(error).rstrip(")").rpartition(" (at ")
-        place = f", {place}" if problem else ""
-        problem = problem or str(error)
-        raise SequenceError(f"{where}{place}: is not valid TOML: {problem.lower()}") from None
+        problem, _, place = str(error).removesuffix(")").rpartition(" (at ")
+        if place == "end of document":
+            place = f"line {len(text.splitlines())}"
+        raise SequenceError(f"{where}, {place}: is not valid TOML: {problem.lower()}") from None
     version = values.get("format", FORMAT)
     if version != FORMAT:
         raise SequenceError(

@@ -164,12 +164,16 @@ class VideoDecoder:
         """
         if not 0 <= frame < self._index.frames:
             return None
-        if self._capture is None or frame < self._at or self._jump_pays(frame):
-            self._jump(frame)
-        self._advance_to(frame)
-        if self._at != frame or self._broken or self._capture is None:
+        try:
+            if self._capture is None or frame < self._at or self._jump_pays(frame):
+                self._jump(frame)
+            self._advance_to(frame)
+            if self._at != frame or self._broken or self._capture is None:
+                return None
+            good, picture = self._capture.retrieve()
+        except cv2.error:  # it refused a spoilt frame: begin afresh with the next one
+            self.close()
             return None
-        good, picture = self._capture.retrieve()
         return np.asarray(picture, dtype=np.uint8) if good else None
 
     def close(self) -> None:
