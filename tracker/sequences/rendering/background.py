@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
+from scipy.ndimage import gaussian_filter
 
 from tracker.camera import Camera
 from tracker.sequences.rendering.interior import Interior, Lamp, Solid
@@ -16,7 +17,7 @@ from tracker.sequences.rendering.textures import linear
 
 FINE = 2
 """The empty room is traced, and people are drawn, this many times finer than the picture."""
-AMBIENT = np.array([[0.20, 0.17, 0.13], [0.30, 0.295, 0.285]])
+AMBIENT = np.array([[0.17, 0.145, 0.115], [0.25, 0.245, 0.235]])
 """Light by colour from below (the floor's glow) and from above, for bodies."""
 _GOLDEN = (0.7548776662466927, 0.5698402909980532)
 
@@ -116,8 +117,18 @@ def render_background(tracer: Tracer, camera: Camera, rounds: int = 4) -> Backgr
     colour, glow = paint(tracer.solids, solids, own, face, places)
     surface = (solids * 8 + face).reshape(rows, columns)
 
-    light = _gather(tracer, places + 2e-3 * normals, normals, grid, rounds)
-    light = _smooth(light.reshape(rows, columns, 3), surface).reshape(-1, 3)
+    # light is gathered at one point in four; the others take it from their own
+    # surface, and what has no such neighbour is gathered after all
+    light = np.zeros((rows * columns, 3), np.float32)
+    known = (grid % FINE == 0).all(axis=1)
+    chosen = np.flatnonzero(known)
+    for _ in range(2):
+        start = places[chosen] + 2e-3 * normals[chosen]
+        light[chosen] = _gather(tracer, start, normals[chosen], grid[chosen] // FINE, rounds)
+        known[chosen] = True
+        filled, reached = _smooth(light, known, surface)
+        chosen = np.flatnonzero(~reached)
+    light = filled
     seen = colour * light + glow
 
     gloss = np.array([s.finish.gloss for s in tracer.solids], np.float32)[solids]
@@ -131,10 +142,11 @@ def render_background(tracer: Tracer, camera: Camera, rounds: int = 4) -> Backgr
     seen_there = _rough_light(tracer, there, np.maximum(hit, 0), glowing=True)
     image = np.zeros((rows * columns, 3), np.float32)
     image[shiny] = seen_there
-    blurred = _smooth(image.reshape(rows, columns, 3), surface, levels=2).reshape(-1, 3)
+    blurred, _ = _smooth(image, gloss > 0.0, surface, levels=3)
     seen[shiny] += share[:, None] * (blurred[shiny] - 0.3 * seen[shiny])
 
-    fine = seen.reshape(rows, columns, 3).astype(np.float32)
+    # no lens is quite sharp
+    fine = gaussian_filter(seen.reshape(rows, columns, 3).astype(np.float32), (0.75, 0.75, 0.0))
     room = fine.reshape(height, FINE, width, FINE, 3).mean(axis=(1, 3))
     axis = camera.rotation[2].astype(np.float32)
     depth = (distance * (directions @ axis)).reshape(rows, columns).astype(np.float32)
@@ -196,24 +208,33 @@ def _rough_light(
     return np.asarray(colour, dtype=np.float32)
 
 
-def _smooth(image: ndarray, surface: ndarray, levels: int = 3) -> ndarray:
-    """Average within each surface, over growing distances, so that its samples come together."""
-    kernel = (0.25, 0.5, 0.25)
+def _smooth(
+    image: ndarray, known: ndarray, surface: ndarray, levels: int = 4
+) -> tuple[ndarray, ndarray]:
+    """Average the known points within each surface, over growing distances.
+
+    Returns:
+        The image (N, 3) and where any known point was near enough (N,).
+    """
     rows, columns = surface.shape
-    for level in range(levels + 1):
+    total = np.where(known[:, None], image, 0.0).reshape(rows, columns, 3).astype(np.float32)
+    weight = known.astype(np.float32).reshape(rows, columns, 1)
+    for level in range(levels):
         reach = 2**level
         for axis in (0, 1):
-            total = np.zeros_like(image)
-            weight = np.zeros((rows, columns, 1), np.float32)
-            for offset, share in zip((-reach, 0, reach), kernel, strict=True):
-                moved = np.clip(np.arange(surface.shape[axis]) + offset, 0, None)
-                moved = np.minimum(moved, surface.shape[axis] - 1)
-                same = (np.take(surface, moved, axis=axis) == surface)[..., None]
-                part = same.astype(np.float32) * np.float32(share)
-                total += part * np.take(image, moved, axis=axis)
-                weight += part
-            image = total / weight
-    return np.asarray(image)
+            ahead = [slice(None)] * 2
+            behind = [slice(None)] * 2
+            ahead[axis], behind[axis] = slice(reach, None), slice(None, -reach)
+            a, b = tuple(ahead), tuple(behind)
+            same = 0.5 * (surface[a] == surface[b])[..., None].astype(np.float32)
+            moved_total, moved_weight = total.copy(), weight.copy()
+            moved_total[a] += same * total[b]
+            moved_total[b] += same * total[a]
+            moved_weight[a] += same * weight[b]
+            moved_weight[b] += same * weight[a]
+            total, weight = moved_total, moved_weight
+    found = weight > 0.0
+    return (total / np.where(found, weight, 1.0)).reshape(-1, 3), found.reshape(-1)
 
 
 def lamp_table(interior: Interior) -> Float[ndarray, "L 9"]:

@@ -7,16 +7,18 @@ import os
 import shutil
 import tempfile
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
-import cv2
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.camera import Camera
+from tracker.sequences.rendering.avi import AviWriter, compress
 from tracker.sequences.rendering.paths import FRAMES_PER_SECOND
-from tracker.sequences.rendering.render import Studio
+from tracker.sequences.rendering.studio import Studio, in_order
 from tracker.sequences.rendering.rooms import (
     CAMERAS,
     ROOMS,
@@ -30,7 +32,7 @@ from tracker.sequences.rendering.scene import Scene
 VERSION = 1
 """Grows when the same call would give other pictures or files."""
 VISIBILITY_FILE = "visibility.csv"
-_QUALITY = 92
+_QUALITY = 82
 _TEMPLATES_PER_VIEW = 3
 
 
@@ -141,41 +143,36 @@ def _write(
     if cancelled():
         raise RenderCancelled(spec.name)
     studio = Studio(spec, CAMERAS[:cameras], seed)
-    writers = []
     visible = np.zeros((frames, len(spec.people), cameras))
-    try:
-        for camera in studio.cameras:
-            path = work / f"{camera.name}.avi"
-            writer = cv2.VideoWriter(
-                str(path),
-                cv2.CAP_OPENCV_MJPEG,
-                cv2.VideoWriter.fourcc(*"MJPG"),
-                FRAMES_PER_SECOND,
-                camera.image_size,
+    with ExitStack() as stack:
+        writers = [
+            stack.enter_context(
+                AviWriter(work / f"{camera.name}.avi", camera.image_size, FRAMES_PER_SECOND)
             )
-            writers.append(writer)
-            if not writer.isOpened():
-                raise OSError(f"{path}: OpenCV cannot write Motion-JPEG video here")
-            writer.set(cv2.VIDEOWRITER_PROP_QUALITY, _QUALITY)
-        for drawn in studio.draw_all(frames):
+            for camera in studio.cameras
+        ]
+        for films, seen, first in in_order(partial(_film, studio), frames):
             if cancelled():
                 raise RenderCancelled(spec.name)
-            for writer, pictures in zip(writers, drawn.pictures, strict=True):
-                for picture in pictures:
+            for writer, film in zip(writers, films, strict=True):
+                for picture in film:
                     writer.write(picture)
-            done = drawn.first + len(drawn.visible)
-            visible[drawn.first : done] = drawn.visible
+            visible[first : first + len(seen)] = seen
             if progress is not None:
-                progress(done, frames)
-    finally:
-        for writer in writers:
-            writer.release()
+                progress(first + len(seen), frames)
     _write_truth(work / "ground_truth.csv", studio.scene, frames)
     _write_visibility(work / VISIBILITY_FILE, studio.scene, visible)
     templates = choose_templates(studio.scene, studio.cameras, visible)
     (work / "sequence.toml").write_text(
         _describe(spec, studio.cameras, frames, studio.scene, templates), encoding="utf-8"
     )
+
+
+def _film(studio: Studio, first: int, last: int) -> tuple[list[list[bytes]], ndarray, int]:
+    """Some steps of all cameras, drawn and compressed; the visible shares; the first step."""
+    drawn = studio.draw(first, last)
+    films = [[compress(picture, _QUALITY) for picture in shown] for shown in drawn.pictures]
+    return films, drawn.visible, first
 
 
 def _write_truth(path: Path, scene: Scene, frames: int) -> None:

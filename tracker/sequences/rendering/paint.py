@@ -136,7 +136,7 @@ def _books(finish: Finish, uv: ndarray, half: ndarray, places: ndarray) -> ndarr
     tall = rng.uniform(0.55, 1.0, size=65)
     colours = palette[rng.integers(0, len(palette), size=65)] * rng.uniform(0.7, 1.2, (65, 1))
     height = (uv[:, 1] + half[1]) / (2.0 * half[1])
-    painted: ndarray = colours[number]
+    painted = colours[number]
     label = (np.abs(height - 0.35 * tall[number]) < 0.03) & (number % 3 == 0)
     painted[label] = linear("#cbb67a")
     painted[height > tall[number] * 0.92] = linear("#1a1512")
@@ -158,7 +158,7 @@ def _picture(finish: Finish, uv: ndarray, half: ndarray, places: ndarray) -> nda
     x, y = rng.uniform(-0.5, 0.5), rng.uniform(0.2, 0.5)
     painted[np.hypot((u - x) * half[0] / half[1], v - y) < 0.12] = sun
     painted[border] = linear("#e8e4da")
-    return painted
+    return np.asarray(painted)
 
 
 def _outside(finish: Finish, uv: ndarray, half: ndarray, places: ndarray) -> ndarray:

@@ -238,11 +238,11 @@ def floor_shadows(
                     cy = y + (y - lamps[lamp, 1]) * stretch
                     width = radius * (1.0 + stretch) * 0.8 + 0.20 * stretch
                     ratio = radius * (1.0 + stretch) / width
-                    depth = lamps[lamp, 3] * min(0.8, 0.62 * ratio * ratio)
+                    depth = lamps[lamp, 3] * min(0.95, 1.05 * ratio * ratio)
                 else:
                     cx, cy = x, y
-                    width = 0.8 * radius + 0.55 * z
-                    depth = 0.42 * (radius / (radius + z)) ** 1.2
+                    width = 0.9 * radius + 0.6 * z
+                    depth = 0.62 * (radius / (radius + z)) ** 1.1
                 if depth < 0.004:
                     continue
                 reach = 2.2 * width
@@ -262,8 +262,11 @@ def floor_shadows(
 
 @_kernel
 def draw(
-    points: ndarray,
+    world: ndarray,
     light: ndarray,
+    pose: ndarray,
+    intrinsics: ndarray,
+    distortion: ndarray,
     texture_points: ndarray,
     triangles: ndarray,
     owners: ndarray,
@@ -288,10 +291,12 @@ def draw(
     shadows, the lens's vignette, the tone curve and the sensor's noise.
 
     Args:
-        points: (F, V, 3): column and row in the fine picture, depth in metres;
-            NaN where behind the lens.
-        light: (F, V, 3), with ``texture_points`` (V, 2), ``triangles`` (T, 3) and
-            the ``owners`` (T,) of the triangles: people first, then doors.
+        world: (F, V, 3), vertices in world metres.
+        light: (F, V, 3) of the vertices.
+        pose: (3, 4), with ``intrinsics`` (3, 3) and ``distortion`` (5,) the camera,
+            as in ``Camera``.
+        texture_points: (V, 2), with ``triangles`` (T, 3) and the ``owners`` (T,) of the
+            triangles: people first, then doors.
         vertex_ranges: (O, 2), first and last + 1 vertex of each owner.
         present: (F, O), who is drawn.
         boxes: (F, P, 4): left, top, right, bottom of each person's target in fine
@@ -304,15 +309,15 @@ def draw(
         shadows: (F, rows, columns).
         vignette: (h, w).
         curve: (K,), picture value 0 … 255 of light from 0 to 1.
-        grain: (N, N, 3), noise of unit size.
-        offsets: (F, 2), where in the grain each picture begins.
+        grain: (N, M, 3), noise of unit size, larger than a picture.
+        offsets: (F, 2), row and column of the grain where each picture begins.
 
     Returns:
         Pictures (F, h, w, 3), 8 bit, blue-green-red, and for every person
         (F, P, 2) the number of fine pixels of its silhouette inside its box, and
         how many of those are visible.
     """
-    frames = points.shape[0]
+    frames, size = world.shape[:2]
     height, width = room.shape[:2]
     people = boxes.shape[1]
     pictures = np.empty((frames, height, width, 3), dtype=np.uint8)
@@ -323,8 +328,11 @@ def draw(
     colour = np.empty((2 * height, 2 * width, 3), dtype=np.float32)
     fresh = np.empty((height, width), dtype=np.uint8)
     windows = np.empty((vertex_ranges.shape[0], 4), dtype=np.int64)
-    top_value = curve.shape[0] - 1
-    grain_size = grain.shape[0]
+    points = np.empty((size, 3))
+    top_value = np.float32(curve.shape[0] - 1)
+    one, quarter = np.float32(1.0), np.float32(0.25)
+    k1, k2, p1, p2, k3 = distortion
+    rows, columns = shadows.shape[1:]
     for f in range(frames):
         fresh[:] = 0
         for o in range(vertex_ranges.shape[0]):
@@ -333,10 +341,25 @@ def draw(
                 continue
             low_x, low_y, high_x, high_y = 1e9, 1e9, -1e9, -1e9
             for v in range(vertex_ranges[o, 0], vertex_ranges[o, 1]):
-                x, y = points[f, v, 0], points[f, v, 1]
-                if x == x:
-                    low_x, high_x = min(low_x, x), max(high_x, x)
-                    low_y, high_y = min(low_y, y), max(high_y, y)
+                wx, wy, wz = world[f, v]
+                z = pose[2, 0] * wx + pose[2, 1] * wy + pose[2, 2] * wz + pose[2, 3]
+                points[v, 0] = math.nan
+                if z < 0.1:
+                    continue
+                a = (pose[0, 0] * wx + pose[0, 1] * wy + pose[0, 2] * wz + pose[0, 3]) / z
+                b = (pose[1, 0] * wx + pose[1, 1] * wy + pose[1, 2] * wz + pose[1, 3]) / z
+                r2 = a * a + b * b
+                if r2 > 4.0:  # far outside the picture, where the lens model does not hold
+                    continue
+                radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+                u = a * radial + 2.0 * p1 * a * b + p2 * (r2 + 2.0 * a * a)
+                v_ = b * radial + p1 * (r2 + 2.0 * b * b) + 2.0 * p2 * a * b
+                x = intrinsics[0, 0] * u + intrinsics[0, 1] * v_ + intrinsics[0, 2]
+                y = intrinsics[1, 1] * v_ + intrinsics[1, 2]
+                x, y = 2.0 * x + 0.5, 2.0 * y + 0.5
+                points[v, 0], points[v, 1], points[v, 2] = x, y, z
+                low_x, high_x = min(low_x, x), max(high_x, x)
+                low_y, high_y = min(low_y, y), max(high_y, y)
             if low_x > high_x:
                 continue
             windows[o, 0] = max(0, int(low_x) // 2)
@@ -356,9 +379,9 @@ def draw(
             if not present[f, o]:
                 continue
             i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-            x0, y0 = points[f, i, 0], points[f, i, 1]
-            x1, y1 = points[f, j, 0], points[f, j, 1]
-            x2, y2 = points[f, k, 0], points[f, k, 1]
+            x0, y0 = points[i, 0], points[i, 1]
+            x1, y1 = points[j, 0], points[j, 1]
+            x2, y2 = points[k, 0], points[k, 1]
             # counter-clockwise seen from outside is clockwise where rows go down
             area = (x2 - x0) * (y1 - y0) - (x1 - x0) * (y2 - y0)
             if not area > 1e-9:
@@ -367,7 +390,7 @@ def draw(
             right = min(2 * windows[o, 2] - 1, math.floor(max(x0, x1, x2)))
             first = max(2 * windows[o, 1], math.ceil(min(y0, y1, y2)))
             last = min(2 * windows[o, 3] - 1, math.floor(max(y0, y1, y2)))
-            z0, z1, z2 = points[f, i, 2], points[f, j, 2], points[f, k, 2]
+            z0, z1, z2 = points[i, 2], points[j, 2], points[k, 2]
             for y in range(first, last + 1):
                 for x in range(left, right + 1):
                     w0 = ((x2 - x) * (y1 - y) - (x1 - x) * (y2 - y)) / area
@@ -417,19 +440,18 @@ def draw(
                         counts[f, o, 0] += 1
                         if owner_map[y, x] == o:
                             counts[f, o, 1] += 1
-        rows, columns = shadows.shape[1:]
         for y in range(height):
             for x in range(width):
-                factor = np.float32(1.0)
+                factor = one
                 u, v = floor_points[y, x, 0], floor_points[y, x, 1]
                 if u >= 0.0:
                     column, row = int(u), int(v)
                     if column < columns - 1 and row < rows - 1:
-                        p, q = u - column, v - row
-                        factor = (1.0 - q) * (
-                            (1.0 - p) * shadows[f, row, column] + p * shadows[f, row, column + 1]
+                        p, q = u - np.float32(column), v - np.float32(row)
+                        factor = (one - q) * (
+                            (one - p) * shadows[f, row, column] + p * shadows[f, row, column + 1]
                         ) + q * (
-                            (1.0 - p) * shadows[f, row + 1, column]
+                            (one - p) * shadows[f, row + 1, column]
                             + p * shadows[f, row + 1, column + 1]
                         )
                 for c in range(3):
@@ -438,17 +460,20 @@ def draw(
                         for b in range(2 * y, 2 * y + 2):
                             for a in range(2 * x, 2 * x + 2):
                                 if owner_map[b, a] == 255:
-                                    value += 0.25 * factor * room_fine[b, a, c]
+                                    value += quarter * factor * room_fine[b, a, c]
                                 else:
-                                    value += 0.25 * min(colour[b, a, c], np.float32(1.5))
+                                    value += quarter * min(colour[b, a, c], np.float32(1.5))
                     else:
                         value = factor * room[y, x, c]
                     value *= vignette[y, x]
-                    shown = curve[min(top_value, int(value * top_value))]
-                    speck = grain[
-                        (y + offsets[f, 0]) % grain_size, (x + offsets[f, 1]) % grain_size, c
-                    ]
+                    shown = curve[int(min(one, value) * top_value)]
+                    speck = grain[y + offsets[f, 0], x + offsets[f, 1], c]
                     # photon noise: largest in the middle greys after the tone curve
-                    shown += speck * (1.1 + 0.010 * shown * (1.0 - shown / 300.0))
-                    pictures[f, y, x, 2 - c] = np.uint8(min(255.0, max(0.0, shown + 0.5)))
+                    shown += speck * (
+                        np.float32(0.7)
+                        + np.float32(0.005) * shown
+                        - np.float32(1.6e-5) * shown * shown
+                    )
+                    shown = min(np.float32(255.0), max(np.float32(0.0), shown + np.float32(0.5)))
+                    pictures[f, y, x, 2 - c] = np.uint8(shown)
     return pictures, counts

@@ -79,7 +79,8 @@ def script(spec: RoomSpec) -> Scene:
         poses = pose(path, person.look.stature, seed=100 * (number + 1))
         middle = (poses.joints[:, PELVIS, :2] + poses.joints[:, HEAD, :2]) / 2.0
         centres = np.column_stack([middle, poses.top - TARGET_HALF_EXTENTS[2]])
-        inside: ndarray = ((centres >= VOLUME_MINIMUM) & (centres <= VOLUME_MAXIMUM)).all(axis=1)
+        held = (centres >= VOLUME_MINIMUM) & (centres <= VOLUME_MAXIMUM)
+        inside = np.asarray(held.all(axis=1))
         first, last = person.waypoints[0][0], person.waypoints[-1][0]
         steps = np.arange(spec.frames)
         drawn = np.asarray((steps >= first) & ((steps <= last) | inside))

@@ -54,7 +54,7 @@ def noise(seed: int, octaves: int = 5, size: int = 256) -> Float[ndarray, "S S"]
         fine = zoom(wrapped, size / cells, order=3, grid_mode=True, mode="nearest")
         margin = 2 * size // cells
         total += fine[margin : margin + size, margin : margin + size] * 0.55**octave
-    return np.clip(total / (2.2 * total.std()), -1.2, 1.2)
+    return np.asarray(np.clip(total / (2.2 * total.std()), -1.2, 1.2))
 
 
 def sample(field: ndarray, u: ndarray, v: ndarray, *, size: float) -> ndarray:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import os
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
+from scipy.ndimage import gaussian_filter
 
 from tracker.camera import Camera
 from tracker.sequences.rendering.background import (
@@ -24,10 +27,13 @@ from tracker.sequences.rendering.raster import draw, floor_shadows, place_bodies
 from tracker.sequences.rendering.rooms import TARGET_HALF_EXTENTS, RoomSpec
 from tracker.sequences.rendering.scene import Figure, Scene, script, shadow_balls
 
+Result = TypeVar("Result")
+
 BATCH = 20
 """Steps drawn by one thread at a time."""
 _CELL = 0.04
-_GRAIN = 512
+_SPARE = 128
+"""Rows and columns of noise more than a picture has."""
 _EXPOSURE = 2.0
 
 
@@ -58,7 +64,7 @@ class Studio:
         self._lamps = lamp_table(interior)
         self._shade_lamps = _shade_lamps(interior)
         self._origin = np.array([LEFT - 0.5, NEAR - 0.2])
-        self._grid = (160, 136)
+        self._grid = (190, 160)
         self._floor_points = [
             np.nan_to_num((b.floor - self._origin) / _CELL, nan=-1.0).astype(np.float32)
             for b in self.backgrounds
@@ -74,6 +80,7 @@ class Studio:
             rows, columns = body.texture.shape[:2]
             self._texture[top : top + rows, :columns] = body.texture
             points.append(body.texture_points + np.array([0.0, float(top)]))
+        self._texture = _muted(self._texture)
         self._texture_points = np.concatenate(points).astype(np.float32)
         self._triangles = np.concatenate(
             [b.triangles + start for b, start in zip(bodies, sizes[:-1], strict=True)]
@@ -82,7 +89,11 @@ class Studio:
             np.arange(len(bodies), dtype=np.int32), [len(b.triangles) for b in bodies]
         )
         rng = np.random.default_rng([seed, 1])
-        self._grain = rng.standard_normal((_GRAIN, _GRAIN, 3), dtype=np.float32)
+        # neighbouring pixels share some noise, as after a camera's own interpolation
+        width, height = np.max([camera.image_size for camera in self.cameras], axis=0)
+        grain = rng.standard_normal((height + _SPARE, width + _SPARE, 3))
+        grain = gaussian_filter(grain, (0.65, 0.65, 0.4), mode="wrap")
+        self._grain = (grain / grain.std()).astype(np.float32)
         self._curve = _tone_curve()
         self._vignettes = [_vignette(camera) for camera in self.cameras]
 
@@ -153,11 +164,6 @@ class Studio:
         shadows: ndarray,
     ) -> tuple[ndarray, ndarray]:
         camera, background = self.cameras[number], self.backgrounds[number]
-        frames, size = world.shape[:2]
-        flat = world.reshape(-1, 3)
-        pixels, _ = camera.project(flat)
-        depth = camera.to_camera(flat)[:, 2]
-        points = np.column_stack([(pixels + 0.5) * FINE - 0.5, depth]).reshape(frames, size, 3)
         boxes, shares = [], []
         for figure in self.scene.figures:
             box, _ = camera.project_boxes(figure.centres[steps], TARGET_HALF_EXTENTS)
@@ -169,13 +175,16 @@ class Studio:
                 shares.append(np.prod(cut[:, 1] - cut[:, 0], axis=1) / np.prod(box[:, 2:], axis=1))
         offsets = np.stack(
             [
-                np.random.default_rng([self.seed, number, step]).integers(0, _GRAIN, size=2)
+                np.random.default_rng([self.seed, number, step]).integers(0, _SPARE, size=2)
                 for step in range(steps.start, steps.stop)
             ]
         )
         pictures, counts = draw(
-            points,
+            world,
             light,
+            np.column_stack([camera.rotation, camera.translation]),
+            camera.intrinsics,
+            camera.distortion,
             self._texture_points,
             self._triangles,
             self._owners,
@@ -196,27 +205,36 @@ class Studio:
         inside = np.nan_to_num(np.stack(shares, axis=1))
         return pictures, inside * counts[:, :, 1] / np.maximum(counts[:, :, 0], 1)
 
-    def draw_all(self, frames: int, workers: int = 2) -> Iterator[Drawn]:
-        """All steps in order; some are drawn ahead by other threads."""
-        starts = range(0, frames, BATCH)
-        with ThreadPoolExecutor(max_workers=workers) as pool:
-            waiting: list[Future[Drawn]] = []
-            try:
-                for start in starts:
-                    waiting.append(pool.submit(self.draw, start, min(start + BATCH, frames)))
-                    if len(waiting) > 2 * workers:
-                        yield waiting.pop(0).result()
-                while waiting:
+
+def in_order(
+    work: Callable[[int, int], Result], frames: int, workers: int | None = None
+) -> Iterator[Result]:
+    """The results of ``work(first, last)`` over all steps, in order, some ahead by threads."""
+    workers = workers or min(8, os.cpu_count() or 1)
+    with ThreadPoolExecutor(max_workers=workers) as pool:
+        waiting: list[Future[Result]] = []
+        try:
+            for start in range(0, frames, BATCH):
+                waiting.append(pool.submit(work, start, min(start + BATCH, frames)))
+                if len(waiting) > 2 * workers:
                     yield waiting.pop(0).result()
-            finally:
-                for future in waiting:
-                    future.cancel()
+            while waiting:
+                yield waiting.pop(0).result()
+        finally:
+            for future in waiting:
+                future.cancel()
 
 
 def _shade_lamps(interior: Interior) -> ndarray:
     """The ceiling's panels as the floor sees them: position and share of its light."""
     panels = interior.lamps[:2]
-    return np.array([[*lamp.centre, 0.40] for lamp in panels])
+    return np.array([[*lamp.centre, 0.45] for lamp in panels])
+
+
+def _muted(image: ndarray) -> Float[ndarray, "H W 3"]:
+    """Colours as a plain camera gives them: an eighth of the way to grey."""
+    grey = image @ np.array([0.2126, 0.7152, 0.0722])
+    return np.asarray(image + 0.125 * (grey[..., None] - image), dtype=np.float32)
 
 
 def _tone_curve() -> Float[ndarray, " K"]:
