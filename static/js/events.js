@@ -62,11 +62,11 @@ export function seenShare({ first, last, spans }) {
  * What a track is doing at a step.
  * @param {TrackLane} track
  * @param {number} step
- * @returns {"not yet" | "ended" | "seen" | "coasting"}
+ * @returns {"not yet" | "ended" | "seen" | "coasting" | "lost"} lost: not reported at this step, but later again
  */
 export function stateAt({ first, last, spans }, step) {
   if (step < first) return "not yet";
   if (step > last) return "ended";
   const span = spans.find(([from, to]) => step >= from && step <= to);
-  return span?.[2] ?? "coasting";
+  return span?.[2] ?? "lost";
 }

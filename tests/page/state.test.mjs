@@ -117,6 +117,7 @@ test("events: births, deaths and long misses, in order", () => {
 
 test("what a track is at a step, and how much of it was seen", () => {
   assert.deepEqual([5, 10, 40, 99, 100].map((step) => stateAt(TRACK, step)), ["not yet", "seen", "coasting", "coasting", "ended"]);
+  assert.equal(stateAt({ id: 1, first: 0, last: 9, spans: [[0, 3, "seen"], [6, 9, "seen"]] }, 5), "lost");
   assert.equal(seenShare(TRACK), 40 / 90);
   assert.deepEqual(longMisses(TRACK, 25), [[40, 79]]);
 });

@@ -247,9 +247,17 @@ export function mountCameras(root, { store, page, actions, playback }) {
       const opening = server?.opening;
       const [title, text] = opening
         ? [`Opening ${opening.name}`, opening.total ? `${opening.message}, ${opening.done} of ${opening.total}` : opening.message]
-        : ["No sequence is open", "Choose one at the top left: a rendered room needs no data of yours."];
+        : ["No sequence is open", "Choose one at the top left: a rendered room needs no data."];
       const part = opening?.total ? opening.done / opening.total : 0;
-      fill(blank, icon("i-folder", "l"), h("h3", {}, title), opening && h("span", { class: "bar", "--part": part }, h("i", {})), h("p", {}, text));
+      const sample = opening ? undefined : store.get().sequences.find((entry) => entry.kind === "rendered");
+      fill(
+        blank,
+        icon("i-folder", "l"),
+        h("h3", {}, title),
+        opening && h("span", { class: "bar", "--part": part }, h("i", {})),
+        h("p", {}, text),
+        sample && h("button", { class: "btn main", onclick: () => page.open(sample.name) }, `Open ${sample.name}`),
+      );
     }
   }
 
@@ -259,6 +267,7 @@ export function mountCameras(root, { store, page, actions, playback }) {
     if ((state.server?.sequence?.key ?? "") !== sequenceKey) build();
     header();
   });
+  store.on(["sequences"], header);
   store.on(["layers2d"], () => {
     header();
     playback.repaint();

@@ -38,7 +38,7 @@ export function mountHelp({ store }) {
       "div",
       { class: "sheet-foot" },
       h("p", {}, "Timeline: drag to seek, wheel to zoom, Shift and wheel to move, double click for the whole. Click a box, a lane or a row to select its track."),
-      h("p", {}, "Inside the 3D view arrows and W A S D move its camera; the other keys work there too."),
+      h("p", {}, "Inside the 3D view arrows and W A S D move its camera; play, ends, events, cameras and layers have their keys there too."),
       h("p", {}, "Dashed always means: not seen by this run here. That is truth, and a track that coasts."),
       h("label", {}, single, "Single-key shortcuts"),
     ),

@@ -92,7 +92,7 @@ export function mountTimeline(root, context) {
     }
     const done = shownDone(store.get());
     const fps = server?.sequence?.fps ?? 25;
-    drawLanes(g, block, view, { tracks: shownTracks(), scroll: lanes.scrollTop, laneHeight, done, fps, selection, hover: hover?.id ?? null }, ink);
+    drawLanes(g, block, view, { tracks: shownTracks(), scroll: lanes.scrollTop, laneHeight, done: timeline?.done ?? 0, fps, selection, hover: hover?.id ?? null }, ink);
     drawRange(g, over, view, { loaded: playback.loadedSteps(), done, frames }, ink);
     drawRuler(g, ruler, view, { range }, ink);
     drawCardinality(g, strip, view, { count: timeline?.count ?? [], truth: timeline?.truth ?? null }, ink);

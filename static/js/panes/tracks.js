@@ -11,7 +11,7 @@ import { eventsOf, nextEvent, seenShare, stateAt } from "../events.js";
 
 /** Rows beyond this are counted, not drawn. */
 const MOST_ROWS = 300;
-const ORDER = { seen: 0, coasting: 1, "not yet": 2, ended: 3 };
+const ORDER = { seen: 0, coasting: 1, lost: 2, "not yet": 3, ended: 4 };
 
 /** @type {Column[]} */
 const COLUMNS = [
@@ -24,6 +24,9 @@ const COLUMNS = [
   { name: "existence", word: "Weight", number: true, give: "", value: (t) => t.id },
   { name: "position", word: "x, y, z  m", number: true, give: "opt-1", value: (t) => t.id },
 ];
+
+/** @param {number} seconds */
+const duration = (seconds) => `${seconds.toFixed(seconds < 1 ? 2 : 1)} s`;
 
 /**
  * @param {HTMLElement} root
@@ -115,7 +118,7 @@ export function mountTracks(root, { store, page, actions, playback }) {
       let entry = rows.get(track.id);
       if (!entry) rows.set(track.id, (entry = makeRow(track)));
       const ended = track.last < done - 1;
-      const texts = [null, null, track.first, ended ? track.last : "–", `${((track.last - track.first + 1) / fps).toFixed(1)} s`, `${Math.round(seenShare(track) * 100)} %`];
+      const texts = [null, null, track.first, ended ? track.last : "–", duration((track.last - track.first + 1) / fps), `${Math.round(seenShare(track) * 100)} %`];
       texts.forEach((text, k) => text !== null && entry && write(entry.cells[k], String(text)));
       if (body.children[index] !== entry.row) body.insertBefore(entry.row, body.children[index] ?? null);
     });
@@ -145,7 +148,7 @@ export function mountTracks(root, { store, page, actions, playback }) {
     for (const track of timeline?.tracks ?? []) {
       const entry = rows.get(track.id);
       if (!entry) continue;
-      const state = stateAt(track, step);
+      const state = step < (timeline?.done ?? 0) ? stateAt(track, step) : "–";
       const alive = state === "seen" || state === "coasting";
       write(entry.cells[1], state);
       const here = whole.get(track.id);
