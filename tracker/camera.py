@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from tracker import kernels
+from tracker import lens
 
 NEAREST_DEPTH = 0.05
 """Metres: a point nearer than this in front of the lens counts as behind the camera."""
@@ -92,6 +92,15 @@ class Camera:
         real = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0.0)].real
         return float(np.sqrt(real.min())) if len(real) else np.inf
 
+    @cached_property
+    def _numbers(self) -> tuple[ndarray, ndarray, ndarray, ndarray]:
+        """R, t, K and the lens in the form that the compiled kernels know."""
+        parts = (self.rotation, self.translation, self.intrinsics, self.distortion)
+        rotation, translation, intrinsics, distortion = (
+            np.ascontiguousarray(part, dtype=float) for part in parts
+        )
+        return rotation, translation, intrinsics, distortion
+
     def to_camera(self, points: Float[ndarray, "N 3"]) -> Float[ndarray, "N 3"]:
         """World points (metres) in camera axes."""
         return np.asarray(points @ self.rotation.T + self.translation)
@@ -116,34 +125,14 @@ class Camera:
     def _project(
         self, points: Float[ndarray, "N 3"], *, with_jacobian: bool
     ) -> tuple[Float[ndarray, "N 2"], Float[ndarray, "N 2 3"], Bool[ndarray, " N"]]:
-        x, y, z = self.to_camera(np.asarray(points, dtype=float)).T
-        valid = z > NEAREST_DEPTH
-        depth = np.where(valid, z, 1.0)
-        u, v = x / depth, y / depth
-        k1, k2, p1, p2, k3 = self.distortion
-        r2 = u * u + v * v
-        valid &= r2 < self._largest_radius**2
-        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        ud = u * radial + 2.0 * p1 * u * v + p2 * (r2 + 2.0 * u * u)
-        vd = v * radial + p1 * (r2 + 2.0 * v * v) + 2.0 * p2 * u * v
-        linear = self.intrinsics[:2, :2]
-        pixels = np.stack([ud, vd], axis=1) @ linear.T + self.intrinsics[:2, 2]
-        pixels[~valid] = np.nan
-        jacobian = np.empty((len(pixels), 2, 3 if with_jacobian else 0))
-        if with_jacobian:
-            slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2))  # d radial / d(r²) · 2
-            lens = np.empty((len(pixels), 2, 2))
-            lens[:, 0, 0] = radial + u * u * slope + 2.0 * p1 * v + 6.0 * p2 * u
-            lens[:, 0, 1] = u * v * slope + 2.0 * p1 * u + 2.0 * p2 * v
-            lens[:, 1, 0] = u * v * slope + 2.0 * p1 * u + 2.0 * p2 * v
-            lens[:, 1, 1] = radial + v * v * slope + 6.0 * p1 * v + 2.0 * p2 * u
-            perspective = np.zeros((len(pixels), 2, 3))
-            perspective[:, 0, 0] = perspective[:, 1, 1] = 1.0 / depth
-            perspective[:, 0, 2] = -u / depth
-            perspective[:, 1, 2] = -v / depth
-            jacobian = linear @ lens @ (perspective @ self.rotation)
-            jacobian[~valid] = 0.0
-        return pixels, jacobian, valid
+        pixels, jacobians, valid = lens.project_points(
+            np.ascontiguousarray(points, dtype=float),
+            *self._numbers,
+            NEAREST_DEPTH,
+            self._largest_radius,
+            with_jacobian,
+        )
+        return pixels, jacobians, valid
 
     def back_project(self, pixels: Float[ndarray, "N 2"]) -> Float[ndarray, "N 3"]:
         """Unit directions, in world axes, of the rays from :attr:`centre` through the pixels.
@@ -155,9 +144,7 @@ class Camera:
             self.intrinsics[:2, :2], (np.asarray(pixels, float) - self.intrinsics[:2, 2]).T
         ).T
         if not self.is_pinhole:
-            drawn = kernels.undistort(
-                np.ascontiguousarray(drawn), self.distortion, _LENS_ITERATIONS
-            )
+            drawn = lens.undistort(np.ascontiguousarray(drawn), self._numbers[3], _LENS_ITERATIONS)
         u, v = drawn.T
         directions = np.stack([u, v, np.ones_like(u)], axis=1) @ self.rotation
         return np.asarray(directions / np.linalg.norm(directions, axis=1, keepdims=True))

@@ -128,10 +128,12 @@ def kalman_pairs(
     size, dimension = means.shape
     count, order = measurements.shape
     shared = noises.shape[0] == 1
-    gains = np.empty((size, dimension, order))
-    updated = np.empty((size, dimension, dimension))
+    ph = np.empty((size, dimension, order))
     lower = np.empty((size, order, order))
     constants = np.empty(size)
+    gains = np.empty((size, dimension, order))
+    updated = np.empty((size, dimension, dimension))
+    has_gain = np.zeros(size, dtype=np.bool_)
 
     component = np.empty(size * count, dtype=np.int64)
     measured = np.empty(size * count, dtype=np.int64)
@@ -139,7 +141,6 @@ def kalman_pairs(
     new_means = np.empty((size * count, dimension))
     new_covariances = np.empty((size * count, dimension, dimension))
 
-    ph = np.empty((dimension, order))
     factor = np.empty((dimension, dimension))
     half = np.empty((dimension, dimension))
     solved = np.empty(order)
@@ -147,19 +148,20 @@ def kalman_pairs(
     for z in range(count):
         noise = noises[0] if shared else noises[z]
         for j in range(size):
-            if z == 0 or not shared:
-                # S = H P Hᵀ + R and its Cholesky factor
+            if z == 0:
                 for a in range(dimension):
                     for p in range(order):
                         total = 0.0
                         for b in range(dimension):
                             total += covariances[j, a, b] * jacobians[j, p, b]
-                        ph[a, p] = total
+                        ph[j, a, p] = total
+            if z == 0 or not shared:
+                # S = H P Hᵀ + R and its Cholesky factor
                 for p in range(order):
                     for q in range(p + 1):
                         total = noise[p, q]
                         for a in range(dimension):
-                            total += jacobians[j, p, a] * ph[a, q]
+                            total += jacobians[j, p, a] * ph[j, a, q]
                         for r in range(q):
                             total -= lower[j, p, r] * lower[j, q, r]
                         if p == q:
@@ -172,10 +174,21 @@ def kalman_pairs(
                 for p in range(order):
                     constant -= math.log(lower[j, p, p])
                 constants[j] = constant
+            distance = 0.0
+            for p in range(order):
+                total = measurements[z, p] - expected[j, p]
+                for r in range(p):
+                    total -= lower[j, p, r] * solved[r]
+                solved[p] = total / lower[j, p, p]
+                distance += solved[p] * solved[p]
+            if not distance <= gate or distance == math.inf:
+                continue
+            if not (shared and has_gain[j]):
+                has_gain[j] = True
                 # K = P Hᵀ S⁻¹, row by row through the factor
                 for a in range(dimension):
                     for p in range(order):
-                        total = ph[a, p]
+                        total = ph[j, a, p]
                         for r in range(p):
                             total -= lower[j, p, r] * solved[r]
                         solved[p] = total / lower[j, p, p]
@@ -207,15 +220,6 @@ def kalman_pairs(
                                 total += gains[j, a, p] * noise[p, q] * gains[j, b, q]
                         updated[j, a, b] = total
                         updated[j, b, a] = total
-            distance = 0.0
-            for p in range(order):
-                total = measurements[z, p] - expected[j, p]
-                for r in range(p):
-                    total -= lower[j, p, r] * solved[r]
-                solved[p] = total / lower[j, p, p]
-                distance += solved[p] * solved[p]
-            if not distance <= gate or distance == math.inf:
-                continue
             component[pairs] = j
             measured[pairs] = z
             likelihood[pairs] = constants[j] - 0.5 * distance
@@ -295,42 +299,3 @@ def belief_propagation(
             total += to_measurement[i, j]
         columns[j] = unexplained[j] / total
     return rows, columns
-
-
-@_kernel
-def undistort(distorted: ndarray, distortion: ndarray, iterations: int) -> ndarray:
-    """Undo the radial-tangential lens model by Newton's method.
-
-    Args:
-        distorted: (N, 2), normalised image coordinates as the lens draws them.
-        distortion: (5,), k1 k2 p1 p2 k3.
-        iterations: At most so many; four or five are enough inside a picture.
-
-    Returns:
-        (N, 2), the coordinates that a pinhole would have drawn.
-    """
-    k1, k2, p1, p2, k3 = distortion
-    straight = distorted.copy()
-    for n in range(len(distorted)):
-        u, v = distorted[n, 0], distorted[n, 1]
-        for _ in range(iterations):
-            r2 = u * u + v * v
-            radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-            slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2))  # d radial / d(r²) · 2
-            error_u = u * radial + 2.0 * p1 * u * v + p2 * (r2 + 2.0 * u * u) - distorted[n, 0]
-            error_v = v * radial + p1 * (r2 + 2.0 * v * v) + 2.0 * p2 * u * v - distorted[n, 1]
-            a = radial + u * u * slope + 2.0 * p1 * v + 6.0 * p2 * u
-            b = u * v * slope + 2.0 * p1 * u + 2.0 * p2 * v
-            d = radial + v * v * slope + 6.0 * p1 * v + 2.0 * p2 * u
-            determinant = a * d - b * b
-            if abs(determinant) < 1e-9:
-                break
-            step_u = (d * error_u - b * error_v) / determinant
-            step_v = (a * error_v - b * error_u) / determinant
-            u -= step_u
-            v -= step_v
-            if step_u * step_u + step_v * step_v < 1e-24:
-                break
-        straight[n, 0] = u
-        straight[n, 1] = v
-    return straight
