@@ -220,5 +220,5 @@ def number(value: float | int | None, digits: int, *, sign: bool = False) -> str
     """A value with fixed decimals and a true minus; an en dash for None."""
     if value is None:
         return "–"
-    text = f"{round(float(value), digits) + 0.0:{'+' if sign else ''}.{digits}f}"
-    return text.replace("-", "−")
+    rounded = round(float(value), digits) + 0.0  # −0.0 + 0.0 is 0.0
+    return f"{rounded:{'+' if sign and rounded else ''}.{digits}f}".replace("-", "−")
