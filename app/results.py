@@ -192,7 +192,9 @@ def _add_tracks(message: models.Step, sequence: Sequence, run: Run, step: int) -
                     id=ids[i],
                     box=_box(boxes[i]) if whole else None,
                     seen=bool(seen[i, index]),
-                    detection_probability=float(fused.detection_probabilities[index, component]),
+                    detection_probability=round(
+                        float(fused.detection_probabilities[index, component]), 4
+                    ),
                     source=int(fused.sources[index, component]),
                     hidden_by=id_of_label.get(int(fused.hidden_by[index, component])),
                     visible=bool(visible[i]),

@@ -178,7 +178,9 @@ def bind(host: str, port: int) -> sockets.socket:
     family, _, _, _, address = sockets.getaddrinfo(
         host, port, type=sockets.SOCK_STREAM, flags=sockets.AI_PASSIVE
     )[0]
-    listener = sockets.socket(family, sockets.SOCK_STREAM)
+    # asyncio switches off the collecting of small packets (40 ms of waiting for each answer)
+    # only on sockets that say they are TCP
+    listener = sockets.socket(family, sockets.SOCK_STREAM, sockets.IPPROTO_TCP)
     try:
         listener.setsockopt(sockets.SOL_SOCKET, sockets.SO_REUSEADDR, 1)
         listener.bind(address)

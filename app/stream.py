@@ -43,6 +43,7 @@ class _Page:
         self.wake = asyncio.Event()
         self.wake.set()
         self.told_step: tuple[Any, ...] = ()
+        self.told_timeline: tuple[str, str, int] = ("", "", 0)
         self.due: set[str] = set()
         """Kinds of message that are held back for a moment."""
         self.told_at = dict.fromkeys(SECONDS_BETWEEN, 0.0)
@@ -193,12 +194,20 @@ class Stream:
         if news & {"run", "sequence"}:
             page.due = {"timeline"}  # how far the run is was in the state
             page.told_at["timeline"] = 0.0
+        shown = _shown(snapshot)
+        if shown == page.told_timeline:
+            page.due.discard("timeline")
         now = self._loop.time()
         for kind in sorted(page.due):
             if now - page.told_at[kind] >= SECONDS_BETWEEN[kind]:
                 page.told_at[kind] = now
                 page.due.discard(kind)
-                await socket.send_text(json.dumps({"type": kind, **_progress(kind, snapshot)}))
+                if kind == "timeline":
+                    page.told_timeline = shown
+                    told: dict[str, Any] = {"run": shown[1], "done": shown[2]}
+                else:
+                    told = {"run": results.run_of(snapshot).model_dump(mode="json")}
+                await socket.send_text(json.dumps({"type": kind, **told}))
         if page.due and page.timer is None:
             when = min(page.told_at[kind] + SECONDS_BETWEEN[kind] for kind in page.due)
             page.timer = self._loop.call_at(when, _remind, page)
@@ -215,11 +224,11 @@ def _remind(page: _Page) -> None:
     page.wake.set()
 
 
-def _progress(kind: str, snapshot: Snapshot) -> dict[str, Any]:
-    if kind == "progress":
-        return {"run": results.run_of(snapshot).model_dump(mode="json")}
+def _shown(snapshot: Snapshot) -> tuple[str, str, int]:
+    """What a timeline shows: of another sequence, run or length it is another."""
     run = snapshot.run
-    return {"run": run.key, "done": run.done} if run is not None else {"run": "", "done": 0}
+    key, done = (run.key, run.done) if run is not None else ("", 0)
+    return snapshot.sequence_key, key, done
 
 
 def _with_type(kind: str, message: models.Model) -> str:

@@ -326,7 +326,7 @@ class Workbench:
                 run = self._last_good
             elif phase == "done":
                 self._last_good = run
-            state = replace(now.run_state, state=phase, seconds_left=None, error=error)
+            state = replace(now.run_state, state=phase, seconds_left=None, message="", error=error)
             self._put("run", run=run, run_state=state)
 
     @contextmanager
