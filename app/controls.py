@@ -1,0 +1,280 @@
+"""The sliders in viser's panel, made from the definitions in :mod:`tracker.parameters`.
+
+One edit goes one way round: browser → workbench → every other face. What the server
+writes into a slider comes back to it without a client and is ignored; and it writes
+into a slider only when that stands elsewhere than the store's value and nobody is
+just moving it.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Set
+from functools import partial
+from typing import Any, Literal, get_args
+
+import viser
+
+from app import scene_style
+from app.scene_sliders import Scale, hint_text, label_text, number_text
+from app.scene_worker import LatestWorker
+from app.workbench import Change, Snapshot, Workbench
+from tracker import parameters as table
+from tracker.parameters import Parameter, ParameterError, RunParameters, Stage
+
+ORIGIN = "viser"
+PANEL_WIDTH = 276
+"""Pixels."""
+
+STAGES: dict[Stage, str] = {"single_view": "Single view", "fusion": "Fusion", "tracks": "Tracks"}
+METHOD_STAGE: dict[str, Stage] = {"single_view": "single_view", "fusion_method": "fusion"}
+
+Key = Literal[
+    "space", "home", "end", "pageup", "pagedown", "escape",
+    "B", "G", "I", "J", "K", "L", "N", "O", "T",
+    "0", "1", "2", "3", "4", "5", "6", "7", "8", "9",
+]  # fmt: skip
+
+COMMANDS: tuple[tuple[str, str, Key, Literal["shift"] | None], ...] = (
+    ("play", "Play or pause", "space", None),
+    ("first", "First step", "home", None),
+    ("last", "Last step", "end", None),
+    ("ten-back", "Ten steps back", "pageup", None),
+    ("ten-forward", "Ten steps on", "pagedown", None),
+    ("play-back", "Play backwards", "J", None),
+    ("stop", "Stop", "K", None),
+    ("play-forward", "Play", "L", None),
+    ("mark-in", "Play from here", "I", None),
+    ("mark-out", "Play to here", "O", None),
+    ("next-event", "Next event", "N", None),
+    ("previous-event", "Previous event", "N", "shift"),
+    ("truth", "Truth on or off", "G", None),
+    ("trails", "Trails on or off", "T", None),
+    ("boxes", "Boxes on or off", "B", None),
+    ("clear", "Clear the selection", "escape", None),
+    ("free-view", "Free view", "0", None),
+    *((f"camera-{key}", f"Camera {key}", key, None) for key in get_args(Key)[-9:]),
+)
+"""Keys that reach the page also from inside the 3D view: name, words, key, modifier. Arrows and
+W A S D Q E are missing on purpose: they move viser's own viewpoint."""
+
+Input = (
+    viser.GuiInputHandle[float]
+    | viser.GuiInputHandle[int]
+    | viser.GuiInputHandle[bool]
+    | viser.GuiInputHandle[str]
+)
+
+
+class Controls:
+    """viser's panel, kept equal to the workbench's parameters, and the other way round."""
+
+    def __init__(self, server: viser.ViserServer, workbench: Workbench) -> None:
+        """Make the panel and follow the workbench from now on.
+
+        Args:
+            server: Its panel belongs to this object.
+            workbench: Whose parameters.
+        """
+        self._server = server
+        self._workbench = workbench
+        self._inputs: dict[str, Any] = {}
+        self._scales: dict[str, Scale] = {}
+        self._groups: dict[str, list[viser.GuiFolderHandle]] = {}
+        self._resets: dict[Stage, viser.GuiButtonHandle] = {}
+        self._lock = threading.Lock()
+        self._moved: set[str] = set()
+        """Edits of browsers that are not yet in the workbench."""
+        self._worker = LatestWorker("controls", self._work)
+        server.gui.main_panel.dock_right()
+        server.gui.main_panel.set_width(PANEL_WIDTH)
+        server.gui.add_html(scene_style.PANEL)
+        self._values = server.gui.add_html("")
+        self._presets = server.gui.add_button_group(
+            "Preset", tuple(table.PRESETS), hint="Takes a named set of values; methods stay."
+        )
+        self._presets.on_click(self._take_preset)
+        for stage, title in STAGES.items():
+            self._make_stage(stage, title)
+        self._reset_all = server.gui.add_button(
+            "Reset all", hint="Every value and method to its default."
+        )
+        self._reset_all.on_click(lambda _: self._reset(None))
+        for name, words, key, modifier in COMMANDS:
+            command = server.gui.add_command(words, hotkey=key, modifier=modifier)
+            command.on_trigger(partial(self._relay, name))
+        self._refresh(workbench.snapshot())
+        self._unsubscribe = workbench.subscribe(self._note)
+        self._worker.ask("refresh")
+
+    def wait(self, timeout: float) -> bool:
+        """Block until all edits and changes are done; whether within ``timeout`` seconds.
+
+        Raises:
+            Exception: What went wrong meanwhile.
+        """
+        return self._worker.wait(timeout)
+
+    def close(self) -> None:
+        """Stop following; the panel stays as it is."""
+        self._unsubscribe()
+        self._worker.close()
+
+    # making the panel
+
+    def _make_stage(self, stage: Stage, title: str) -> None:
+        parameters = [p for p in table.PARAMETERS.values() if p.stage == stage]
+        with self._server.gui.add_folder(title):
+            for method, owner in METHOD_STAGE.items():
+                if owner == stage:
+                    self._make_method(method)
+            for group in dict.fromkeys(p.group for p in parameters):
+                self._make_group([p for p in parameters if p.group == group])
+            reset = self._server.gui.add_button(f"Reset {title.lower()}", visible=False)
+            reset.on_click(lambda _: self._reset(stage))
+            self._resets[stage] = reset
+
+    def _make_method(self, method: str) -> None:
+        field = RunParameters.model_fields[method]
+        chooser = self._server.gui.add_dropdown(
+            "Method",
+            table.METHODS[method],
+            initial_value=table.METHODS[method][0],
+            hint=field.description,
+        )
+        self._follow(method, chooser)
+
+    def _make_group(self, parameters: list[Parameter]) -> None:
+        group = parameters[0].group
+        folder = self._server.gui.add_folder(None)
+        self._groups.setdefault(group, []).append(folder)
+        with folder:
+            for parameter in parameters:
+                if not parameter.advanced:
+                    self._make_input(parameter)
+            advanced = [p for p in parameters if p.advanced]
+            if advanced:
+                with self._server.gui.add_folder("Advanced", expand_by_default=False):
+                    for parameter in advanced:
+                        self._make_input(parameter)
+
+    def _make_input(self, parameter: Parameter) -> None:
+        gui = self._server.gui
+        label, hint = label_text(parameter, changed=False), hint_text(parameter)
+        handle: Input
+        if parameter.kind == "bool":
+            handle = gui.add_checkbox(label, bool(parameter.default), hint=hint)
+        elif parameter.kind == "choice":
+            handle = gui.add_dropdown(
+                label, parameter.choices, initial_value=parameter.default, hint=hint
+            )
+        else:
+            scale = self._scales[parameter.key] = Scale(parameter)
+            handle = gui.add_slider(
+                label,
+                min=scale.minimum,
+                max=scale.maximum,
+                step=scale.step,
+                initial_value=scale.place(parameter.default),
+                hint=hint,
+            )
+        self._follow(parameter.key, handle)
+
+    def _follow(self, key: str, handle: Any) -> None:
+        self._inputs[key] = handle
+
+        @handle.on_update  # type: ignore[untyped-decorator]
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:  # else it is our own writing
+                with self._lock:
+                    self._moved.add(key)
+                self._worker.ask("edit")
+
+    # what happens: these return at once
+
+    def _note(self, change: Change) -> None:
+        if change in ("parameters", "sequence"):
+            self._worker.ask("refresh")
+
+    def _relay(self, name: str, _: object) -> None:
+        self._workbench.command(name)
+
+    def _take_preset(self, event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+        self._workbench.apply_preset(event.target.value, ORIGIN)
+
+    def _reset(self, stage: Stage | None) -> None:
+        keys = None
+        if stage is not None:
+            shown = self._shown_keys(self._workbench.snapshot().parameters)
+            keys = [key for key in shown if self._stage_of(key) == stage]
+        self._workbench.reset_parameters(keys, ORIGIN)
+
+    # the worker's thread
+
+    def _work(self, topics: Set[str]) -> None:
+        if "edit" in topics:
+            self._take_edits()
+        self._refresh(self._workbench.snapshot())
+
+    def _take_edits(self) -> None:
+        with self._lock:
+            moved, self._moved = self._moved, set()
+        edits = {key: self._value_of(key) for key in moved}
+        try:
+            self._workbench.set_parameters(edits, ORIGIN)
+        except ParameterError as error:
+            self._workbench.notify("error", str(error))
+
+    def _value_of(self, key: str) -> Any:
+        place = self._inputs[key].value
+        return self._scales[key].value(place) if key in self._scales else place
+
+    def _refresh(self, snapshot: Snapshot) -> None:
+        parameters = snapshot.parameters
+        changed = table.changed(parameters, snapshot.defaults)
+        with self._server.atomic():
+            for key, handle in self._inputs.items():
+                self._write(key, handle, table.value(parameters, key))
+                if key in table.PARAMETERS:
+                    label = label_text(table.PARAMETERS[key], changed=key in changed)
+                else:
+                    label = "• Method" if key in changed else "Method"
+                handle.label = label
+            shown = self._shown_keys(parameters)
+            groups = {table.PARAMETERS[key].group for key in shown if key in table.PARAMETERS}
+            for group, folders in self._groups.items():
+                for folder in folders:
+                    folder.visible = group in groups
+            for stage, reset in self._resets.items():
+                reset.visible = any(self._stage_of(k) == stage for k in changed if k in shown)
+            self._reset_all.visible = bool(changed)
+            self._values.content = self._value_style(parameters, set(changed))
+        self._server.flush()
+
+    def _write(self, key: str, handle: Any, value: Any) -> None:
+        scale = self._scales.get(key)
+        with self._lock:
+            if key in self._moved:  # somebody is moving it; the edit comes next
+                return
+            if scale is None:
+                handle.value = value
+            elif not scale.stands_at(handle.value, value):
+                handle.value = scale.place(value)
+
+    def _shown_keys(self, parameters: RunParameters) -> set[str]:
+        """The keys that the chosen methods read, the choices themselves included."""
+        stages = (table.stage_values(parameters, stage) for stage in STAGES)
+        return {*table.METHODS, *(key for values in stages for key in values)}
+
+    def _stage_of(self, key: str) -> Stage:
+        return METHOD_STAGE[key] if key in METHOD_STAGE else table.PARAMETERS[key].stage
+
+    def _value_style(self, parameters: RunParameters, changed: set[str]) -> str:
+        """The readable numbers of logarithmic sliders, and stronger ink for changed labels."""
+        numbers = {
+            self._inputs[key]._impl.uuid: number_text(table.value(parameters, key))
+            for key, scale in self._scales.items()
+            if scale.parameter.log
+        }
+        marked = [self._inputs[key]._impl.uuid for key in changed if key in self._inputs]
+        return scene_style.values(numbers, marked)

@@ -1,0 +1,285 @@
+"""Shapes of the 3D scene as arrays: ellipsoids, boxes, trails, the view of the whole volume."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+from scipy.stats import chi2
+
+from tracker.trajectories import Trajectories
+
+DEFAULT_MASS = 0.9
+"""Probability that an ellipsoid holds of its Gaussian."""
+
+_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+_EDGES = np.array(
+    [[a, b] for a in range(8) for b in range(a + 1, 8) if (a ^ b).bit_count() == 1], dtype=np.int64
+)
+"""Pairs of corners that differ in one coordinate: the twelve edges of a box."""
+
+
+def mass_radius(mass: float, dimension: int = 3) -> float:
+    """How many standard deviations hold a share of a Gaussian: the root of the χ² quantile.
+
+    Raises:
+        ValueError: If ``mass`` is not between 0 and 1.
+    """
+    if not 0.0 < mass < 1.0:
+        raise ValueError(f"mass must be above 0 and below 1 (a probability), got {mass}")
+    return float(np.sqrt(chi2.ppf(mass, dimension)))
+
+
+def quaternions(rotations: Float[ndarray, "N 3 3"]) -> Float[ndarray, "N 4"]:
+    """Unit quaternions w, x, y, z of proper rotation matrices.
+
+    Takes the largest of the four components from the diagonal and the others
+    from it, which keeps the digits whatever the angle.
+    """
+    r = np.asarray(rotations, dtype=float)
+    trace = np.einsum("nii->n", r)
+    diagonal = np.einsum("nii->ni", r)
+    squares = np.concatenate([trace[:, None], 2.0 * diagonal - trace[:, None]], axis=1) + 1.0
+    products = np.empty((len(r), 4, 4))  # 4 q qᵀ
+    products[:, range(4), range(4)] = squares
+    for i, j, k in ((1, 2, 3), (2, 3, 1), (3, 1, 2)):
+        a, b, c = i - 1, j - 1, k - 1
+        products[:, 0, i] = products[:, i, 0] = r[:, c, b] - r[:, b, c]
+        products[:, i, j] = products[:, j, i] = r[:, a, b] + r[:, b, a]
+    rows = products[np.arange(len(r)), np.argmax(squares, axis=1)]
+    return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True))
+
+
+def ellipsoids(
+    covariances: Float[ndarray, "N 3 3"], mass: float = DEFAULT_MASS
+) -> tuple[Float[ndarray, "N 4"], Float[ndarray, "N 3"]]:
+    """Orientations and half axes of the ellipsoids that hold a share of each Gaussian.
+
+    The surface is (x - m)ᵀ P⁻¹ (x - m) = χ²₃(mass), with the whole covariance P:
+    its axes are the eigenvectors, as long as the roots of the eigenvalues.
+
+    Args:
+        covariances: P in squared metres, symmetric.
+        mass: Probability inside.
+
+    Returns:
+        Unit quaternions w, x, y, z and half axes in metres; no rows for no rows.
+    """
+    if len(covariances) == 0:
+        return np.zeros((0, 4)), np.zeros((0, 3))
+    variances, axes = np.linalg.eigh(covariances)
+    axes[:, :, 0] *= np.sign(np.linalg.det(axes))[:, None]  # a rotation, not a mirror
+    return quaternions(axes), np.sqrt(np.maximum(variances, 0.0)) * mass_radius(mass)
+
+
+@cache
+def icosphere(subdivisions: int = 2) -> tuple[Float[ndarray, "V 3"], Int[ndarray, "F 3"]]:
+    """Vertices on the unit sphere and triangles, from a divided icosahedron."""
+    golden = (1.0 + 5.0**0.5) / 2.0
+    vertices = [
+        *((s, t * golden, 0.0) for t in (1, -1) for s in (-1, 1)),
+        *((0.0, s, t * golden) for t in (1, -1) for s in (-1, 1)),
+        *((t * golden, 0.0, s) for t in (1, -1) for s in (-1, 1)),
+    ]
+    points = np.array(vertices) / np.linalg.norm(vertices[0])
+    edge = np.linalg.norm(points[:, None] - points[None], axis=2)
+    near = (edge > 0.0) & (edge < edge[edge > 0.0].min() * 1.01)
+    triangles = np.array(
+        [
+            (a, b, c)
+            for a in range(12)
+            for b in range(a + 1, 12)
+            for c in range(b + 1, 12)
+            if near[a, b] and near[b, c] and near[a, c]
+        ]
+    )
+    for _ in range(subdivisions):
+        corners = points[triangles]
+        middles = corners + np.roll(corners, -1, axis=1)
+        middles /= np.linalg.norm(middles, axis=2, keepdims=True)
+        stacked = np.concatenate([points, middles.reshape(-1, 3)])
+        _, first, inverse = np.unique(
+            stacked.round(9), axis=0, return_index=True, return_inverse=True
+        )
+        points, inverse = stacked[first], inverse.reshape(-1)
+        middle = inverse[len(inverse) - middles.size // 3 :].reshape(-1, 3)
+        a, b, c = inverse[triangles].T
+        ab, bc, ca = middle.T
+        triangles = np.concatenate(
+            [np.stack(t, axis=1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+        )
+    normals = np.cross(
+        points[triangles[:, 1]] - points[triangles[:, 0]],
+        points[triangles[:, 2]] - points[triangles[:, 0]],
+    )
+    inward = np.einsum("fi,fi->f", normals, points[triangles].mean(axis=1)) < 0.0
+    triangles[inward] = triangles[inward][:, ::-1]
+    return points, triangles
+
+
+def unit_cube() -> tuple[Float[ndarray, "8 3"], Int[ndarray, "12 3"]]:
+    """The cube from -1 to 1 as vertices and outward triangles."""
+    quads = np.array(
+        [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    )
+    return _CORNERS.copy(), np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
+
+
+def box_corners(low: Float[ndarray, " 3"], high: Float[ndarray, " 3"]) -> Float[ndarray, "8 3"]:
+    """The eight corners of a volume."""
+    return np.asarray((low + high) / 2.0 + _CORNERS * (high - low) / 2.0)
+
+
+def box_edges(
+    centres: Float[ndarray, "N 3"], half_extents: Float[ndarray, " 3"]
+) -> Float[ndarray, "N 12 2 3"]:
+    """The twelve edges of upright boxes as segments."""
+    centres = np.asarray(centres, dtype=float).reshape(-1, 3)
+    corners = centres[:, None, :] + _CORNERS * half_extents
+    return np.asarray(corners[:, _EDGES])
+
+
+def dashes(segments: Float[ndarray, "N 2 3"], length: float) -> Float[ndarray, "M 2 3"]:
+    """Segments cut into dashes of about ``length`` metres with gaps of two thirds of it.
+
+    Each begins and ends with a dash, so that corners stay closed.
+    """
+    if len(segments) == 0:
+        return np.zeros((0, 2, 3))
+    start, step = segments[:, 0], segments[:, 1] - segments[:, 0]
+    whole = np.linalg.norm(step, axis=1)
+    # n dashes and n - 1 gaps fill the segment
+    counts = np.maximum(1, np.rint((whole / length + 2.0 / 3.0) / (5.0 / 3.0))).astype(np.int64)
+    owner = np.repeat(np.arange(len(segments)), counts)
+    place = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
+    dash = 1.0 / (counts + (counts - 1) * 2.0 / 3.0)
+    begin = (place * dash[owner] * 5.0 / 3.0)[:, None]
+    end = begin + dash[owner][:, None]
+    return np.stack([start[owner] + begin * step[owner], start[owner] + end * step[owner]], axis=1)
+
+
+def floor_grid(
+    low: Float[ndarray, " 2"], high: Float[ndarray, " 2"], height: float, cell: float
+) -> tuple[Float[ndarray, "A 2 3"], Float[ndarray, "B 2 3"]]:
+    """Lines of a grid on the floor, at multiples of the cell: the fine ones and every second.
+
+    Args:
+        low: Least x and y that it must reach.
+        high: Greatest x and y.
+        height: z of the floor.
+        cell: Metres between two lines.
+    """
+    first = np.floor(np.asarray(low) / cell / 2.0).astype(int) * 2
+    last = np.ceil(np.asarray(high) / cell / 2.0).astype(int) * 2
+    lines: dict[bool, list[list[list[float]]]] = {False: [], True: []}
+    (x0, y0), (x1, y1) = (first * cell).tolist(), (last * cell).tolist()
+    for i in range(first[0], last[0] + 1):
+        lines[i % 2 == 0].append([[i * cell, y0, height], [i * cell, y1, height]])
+    for i in range(first[1], last[1] + 1):
+        lines[i % 2 == 0].append([[x0, i * cell, height], [x1, i * cell, height]])
+    return np.array(lines[False]).reshape(-1, 2, 3), np.array(lines[True]).reshape(-1, 2, 3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trails:
+    """Segments of the way that each track came, oldest first."""
+
+    segments: Float[ndarray, "S 2 3"]
+    ids: Int[ndarray, " S"]
+    ages: Float[ndarray, "S 2"]
+    """Seconds before the shown step, of both ends."""
+
+
+def trails(
+    tracks: Trajectories, step: int, seconds: float, fps: float, drop: float = 0.0
+) -> Trails:
+    """The way of every track over the last seconds; a gap where no camera saw it.
+
+    Args:
+        tracks: Rows sorted by step.
+        step: The shown one; nothing after it is drawn.
+        seconds: How far back.
+        fps: Steps a second.
+        drop: Metres below the position, for instance half a person's height.
+    """
+    oldest = step - round(seconds * fps)
+    first, last = np.searchsorted(tracks.frames, [oldest, step + 1])
+    rows = np.arange(first, last)
+    order = rows[np.lexsort((tracks.frames[rows], tracks.ids[rows]))]
+    frames, ids = tracks.frames[order], tracks.ids[order]
+    seen: Bool[ndarray, " M"] = np.asarray(tracks.seen[order].any(axis=1))
+    joined = (np.diff(ids) == 0) & (np.diff(frames) == 1) & (seen[1:] | seen[:-1])
+    ends = np.flatnonzero(joined)
+    positions = tracks.positions[order] - np.array([0.0, 0.0, drop])
+    ages = (step - frames) / fps
+    return Trails(
+        segments=np.stack([positions[ends], positions[ends + 1]], axis=1),
+        ids=ids[ends],
+        ages=np.stack([ages[ends], ages[ends + 1]], axis=1),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose:
+    """Where to look from, at what, and how wide."""
+
+    position: Float[ndarray, " 3"]
+    look_at: Float[ndarray, " 3"]
+    up: Float[ndarray, " 3"]
+    fov: float
+    """Vertical field of view, radians."""
+
+
+def overview(
+    points: Float[ndarray, "N 3"],
+    eyes: Float[ndarray, "C 3"],
+    centre: Float[ndarray, " 3"],
+    aspect: float,
+    fov: float = 0.72,
+    elevation: float = 0.56,
+) -> Pose:
+    """A pose outside and above that has all points in the picture.
+
+    It looks through the widest gap between the cameras, so that none of them
+    stands in front of the volume.
+
+    Args:
+        points: What must be seen: corners of the volume, the cameras.
+        eyes: The cameras' positions.
+        centre: Of the volume.
+        aspect: Width over height of the picture.
+        fov: Vertical field of view, radians.
+        elevation: Angle above the floor, radians.
+    """
+    azimuth = np.deg2rad(-52.0)
+    if len(eyes):
+        around = np.sort(np.arctan2(eyes[:, 1] - centre[1], eyes[:, 0] - centre[0]))
+        gaps = np.diff(np.append(around, around[0] + 2.0 * np.pi))
+        widest = int(np.argmax(gaps))
+        azimuth = around[widest] + gaps[widest] / 2.0
+    away = np.array(
+        [
+            np.cos(azimuth) * np.cos(elevation),
+            np.sin(azimuth) * np.cos(elevation),
+            np.sin(elevation),
+        ]
+    )
+    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    up = np.cross(away, right)
+    tangent = np.tan(fov / 2.0) * 0.93  # a margin at the edges
+    across, above, nearer = ((points - centre) @ np.stack([right, up, away], axis=1)).T
+    shift_x = shift_y = 0.0
+    distance = 1.0
+    for _ in range(8):
+        wide = np.abs(across - shift_x) / (tangent * aspect) + nearer
+        tall = np.abs(above - shift_y) / tangent + nearer
+        distance = float(max(wide.max(), tall.max()))
+        depth = distance - nearer
+        sideways, upright = (across - shift_x) / depth, (above - shift_y) / depth
+        shift_x += float(sideways.max() + sideways.min()) * distance / 2.0
+        shift_y += float(upright.max() + upright.min()) * distance / 2.0
+    target = centre + shift_x * right + shift_y * up
+    return Pose(target + distance * away, target, np.array([0.0, 0.0, 1.0]), fov)

@@ -1,0 +1,186 @@
+"""The kinds of named nodes that the 3D scene is made of, each made once and updated in place.
+
+viser keeps a message for every name that it has ever seen until the next browser
+connects, so nothing here is ever removed: what has nothing to show is hidden, and
+what comes in numbers is a batch or a pool that only grows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import viser
+from jaxtyping import Float, UInt8
+from numpy import ndarray
+
+from app import colours
+
+NO_TURN = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+class Lines:
+    """A batch of line segments, coloured end by end."""
+
+    def __init__(self, server: viser.ViserServer, name: str, thickness: float) -> None:
+        """Make the node, hidden.
+
+        Args:
+            server: Where the node lives.
+            name: Of the node.
+            thickness: Pixels, whatever the distance.
+        """
+        self._handle = server.scene.add_line_segments(
+            name,
+            np.zeros((1, 2, 3)),
+            np.zeros((1, 2, 3), dtype=np.uint8),
+            thickness=thickness,
+            thickness_units="screen",
+            visible=False,
+        )
+
+    def show(
+        self,
+        segments: Float[ndarray, "N 2 3"],
+        colour: UInt8[ndarray, "N 2 3"] | colours.Rgb,
+    ) -> None:
+        """Draw these segments and no others; no rows hide the node."""
+        self._handle.visible = len(segments) > 0
+        if len(segments) == 0:
+            return
+        ends = np.broadcast_to(np.asarray(colour, dtype=np.uint8), segments.shape)
+        self._handle.points = np.asarray(segments, dtype=np.float32)
+        self._handle.colors = linear(ends)
+
+
+class Meshes:
+    """Many copies of one mesh, each with a place, a turn, a size, a colour and an opacity."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        name: str,
+        vertices: Float[ndarray, "V 3"],
+        faces: ndarray,
+        *,
+        on_click: Callable[[int], None] | None = None,
+    ) -> None:
+        """Make the node, hidden.
+
+        Args:
+            server: Where the node lives.
+            name: Of the node.
+            vertices: Of the mesh, its own units.
+            faces: Triangles of indices.
+            on_click: Called with the index of the copy that was clicked.
+        """
+        self._handle = server.scene.add_batched_meshes_simple(
+            name,
+            vertices,
+            faces,
+            batched_wxyzs=NO_TURN[None],
+            batched_positions=np.zeros((1, 3)),
+            batched_scales=np.ones((1, 3)),
+            batched_colors=np.zeros((1, 3), dtype=np.uint8),
+            batched_opacities=np.zeros(1),
+            lod="off",
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=False,
+        )
+        if on_click is not None:
+            chosen = on_click
+
+            @self._handle.on_click
+            def _(event: viser.SceneNodePointerEvent[viser.BatchedMeshHandle]) -> None:
+                if event.instance_index is not None:
+                    chosen(event.instance_index)
+
+    def show(
+        self,
+        positions: Float[ndarray, "N 3"],
+        scales: Float[ndarray, "N 3"],
+        colour: UInt8[ndarray, "N 3"],
+        opacities: Float[ndarray, " N"],
+        wxyzs: Float[ndarray, "N 4"] | None = None,
+    ) -> None:
+        """Draw these copies and no others; no rows hide the node."""
+        self._handle.visible = len(positions) > 0
+        if len(positions) == 0:
+            return
+        if wxyzs is None:
+            wxyzs = np.broadcast_to(NO_TURN, (len(positions), 4))
+        self._handle.batched_positions = np.asarray(positions, dtype=np.float32)
+        self._handle.batched_wxyzs = np.asarray(wxyzs, dtype=np.float32)
+        self._handle.batched_scales = np.asarray(scales, dtype=np.float32)
+        self._handle.batched_colors = linear(np.asarray(colour, dtype=np.uint8))
+        self._handle.batched_opacities = np.asarray(opacities, dtype=np.float32)
+
+
+_SCREEN = np.arange(256) / 255.0
+_LINEAR = np.where(_SCREEN <= 0.04045, _SCREEN / 12.92, ((_SCREEN + 0.055) / 1.055) ** 2.4)
+_TABLE = np.rint(255.0 * _LINEAR).astype(np.uint8)
+
+
+def linear(colour: UInt8[ndarray, "*N 3"]) -> UInt8[ndarray, "*N 3"]:
+    """Screen colours as viser's client wants those of single vertices and copies.
+
+    It takes them as linear light and encodes them for the screen once more; colours
+    of a whole node, and pictures, it takes as they are.
+    """
+    return np.asarray(_TABLE[colour], dtype=np.uint8)
+
+
+@dataclass(frozen=True, slots=True)
+class Tag:
+    """A label at a place, in metres."""
+
+    position: tuple[float, float, float]
+    text: str
+
+
+class Tags:
+    """A pool of labels that face the viewer; it grows to the most that was needed.
+
+    viser writes them black on white, above everything else.
+    """
+
+    def __init__(self, server: viser.ViserServer, name: str, size: int, scale: float) -> None:
+        """Make the pool, hidden.
+
+        Args:
+            server: Where the nodes live.
+            name: Of the nodes, before their number.
+            size: How many to make at once.
+            scale: Of the letters; 1 is 12 pixels.
+        """
+        self._server = server
+        self._name = name
+        self._scale = scale
+        self._nodes: list[viser.LabelHandle] = []
+        for _ in range(size):
+            self._grow()
+
+    def _grow(self) -> None:
+        self._nodes.append(
+            self._server.scene.add_label(
+                f"{self._name}/{len(self._nodes):02d}",
+                "",
+                font_screen_scale=self._scale,
+                anchor="bottom-center",
+                visible=False,
+            )
+        )
+
+    def show(self, tags: list[Tag]) -> None:
+        """Show these labels and no others."""
+        while len(self._nodes) < len(tags):
+            self._grow()
+        for node, tag in zip(self._nodes, tags, strict=False):
+            node.position = tag.position
+            node.text = tag.text
+            node.visible = True
+        for node in self._nodes[len(tags) :]:
+            node.visible = False

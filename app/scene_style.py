@@ -1,0 +1,74 @@
+"""The style sheet of viser's panel, to have it as compact as the page around it.
+
+viser has no hook for styles, so they travel as an HTML element of the panel. The class names are
+those of its client in the version that the project pins.
+"""
+
+from __future__ import annotations
+
+PANEL = """<style>
+/* the step */
+.mvp-status { padding: 0 10px 6px; color: #bdbdbd; line-height: 16px; }
+.mvp-status p { margin: 0 0 2px; font-size: 13px; font-variant-numeric: tabular-nums; }
+.mvp-status b { color: #ededed; font-weight: 600; }
+.mvp-status span { float: right; font-size: 12px; }
+.mvp-status small { display: block; font-size: 10px; line-height: 14px; color: #979797; }
+.mvp-status[data-state="computing"] span { color: #6cb2f5; }
+/* rows: label, slider, number */
+div:has(> .mantine-Flex-root > div > .mantine-Text-root > label[for]) {
+  padding: 0 10px 2px !important; }
+.mantine-Flex-root:has(> div > .mantine-Text-root > label[for]) { min-height: 25px; }
+div:has(> .mantine-Text-root > label[for]) { width: 128px !important; flex-shrink: 0;
+  padding-right: 8px !important; }
+.mantine-Flex-root:has(.mantine-Select-root) > div:first-child { width: 92px !important; }
+.mantine-Text-root:has(> label[for]) { font-size: 11px !important; line-height: 13px !important;
+  letter-spacing: 0 !important; font-weight: 400 !important; color: #b3b3b3 !important;
+  overflow-wrap: normal !important; }
+label[for] > wbr { display: none; }
+.mantine-Slider-root { padding: 0 !important; align-self: center; }
+.mantine-Slider-mark, .mantine-Slider-markLabel { display: none !important; }
+.mantine-Slider-thumb { background: #f1f3f5 !important; border: 0 !important;
+  width: 6px !important; height: 12px !important; }
+.mantine-NumberInput-root { width: 48px !important; margin-left: 10px !important; }
+.mantine-Input-input { font-size: 11px !important; letter-spacing: 0 !important;
+  min-height: 22px !important; height: 22px !important; padding: 0 6px !important;
+  background: #2e2e2e; border-color: #383838; color: #c9c9c9;
+  font-variant-numeric: tabular-nums; }
+.mantine-Checkbox-root { transform: scale(.8); transform-origin: left; }
+/* sections with a line above instead of frames */
+.mantine-Paper-root:has(> .mantine-Paper-root + div) { margin: 0 !important;
+  padding: 0 0 6px !important; border: 0 solid #383838; border-top-width: 1px !important;
+  border-radius: 0; background: none; }
+.mantine-Paper-root:has(> .mantine-Paper-root + div) > .mantine-Paper-root {
+  position: static; transform: none; padding: 7px 10px 3px !important; background: none;
+  font-size: 12px; font-weight: 600; line-height: 16px; color: #dcdcdc; }
+.mantine-Button-root { height: 24px !important; min-height: 24px !important;
+  font-size: 11px !important; }
+</style>"""
+
+
+NUMBER = """height: 22px; line-height: 20px; padding: 0 6px; border: 1px solid #383838;
+border-radius: 3px; background: #2e2e2e; color: #c9c9c9; font-size: 11px; box-sizing: border-box;
+white-space: nowrap; font-variant-numeric: tabular-nums;"""
+
+
+def values(numbers: dict[str, str], marked: list[str]) -> str:
+    """Style that depends on the values.
+
+    Args:
+        numbers: What stands beside a slider in place of its own number, by the slider's id.
+        marked: Ids of inputs whose label is stronger.
+    """
+    rules = [
+        f'[id="{uuid}"] + .mantine-InputWrapper-root::after {{ content: "{text}"; }}'
+        for uuid, text in numbers.items()
+    ]
+    hidden = ",".join(f'[id="{uuid}"] + .mantine-InputWrapper-root' for uuid in numbers)
+    labels = ",".join(f'label[for="{uuid}"]' for uuid in marked)
+    if hidden:
+        rules.append(f"{hidden} {{ {NUMBER} }}")
+        inputs = ",".join(f'[id="{uuid}"] + .mantine-InputWrapper-root > *' for uuid in numbers)
+        rules.append(f"{inputs} {{ display: none; }}")
+    if labels:
+        rules.append(f"{labels} {{ color: #ededed; }}")
+    return f"<style>{' '.join(rules)}</style>"
