@@ -150,7 +150,7 @@ def _listen(command: Serve) -> Any:
 
 def _leave(status: int) -> None:
     """End now, even where a thread is still in the middle of a step that nothing can interrupt."""
-    deadline = time.monotonic() + 0.3
+    deadline = time.monotonic() + 0.2
     while time.monotonic() < deadline:
         if all(t.daemon or t is threading.main_thread() for t in threading.enumerate()):
             return

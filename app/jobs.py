@@ -32,6 +32,9 @@ NICENESS = 5
 OPENING_TELLS_SECONDS = 0.1
 """At most this often an opening tells how far it is."""
 
+CLOSING_SECONDS = 1.0
+"""How long what is under way may take to notice that it is to end."""
+
 KEPT_RUNS = 3
 """Earlier runs, each with another stage 1, whose columns may be taken up again."""
 
@@ -285,9 +288,10 @@ class Jobs:
             if self._under_way is not None:
                 self._under_way.cancelled.set()
             self._condition.notify_all()
+        deadline = time.monotonic() + CLOSING_SECONDS
         for thread in (self._worker, *self._openings):
             if thread.ident is not None:
-                thread.join(timeout=1.5)
+                thread.join(timeout=max(0.0, deadline - time.monotonic()))
         sys.setswitchinterval(self._switch_interval)
         reader = self._workbench.snapshot().reader
         if reader is not None:
