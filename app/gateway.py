@@ -39,12 +39,8 @@ def start_viser() -> viser.ViserServer:
     import viser
     from viser import _messages
 
-    console = rich.get_console()
-    was_quiet, console.quiet = console.quiet, True  # it would print its private address
-    try:
-        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    finally:
-        console.quiet = was_quiet
+    rich.get_console().quiet = True  # it would print its private address, and when it ends
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     # a client may ask for a public address through a third party's server: never here
     server._websock_server.unregister_handler(_messages.ShareUrlRequest)
     return server

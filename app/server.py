@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import uvicorn
-from fastapi import FastAPI
-from fastapi.responses import FileResponse, Response
+from fastapi import FastAPI, Request
+from fastapi.responses import Response
 from fastapi.staticfiles import StaticFiles
 from fastapi_offline import FastAPIOffline
 from starlette.types import Scope
@@ -75,16 +75,15 @@ def create_app(settings: Settings) -> FastAPI:
     app.include_router(api.router)
     app.include_router(stream.router)
     app.include_router(gateway.router)
-    folder = static_folder()
+    files = _PageFiles(directory=static_folder())
 
     @app.get("/", include_in_schema=False)
-    async def page() -> Response:
-        return FileResponse(
-            folder / "index.html",
-            headers={"cache-control": ASK_AGAIN, "content-security-policy": CONTENT_POLICY},
-        )
+    async def page(request: Request) -> Response:
+        response = await files.get_response("index.html", request.scope)
+        response.headers["content-security-policy"] = CONTENT_POLICY
+        return response
 
-    app.mount("/static", _PageFiles(directory=folder), name="static")
+    app.mount("/static", files, name="static")
     return app
 
 
