@@ -75,7 +75,7 @@ const { actions, page } = createActions({
   seek: playback.seek,
   send: (message) => stream.send(message),
   help: () => toggleHelp(),
-  receive: receiveState,
+  receive: (state) => receiveState(state),
 });
 
 const element = (/** @type {string} */ selector) => /** @type {HTMLElement} */ (document.querySelector(selector));
@@ -92,12 +92,20 @@ toggleHelp = mountHelp(context);
 let place = start.place;
 if (start.unknown.length) page.note("warn", `The address has unknown parts: ${start.unknown.join(", ")}`, "The rest of it is followed.");
 
-/** @param {ServerState} server */
-function receiveState(server) {
+/**
+ * @param {ServerState} server
+ * @param {boolean} [streamed]  it came over the socket, in order
+ */
+function receiveState(server, streamed = false) {
   const before = store.get().server;
   // An answer to a request may be older than what the socket has brought since.
-  if (before && server.version < before.version && store.get().link === "open" && before.sequence?.key === server.sequence?.key) return;
+  if (!streamed && before && server.version < before.version) return;
   const changed = before?.sequence?.key !== server.sequence?.key;
+  if (before?.sequence && !server.sequence) {
+    // The server was started anew: when the same sequence is open again, go where we were.
+    const { shown, selection, large } = store.get();
+    place = { sequence: before.sequence.name, step: Math.max(0, shown), selection, camera: large };
+  }
   const first = before === null;
   if (first && place.sequence && server.sequence?.name !== place.sequence && server.opening?.name !== place.sequence) {
     void page.open(place.sequence);
@@ -175,7 +183,7 @@ async function fetchSchema() {
 function receive(message) {
   switch (message.type) {
     case "state":
-      receiveState(message.state);
+      receiveState(message.state, true);
       break;
     case "progress":
       if (message.run.key === store.get().server?.run.key) store.set({ run: message.run });

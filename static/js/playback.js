@@ -68,7 +68,10 @@ export function createPlayback(store, sendSeek) {
     sizeOf: () => 1,
     budget: RESULTS_KEPT,
     parallel: 2,
-    arrived: () => ask(),
+    arrived: (name) => {
+      if (Number(name.split("/")[1]) === store.get().step) dirty = true;
+      ask();
+    },
     failed: () => {
       later();
       return undefined;
@@ -199,6 +202,10 @@ export function createPlayback(store, sendSeek) {
   store.on(["step", "playing", "speed", "layers2d", "link"], () => {
     windowDirty = true;
     ask();
+  });
+  store.on(["link"], () => {
+    // A server that was started anew stands at its own first step.
+    lastSent = -1;
   });
   store.on(["playing"], () => {
     lastTick = 0;

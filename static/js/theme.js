@@ -8,6 +8,6 @@
   } catch {
     // Storage may be switched off; the system's wish is a good default then.
   }
-  const light = matchMedia("(prefers-color-scheme: light)").matches;
-  document.documentElement.dataset.theme = chosen ?? (light ? "light" : "dark");
+  // Dark until somebody chooses otherwise, as the 3D view is: pictures are judged best on it.
+  document.documentElement.dataset.theme = chosen ?? "dark";
 }

@@ -145,7 +145,7 @@ function drawLane(g, middle, view, { track, done, fps, thick }, ink) {
   }
   const centre = top + thick / 2;
   g.fillStyle = ink.get("ink-1");
-  if (track.first > 0) {
+  if (track.first > 0 && track.first >= view.first) {
     const x = xOf(track.first, view);
     g.beginPath();
     g.moveTo(x - 5.5, centre - 4);
@@ -154,5 +154,5 @@ function drawLane(g, middle, view, { track, done, fps, thick }, ink) {
     g.closePath();
     g.fill();
   }
-  if (track.last < done - 1) g.fillRect(xOf(track.last + 1, view) + 2, centre - 2.5, 5, 5);
+  if (track.last < done - 1 && track.last < view.last) g.fillRect(xOf(track.last + 1, view) + 2, centre - 2.5, 5, 5);
 }

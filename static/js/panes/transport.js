@@ -96,6 +96,9 @@ export function mountTransport({ store, actions, playback }) {
     write(step, String(shown < 0 ? 0 : shown));
     write(of, `/ ${sequence?.frames ?? 0}`);
     write(time, sequence ? secondsOf(Math.max(0, shown), sequence.fps) : "0.00");
+    // Room for the largest number, so that nothing moves sideways.
+    step.style.minWidth = `${String(sequence?.frames ?? 0).length}ch`;
+    time.style.minWidth = `${secondsOf(sequence?.frames ?? 0, sequence?.fps ?? 25).length}ch`;
   });
   store.on(["playing"], ({ playing }) => {
     play.querySelector("use")?.setAttribute("href", playing ? "#i-pause" : "#i-play");

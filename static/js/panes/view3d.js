@@ -80,10 +80,12 @@ export function mountView3d(root, { store, page, retry }) {
   }
 
   function header() {
-    const { server, layers3d, view3d } = store.get();
+    const { server, layers3d, view3d, link } = store.get();
     const sequence = server?.sequence;
     for (const [layer] of LAYERS) chips[layer].setAttribute("aria-pressed", String(Boolean(layers3d[layer])));
-    chips.truth.toggleAttribute("disabled", !sequence?.has_truth);
+    for (const [layer, chip] of Object.entries(chips)) {
+      chip.toggleAttribute("disabled", link !== "open" || (layer === "truth" && !sequence?.has_truth));
+    }
     const names = ["free", ...(sequence?.cameras ?? []).map((_, index) => `C${index + 1}`)];
     if (views.childElementCount !== names.length) {
       fill(
@@ -102,7 +104,10 @@ export function mountView3d(root, { store, page, retry }) {
         ),
       );
     }
-    [...views.children].forEach((button, index) => button.setAttribute("aria-pressed", String(index - 1 === view3d)));
+    [...views.children].forEach((button, index) => {
+      button.setAttribute("aria-pressed", String(index - 1 === view3d));
+      button.toggleAttribute("disabled", link !== "open");
+    });
   }
 
   store.on(["server"], ({ server }) => {
@@ -122,7 +127,7 @@ export function mountView3d(root, { store, page, retry }) {
     wasLost = link === "lost" || (wasLost && link !== "open");
     cover();
   });
-  store.on(["layers3d", "view3d"], header);
+  store.on(["layers3d", "view3d", "link"], header);
   header();
   cover();
 }
