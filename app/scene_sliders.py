@@ -67,6 +67,8 @@ class Scale:
         """Whether a place is the one of a value, as near as the slider can tell."""
         if math.isclose(float(place), float(self.place(value)), rel_tol=1e-9, abs_tol=1e-12):
             return True
+        if not self.minimum <= place <= self.maximum:
+            return False  # the client does not keep to the range
         return math.isclose(float(self.value(place)), float(value), rel_tol=1e-9, abs_tol=1e-12)
 
 
@@ -74,9 +76,10 @@ def number_text(value: float) -> str:
     """A number as short as it can be read: ``0.02``, ``1e-4``, ``400``."""
     if isinstance(value, int):
         return str(value)
-    text = f"{value:.{DIGITS}g}"
-    mantissa, mark, exponent = text.partition("e")
-    return f"{mantissa}e{int(exponent)}" if mark else text
+    if value == 0.0 or abs(value) >= 1e-3:
+        return f"{value:.{DIGITS + 1}g}"
+    mantissa, _, exponent = f"{value:.{DIGITS - 1}e}".partition("e")
+    return f"{float(mantissa):g}e{int(exponent)}"
 
 
 def label_text(parameter: Parameter, *, changed: bool) -> str:
