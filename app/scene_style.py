@@ -8,7 +8,7 @@ from __future__ import annotations
 
 PANEL = """<style>
 /* the step */
-.mvp-status { padding: 0 10px 6px; color: #bdbdbd; line-height: 16px; }
+.mvp-status { padding: 0 16px 6px 10px; color: #bdbdbd; line-height: 16px; }
 .mvp-status p { margin: 0 0 2px; font-size: 13px; font-variant-numeric: tabular-nums; }
 .mvp-status b { color: #ededed; font-weight: 600; }
 .mvp-status span { float: right; font-size: 12px; }
@@ -16,7 +16,7 @@ PANEL = """<style>
 .mvp-status[data-state="computing"] span { color: #6cb2f5; }
 /* rows: label, slider, number */
 div:has(> .mantine-Flex-root > div > .mantine-Text-root > label[for]) {
-  padding: 0 10px 2px !important; }
+  padding: 0 16px 2px 10px !important; }
 .mantine-Flex-root:has(> div > .mantine-Text-root > label[for]) { min-height: 25px; }
 div:has(> .mantine-Text-root > label[for]) { width: 128px !important; flex-shrink: 0;
   padding-right: 8px !important; }
@@ -42,6 +42,8 @@ label[for] > wbr { display: none; }
 .mantine-Paper-root:has(> .mantine-Paper-root + div) > .mantine-Paper-root {
   position: static; transform: none; padding: 7px 10px 3px !important; background: none;
   font-size: 12px; font-weight: 600; line-height: 16px; color: #dcdcdc; }
+.mantine-Paper-root:has(> .mantine-Paper-root + div) [style*="padding-top"] {
+  padding-top: 0 !important; }
 .mantine-Button-root { height: 24px !important; min-height: 24px !important;
   font-size: 11px !important; }
 </style>"""

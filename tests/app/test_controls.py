@@ -82,7 +82,10 @@ def test_every_place_gives_a_value_that_is_allowed(
     changed = table.with_values(table.RunParameters(), {parameter.key: number})
     assert table.value(changed, parameter.key) == number
     # what was sent stands where it was put, unless it had to be moved into the range
-    assert scale.stands_at(place, number) == (scale.minimum <= place <= scale.maximum)
+    if 0.0 <= share <= 1.0:
+        assert scale.stands_at(min(max(place, scale.minimum), scale.maximum), number)
+    elif share < -1e-6 or share > 1.0 + 1e-6:
+        assert not scale.stands_at(place, number)
 
 
 def test_a_logarithmic_slider_moves_by_decades() -> None:
