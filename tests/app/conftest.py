@@ -1,0 +1,53 @@
+"""A data folder with two small sequences, and an application that has one of them open."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.server import Settings, create_app
+from tests.app.folders import write_crossing
+from tests.synthetic import write_sequence
+
+ADDRESS = "http://127.0.0.1:8000"
+
+
+def wait_until(holds: Callable[[], bool], seconds: float = 30.0) -> None:
+    """Wait for something that another thread brings about."""
+    deadline = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < deadline, "it did not come about in time"
+        time.sleep(0.01)
+
+
+def run_is(client: TestClient, phase: str) -> Callable[[], bool]:
+    """Whether the run of an application is in a phase."""
+    return lambda: client.get("/api/state").json()["run"]["state"] == phase
+
+
+@pytest.fixture(scope="session")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the sequences ``crossing`` (boxes) and ``numbers`` (pictures)."""
+    folder = tmp_path_factory.mktemp("data")
+    write_crossing(folder / "crossing")
+    write_sequence(folder / "numbers", frames=30, container="mp4")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def crossing(data: Path) -> Path:
+    """The folder of the sequence with boxes."""
+    return data / "crossing"
+
+
+@pytest.fixture
+def client(data: Path) -> Iterator[TestClient]:
+    """The application with ``crossing`` open and computed."""
+    app = create_app(Settings(sequence="crossing", data=data, with_viser=False))
+    with TestClient(app, base_url=ADDRESS) as client:
+        wait_until(run_is(client, "done"))
+        yield client
