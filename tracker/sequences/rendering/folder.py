@@ -18,7 +18,6 @@ from numpy import ndarray
 from tracker.camera import Camera
 from tracker.sequences.rendering.avi import AviWriter, compress
 from tracker.sequences.rendering.paths import FRAMES_PER_SECOND
-from tracker.sequences.rendering.studio import Studio, in_order
 from tracker.sequences.rendering.rooms import (
     CAMERAS,
     ROOMS,
@@ -28,6 +27,7 @@ from tracker.sequences.rendering.rooms import (
     RoomSpec,
 )
 from tracker.sequences.rendering.scene import Scene
+from tracker.sequences.rendering.studio import Studio, in_order
 
 VERSION = 1
 """Grows when the same call would give other pictures or files."""
@@ -111,9 +111,10 @@ def read_visibility(folder: Path) -> Float[ndarray, "F P C"]:
     Raises:
         FileNotFoundError: If the folder has no ``visibility.csv``.
     """
-    table = np.loadtxt(Path(folder) / VISIBILITY_FILE, delimiter=",", skiprows=1, ndmin=2)
-    if not table.size:
+    rows = (Path(folder) / VISIBILITY_FILE).read_text(encoding="utf-8").splitlines()[1:]
+    if not rows:
         return np.full((0, 0, 0), np.nan)
+    table = np.array([row.split(",") for row in rows], dtype=float)
     index = table[:, :3].astype(int) - [0, 1, 0]
     shares = np.full(tuple(index.max(axis=0) + 1), np.nan)
     shares[tuple(index.T)] = table[:, 3]
@@ -231,7 +232,7 @@ def choose_templates(
 
 
 def _numbers(values: ndarray) -> str:
-    return "[" + ", ".join(f"{float(v):.10g}" for v in values) + "]"
+    return "[" + ", ".join(f"{float(v):.12g}" for v in values) + "]"
 
 
 def _describe(

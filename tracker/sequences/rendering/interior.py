@@ -276,7 +276,7 @@ def _furniture(room: Interior, decor: Decor) -> None:
     room.box((0.42, FAR - 0.015, 1.12), (0.50, FAR, 1.20), Finish("plain", "#efece4"))
     if decor.rug is not None:
         first, second = decor.rug
-        room.box((-1.05, -0.95, 0.0), (0.95, 0.55, 0.008), Finish("rug", first, second, seed=4))
+        room.box((-1.05, -0.95, 0.0), (0.95, 0.55, 0.003), Finish("rug", first, second, seed=4))
 
 
 def _armchair(room: Interior, decor: Decor) -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from typing import TypeVar
 
 import numpy as np
@@ -24,7 +25,7 @@ from tracker.sequences.rendering.background import (
 )
 from tracker.sequences.rendering.interior import LEFT, NEAR, Interior, furnish
 from tracker.sequences.rendering.raster import draw, floor_shadows, place_bodies
-from tracker.sequences.rendering.rooms import TARGET_HALF_EXTENTS, RoomSpec
+from tracker.sequences.rendering.rooms import CAMERAS, TARGET_HALF_EXTENTS, RoomSpec
 from tracker.sequences.rendering.scene import Figure, Scene, script, shadow_balls
 
 Result = TypeVar("Result")
@@ -48,6 +49,14 @@ class Drawn:
     """Share of each person's silhouette within its target box that each camera sees."""
 
 
+@lru_cache(maxsize=len(CAMERAS))
+def _empty_room(spec: RoomSpec, camera: Camera) -> Background:
+    """The traced room, kept for the next rendering with another seed."""
+    interior = furnish(spec.decor, spec.back_door, spec.front_door)
+    background = render_background(Tracer(interior), camera)
+    return replace(background, room=_muted(background.room), room_fine=_muted(background.room_fine))
+
+
 class Studio:
     """A room lit and traced for some cameras, ready to draw any of its steps."""
 
@@ -56,11 +65,8 @@ class Studio:
         self.cameras = tuple(cameras)
         self.seed = seed
         interior = furnish(spec.decor, spec.back_door, spec.front_door)
-        tracer = Tracer(interior)
         with ThreadPoolExecutor(max_workers=2) as pool:
-            self.backgrounds: list[Background] = list(
-                pool.map(lambda camera: render_background(tracer, camera), self.cameras)
-            )
+            self.backgrounds = list(pool.map(partial(_empty_room, spec), self.cameras))
         self._lamps = lamp_table(interior)
         self._shade_lamps = _shade_lamps(interior)
         self._origin = np.array([LEFT - 0.5, NEAR - 0.2])
