@@ -117,7 +117,8 @@ def install(app: FastAPI) -> None:
                 hint="See /docs for what it takes.",
             )
         else:
-            detail = ErrorDetail(code="http_error", message=str(error.detail))
+            code = "too_large" if error.status_code == 413 else "http_error"
+            detail = ErrorDetail(code=code, message=str(error.detail))
         return JSONResponse(body(detail), error.status_code, headers=error.headers)
 
     @app.exception_handler(Exception)

@@ -13,6 +13,7 @@ import socket
 from collections.abc import Iterable
 from urllib.parse import urlsplit
 
+from fastapi import HTTPException
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -79,10 +80,7 @@ class Guard:
         if refusal is not None:
             await _refuse(scope, receive, send, *refusal)
             return
-        try:
-            await self._app(scope, receive, _framed(send))
-        except BodyTooLarge:
-            await _refuse(scope, receive, send, 413, _too_large())
+        await self._app(scope, receive, _framed(send))
 
     def _refusal(self, scope: Scope, headers: Headers) -> tuple[int, ErrorDetail] | None:
         host = headers.get("host", "")
@@ -128,16 +126,19 @@ def _same_place(origin: str, host: str) -> bool:
     return scheme in ("http", "https") and place.lower() == host.lower()
 
 
-class BodyTooLarge(Exception):
-    """A body without a stated length went past the limit."""
-
-
 def _too_large() -> ErrorDetail:
     return ErrorDetail(
         code="too_large",
         message=f"The request's body is larger than {LARGEST_BODY} bytes.",
         hint="Send the changes only.",
     )
+
+
+class BodyTooLarge(HTTPException):
+    """A body without a stated length went past the limit, while somebody was reading it."""
+
+    def __init__(self) -> None:
+        super().__init__(413, _too_large().message)
 
 
 def _limited(receive: Receive) -> Receive:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
@@ -27,6 +28,11 @@ def wait_until(holds: Callable[[], bool], seconds: float = 30.0) -> None:
 def run_is(client: TestClient, phase: str) -> Callable[[], bool]:
     """Whether the run of an application is in a phase."""
     return lambda: client.get("/api/state").json()["run"]["state"] == phase
+
+
+def connect(client: TestClient, path: str = "/api/stream", **headers: str) -> Any:
+    """A socket as a page of ours opens it; the test client knows its host for requests only."""
+    return client.websocket_connect(path, headers={"host": "127.0.0.1:8000", **headers})
 
 
 @pytest.fixture(scope="session")
