@@ -2,7 +2,7 @@
 /** What a person can do: the page's own state at once, the server's by request. */
 import { ApiError, request, sendJson } from "./api.js";
 import { SPEEDS, clampStep } from "./clock.js";
-import { eventsOf, nextEvent } from "./events.js";
+import { eventsOf, nextEvent, ordered } from "./events.js";
 
 /**
  * @typedef {import("./types.js").PageState} PageState
@@ -186,7 +186,8 @@ export function createActions({ store, seek, send, help, receive }) {
       select(event.id);
     },
     nextTrack(direction) {
-      const ids = (store.get().timeline?.tracks ?? []).map((track) => track.id);
+      const { timeline, laneOrder } = store.get();
+      const ids = ordered(timeline?.tracks ?? [], laneOrder).map((track) => track.id);
       if (!ids.length) return;
       const index = ids.indexOf(store.get().selection ?? -1);
       select(ids[index < 0 ? (direction > 0 ? 0 : ids.length - 1) : (index + direction + ids.length) % ids.length]);

@@ -49,6 +49,17 @@ export function nextEvent(events, step, direction) {
 }
 
 /**
+ * Tracks in the order of the lanes.
+ * @param {TrackLane[]} tracks
+ * @param {"longest" | "born"} order  longest: people first, ghosts of a few steps last
+ * @returns {TrackLane[]}
+ */
+export function ordered(tracks, order) {
+  const length = (/** @type {TrackLane} */ { first, last }) => last - first;
+  return [...tracks].sort((a, b) => (order === "longest" ? length(b) - length(a) : a.first - b.first) || a.id - b.id);
+}
+
+/**
  * Share of its life in which a camera saw the track.
  * @param {TrackLane} track
  * @returns {number} 0 … 1

@@ -20,7 +20,7 @@ import { readPlace, writePlace } from "./url.js";
  */
 
 /** What is remembered in this browser: how the page looks, never what it shows. */
-const KEPT = /** @type {const} */ (["theme", "tab", "layers2d", "singleKeys"]);
+const KEPT = /** @type {const} */ (["theme", "tab", "layers2d", "laneOrder", "singleKeys"]);
 
 /** @returns {Partial<PageState>} */
 function remembered() {
@@ -58,6 +58,7 @@ const store = createStore(
     view3d: -1,
     large: start.place.camera,
     tab: "tracks",
+    laneOrder: "longest",
     singleKeys: true,
     notes: [],
     ...remembered(),

@@ -143,6 +143,7 @@
  * @property {number} view3d  -1 is the free view, otherwise a camera's index
  * @property {number | null} large  the camera that is shown large; null: all alike
  * @property {"tracks" | "changes" | "runs"} tab
+ * @property {"longest" | "born"} laneOrder
  * @property {string} theme
  * @property {boolean} singleKeys
  * @property {Note[]} notes

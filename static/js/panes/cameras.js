@@ -111,14 +111,17 @@ export function mountCameras(root, { store, page, actions, playback }) {
     const cameras = state.server?.sequence?.cameras ?? [];
     if (state.server?.sequence?.key !== sequenceKey) return;
     const ink = pictureInk();
-    cells.forEach(({ canvas, tag }, index) => {
+    cells.forEach(({ element, canvas, tag }, index) => {
+      // what is drawn says which step it is of, so that a test can hold them against each other
+      element.dataset.step = String(next.step);
+      element.dataset.overlay = String(next.result?.step ?? "");
       const { width, height } = places[index];
       const camera = cameras[index];
       const g = prepare(canvas, width, height);
       const picture = next.pictures[index];
       const view = next.result?.cameras[index];
       if (picture?.bitmap) {
-        g.imageSmoothingQuality = "high";
+        g.imageSmoothingQuality = "medium";
         g.drawImage(picture.bitmap, 0, 0, width, height);
       } else drawEmptyPicture(g, width, height);
       if (view) {

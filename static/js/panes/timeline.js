@@ -5,7 +5,7 @@ import { fill, h, idTag, write } from "../dom.js";
 import { hatch, prepare } from "../draw/canvas.js";
 import { drawLanes, drawRange, drawRuler } from "../draw/lanes.js";
 import { drawCardinality } from "../draw/strips.js";
-import { seenShare } from "../events.js";
+import { ordered, seenShare } from "../events.js";
 import { faded, palette } from "../palette.js";
 import { shownDone } from "../playback.js";
 import { mountTransport } from "./transport.js";
@@ -22,6 +22,8 @@ export function mountTimeline(root, context) {
   const { store, page, playback } = context;
   const lanes = h("div", { class: "lanes", tabindex: -1, "aria-label": "Tracks" });
   const people = h("span", { class: "r" });
+  const order = h("button", { class: "start", "data-tip": "Order of the lanes: longest first, or as they were born" });
+  order.addEventListener("click", () => store.set({ laneOrder: store.get().laneOrder === "longest" ? "born" : "longest" }));
   const sign = (/** @type {string} */ word, /** @type {string} */ token, /** @type {number} */ width) => {
     const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
     svg.setAttribute("viewBox", "0 0 12 8");
@@ -33,7 +35,7 @@ export function mountTimeline(root, context) {
     "div",
     { class: "gut" },
     h("div", { class: "gr over" }),
-    h("div", { class: "gr ruler" }, h("span", {}, "tracks"), h("span", { class: "r" }, "seen")),
+    h("div", { class: "gr ruler" }, order, h("span", { class: "r" }, "seen")),
     lanes,
     h("div", { class: "gr strip" }, h("span", { class: "n" }, "People"), people, h("span", { class: "brk" }), truthSign, sign("estimate", "p-est", 1.25)),
   );
@@ -68,9 +70,15 @@ export function mountTimeline(root, context) {
     });
   }
 
+  /** @type {{of: any, by: string, tracks: TrackLane[]}} */
+  let sorted = { of: null, by: "", tracks: [] };
   /** @returns {TrackLane[]} */
   function shownTracks() {
-    return store.get().timeline?.tracks ?? [];
+    const { timeline, laneOrder } = store.get();
+    if (timeline !== sorted.of || laneOrder !== sorted.by) {
+      sorted = { of: timeline, by: laneOrder, tracks: ordered(timeline?.tracks ?? [], laneOrder) };
+    }
+    return sorted.tracks;
   }
 
   function paint() {
@@ -162,7 +170,8 @@ export function mountTimeline(root, context) {
       write(label.share, `${Math.round(seenShare(track) * 100)} %`);
       if (lanes.children[index] !== label.element) lanes.insertBefore(label.element, lanes.children[index] ?? null);
     });
-    const { run, server } = store.get();
+    const { run, server, laneOrder } = store.get();
+    write(order, laneOrder === "longest" ? "tracks, longest first" : "tracks, first born first");
     const idle = tracks.length === 0 && Boolean(server?.sequence);
     write(empty, !idle ? "" : run?.state === "computing" ? "" : run?.state === "failed" ? "The run failed before a track was found." : "No track was found with these parameters.");
     empty.style.top = `${token("h-over") + token("h-ruler") + 8}px`;
@@ -218,7 +227,7 @@ export function mountTimeline(root, context) {
     seekBar.max = String(Math.max(0, frames - 1));
     measure();
   });
-  store.on(["timeline", "run", "basis"], () => {
+  store.on(["timeline", "run", "basis", "laneOrder"], () => {
     listLanes();
     draw();
     placeHead();
@@ -241,6 +250,7 @@ export function mountTimeline(root, context) {
       draw();
     }, 200);
   });
+  listLanes();
   new ResizeObserver(measure).observe(plot);
   measure();
 }

@@ -33,8 +33,8 @@ const duration = (seconds) => `${seconds.toFixed(seconds < 1 ? 2 : 1)} s`;
  * @param {import("../types.js").Context} context
  */
 export function mountTracks(root, { store, page, actions, playback }) {
-  let sortBy = "born";
-  let downward = false;
+  let sortBy = "length";
+  let downward = true;
   /** @type {Map<number, Row>} */
   const rows = new Map();
   const heads = COLUMNS.map((column) =>

@@ -1,0 +1,51 @@
+// What the page loads: nothing from elsewhere, all modules at once, not too much of it.
+import assert from "node:assert/strict";
+import { readdirSync, readFileSync, statSync } from "node:fs";
+import { join, relative } from "node:path";
+import { test } from "node:test";
+import { fileURLToPath } from "node:url";
+
+const ROOT = fileURLToPath(new URL("../../static/", import.meta.url));
+const files = readdirSync(ROOT, { recursive: true }).map(String).filter((name) => statSync(join(ROOT, name)).isFile());
+const scripts = files.filter((name) => name.endsWith(".js"));
+/** Types only: no browser loads it. */
+const loaded = scripts.filter((name) => name !== join("js", "types.js"));
+
+test("every module is loaded at once, and none that is not there", () => {
+  const html = readFileSync(join(ROOT, "index.html"), "utf8");
+  const named = [...html.matchAll(/(?:href|src)="\/static\/([^"]+\.js)"/g)].map((match) => match[1]);
+  assert.deepEqual([...named].sort(), loaded.map((name) => name.replaceAll("\\", "/")).sort());
+});
+
+test("every import is a file of the page", () => {
+  for (const name of scripts) {
+    const text = readFileSync(join(ROOT, name), "utf8");
+    for (const [, target] of text.matchAll(/from "([^"]+)"/g)) {
+      assert.match(target, /^\.{1,2}\//, `${name} imports ${target}`);
+      assert.ok(scripts.includes(relative(ROOT, join(ROOT, name, "..", target))), `${name} imports ${target}`);
+    }
+  }
+});
+
+test("nothing comes from another host", () => {
+  for (const name of files.filter((file) => /\.(html|css|js)$/.test(file))) {
+    const text = readFileSync(join(ROOT, name), "utf8").replaceAll("http://www.w3.org/2000/svg", "");
+    assert.doesNotMatch(text, /https?:\/\//, name);
+  }
+});
+
+test("the page stays light: at most 150 kB of JavaScript", () => {
+  const bytes = loaded.reduce((sum, name) => sum + statSync(join(ROOT, name)).size, 0);
+  assert.ok(bytes <= 150_000, `${bytes} bytes`);
+});
+
+test("every symbol that is used is in the page", () => {
+  const html = readFileSync(join(ROOT, "index.html"), "utf8");
+  const known = new Set([...html.matchAll(/symbol id="([^"]+)"/g)].map((match) => match[1]));
+  for (const name of loaded) {
+    const text = readFileSync(join(ROOT, name), "utf8");
+    for (const [, symbol] of text.matchAll(/"((?:i|l)-[a-z]+)"/g)) {
+      if (!symbol.endsWith("-")) assert.ok(known.has(symbol), `${name} uses ${symbol}`);
+    }
+  }
+});
