@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { createCache } from "../../static/js/cache.js";
-import { eventsOf, longMisses, nextEvent, seenShare, stateAt } from "../../static/js/events.js";
+import { eventsOf, longMisses, nextEvent, ordered, seenShare, stateAt } from "../../static/js/events.js";
 import { mosaic } from "../../static/js/mosaic.js";
 import { createStore } from "../../static/js/store.js";
 import { readPlace, writePlace } from "../../static/js/url.js";
@@ -120,6 +120,14 @@ test("what a track is at a step, and how much of it was seen", () => {
   assert.equal(stateAt({ id: 1, first: 0, last: 9, spans: [[0, 3, "seen"], [6, 9, "seen"]] }, 5), "lost");
   assert.equal(seenShare(TRACK), 40 / 90);
   assert.deepEqual(longMisses(TRACK, 25), [[40, 79]]);
+});
+
+test("lanes are ordered by length or birth, and the tracks stay as they were", () => {
+  const tracks = [[1, 50, 51], [2, 10, 90], [3, 0, 5]].map(([id, first, last]) => ({ id, first, last, spans: [] }));
+  assert.deepEqual(ordered(tracks, "longest").map((t) => t.id), [2, 3, 1]);
+  assert.deepEqual(ordered(tracks, "born").map((t) => t.id), [3, 2, 1]);
+  assert.deepEqual(tracks.map((t) => t.id), [1, 2, 3]);
+  assert.deepEqual(ordered([], "born"), []);
 });
 
 test("pictures keep their shape, stay inside and do not overlap", () => {

@@ -130,6 +130,7 @@ function drawSamples(g, samples, scale) {
  * @param {boolean} roomy
  */
 function drawTracks(g, tracks, { scale, selection, hover, ink, width }, roomy) {
+  const huge = width > 800 ? 1.4 : 1;
   for (const { id, box, seen } of tracks) {
     const marked = id === selection || id === hover;
     const colour = ink.id(id);
@@ -138,10 +139,10 @@ function drawTracks(g, tracks, { scale, selection, hover, ink, width }, roomy) {
       g.fillStyle = faded(colour, 0.16);
       g.fill();
     }
-    stroke(g, colour, (roomy ? 2.5 : 2) + (marked ? 0.5 : 0), seen ? [] : [7, 4], 0.55);
+    stroke(g, colour, (roomy ? 2.5 : 2) * huge + (marked ? 0.5 : 0), seen ? [] : [7, 4], 0.55);
   }
-  const size = roomy ? 15 : 13;
-  g.font = `600 ${roomy ? 11 : 10}px ${ink.font}`;
+  const size = Math.round((roomy ? 15 : 13) * huge);
+  g.font = `600 ${Math.round((roomy ? 11 : 10) * huge)}px ${ink.font}`;
   g.textAlign = "center";
   g.textBaseline = "middle";
   /** @type {[number, number, number][]} */

@@ -233,7 +233,7 @@ export function mountCameras(root, { store, page, actions, playback }) {
             ? h("dd", {}, `box ${(track.source ?? 0) + 1}`)
             : h("dd", {}, "no box here"),
         ],
-        whole && [h("dt", {}, "at"), h("dd", {}, whole.position.map((v) => v.toFixed(2)).join("  "), h("small", {}, " m"))],
+        whole && [h("dt", {}, "at"), h("dd", {}, whole.position.map((v) => v.toFixed(2).replace("-", "−")).join("  "), h("small", {}, " m"))],
       ),
     );
   }
