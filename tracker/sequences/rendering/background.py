@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter
 from tracker.camera import Camera
 from tracker.sequences.rendering.interior import Interior, Lamp, Solid
 from tracker.sequences.rendering.paint import paint
-from tracker.sequences.rendering.raster import BOX, cast
+from tracker.sequences.rendering.rays import BOX, cast
 from tracker.sequences.rendering.textures import linear
 
 FINE = 2
@@ -98,7 +98,8 @@ class Tracer:
         distance = np.sqrt(np.einsum("ni,ni->n", toward, toward))
         toward /= distance[:, None]
         facing = np.maximum(np.einsum("ni,ni->n", normals, toward), 0.0)
-        leaving = np.maximum(-toward @ np.array(lamp.direction, np.float32), 0.0)
+        direction = np.array(lamp.direction, np.float32)
+        leaving = np.maximum(-np.einsum("ni,i->n", toward, direction), 0.0)
         return facing * leaving / (distance**2 + 0.02), toward, distance
 
 
@@ -149,7 +150,11 @@ def render_background(tracer: Tracer, camera: Camera, rounds: int = 4) -> Backgr
     fine = gaussian_filter(seen.reshape(rows, columns, 3).astype(np.float32), (0.75, 0.75, 0.0))
     room = fine.reshape(height, FINE, width, FINE, 3).mean(axis=(1, 3))
     axis = camera.rotation[2].astype(np.float32)
-    depth = (distance * (directions @ axis)).reshape(rows, columns).astype(np.float32)
+    depth = (
+        (distance * np.einsum("ni,i->n", directions, axis))
+        .reshape(rows, columns)
+        .astype(np.float32)
+    )
     floor = places[:, :2].copy()
     floor[(places[:, 2] > 0.02) | (normals[:, 2] < 0.9)] = np.nan
     floor = floor.reshape(height, FINE, width, FINE, 2).mean(axis=(1, 3))

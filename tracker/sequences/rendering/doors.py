@@ -79,7 +79,7 @@ def leaf_hinge(door: str, middle: float, wall: float) -> tuple[ndarray, float, f
     half = DOOR_WIDTH / 2.0 - 0.015
     if door == "back":  # hinge on the left, the leaf swings towards the cameras
         return np.array([middle - half, wall + 0.035, 0.0]), 0.0, -0.56 * np.pi
-    return np.array([wall + 0.035, middle + half, 0.0]), -0.5 * np.pi, -1.06 * np.pi
+    return np.array([wall + 0.035, middle + half, 0.0]), -0.5 * np.pi, -0.98 * np.pi
 
 
 def leaf_angle(

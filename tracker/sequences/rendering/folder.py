@@ -29,7 +29,7 @@ from tracker.sequences.rendering.rooms import (
 from tracker.sequences.rendering.scene import Scene
 from tracker.sequences.rendering.studio import Studio, in_order
 
-VERSION = 1
+VERSION = 2
 """Grows when the same call would give other pictures or files."""
 VISIBILITY_FILE = "visibility.csv"
 _QUALITY = 82
@@ -232,7 +232,7 @@ def choose_templates(
 
 
 def _numbers(values: ndarray) -> str:
-    return "[" + ", ".join(f"{float(v):.12g}" for v in values) + "]"
+    return "[" + ", ".join(f"{float(v) + 0.0:.12g}" for v in values) + "]"
 
 
 def _describe(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy import ndarray
 
-from tracker.sequences.rendering.raster import BALL, BOX, CYLINDER
+from tracker.sequences.rendering.rays import BALL, BOX, CYLINDER
 
 LEFT, RIGHT, NEAR, FAR, CEILING = -2.1, 2.1, -3.45, 1.8, 2.7
 """The room's inner faces, metres."""

@@ -207,6 +207,8 @@ def _clock(finish: Finish, uv: ndarray, half: ndarray, places: ndarray) -> ndarr
 
 
 def _rug(finish: Finish, uv: ndarray, half: ndarray, places: ndarray) -> ndarray:
+    if half.min() < 0.01:  # the rug's own thickness
+        return _tint(finish, np.full(len(uv), -0.6))
     edge = (half - np.abs(uv)).min(axis=1)
     pile = sample(noise(finish.seed, octaves=7), uv[:, 0], uv[:, 1], size=0.7)
     painted = _tint(finish, 0.22 * pile)

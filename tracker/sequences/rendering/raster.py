@@ -1,4 +1,4 @@
-"""The compiled loops of the renderer: rays through the room, bodies into the pictures.
+"""The compiled loops of the renderer: bodies into the pictures of a room.
 
 Arrays in, arrays out, without the interpreter's lock, so that threads share the
 work. Colours are linear red, green, blue until the last step.
@@ -16,116 +16,18 @@ from numpy import ndarray
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
-BOX, BALL, CYLINDER = 0, 1, 2
-"""Kinds of solids: the cube, ball and upright cylinder of half size 1 in their own axes."""
 NOBODY = 255
 """In an owner map: a pixel that shows the room."""
 
 
-def _kernel(function: _F) -> _F:
+def kernel(function: _F) -> _F:
     """Compile on the first call, keep the machine code on disk, release the interpreter."""
     options: Any = {"cache": True, "nogil": True, "fastmath": {"contract", "arcp", "nsz"}}
     compiled: _F = numba.njit(**options)(function)
     return compiled
 
 
-@_kernel
-def cast(
-    origins: ndarray,
-    directions: ndarray,
-    limits: ndarray,
-    kinds: ndarray,
-    inverses: ndarray,
-    bounds: ndarray,
-    any_hit: bool,
-) -> tuple[ndarray, ndarray]:
-    """The first solid on each ray.
-
-    Args:
-        origins: (N, 3), metres.
-        directions: (N, 3), unit vectors.
-        limits: (N,), the length of each ray, metres.
-        kinds: (P,), BOX, BALL or CYLINDER.
-        inverses: (P, 3, 4), from the world to each solid's own axes.
-        bounds: (P, 4), centre and radius of a ball around each solid.
-        any_hit: Stop at any solid rather than the nearest, for shadows.
-
-    Returns:
-        The distance (N,) and the index of the solid (N,), -1 where there is none.
-    """
-    count = origins.shape[0]
-    distances = np.empty(count, dtype=np.float32)
-    solids = np.full(count, -1, dtype=np.int32)
-    for n in range(count):
-        ox, oy, oz = origins[n, 0], origins[n, 1], origins[n, 2]
-        dx, dy, dz = directions[n, 0], directions[n, 1], directions[n, 2]
-        best = limits[n]
-        for p in range(kinds.shape[0]):
-            cx, cy, cz = bounds[p, 0] - ox, bounds[p, 1] - oy, bounds[p, 2] - oz
-            along = cx * dx + cy * dy + cz * dz
-            radius2 = bounds[p, 3] * bounds[p, 3]
-            squared = cx * cx + cy * cy + cz * cz
-            if squared > radius2 and (along < 0.0 or squared - along * along > radius2):
-                continue
-            m = inverses[p]
-            ax = m[0, 0] * ox + m[0, 1] * oy + m[0, 2] * oz + m[0, 3]
-            ay = m[1, 0] * ox + m[1, 1] * oy + m[1, 2] * oz + m[1, 3]
-            az = m[2, 0] * ox + m[2, 1] * oy + m[2, 2] * oz + m[2, 3]
-            bx = m[0, 0] * dx + m[0, 1] * dy + m[0, 2] * dz
-            by = m[1, 0] * dx + m[1, 1] * dy + m[1, 2] * dz
-            bz = m[2, 0] * dx + m[2, 1] * dy + m[2, 2] * dz
-            if kinds[p] == 0:
-                near, far = -1e30, 1e30
-                if abs(bx) > 1e-12:
-                    s, e = (-1.0 - ax) / bx, (1.0 - ax) / bx
-                    near, far = max(near, min(s, e)), min(far, max(s, e))
-                elif abs(ax) > 1.0:
-                    continue
-                if abs(by) > 1e-12:
-                    s, e = (-1.0 - ay) / by, (1.0 - ay) / by
-                    near, far = max(near, min(s, e)), min(far, max(s, e))
-                elif abs(ay) > 1.0:
-                    continue
-                if abs(bz) > 1e-12:
-                    s, e = (-1.0 - az) / bz, (1.0 - az) / bz
-                    near, far = max(near, min(s, e)), min(far, max(s, e))
-                elif abs(az) > 1.0:
-                    continue
-                t = near
-                if near > far or near < 1e-4:
-                    continue
-            else:
-                a = bx * bx + by * by
-                b = ax * bx + ay * by
-                c = ax * ax + ay * ay - 1.0
-                if kinds[p] == 1:
-                    a += bz * bz
-                    b += az * bz
-                    c += az * az
-                t = -1.0
-                inner = b * b - a * c
-                if inner > 0.0 and a > 1e-14:
-                    t = (-b - math.sqrt(inner)) / a
-                if kinds[p] == 2:
-                    if t > 0.0 and abs(az + t * bz) > 1.0:
-                        t = -1.0
-                    if t <= 0.0 and abs(bz) > 1e-12:
-                        s = ((1.0 if bz < 0.0 else -1.0) - az) / bz
-                        hx, hy = ax + s * bx, ay + s * by
-                        if s > 0.0 and hx * hx + hy * hy < 1.0:
-                            t = s
-                if t < 1e-4:
-                    continue
-            if t < best:
-                best = t
-                solids[n] = p
-                if any_hit:
-                    break
-        distances[n] = best
-    return distances, solids
-
-
-@_kernel
+@kernel
 def place_bodies(
     vertices: ndarray,
     normals: ndarray,
@@ -203,7 +105,7 @@ def place_bodies(
     return world, light
 
 
-@_kernel
+@kernel
 def floor_shadows(
     balls: ndarray, lamps: ndarray, rows: int, columns: int, origin: ndarray, cell: float
 ) -> ndarray:
@@ -260,13 +162,10 @@ def floor_shadows(
     return field
 
 
-@_kernel
+@kernel
 def draw(
-    world: ndarray,
+    points: ndarray,
     light: ndarray,
-    pose: ndarray,
-    intrinsics: ndarray,
-    distortion: ndarray,
     texture_points: ndarray,
     triangles: ndarray,
     owners: ndarray,
@@ -291,10 +190,9 @@ def draw(
     shadows, the lens's vignette, the tone curve and the sensor's noise.
 
     Args:
-        world: (F, V, 3), vertices in world metres.
+        points: (F, V, 3), column and row in the fine picture and depth in metres; NaN
+            where behind the lens.
         light: (F, V, 3) of the vertices.
-        pose: (3, 4), with ``intrinsics`` (3, 3) and ``distortion`` (5,) the camera,
-            as in ``Camera``.
         texture_points: (V, 2), with ``triangles`` (T, 3) and the ``owners`` (T,) of the
             triangles: people first, then doors.
         vertex_ranges: (O, 2), first and last + 1 vertex of each owner.
@@ -317,7 +215,7 @@ def draw(
         (F, P, 2) the number of fine pixels of its silhouette inside its box, and
         how many of those are visible.
     """
-    frames, size = world.shape[:2]
+    frames = points.shape[0]
     height, width = room.shape[:2]
     people = boxes.shape[1]
     pictures = np.empty((frames, height, width, 3), dtype=np.uint8)
@@ -328,10 +226,8 @@ def draw(
     colour = np.empty((2 * height, 2 * width, 3), dtype=np.float32)
     fresh = np.empty((height, width), dtype=np.uint8)
     windows = np.empty((vertex_ranges.shape[0], 4), dtype=np.int64)
-    points = np.empty((size, 3))
     top_value = np.float32(curve.shape[0] - 1)
     one, quarter = np.float32(1.0), np.float32(0.25)
-    k1, k2, p1, p2, k3 = distortion
     rows, columns = shadows.shape[1:]
     for f in range(frames):
         fresh[:] = 0
@@ -341,23 +237,9 @@ def draw(
                 continue
             low_x, low_y, high_x, high_y = 1e9, 1e9, -1e9, -1e9
             for v in range(vertex_ranges[o, 0], vertex_ranges[o, 1]):
-                wx, wy, wz = world[f, v]
-                z = pose[2, 0] * wx + pose[2, 1] * wy + pose[2, 2] * wz + pose[2, 3]
-                points[v, 0] = math.nan
-                if z < 0.1:
+                x, y = points[f, v, 0], points[f, v, 1]
+                if not x == x:
                     continue
-                a = (pose[0, 0] * wx + pose[0, 1] * wy + pose[0, 2] * wz + pose[0, 3]) / z
-                b = (pose[1, 0] * wx + pose[1, 1] * wy + pose[1, 2] * wz + pose[1, 3]) / z
-                r2 = a * a + b * b
-                if r2 > 4.0:  # far outside the picture, where the lens model does not hold
-                    continue
-                radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-                u = a * radial + 2.0 * p1 * a * b + p2 * (r2 + 2.0 * a * a)
-                v_ = b * radial + p1 * (r2 + 2.0 * b * b) + 2.0 * p2 * a * b
-                x = intrinsics[0, 0] * u + intrinsics[0, 1] * v_ + intrinsics[0, 2]
-                y = intrinsics[1, 1] * v_ + intrinsics[1, 2]
-                x, y = 2.0 * x + 0.5, 2.0 * y + 0.5
-                points[v, 0], points[v, 1], points[v, 2] = x, y, z
                 low_x, high_x = min(low_x, x), max(high_x, x)
                 low_y, high_y = min(low_y, y), max(high_y, y)
             if low_x > high_x:
@@ -372,16 +254,16 @@ def draw(
                     for b in range(2 * y, 2 * y + 2):
                         for a in range(2 * x, 2 * x + 2):
                             depth[b, a] = depth_fine[b, a]
-                            owner_map[b, a] = 255
+                            owner_map[b, a] = NOBODY
                             covered[b, a] = 0
         for t in range(triangles.shape[0]):
             o = owners[t]
             if not present[f, o]:
                 continue
             i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-            x0, y0 = points[i, 0], points[i, 1]
-            x1, y1 = points[j, 0], points[j, 1]
-            x2, y2 = points[k, 0], points[k, 1]
+            x0, y0 = points[f, i, 0], points[f, i, 1]
+            x1, y1 = points[f, j, 0], points[f, j, 1]
+            x2, y2 = points[f, k, 0], points[f, k, 1]
             # counter-clockwise seen from outside is clockwise where rows go down
             area = (x2 - x0) * (y1 - y0) - (x1 - x0) * (y2 - y0)
             if not area > 1e-9:
@@ -390,7 +272,7 @@ def draw(
             right = min(2 * windows[o, 2] - 1, math.floor(max(x0, x1, x2)))
             first = max(2 * windows[o, 1], math.ceil(min(y0, y1, y2)))
             last = min(2 * windows[o, 3] - 1, math.floor(max(y0, y1, y2)))
-            z0, z1, z2 = points[i, 2], points[j, 2], points[k, 2]
+            z0, z1, z2 = points[f, i, 2], points[f, j, 2], points[f, k, 2]
             for y in range(first, last + 1):
                 for x in range(left, right + 1):
                     w0 = ((x2 - x) * (y1 - y) - (x1 - x) * (y2 - y)) / area
@@ -459,7 +341,7 @@ def draw(
                         value = np.float32(0.0)
                         for b in range(2 * y, 2 * y + 2):
                             for a in range(2 * x, 2 * x + 2):
-                                if owner_map[b, a] == 255:
+                                if owner_map[b, a] == NOBODY:
                                     value += quarter * factor * room_fine[b, a, c]
                                 else:
                                     value += quarter * min(colour[b, a, c], np.float32(1.5))

@@ -35,7 +35,7 @@ BATCH = 20
 _CELL = 0.04
 _SPARE = 128
 """Rows and columns of noise more than a picture has."""
-_EXPOSURE = 2.0
+_EXPOSURE = 2.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,6 +170,10 @@ class Studio:
         shadows: ndarray,
     ) -> tuple[ndarray, ndarray]:
         camera, background = self.cameras[number], self.backgrounds[number]
+        flat = world.reshape(-1, 3)
+        pixels, _ = camera.project(flat)
+        depth = np.einsum("ni,i->n", flat, camera.rotation[2]) + camera.translation[2]
+        points = np.column_stack([(pixels + 0.5) * FINE - 0.5, depth]).astype(np.float32)
         boxes, shares = [], []
         for figure in self.scene.figures:
             box, _ = camera.project_boxes(figure.centres[steps], TARGET_HALF_EXTENTS)
@@ -186,11 +190,8 @@ class Studio:
             ]
         )
         pictures, counts = draw(
-            world,
+            points.reshape(*world.shape),
             light,
-            np.column_stack([camera.rotation, camera.translation]),
-            camera.intrinsics,
-            camera.distortion,
             self._texture_points,
             self._triangles,
             self._owners,
@@ -239,7 +240,7 @@ def _shade_lamps(interior: Interior) -> ndarray:
 
 def _muted(image: ndarray) -> Float[ndarray, "H W 3"]:
     """Colours as a plain camera gives them: an eighth of the way to grey."""
-    grey = image @ np.array([0.2126, 0.7152, 0.0722])
+    grey = np.einsum("hwc,c->hw", image, [0.2126, 0.7152, 0.0722])
     return np.asarray(image + 0.125 * (grey[..., None] - image), dtype=np.float32)
 
 
