@@ -94,10 +94,12 @@ let place = start.place;
 if (start.unknown.length) page.note("warn", `The address has unknown parts: ${start.unknown.join(", ")}`, "The rest of it is followed.");
 
 /**
- * @param {ServerState} server
+ * @param {ServerState} told
  * @param {boolean} [streamed]  it came over the socket, in order
  */
-function receiveState(server, streamed = false) {
+function receiveState(told, streamed = false) {
+  // A method is a choice like any other: it is listed, undone and taken up again with the values.
+  const server = { ...told, parameters: { ...told.parameters, ...told.methods } };
   const before = store.get().server;
   // An answer to a request may be older than what the socket has brought since.
   if (!streamed && before && server.version < before.version) return;
@@ -246,8 +248,10 @@ document.addEventListener("keydown", (event) => {
   command.run(actions);
 });
 
-// A click leaves the focus where it was, so that Space goes on meaning play.
+// A click leaves the focus where it was, so that Space goes on meaning play; only the 3D view,
+// which keeps all keys to itself while it has the focus, gives it back.
 document.addEventListener("mousedown", (event) => {
+  if (document.activeElement instanceof HTMLIFrameElement) document.activeElement.blur();
   if (event.target instanceof Element && event.target.closest("button, tr, .cam")) event.preventDefault();
 });
 

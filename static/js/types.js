@@ -39,7 +39,7 @@
  * @property {number} version
  * @property {SequenceInfo | null} sequence
  * @property {{name: string, message: string, done: number, total: number} | null} opening
- * @property {Record<string, any>} parameters
+ * @property {Record<string, any>} parameters  in the page with the methods among them
  * @property {string[]} changed
  * @property {{single_view: string, fusion_method: string}} methods
  * @property {number} playhead

@@ -84,7 +84,7 @@ export function mountChanges(root, { store, page, actions }) {
           { title: parameter?.help ?? "" },
           h("td", { class: "q" }, group),
           h("td", {}, name),
-          h("td", { class: "num q" }, parameter ? show(parameter.default) : "–"),
+          h("td", { class: "num q" }, parameter ? show(parameter.default) : "what fits"),
           h("td", { class: "num" }, show(server?.parameters[key]), unit && h("span", { class: "q opt-1" }, unit)),
           h("td", { class: "num" }, h("button", { class: "btn", disabled: locked, "aria-label": `Reset ${parameter?.label ?? key}`, onclick: () => page.reset(key) }, icon("i-reset", "s"), "reset")),
         );
