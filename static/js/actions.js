@@ -6,7 +6,7 @@ import { eventsOf, nextEvent, ordered } from "./events.js";
 
 /**
  * @typedef {import("./types.js").PageState} PageState
- * @typedef {import("./commands.js").Actions} Actions
+ * @typedef {import("./types.js").Actions} Actions
  */
 
 /**

@@ -6,77 +6,66 @@
  * A key is written as `keyOf` names it: modifiers in the order Ctrl, Shift, then the key;
  * letters are lower case, and signs such as `?` stand for themselves whatever makes them.
  *
- * @typedef {object} Command
- * @property {string} name
- * @property {string} title
- * @property {"Play" | "Cameras and 3D" | "Tracks" | "Page"} group
- * @property {string[]} keys
- * @property {(actions: Actions) => void} run
- *
- * @typedef {object} Actions  what commands need of the page
- * @property {() => void} togglePlay
- * @property {(direction: -1 | 0 | 1) => void} shuttle
- * @property {(steps: number) => void} stepBy
- * @property {(seconds: number) => void} seekBy
- * @property {(end: "first" | "last") => void} toEnd
- * @property {(direction: -1 | 1) => void} changeSpeed
- * @property {() => void} toggleLoop
- * @property {(end: 0 | 1) => void} markRange
- * @property {(direction: -1 | 1) => void} toEvent
- * @property {(direction: -1 | 1) => void} nextTrack
- * @property {(index: number) => void} chooseCamera
- * @property {() => void} freeView
- * @property {(layer: string) => void} toggleLayer
- * @property {() => void} clear
- * @property {() => void} exportTracks
- * @property {() => void} toggleTheme
- * @property {() => void} help
- * @property {() => void} undo
+ * @typedef {import("./types.js").Command} Command
+ * @typedef {import("./types.js").Actions} Actions
  */
 
+/**
+ * Name, title, keys, what it does.
+ * @type {Record<Command["group"], [string, string, string[], (actions: Actions) => void][]>}
+ */
+const TABLE = {
+  Play: [
+    ["play", "Play or pause", ["Space"], (a) => a.togglePlay()],
+    ["step-back", "One step back", ["ArrowLeft", ","], (a) => a.stepBy(-1)],
+    ["step-forward", "One step on", ["ArrowRight", "."], (a) => a.stepBy(1)],
+    ["second-back", "One second back", ["Shift+ArrowLeft"], (a) => a.seekBy(-1)],
+    ["second-forward", "One second on", ["Shift+ArrowRight"], (a) => a.seekBy(1)],
+    ["ten-back", "Ten steps back", ["PageUp"], (a) => a.stepBy(-10)],
+    ["ten-forward", "Ten steps on", ["PageDown"], (a) => a.stepBy(10)],
+    ["first", "First step", ["Home"], (a) => a.toEnd("first")],
+    ["last", "Last step", ["End"], (a) => a.toEnd("last")],
+    ["play-back", "Play backwards, again: faster", ["j"], (a) => a.shuttle(-1)],
+    ["stop", "Stop", ["k"], (a) => a.shuttle(0)],
+    ["play-forward", "Play, again: faster", ["l"], (a) => a.shuttle(1)],
+    ["slower", "Slower", ["-"], (a) => a.changeSpeed(-1)],
+    ["faster", "Faster", ["="], (a) => a.changeSpeed(1)],
+    ["mark-in", "Play from here", ["i"], (a) => a.markRange(0)],
+    ["mark-out", "Play to here", ["o"], (a) => a.markRange(1)],
+    ["loop", "Loop", ["\\"], (a) => a.toggleLoop()],
+  ],
+  Tracks: [
+    ["next-event", "Next birth, death or long miss", ["n"], (a) => a.toEvent(1)],
+    ["previous-event", "Previous birth, death or long miss", ["Shift+n"], (a) => a.toEvent(-1)],
+    ["previous-track", "Previous track", ["["], (a) => a.nextTrack(-1)],
+    ["next-track", "Next track", ["]"], (a) => a.nextTrack(1)],
+    ["clear", "Clear the selection", ["Escape"], (a) => a.clear()],
+    ["export", "Export the tracks as CSV", ["Ctrl+e"], (a) => a.exportTracks()],
+  ],
+  "Cameras and 3D": [
+    ...Array.from({ length: 9 }, (_, index) => {
+      const run = (/** @type {Actions} */ a) => a.chooseCamera(index);
+      return /** @type {[string, string, string[], typeof run]} */ ([`camera-${index + 1}`, `Camera ${index + 1} large`, [String(index + 1)], run]);
+    }),
+    ["free-view", "Free view, cameras alike", ["0"], (a) => a.freeView()],
+    ["truth", "Truth on or off", ["g"], (a) => a.toggleLayer("truth")],
+    ["trails", "Trails on or off", ["t"], (a) => a.toggleLayer("trails")],
+    ["detections", "Detections on or off", ["d"], (a) => a.toggleLayer("measurements")],
+    ["estimates", "2D estimates on or off", ["e"], (a) => a.toggleLayer("estimates")],
+    ["boxes", "Reprojected boxes on or off", ["b"], (a) => a.toggleLayer("boxes")],
+    ["samples", "Samples on or off", ["s"], (a) => a.toggleLayer("samples")],
+  ],
+  Page: [
+    ["undo", "Undo the last change of parameters", ["Ctrl+z"], (a) => a.undo()],
+    ["theme", "Dark or light", ["Shift+d"], (a) => a.toggleTheme()],
+    ["help", "Help and keys", ["?"], (a) => a.help()],
+  ],
+};
+
 /** @type {Command[]} */
-export const COMMANDS = [
-  { name: "play", title: "Play or pause", group: "Play", keys: ["Space"], run: (a) => a.togglePlay() },
-  { name: "step-back", title: "One step back", group: "Play", keys: ["ArrowLeft", ","], run: (a) => a.stepBy(-1) },
-  { name: "step-forward", title: "One step on", group: "Play", keys: ["ArrowRight", "."], run: (a) => a.stepBy(1) },
-  { name: "second-back", title: "One second back", group: "Play", keys: ["Shift+ArrowLeft"], run: (a) => a.seekBy(-1) },
-  { name: "second-forward", title: "One second on", group: "Play", keys: ["Shift+ArrowRight"], run: (a) => a.seekBy(1) },
-  { name: "ten-back", title: "Ten steps back", group: "Play", keys: ["PageUp"], run: (a) => a.stepBy(-10) },
-  { name: "ten-forward", title: "Ten steps on", group: "Play", keys: ["PageDown"], run: (a) => a.stepBy(10) },
-  { name: "first", title: "First step", group: "Play", keys: ["Home"], run: (a) => a.toEnd("first") },
-  { name: "last", title: "Last step", group: "Play", keys: ["End"], run: (a) => a.toEnd("last") },
-  { name: "play-back", title: "Play backwards, again: faster", group: "Play", keys: ["j"], run: (a) => a.shuttle(-1) },
-  { name: "stop", title: "Stop", group: "Play", keys: ["k"], run: (a) => a.shuttle(0) },
-  { name: "play-forward", title: "Play, again: faster", group: "Play", keys: ["l"], run: (a) => a.shuttle(1) },
-  { name: "slower", title: "Slower", group: "Play", keys: ["-"], run: (a) => a.changeSpeed(-1) },
-  { name: "faster", title: "Faster", group: "Play", keys: ["="], run: (a) => a.changeSpeed(1) },
-  { name: "mark-in", title: "Play from here", group: "Play", keys: ["i"], run: (a) => a.markRange(0) },
-  { name: "mark-out", title: "Play to here", group: "Play", keys: ["o"], run: (a) => a.markRange(1) },
-  { name: "loop", title: "Loop", group: "Play", keys: ["\\"], run: (a) => a.toggleLoop() },
-  { name: "next-event", title: "Next birth, death or long miss", group: "Tracks", keys: ["n"], run: (a) => a.toEvent(1) },
-  { name: "previous-event", title: "Previous birth, death or long miss", group: "Tracks", keys: ["Shift+n"], run: (a) => a.toEvent(-1) },
-  { name: "previous-track", title: "Previous track", group: "Tracks", keys: ["["], run: (a) => a.nextTrack(-1) },
-  { name: "next-track", title: "Next track", group: "Tracks", keys: ["]"], run: (a) => a.nextTrack(1) },
-  { name: "clear", title: "Clear the selection", group: "Tracks", keys: ["Escape"], run: (a) => a.clear() },
-  { name: "export", title: "Export the tracks as CSV", group: "Tracks", keys: ["Ctrl+e"], run: (a) => a.exportTracks() },
-  ...Array.from({ length: 9 }, (_, index) => ({
-    name: `camera-${index + 1}`,
-    title: `Camera ${index + 1} large`,
-    group: /** @type {const} */ ("Cameras and 3D"),
-    keys: [String(index + 1)],
-    run: (/** @type {Actions} */ a) => a.chooseCamera(index),
-  })),
-  { name: "free-view", title: "Free view, cameras alike", group: "Cameras and 3D", keys: ["0"], run: (a) => a.freeView() },
-  { name: "truth", title: "Truth on or off", group: "Cameras and 3D", keys: ["g"], run: (a) => a.toggleLayer("truth") },
-  { name: "trails", title: "Trails on or off", group: "Cameras and 3D", keys: ["t"], run: (a) => a.toggleLayer("trails") },
-  { name: "detections", title: "Detections on or off", group: "Cameras and 3D", keys: ["d"], run: (a) => a.toggleLayer("measurements") },
-  { name: "estimates", title: "2D estimates on or off", group: "Cameras and 3D", keys: ["e"], run: (a) => a.toggleLayer("estimates") },
-  { name: "boxes", title: "Reprojected boxes on or off", group: "Cameras and 3D", keys: ["b"], run: (a) => a.toggleLayer("boxes") },
-  { name: "samples", title: "Samples on or off", group: "Cameras and 3D", keys: ["s"], run: (a) => a.toggleLayer("samples") },
-  { name: "undo", title: "Undo the last change of parameters", group: "Page", keys: ["Ctrl+z"], run: (a) => a.undo() },
-  { name: "theme", title: "Dark or light", group: "Page", keys: ["Shift+d"], run: (a) => a.toggleTheme() },
-  { name: "help", title: "Help and keys", group: "Page", keys: ["?"], run: (a) => a.help() },
-];
+export const COMMANDS = Object.entries(TABLE).flatMap(([group, rows]) =>
+  rows.map(([name, title, keys, run]) => ({ name, title, keys, run, group: /** @type {Command["group"]} */ (group) })),
+);
 
 /**
  * The name of the key that an event brings.

@@ -14,13 +14,7 @@ import { createPictures, pictureName, PICTURE_BUDGET } from "./pictures.js";
 /**
  * @typedef {import("./types.js").StepResult} StepResult
  * @typedef {import("./types.js").PageState} PageState
- * @typedef {import("./pictures.js").Picture} Picture
- *
- * @typedef {object} Frame  what is painted at once
- * @property {number} step
- * @property {(Picture | undefined)[]} pictures  by camera; undefined where it is not loaded and will not be
- * @property {StepResult | null} result
- * @property {boolean} stale  the result is of the run before, shown faintly until the new one is there
+ * @typedef {import("./types.js").Frame} Frame
  */
 
 const RESULTS_KEPT = 600;
@@ -47,8 +41,6 @@ export function createPlayback(store, sendSeek) {
   let lastTick = 0;
   let rest = 0;
   let lastSent = -1;
-  /** @type {Set<number>} */
-  const waits = new Set();
 
   const pictures = createPictures(() => {
     store.set({ loaded: store.get().loaded + 1 });
@@ -89,12 +81,10 @@ export function createPlayback(store, sendSeek) {
 
   /** Try again after something failed that may come back. */
   function later() {
-    const wait = window.setTimeout(() => {
-      waits.delete(wait);
+    setTimeout(() => {
       windowDirty = true;
       ask();
     }, 500);
-    waits.add(wait);
   }
 
   function ask() {

@@ -148,10 +148,43 @@
  * @property {boolean} singleKeys
  * @property {Note[]} notes
  *
+ * @typedef {object} Command
+ * @property {string} name
+ * @property {string} title
+ * @property {"Play" | "Cameras and 3D" | "Tracks" | "Page"} group
+ * @property {string[]} keys
+ * @property {(actions: Actions) => void} run
+ *
+ * @typedef {object} Actions  what commands need of the page
+ * @property {() => void} togglePlay
+ * @property {(direction: -1 | 0 | 1) => void} shuttle
+ * @property {(steps: number) => void} stepBy
+ * @property {(seconds: number) => void} seekBy
+ * @property {(end: "first" | "last") => void} toEnd
+ * @property {(direction: -1 | 1) => void} changeSpeed
+ * @property {() => void} toggleLoop
+ * @property {(end: 0 | 1) => void} markRange
+ * @property {(direction: -1 | 1) => void} toEvent
+ * @property {(direction: -1 | 1) => void} nextTrack
+ * @property {(index: number) => void} chooseCamera
+ * @property {() => void} freeView
+ * @property {(layer: string) => void} toggleLayer
+ * @property {() => void} clear
+ * @property {() => void} exportTracks
+ * @property {() => void} toggleTheme
+ * @property {() => void} help
+ * @property {() => void} undo
+ *
+ * @typedef {object} Frame  what is painted at once
+ * @property {number} step
+ * @property {(import("./pictures.js").Picture | undefined)[]} pictures  by camera; undefined where it is not loaded and will not be
+ * @property {StepResult | null} result
+ * @property {boolean} stale  the result is of the run before, shown faintly until the new one is there
+ *
  * @typedef {object} Context  what every pane is given
  * @property {import("./store.js").Store<PageState>} store
  * @property {ReturnType<typeof import("./playback.js").createPlayback>} playback
- * @property {import("./commands.js").Actions} actions
+ * @property {Actions} actions
  * @property {ReturnType<typeof import("./actions.js").createActions>["page"]} page
  * @property {() => void} retry  connect now
  */

@@ -8,7 +8,7 @@ import { pictureInk } from "../palette.js";
 
 /**
  * @typedef {import("../types.js").TrackInView} TrackInView
- * @typedef {import("../playback.js").Frame} Frame
+ * @typedef {import("../types.js").Frame} Frame
  */
 
 /** @type {[string, string, string, string][]} layer, word, sign, command */
