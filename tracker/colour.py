@@ -10,6 +10,7 @@ density filtering", 2021, §2.1.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -75,32 +76,48 @@ class ColourModel:
 
     space: ColourSpaceName
     kernel: KernelName
-    templates: Float[ndarray, "n bins"]
-    """Histograms q_1 … q_n, each summing to 1."""
+    names: tuple[str, ...]
+    """Whose templates they are, each person once."""
     roots: Float[ndarray, "n bins"]
-    """Their square roots."""
+    """Square roots of the histograms q_1 … q_n."""
+    owners: Int[ndarray, " n"]
+    """Index into ``names`` of each."""
 
     @staticmethod
     def of(
-        templates: Float[ndarray, "n bins"], space: ColourSpaceName, kernel: KernelName
+        templates: Float[ndarray, "n bins"],
+        names: Sequence[str],
+        space: ColourSpaceName,
+        kernel: KernelName,
     ) -> ColourModel:
         """A model of given histograms.
 
+        Args:
+            templates: Histograms, each summing to 1.
+            names: Whose each is; several may be of one person.
+            space: The histograms' bins.
+            kernel: How the pixels of a box are to count.
+
         Raises:
-            ValueError: If there is no template, or one has another number of bins.
+            ValueError: If there is no template, or they have another number of bins.
         """
         if len(templates) == 0:
             raise ValueError("a colour model needs at least one template, got none")
-        if templates.shape[1] != BINS[space]:
+        if templates.shape != (len(names), BINS[space]):
             raise ValueError(
-                f"templates of space {space} have {BINS[space]} bins, got {templates.shape[1]}"
+                f"{len(names)} templates of {BINS[space]} bins ({space}) must have shape "
+                f"({len(names)}, {BINS[space]}), got {templates.shape}"
             )
-        return ColourModel(space, kernel, templates, np.sqrt(templates))
+        people = tuple(dict.fromkeys(names))
+        owners = np.array([people.index(name) for name in names])
+        return ColourModel(space, kernel, people, np.sqrt(templates), owners)
 
     def distances(
         self, bins: UInt16[ndarray, "h w"], boxes: Float[ndarray, "N 4"]
-    ) -> tuple[Float[ndarray, " N"], Int[ndarray, " N"]]:
-        """D = min_i sqrt(1 - Σ_u sqrt(p(u) q_i(u))) of each box, and the template i it is for.
+    ) -> Float[ndarray, "N G"]:
+        """D = min_i sqrt(1 - Σ_u sqrt(p(u) q_i(u))) over the templates of each of G people.
+
+        The distance of [ZW21], over all templates, is the smallest of a row.
 
         Args:
             bins: :func:`bin_map` of the picture, computed once a picture.
@@ -108,8 +125,8 @@ class ColourModel:
                 wholly outside, D is 1.
         """
         boxes = np.ascontiguousarray(boxes, dtype=float)
-        nearest: tuple[ndarray, ndarray] = image_kernels.nearest_templates(
-            bins, boxes, self.roots, self.kernel == "epanechnikov", LONGEST_SIDE
+        nearest: ndarray = image_kernels.template_distances(
+            bins, boxes, self.roots, self.owners, self.kernel == "epanechnikov", LONGEST_SIDE
         )
         return nearest
 

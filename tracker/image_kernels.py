@@ -62,14 +62,15 @@ def box_histograms(
 
 
 @_kernel
-def nearest_templates(
+def template_distances(
     bin_map: ndarray,
     boxes: ndarray,
     template_roots: ndarray,
+    groups: ndarray,
     epanechnikov: bool,
     longest_side: int,
-) -> tuple[ndarray, ndarray]:
-    """Bhattacharyya distance of every box to its nearest template, and which one that is.
+) -> ndarray:
+    """Bhattacharyya distance of every box to the nearest template of each group.
 
     The same as :func:`box_histograms` and the distances to all rows, without the
     histograms being stored: only the bins that a box touches are visited.
@@ -78,17 +79,17 @@ def nearest_templates(
         bin_map: (h, w), the bin of each pixel.
         boxes: (N, 4), centre x, centre y, half width, half height, pixels.
         template_roots: (n, bins), the square roots of the templates' histograms.
+        groups: (n,) the group of each template, 0 … G - 1, each used.
         epanechnikov: As in :func:`box_histograms`.
         longest_side: As in :func:`box_histograms`.
 
     Returns:
-        (N,) distances, 1 where a box holds no pixel, and (N,) rows of ``template_roots``.
+        (N, G) distances, 1 where a box holds no pixel.
     """
     height, width = bin_map.shape
     count = boxes.shape[0]
     templates, bins = template_roots.shape
-    distances = np.ones(count)
-    nearest = np.zeros(count, dtype=np.int64)
+    largest = np.zeros((count, groups.max() + 1))
     histogram = np.zeros(bins)
     touched = np.empty(bins, dtype=np.int64)
     for n in range(count):
@@ -121,18 +122,14 @@ def nearest_templates(
             continue
         for k in range(used):
             histogram[touched[k]] = math.sqrt(histogram[touched[k]] / total)
-        best = -1.0
         for t in range(templates):
             coefficient = 0.0
             for k in range(used):
                 coefficient += histogram[touched[k]] * template_roots[t, touched[k]]
-            if coefficient > best:
-                best = coefficient
-                nearest[n] = t
-        distances[n] = math.sqrt(max(0.0, 1.0 - best))
+            largest[n, groups[t]] = max(largest[n, groups[t]], coefficient)
         for k in range(used):
             histogram[touched[k]] = 0.0
-    return distances, nearest
+    return np.sqrt(np.maximum(1.0 - largest, 0.0))
 
 
 @_kernel

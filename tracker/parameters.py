@@ -93,8 +93,8 @@ class ColourPhdParams(Params):
 
     acceptance_distance: Annotated[
         float, Field(ge=0.05, le=1.0), ui("D_max", step=0.01, published=1.0)
-    ] = 0.5
-    """A peak further than this from every template is not taken: misses against false boxes."""
+    ] = 0.52
+    """A peak less likely, with its foreground, than a box at this distance is not taken."""
 
     acceptance_foreground: Annotated[
         float, Field(ge=0.0, le=1.0), ui("f_min", step=0.01, published=0.0)
@@ -123,6 +123,9 @@ class ColourPhdParams(Params):
         float, Field(ge=0.0, le=1.0), ui("s", step=0.05, published=0.0)
     ] = 0.5
     """Share of the samples drawn anywhere on the foreground; the rest from the prediction."""
+
+    peaks_per_person: Annotated[bool, ui("l_z", published=False)] = True
+    """Whether peaks are sought for each person's templates by themselves, not for all at once."""
 
     mean_shift_starts: Annotated[int, Field(ge=1, le=100), ui("K", step=1)] = 20
     """Samples at most from which the search for peaks starts."""

@@ -31,8 +31,11 @@ BACKGROUND_PICTURES = 32
 GATE = float(chi2.ppf(0.9999, df=4))
 """Squared Mahalanobis distance: a person's own peak lies inside with this probability."""
 
-MERGE_DISTANCE = 1.0
+MERGE_DISTANCE = 0.8
 """Peaks closer than this, in half sizes, are one."""
+
+SAME_PERSON_DISTANCE = 1.5
+"""Peaks of the same person's colours closer than this, in half sizes, are one."""
 
 SIZE_JITTER = 0.1
 """Relative spread around the size that the target has at a place of the room: people differ."""
@@ -163,21 +166,9 @@ class ColourPhd:
 
         scene = self._look(picture)
         samples = self._sample(predicted, scene, rng)
-        scores, distances, _ = self._score(scene, samples)
-        weights = np.exp(scores - scores.max()) if len(scores) else scores
-        starts = mean_shift.starts(samples, weights, p.mean_shift_starts, spread=p.spread_starts)
-        peaks, _densities = mean_shift.modes(
-            samples,
-            weights,
-            samples[starts],
-            bandwidth=p.bandwidth,
-            merge_distance=MERGE_DISTANCE,
-        )
-        scores, distances, inside = self._score(scene, peaks)
-        accepted = distances <= p.acceptance_distance
-        if self._background is not None:
-            accepted &= inside >= p.acceptance_foreground
-        peaks, distances = peaks[accepted], distances[accepted]
+        scores, _, _ = self._score(scene, samples)
+        candidates = self._climb(samples, scores)
+        peaks, distances = self._accept(scene, candidates)
 
         noise = self._sigmas(peaks)[:, :, None] ** 2 * np.eye(4)
         updated = phd.update(
@@ -197,9 +188,9 @@ class ColourPhd:
             peaks=peaks,
             peak_scores=np.exp(-0.5 * (distances / p.likelihood_sigma) ** 2),
             samples=samples,
-            sample_weights=weights,
+            sample_weights=np.exp(scores.max(axis=1) - scores.max()) if len(scores) else None,
             information={
-                "peaks before acceptance": float(len(accepted)),
+                "peaks before acceptance": float(len(candidates)),
                 "least distance": float(distances.min()) if len(distances) else 1.0,
                 "foreground share": float(scene.mask.mean()) if scene.mask is not None else 0.0,
                 "cardinality": mixture.cardinality,
@@ -275,10 +266,12 @@ class ColourPhd:
 
     def _score(
         self, scene: _Scene, boxes: Float[ndarray, "N 4"]
-    ) -> tuple[Float[ndarray, " N"], Float[ndarray, " N"], Float[ndarray, " N"]]:
-        """Log-likelihood, distance D and share of foreground of each box."""
+    ) -> tuple[Float[ndarray, "N G"], Float[ndarray, "N G"], Float[ndarray, " N"]]:
+        """Log-likelihood and distance D of each box for each person, and share of foreground."""
         p = self._parameters
-        distances, _ = self._model.distances(scene.bins, boxes)
+        distances = self._model.distances(scene.bins, boxes)
+        if not p.peaks_per_person:
+            distances = distances.min(axis=1, keepdims=True)
         scores = -0.5 * (distances / p.likelihood_sigma) ** 2
         if scene.sums is None:
             return scores, distances, np.ones(len(boxes))
@@ -287,8 +280,47 @@ class ColourPhd:
             foreground.box_shares(scene.sums, middles + part * half_sizes) for part in _PARTS
         )
         around = above + (left + right) / 2.0
-        scores += p.foreground_weight * np.log(inside + 0.02) - p.surroundings_weight * around
-        return scores, distances, inside
+        factors = p.foreground_weight * np.log(inside + 0.02) - p.surroundings_weight * around
+        return scores + factors[:, None], distances, inside
+
+    def _climb(
+        self, samples: Float[ndarray, "S 4"], scores: Float[ndarray, "S G"]
+    ) -> Float[ndarray, "M 4"]:
+        """The peaks of the weighted samples, by each person's colours for themselves."""
+        p = self._parameters
+        found = [np.zeros((0, 4))]
+        for person in range(scores.shape[1] if len(samples) else 0):
+            weights = np.exp(scores[:, person] - scores[:, person].max())
+            starts = mean_shift.starts(
+                samples, weights, p.mean_shift_starts, spread=p.spread_starts
+            )
+            peaks, _ = mean_shift.modes(
+                samples,
+                weights,
+                samples[starts],
+                bandwidth=p.bandwidth,
+                merge_distance=MERGE_DISTANCE,
+            )
+            found.append(peaks)
+        return np.concatenate(found)
+
+    def _accept(
+        self, scene: _Scene, candidates: Float[ndarray, "M 4"]
+    ) -> tuple[Float[ndarray, "K 4"], Float[ndarray, " K"]]:
+        """The peaks that look enough like a person, and their distances; one at each place."""
+        p = self._parameters
+        scores, distances, inside = self._score(scene, candidates)
+        best, nearest, person = scores.max(axis=1), distances.min(axis=1), scores.argmax(axis=1)
+        good = best >= -0.5 * (p.acceptance_distance / p.likelihood_sigma) ** 2
+        if scene.sums is not None:
+            good &= inside >= p.acceptance_foreground
+        kept: list[int] = []
+        for i in np.argsort(-best, kind="stable"):
+            apart = (candidates[kept, :2] - candidates[i, :2]) / candidates[kept, 2:]
+            least = np.where(person[kept] == person[i], SAME_PERSON_DISTANCE, MERGE_DISTANCE)
+            if good[i] and np.all((apart**2).sum(axis=1) >= least**2):
+                kept.append(int(i))
+        return candidates[kept], nearest[kept]
 
     def _sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
         """Standard deviations of peaks: proportional to the box."""
@@ -382,5 +414,8 @@ def read_templates(
             )
         histograms.append(histogram)
     return ColourModel.of(
-        np.array(histograms), parameters.colour_space, parameters.histogram_kernel
+        np.array(histograms),
+        [template.name for template in sequence.templates],
+        parameters.colour_space,
+        parameters.histogram_kernel,
     )
