@@ -123,6 +123,7 @@ function receiveState(told, streamed = false) {
     const known = place.selection !== null && here ? place.selection : server.selection;
     store.set({ basis: "", timeline: null, result: null, shown: -1, step: 0, playing: 0, range: [null, null], loop: false, hover: null, large, selection: known });
     if (server.sequence) store.set({ step: Math.max(0, Math.min(server.sequence.frames - 1, step)) });
+    if (known !== server.selection) stream.send({ type: "select", id: known });
     if (server.sequence && (!place.sequence || place.sequence === server.sequence.name)) {
       place = { sequence: null, step: null, selection: null, camera: null };
     }
