@@ -155,9 +155,10 @@ def render_background(tracer: Tracer, camera: Camera, rounds: int = 4) -> Backgr
         .reshape(rows, columns)
         .astype(np.float32)
     )
-    floor = places[:, :2].copy()
-    floor[(places[:, 2] > 0.02) | (normals[:, 2] < 0.9)] = np.nan
-    floor = floor.reshape(height, FINE, width, FINE, 2).mean(axis=(1, 3))
+    low = (places[:, 2:] < 0.02).reshape(height, FINE, width, FINE, 1)
+    share = low.mean(axis=(1, 3))
+    floor = (places[:, :2].reshape(height, FINE, width, FINE, 2) * low).mean(axis=(1, 3))
+    floor = np.where(share >= 0.5, floor / np.maximum(share, 0.5), np.nan)
     return Background(room, fine, depth, floor)
 
 
