@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
+from scipy.optimize import isotonic_regression
 
 from tracker import image_kernels
 
@@ -56,7 +57,7 @@ class BackgroundModel:
             return None
         # the first median is blurred by the exposures, but good enough to align them by
         reference = _median(stack)
-        aligned = [cv2.LUT(picture, tone_curve(picture, reference)) for picture in stack]
+        aligned = [cv2.LUT(picture, _inverse(tone_curve(reference, picture))) for picture in stack]
         reference = _median(aligned)
         roots = cv2.LUT(reference, _ROOTS)
         deviations = [
@@ -98,8 +99,13 @@ def tone_curve(
 
     At each of some levels of the source the median of the target's values there is
     taken, which holds while less than half of those pixels show something else;
-    the levels between are interpolated and the curve never falls. Levels that the
-    source hardly has follow their neighbours' shift.
+    the levels between are interpolated. The curve never falls: where medians do, a
+    person hides most of what has that level, and the commoner levels decide. Levels
+    beyond those measured follow the last one's shift.
+
+    Args:
+        source: A picture of the background alone; its levels make the groups.
+        target: Of the same size and view.
     """
     height, width = source.shape[:2]
     stride = max(1, int(np.sqrt(height * width / SAMPLED_PIXELS)))
@@ -121,9 +127,22 @@ def tone_curve(
         medians = halves.argmax(axis=1).astype(float)
         sums = np.bincount(group, weights=few[:, channel], minlength=LEVELS)
         centres = sums[used] / total[used]
-        mapped = levels + np.interp(levels, centres, medians - centres)
-        curve[0, :, channel] = np.clip(np.rint(np.maximum.accumulate(mapped)), 0, 255)
+        rising = isotonic_regression(medians, weights=total[used]).x
+        mapped = levels + np.interp(levels, centres, rising - centres)
+        curve[0, :, channel] = np.clip(np.rint(mapped), 0, 255)
     return curve
+
+
+def _inverse(curve: UInt8[ndarray, "1 256 3"]) -> UInt8[ndarray, "1 256 3"]:
+    """The curve that undoes a rising one, as far as it can be undone."""
+    levels = np.arange(256)
+    inverse = np.empty_like(curve)
+    for channel in range(3):
+        # of levels that became one, the middle; np.interp needs strictly rising points
+        values, first = np.unique(curve[0, :, channel], return_index=True)
+        last = np.append(first[1:], 256) - 1
+        inverse[0, :, channel] = np.rint(np.interp(levels, values, (first + last) / 2.0))
+    return inverse
 
 
 def integral(mask: UInt8[ndarray, "h w"]) -> Int[ndarray, "h1 w1"]:

@@ -87,7 +87,7 @@ def concatenate(mixtures: Sequence[GaussianMixture]) -> GaussianMixture:
 def predict(
     mixture: GaussianMixture,
     transition: Float[ndarray, "d d"],
-    noise: Float[ndarray, "d d"],
+    noise: Float[ndarray, "*J d d"],
     survival_probability: float | Float[ndarray, " J"],
 ) -> GaussianMixture:
     """Move every component one step ahead through a linear motion model.
@@ -97,7 +97,7 @@ def predict(
     Args:
         mixture: J components. Labels are kept.
         transition: F.
-        noise: Q, in squared state units per step.
+        noise: Q, in squared state units per step, one for all or one a component.
         survival_probability: p_S, one for all or one a component.
     """
     covariances = transition @ mixture.covariances @ transition.T + noise

@@ -197,12 +197,12 @@ class DetectionBoxParams(Params):
 
     centre_sigma: Annotated[
         float, Field(ge=0.01, le=3.0), ui("σ_x", unit="half sizes", step=0.01, log=True)
-    ] = 0.2
+    ] = 0.15
     """Standard deviation of a box's centre, as a share of its half width and half height."""
 
     size_sigma: Annotated[
         float, Field(ge=0.01, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
-    ] = 0.2
+    ] = 0.1
     """Standard deviation of a box's half width and half height, as a share of each."""
 
 

@@ -74,6 +74,10 @@ class BoxSizes:
     """Where the sizes of each cell begin; one more at the end."""
     sizes: Float[ndarray, "P 2"]
     """Half width and half height, pixels, cell by cell."""
+    smallest: Float[ndarray, " 2"]
+    """Half width and half height, pixels; 1 if nothing is seen."""
+    largest: Float[ndarray, " 2"]
+    """Half width and half height, pixels; 2 if nothing is seen."""
 
     @staticmethod
     def of(camera: Camera, room: Room, half_extents: Float[ndarray, " 3"]) -> BoxSizes:
@@ -89,7 +93,10 @@ class BoxSizes:
         place = _cells(boxes[:, :2], cell, columns, rows)
         order = np.argsort(place, kind="stable")
         starts = np.searchsorted(place[order], np.arange(columns * rows + 1))
-        return BoxSizes(cell, columns, rows, starts, boxes[order, 2:])
+        sizes = boxes[order, 2:]
+        smallest = sizes.min(axis=0) if len(sizes) else np.ones(2)
+        largest = sizes.max(axis=0) if len(sizes) else np.full(2, 2.0)
+        return BoxSizes(cell, columns, rows, starts, sizes, smallest, largest)
 
     def contains(self, centres: Float[ndarray, "N 2"]) -> Bool[ndarray, " N"]:
         """Whether a target's centre can be there at all."""
@@ -107,13 +114,6 @@ class BoxSizes:
         possible = count > 0
         sizes[possible] = self.sizes[chosen[possible]]
         return sizes, possible
-
-    @property
-    def range(self) -> Float[ndarray, "2 2"]:
-        """Smallest and largest half width and half height, pixels; (1, 2) if nothing is seen."""
-        if not len(self.sizes):
-            return np.array([[1.0, 1.0], [2.0, 2.0]])
-        return np.array([self.sizes.min(axis=0), self.sizes.max(axis=0)])
 
 
 def _even_points(count: int) -> Float[ndarray, "N 3"]:

@@ -125,10 +125,10 @@ class ColourPhd:
         self._entrances = GaussianMixture(
             births.weights * self._step_time, births.means, births.covariances, births.labels
         )
-        low, high = self._sizes.range
         width, height = self._image_size
         # uniform over the picture and the range of half sizes, of which a pixel each at least
-        volume = width * height * float(np.prod(np.maximum(high - low, 1.0)))
+        sizes = np.maximum(self._sizes.largest - self._sizes.smallest, 1.0)
+        volume = width * height * float(np.prod(sizes))
         self._clutter = parameters.clutter_rate / volume
 
     @property
@@ -243,8 +243,7 @@ class ColourPhd:
             offsets = np.einsum("nab,nb->na", factors[chosen], rng.standard_normal((count, 4)))
             parts.append(predicted.means[chosen] + offsets)
         samples = np.concatenate(parts)
-        low, high = self._sizes.range
-        samples[:, 2:] = np.clip(samples[:, 2:], low, high)
+        samples[:, 2:] = np.clip(samples[:, 2:], self._sizes.smallest, self._sizes.largest)
         last = np.array(self._image_size) - 1
         inside = ((samples[:, :2] >= 0.0) & (samples[:, :2] <= last)).all(axis=1)
         return np.asarray(samples[inside])

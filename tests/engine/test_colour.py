@@ -1,0 +1,160 @@
+"""Histograms, the distance between them and the colour likelihood: laws and a plain reference."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy import ndarray
+
+from tracker import colour
+from tracker.colour import BINS, ColourModel, ColourSpaceName, KernelName
+
+SPACES: tuple[ColourSpaceName, ...] = ("hue_saturation", "rgb")
+KERNELS: tuple[KernelName, ...] = ("epanechnikov", "flat")
+
+
+def picture_of(seed: int, height: int = 40, width: int = 50) -> ndarray:
+    """A picture of a few large and many small colours."""
+    rng = np.random.default_rng(seed)
+    picture = rng.integers(0, 256, (height, width, 3), dtype=np.uint8)
+    picture[:, : width // 2] = cv2.blur(picture[:, : width // 2], (9, 9))
+    return picture
+
+
+def reference_histogram(bins: ndarray, box: ndarray, count: int, kernel: KernelName) -> ndarray:
+    """The definition, pixel by pixel over the whole picture."""
+    y, x = np.mgrid[: bins.shape[0], : bins.shape[1]]
+    u, v = (x - box[0]) / box[2], (y - box[1]) / box[3]
+    weights = (
+        np.clip(1.0 - u**2 - v**2, 0.0, None) if kernel == "epanechnikov" else np.ones(u.shape)
+    )
+    weights = weights * ((np.abs(u) <= 1.0) & (np.abs(v) <= 1.0))
+    histogram = np.bincount(bins.ravel(), weights.ravel(), minlength=count)
+    return histogram / histogram.sum() if histogram.sum() > 0.0 else histogram
+
+
+histograms_of_eight = st.lists(st.floats(0.0, 1.0), min_size=8, max_size=8).filter(
+    lambda values: sum(values) > 1e-3
+)
+
+
+@given(histograms_of_eight, histograms_of_eight)
+def test_the_distance_is_symmetric_and_between_0_and_1(
+    first: list[float], second: list[float]
+) -> None:
+    p, q = np.array(first) / sum(first), np.array(second) / sum(second)
+    there, back = colour.distance(p, q), colour.distance(q, p)
+    assert there == back
+    assert 0.0 <= there <= 1.0
+    assert colour.distance(p, p) == pytest.approx(0.0, abs=1e-7)
+
+
+def test_histograms_without_a_common_bin_are_1_apart() -> None:
+    assert colour.distance(np.array([1.0, 0.0]), np.array([0.0, 1.0])) == 1.0
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=2, max_size=20), st.floats(0.05, 0.5))
+def test_the_likelihood_falls_with_the_distance(distances: list[float], sigma: float) -> None:
+    ordered = np.sort(distances)
+    likelihoods = colour.likelihood(ordered, sigma)
+    assert np.all(np.diff(likelihoods) <= 0.0)
+    assert np.all(likelihoods <= 1.0 / (sigma * np.sqrt(2.0 * np.pi)))
+
+
+@pytest.mark.parametrize("space", SPACES)
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_histograms_agree_with_their_definition(space: ColourSpaceName, kernel: KernelName) -> None:
+    bins = colour.bin_map(picture_of(1), space)
+    boxes = np.array([[20.0, 15.0, 6.0, 9.0], [2.3, 3.7, 5.5, 8.25], [48.6, 38.1, 11.0, 3.5]])
+    found = colour.histograms(bins, boxes, space, kernel)
+    for box, histogram in zip(boxes, found, strict=True):
+        np.testing.assert_allclose(
+            histogram, reference_histogram(bins, box, BINS[space], kernel), atol=1e-12
+        )
+    np.testing.assert_allclose(found.sum(axis=1), 1.0)
+
+
+@pytest.mark.parametrize("space", SPACES)
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_distances_agree_with_the_histograms(space: ColourSpaceName, kernel: KernelName) -> None:
+    bins = colour.bin_map(picture_of(2), space)
+    rng = np.random.default_rng(3)
+    boxes = np.column_stack([rng.uniform(-5, 55, (40, 2)), rng.uniform(0.2, 20.0, (40, 2))])
+    templates = colour.histograms(
+        bins, np.array([[10.0, 20, 5, 8], [30, 20, 5, 8], [40, 10, 4, 4]]), space, kernel
+    )
+    model = ColourModel.of(templates, ["Ann", "Ben", "Ann"], space, kernel)
+    assert model.names == ("Ann", "Ben")
+    histograms = colour.histograms(bins, boxes, space, kernel)
+    each = colour.distance(histograms[:, None], templates[None])
+    expected = np.stack([np.minimum(each[:, 0], each[:, 2]), each[:, 1]], axis=1)
+    np.testing.assert_allclose(model.distances(bins, boxes), expected, atol=1e-7)
+
+
+def test_hues_count_only_where_there_is_colour() -> None:
+    grey = np.full((4, 4, 3), 130, dtype=np.uint8)
+    almost = grey + np.array([0, 0, 3], dtype=np.uint8)  # a trace of red
+    red = np.zeros((4, 4, 3), dtype=np.uint8)
+    red[..., 2] = 200
+    bins = [colour.bin_map(picture, "hue_saturation")[0, 0] for picture in (grey, almost, red)]
+    assert bins[0] == bins[1]
+    assert bins[0] >= 256
+    assert bins[2] < 256
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from(SPACES))
+def test_every_pixel_has_a_bin(seed: int, space: ColourSpaceName) -> None:
+    rng = np.random.default_rng(seed)
+    bins = colour.bin_map(rng.integers(0, 256, (7, 5, 3), dtype=np.uint8), space)
+    assert bins.shape == (7, 5)
+    assert bins.max() < BINS[space]
+
+
+def test_a_box_of_one_pixel_and_one_outside() -> None:
+    bins = colour.bin_map(picture_of(4), "rgb")
+    boxes = np.array([[12.0, 9.0, 0.01, 0.01], [500.0, 500.0, 5.0, 5.0]])
+    histograms = colour.histograms(bins, boxes, "rgb", "epanechnikov")
+    assert histograms[0, bins[9, 12]] == 1.0
+    assert not histograms[1].any()
+    model = ColourModel.of(histograms[:1], ["spot"], "rgb", "epanechnikov")
+    np.testing.assert_allclose(model.distances(bins, boxes), [[0.0], [1.0]], atol=1e-7)
+
+
+def test_no_boxes_give_no_distances() -> None:
+    bins = colour.bin_map(picture_of(5), "rgb")
+    model = ColourModel.of(np.full((1, 512), 1 / 512), ["all"], "rgb", "flat")
+    assert model.distances(bins, np.zeros((0, 4))).shape == (0, 1)
+    assert colour.histograms(bins, np.zeros((0, 4)), "rgb", "flat").shape == (0, 512)
+
+
+def test_a_stride_over_large_boxes_keeps_the_histogram() -> None:
+    rng = np.random.default_rng(6)
+    palette = rng.integers(0, 256, (6, 3), dtype=np.uint8)
+    small = palette[rng.integers(0, 6, (60, 60))]
+    large = cv2.resize(small, None, fx=6, fy=6, interpolation=cv2.INTER_NEAREST)
+    box = np.array([[30.0, 30.0, 15.0, 20.0]])
+    pair = [
+        colour.histograms(colour.bin_map(picture, "rgb"), boxes, "rgb", "epanechnikov")[0]
+        for picture, boxes in ((small, box), (large, box * 6 + [2.5, 2.5, 0, 0]))
+    ]
+    assert colour.distance(pair[0], pair[1]) < 0.05
+
+
+def test_a_model_says_what_is_wrong() -> None:
+    with pytest.raises(ValueError, match="at least one template"):
+        ColourModel.of(np.zeros((0, 512)), [], "rgb", "flat")
+    with pytest.raises(ValueError, match=r"272 bins.*got \(1, 512\)"):
+        ColourModel.of(np.zeros((1, 512)), ["Ann"], "hue_saturation", "flat")
+    with pytest.raises(ValueError, match="expected one of hue_saturation, rgb, got 'hsv'"):
+        colour.bin_map(picture_of(7), "hsv")  # type: ignore[arg-type]
+
+
+def test_hue_saturation_bins_agree_with_numpy() -> None:
+    hsv = cv2.cvtColor(picture_of(8), cv2.COLOR_BGR2HSV).astype(int)
+    hue, saturation, value = hsv[..., 0], hsv[..., 1], hsv[..., 2]
+    coloured = (saturation >= colour.LEAST_SATURATION) & (value >= colour.LEAST_VALUE)
+    expected = np.where(coloured, hue * 16 // 180 * 16 + saturation // 16, 256 + value // 16)
+    np.testing.assert_array_equal(colour.bin_map(picture_of(8), "hue_saturation"), expected)
