@@ -165,7 +165,7 @@ class ColourPhdParams(Params):
 
     centre_sigma: Annotated[
         float, Field(ge=0.02, le=3.0), ui("σ_x", unit="half sizes", step=0.01, log=True)
-    ] = 0.4
+    ] = 0.5
     """Standard deviation of a peak's centre."""
 
     size_sigma: Annotated[
