@@ -1,0 +1,28 @@
+"""The claims of the papers, run again: ``multiview-phd experiment NAME``.
+
+One module a claim; its ``EXPERIMENT`` is entered here under its name.
+"""
+
+from __future__ import annotations
+
+from tracker.experiments.experiment import (
+    Context,
+    Experiment,
+    Finding,
+    Result,
+    Unavailable,
+    Verdict,
+)
+
+EXPERIMENTS: dict[str, Experiment] = {}
+"""By name, in the order in which ``--all`` runs them."""
+
+__all__ = [
+    "EXPERIMENTS",
+    "Context",
+    "Experiment",
+    "Finding",
+    "Result",
+    "Unavailable",
+    "Verdict",
+]

@@ -1,0 +1,74 @@
+"""What an experiment is: a claim, the run that tests it, and what it gives back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Verdict = Literal["better", "worse"]
+"""Whether what was found is at least as good as what is claimed."""
+
+Told = Callable[[str, int, int], None]
+"""Called with what is being done, how much of it is done, and how much there is."""
+
+
+class Unavailable(Exception):
+    """An experiment cannot be run here; the message says what is missing and how to get it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What an experiment is run with."""
+
+    quick: bool = False
+    """Shortened to what shows the direction of each claim."""
+    data: Path | None = None
+    """Folder of real recordings; None where there are none."""
+    processes: int = 1
+    """At most this many at once."""
+    told: Told = lambda words, done, total: None
+    cancelled: Callable[[], bool] = lambda: False
+    """Asked now and then; an experiment that hears yes raises ``tracker.pipeline.Cancelled``."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A claim and what became of it."""
+
+    claim: str
+    """What the paper says, in a few words."""
+    found: str
+    """What was measured, with the value."""
+    verdict: Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What an experiment found."""
+
+    head: tuple[str, ...]
+    """Names of the table's columns, with units."""
+    rows: tuple[tuple[str, ...], ...]
+    numbers: dict[str, Any]
+    """Everything that was measured, as JSON takes it, with what it was measured with."""
+    findings: tuple[Finding, ...]
+    figure: Callable[[], Figure] | None = None
+    """Draws the figure; called once, where a figure is wanted."""
+    notes: tuple[str, ...] = field(default=())
+    """What a reader of the table must know."""
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """One claim that can be tested with one command."""
+
+    name: str
+    claim: str
+    """What the paper says, in one line."""
+    run: Callable[[Context], Result]
+    """Raises ``Unavailable`` where something it needs is not there."""
