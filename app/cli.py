@@ -1,4 +1,4 @@
-"""The command line: serve, track, sequences, render, parameters.
+"""The command line: serve, track, evaluate, experiment, sequences, render, parameters.
 
 Status 0 for success, 1 for a failure told in one line on standard error, 2 for
 wrong usage, 130 after Ctrl-C. The engine is imported by the command that needs it.
@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import errno
 import os
-import shutil
 import sys
-import textwrap
 import threading
 import time
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from app.flags import (
     Arguments,
+    Evaluate,
     Parameters,
     Render,
     Sequences,
@@ -28,6 +26,7 @@ from app.flags import (
     parse,
     show,
 )
+from app.terminal import Bar, CommandError, print_table, say
 from tracker import parameters as table
 from tracker.parameters import ParameterError
 
@@ -37,19 +36,15 @@ TRACEBACK = "MULTIVIEW_PHD_TRACEBACK"
 """Environment variable: with any value, an unexpected failure shows where it happened."""
 
 
-class CommandError(Exception):
-    """A failure with its sentence."""
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit status."""
     try:
         return _run(parse(arguments))
     except ParameterError as error:
-        _say(str(error))
+        say(str(error))
         return USAGE
     except KeyboardInterrupt:
-        _say("interrupted; nothing was written")
+        say("interrupted; nothing was written")
         return INTERRUPTED
     except BrokenPipeError:  # whoever read our output has enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -57,7 +52,7 @@ def main(arguments: list[str] | None = None) -> int:
     except Exception as error:
         if os.environ.get(TRACEBACK):
             raise
-        _say(_sentence(error))
+        say(_sentence(error))
         return FAILURE
 
 
@@ -67,6 +62,10 @@ def _run(command: Arguments) -> int:
             return _serve(command)
         case Track():
             _track(command)
+        case Evaluate():
+            from app.evaluation.command import evaluate
+
+            evaluate(command)
         case Sequences():
             _sequences(command)
         case Render():
@@ -74,11 +73,6 @@ def _run(command: Arguments) -> int:
         case Parameters():
             _parameters()
     return 0
-
-
-def _say(text: str) -> None:
-    sys.stderr.write(f"multiview-phd: {text}\n")
-    sys.stderr.flush()
 
 
 def _sentence(error: Exception) -> str:
@@ -109,7 +103,7 @@ def _serve(command: Serve) -> int:
     shown = "127.0.0.1" if command.host == "0.0.0.0" else "[::1]" if host == "[::]" else host
     address = f"http://{shown}:{port}"
     if not is_loopback(command.host):
-        _say(f"anyone who reaches {command.host} can change what you see")
+        say(f"anyone who reaches {command.host} can change what you see")
 
     def ready() -> None:
         sys.stdout.write(f"multiview-phd: {address} (Ctrl-C ends it)\n")
@@ -180,11 +174,11 @@ def _track(command: Track) -> None:
     from tracker import export, pipeline
     from tracker.sequences import library
 
-    with _Bar("rendering", "frame") as rendering:
+    with Bar("rendering", "frame") as rendering:
         sequence = library.open_sequence(command.sequence, progress=rendering.at)
     parameters = table.with_values(pipeline.default_parameters(sequence), changes)
     begin = time.perf_counter()
-    with _Bar("tracking", "step") as tracking:
+    with Bar("tracking", "step") as tracking:
         tracking.at(0, sequence.frames)
         run = pipeline.compute(
             sequence,
@@ -195,36 +189,10 @@ def _track(command: Track) -> None:
     seconds = time.perf_counter() - begin
     export.save_tracks_csv(output, sequence, run.tracks, parameters, command.seed)
     targets = len(set(run.tracks.ids.tolist()))
-    _say(
+    say(
         f"{sequence.frames} steps, {targets} tracks, {sequence.frames / seconds:.0f} steps/s "
         f"({sequence.frames / seconds / sequence.fps:.1f} × real time), written to {output}"
     )
-
-
-class _Bar:
-    """A progress bar on standard error, there from the first step on, and only for people."""
-
-    def __init__(self, words: str, unit: str) -> None:
-        self._words = words
-        self._unit = unit
-        self._bar: Any = None
-
-    def __enter__(self) -> _Bar:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.close()
-
-    def at(self, done: int, total: int) -> None:
-        """So far."""
-        if self._bar is None:
-            from tqdm import tqdm
-
-            self._bar = tqdm(
-                total=total, desc=self._words, unit=self._unit, disable=None, file=sys.stderr
-            )
-        self._bar.update(done - self._bar.n)
 
 
 # the rest
@@ -245,7 +213,7 @@ def _sequences(command: Sequences) -> None:
         )
         for entry in library.available(command.data)
     ]
-    _print_table(("name", "kind", "cameras", "steps", "ready", "description"), rows)
+    print_table(("name", "kind", "cameras", "steps", "ready", "description"), rows)
 
 
 def _render(command: Render) -> None:
@@ -258,7 +226,7 @@ def _render(command: Render) -> None:
         raise ParameterError("--cameras", f"expected 2 or 3, got {command.cameras}")
     if command.folder.exists():
         raise CommandError(f"{command.folder} exists; name a folder that does not")
-    with _Bar("rendering", "frame") as bar:
+    with Bar("rendering", "frame") as bar:
         rendering.render(
             command.name,
             command.folder,
@@ -266,7 +234,7 @@ def _render(command: Render) -> None:
             seed=command.seed,
             progress=bar.at,
         )
-    _say(f"{command.name} with {command.cameras} cameras, written to {command.folder}")
+    say(f"{command.name} with {command.cameras} cameras, written to {command.folder}")
 
 
 def _parameters() -> None:
@@ -283,22 +251,7 @@ def _parameters() -> None:
         (p.key, p.symbol, describe_range(p), p.unit, show(p.default), p.help)
         for p in table.PARAMETERS.values()
     ]
-    _print_table(("key", "symbol", "range", "unit", "default", "help"), rows)
-
-
-def _print_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Aligned columns; on a terminal the last one is wrapped, in a file every row is a line."""
-    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)][:-1]
-    indent = sum(widths) + 2 * len(widths)
-    wrap: Callable[[str], list[str]] = lambda text: [text]  # noqa: E731
-    if sys.stdout.isatty():
-        room = shutil.get_terminal_size().columns - indent - 1
-        wrap = lambda text: textwrap.wrap(text, max(room, 30)) or [""]  # noqa: E731
-    for row in (head, *rows):
-        cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=False)]
-        first, *others = wrap(row[-1])
-        sys.stdout.write("  ".join([*cells, first]).rstrip() + "\n")
-        sys.stdout.writelines(" " * indent + line + "\n" for line in others)
+    print_table(("key", "symbol", "range", "unit", "default", "help"), rows)
 
 
 if __name__ == "__main__":

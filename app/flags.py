@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
-from tyro.conf import Positional, UseAppendAction, arg, subcommand
+from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subcommand
 
 from tracker import parameters as table
 from tracker.parameters import METHODS, PRESETS, Parameter, ParameterError
@@ -111,6 +111,27 @@ class Track:
 
 
 @dataclass
+class Evaluate:
+    """Score a track file against the truth of the sequence that it is of."""
+
+    sequence: Annotated[
+        Positional[str], arg(metavar="SEQUENCE", help="A built-in room's name or a folder.")
+    ]
+    tracks: Annotated[
+        Positional[Path], arg(metavar="TRACKS.csv", help="As `track` and the page write it.")
+    ]
+    json: FlagCreatePairsOff[bool] = False
+    """Print everything as JSON instead of tables."""
+    html: Annotated[Path | None, arg(metavar="REPORT.html", help_behavior_hint="(optional)")] = None
+    """Write a report as well: one file with figures, plots, paths and tracks."""
+
+    def changes(self) -> dict[str, str]:
+        """The settings asked for, by name."""
+        own = {"sequence", "tracks", "json", "html"}
+        return {k: v for k, v in vars(self).items() if k not in own and v is not None}
+
+
+@dataclass
 class Sequences:
     """List the sequences that can be opened by name."""
 
@@ -180,15 +201,42 @@ def _track_with_flags() -> Any:
     return with_flags
 
 
-Arguments = Serve | Track | Sequences | Render | Parameters
+def _evaluate_with_flags() -> Any:
+    """``Evaluate`` with a flag for every setting of the evaluation: ``--gate`` and so on."""
+    from tracker.evaluation import EvaluationSettings
+
+    flags: list[tuple[str, Any, Any]] = []
+    for name, schema in EvaluationSettings.model_json_schema()["properties"].items():
+        ui = schema["x-ui"]
+        choices = "|".join(schema.get("enum", ()))
+        bounds = "" if choices else f", {schema['minimum']:g} … {schema['maximum']:g} {ui['unit']}"
+        annotation = Annotated[
+            str | None,
+            arg(
+                metavar=choices or {"number": "FLOAT", "integer": "INT"}[schema["type"]],
+                help=f"{schema['description']} {ui['symbol']}{bounds.rstrip()}.",
+                help_behavior_hint=f"(default: {show(schema['default'])})",
+            ),
+        ]
+        flags.append((name, annotation, field(default=None)))
+    with_flags = make_dataclass("EvaluateWithFlags", flags, bases=(Evaluate,))
+    with_flags.__doc__ = Evaluate.__doc__
+    return with_flags
+
+
+Arguments = Serve | Track | Evaluate | Sequences | Render | Parameters
 
 
 def parse(arguments: list[str] | None = None) -> Arguments:
     """The command and its arguments. Wrong usage ends the program with status 2."""
     track: Any = _track_with_flags()
+    # its settings come with the engine, which only who evaluates has to wait for
+    asked = sys.argv[1:] if arguments is None else arguments
+    evaluate: Any = _evaluate_with_flags() if asked[:1] == ["evaluate"] else Evaluate
     commands: Any = (
         Annotated[Serve, subcommand("serve")]
         | Annotated[track, subcommand("track")]
+        | Annotated[evaluate, subcommand("evaluate")]
         | Annotated[Sequences, subcommand("sequences")]
         | Annotated[Render, subcommand("render")]
         | Annotated[Parameters, subcommand("parameters")]

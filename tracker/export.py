@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import os
+import re
 import secrets
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -46,6 +47,8 @@ class TrackFile:
     """For each camera left, top, width, height in pixels; NaN where its picture has no box."""
     settings: Mapping[str, str]
     """The comment lines ``# key = value``: sequence, seed, methods and parameters."""
+    done: int | None = None
+    """The number of steps computed, where the file says that it is not all of them."""
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -192,6 +195,7 @@ def read_tracks_csv(path: Path | str) -> TrackFile:
             for camera in cameras
         },
         settings=_settings(path),
+        done=_done(path),
     )
 
 
@@ -211,6 +215,15 @@ def _settings(path: Path) -> dict[str, str]:
         if equals:
             settings[key.strip()] = setting.strip()
     return settings
+
+
+def _done(path: Path) -> int | None:
+    for line in _beginning(path):
+        if not line.startswith("#"):
+            break
+        if partial := re.match(r"# partial: the first (\d+) of ", line):
+            return int(partial[1])
+    return None
 
 
 def _beginning(path: Path) -> Iterator[str]:

@@ -1,0 +1,1 @@
+"""Tracks against the truth in the workbench: the command, the worker, the routes."""

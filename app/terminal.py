@@ -1,0 +1,72 @@
+"""What every command does with a terminal: say a sentence, show a bar, print a table."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import textwrap
+from collections.abc import Callable, Sequence
+from typing import Any
+
+
+class CommandError(Exception):
+    """A failure with its sentence."""
+
+
+def say(text: str) -> None:
+    """One line on standard error."""
+    sys.stderr.write(f"multiview-phd: {text}\n")
+    sys.stderr.flush()
+
+
+class Bar:
+    """A progress bar on standard error, there from the first step on, and only for people."""
+
+    def __init__(self, words: str, unit: str) -> None:
+        self._words = words
+        self._unit = unit
+        self._bar: Any = None
+
+    def __enter__(self) -> Bar:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+    def at(self, done: int, total: int) -> None:
+        """So far."""
+        if self._bar is None:
+            from tqdm import tqdm
+
+            self._bar = tqdm(
+                total=total, desc=self._words, unit=self._unit, disable=None, file=sys.stderr
+            )
+        self._bar.update(done - self._bar.n)
+
+
+def print_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Aligned columns; on a terminal the last one is wrapped, in a file every row is a line.
+
+    Args:
+        head: The columns' names; one that begins with ``>`` stands over numbers.
+        rows: Cells of text.
+    """
+    right = [name.startswith(">") for name in head]
+    names = [name.removeprefix(">") for name in head]
+    widths = [max(map(len, column)) for column in zip(names, *rows, strict=True)]
+    if not right[-1]:
+        widths[-1] = 0
+    indent = sum(widths) + 2 * (len(widths) - 1)
+    wrap: Callable[[str], list[str]] = lambda text: [text]  # noqa: E731
+    if sys.stdout.isatty() and not right[-1]:
+        room = shutil.get_terminal_size().columns - indent - 1
+        wrap = lambda text: textwrap.wrap(text, max(room, 30)) or [""]  # noqa: E731
+    for row in (names, *rows):
+        first, *others = wrap(row[-1])
+        cells = [
+            cell.rjust(width) if numbers else cell.ljust(width)
+            for cell, width, numbers in zip([*row[:-1], first], widths, right, strict=True)
+        ]
+        sys.stdout.write("  ".join(cells).rstrip() + "\n")
+        sys.stdout.writelines(" " * indent + line + "\n" for line in others)
