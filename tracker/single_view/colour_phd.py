@@ -16,7 +16,6 @@ from numpy import ndarray
 from scipy.stats import chi2
 
 from tracker import colour, foreground, gaussian_mixture, mean_shift, models, phd
-from tracker.colour import ColourModel
 from tracker.foreground import BackgroundModel
 from tracker.gaussian_mixture import GaussianMixture
 from tracker.parameters import ColourPhdParams
@@ -24,6 +23,7 @@ from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes, entrance_boxes
 from tracker.single_view.protocol import ViewResult
+from tracker.single_view.templates import read_templates
 
 BACKGROUND_PICTURES = 32
 """Pictures spread over the clip that the background is learnt from."""
@@ -376,45 +376,3 @@ class ColourPhd:
             ),
             information=information or {},
         )
-
-
-def read_templates(
-    sequence: Sequence, parameters: ColourPhdParams, reader: FrameReader
-) -> ColourModel:
-    """The colour model of the sequence's templates.
-
-    Raises:
-        ValueError: If there is none, or one's picture or box cannot be used.
-    """
-    if not sequence.templates:
-        raise ValueError(
-            f"{sequence.name} has no template of a person's colours; add at least one [[template]] "
-            "with camera, frame and box to sequence.toml"
-        )
-    names = [camera.name for camera in sequence.cameras]
-    histograms = []
-    for template in sequence.templates:
-        place = f'template "{template.name}" ({template.camera}, frame {template.frame})'
-        if template.camera not in names:
-            raise ValueError(f"{place}: there is no such camera; expected {', '.join(names)}")
-        picture = reader.picture(names.index(template.camera), template.frame)
-        if picture is None:
-            raise ValueError(f"{place}: its picture cannot be read; choose another frame")
-        left, top, width, height = template.box
-        box = np.array([[left + width / 2, top + height / 2, width / 2, height / 2]])
-        bins = colour.bin_map(picture, parameters.colour_space)
-        histogram = colour.histograms(
-            bins, box, parameters.colour_space, parameters.histogram_kernel
-        )[0]
-        if not histogram.any():
-            raise ValueError(
-                f"{place}: the box {template.box.tolist()} lies outside the picture of "
-                f"{picture.shape[1]}x{picture.shape[0]}; move it inside"
-            )
-        histograms.append(histogram)
-    return ColourModel.of(
-        np.array(histograms),
-        [template.name for template in sequence.templates],
-        parameters.colour_space,
-        parameters.histogram_kernel,
-    )

@@ -1,0 +1,53 @@
+"""The sequence's templates: boxes whose colour histograms model the people."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracker import colour
+from tracker.colour import ColourModel
+from tracker.parameters import ColourPhdParams
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+
+
+def read_templates(
+    sequence: Sequence, parameters: ColourPhdParams, reader: FrameReader
+) -> ColourModel:
+    """The colour model of the sequence's templates.
+
+    Raises:
+        ValueError: If there is none, or one's picture or box cannot be used.
+    """
+    if not sequence.templates:
+        raise ValueError(
+            f"{sequence.name} has no template of a person's colours; add at least one [[template]] "
+            "with camera, frame and box to sequence.toml"
+        )
+    names = [camera.name for camera in sequence.cameras]
+    histograms = []
+    for template in sequence.templates:
+        place = f'template "{template.name}" ({template.camera}, frame {template.frame})'
+        if template.camera not in names:
+            raise ValueError(f"{place}: there is no such camera; expected {', '.join(names)}")
+        picture = reader.picture(names.index(template.camera), template.frame)
+        if picture is None:
+            raise ValueError(f"{place}: its picture cannot be read; choose another frame")
+        left, top, width, height = template.box
+        box = np.array([[left + width / 2, top + height / 2, width / 2, height / 2]])
+        bins = colour.bin_map(picture, parameters.colour_space)
+        histogram = colour.histograms(
+            bins, box, parameters.colour_space, parameters.histogram_kernel
+        )[0]
+        if not histogram.any():
+            raise ValueError(
+                f"{place}: the box {template.box.tolist()} lies outside the picture of "
+                f"{picture.shape[1]}x{picture.shape[0]}; move it inside"
+            )
+        histograms.append(histogram)
+    return ColourModel.of(
+        np.array(histograms),
+        [template.name for template in sequence.templates],
+        parameters.colour_space,
+        parameters.histogram_kernel,
+    )
