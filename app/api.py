@@ -24,12 +24,12 @@ FOR_EVER = "private, max-age=31536000, immutable"
 OPENING_SECONDS = 1.0
 """How long a request to open waits, so that what fails at once is told in the answer."""
 
-_ERRORS: dict[int | str, dict[str, Any]] = {
+ERRORS: dict[int | str, dict[str, Any]] = {
     "4XX": {"model": ErrorBody, "description": "What was expected, what was found, what to do."},
     "5XX": {"model": ErrorBody, "description": "The server failed; what was open still is."},
 }
 
-router = APIRouter(prefix="/api", responses=_ERRORS)
+router = APIRouter(prefix="/api", responses=ERRORS)
 
 
 def _workbench(request: Request) -> Workbench:
@@ -199,7 +199,7 @@ async def step(
     snapshot = bench.snapshot()
     sequence = snapshot.sequence
     if sequence is None:
-        raise _nothing_open()
+        raise nothing_open()
     if not 0 <= step < sequence.frames:
         raise ApiError(
             404,
@@ -215,7 +215,7 @@ def timeline(request: Request, bench: Bench) -> models.Timeline:
     """The shown run over time, as far as it is computed."""
     snapshot = bench.snapshot()
     if snapshot.sequence is None:
-        raise _nothing_open()
+        raise nothing_open()
     timelines: results.Timelines = request.app.state.timelines
     return timelines.of(snapshot.sequence, snapshot.run)
 
@@ -237,13 +237,14 @@ def export_tracks(bench: Bench) -> Response:
             hint="Wait for the run's first steps, or start it again.",
         )
     done, tracks = run.done, run.tracks
+    name = file_name(run.sequence.name, "tracks.csv")
     stream = io.StringIO(newline="")
     export.write_tracks_csv(stream, run.sequence, tracks, run.parameters, run.seed, done=done)
     return Response(
         stream.getvalue(),
         media_type="text/csv; charset=utf-8",
         headers={
-            "content-disposition": f'attachment; filename="{_file_name(run.sequence.name)}"',
+            "content-disposition": f'attachment; filename="{name}"',
             "cache-control": "no-store",
             "x-run-key": run.key,
             "x-run-partial": "false" if run.complete else "true",
@@ -252,7 +253,8 @@ def export_tracks(bench: Bench) -> Response:
     )
 
 
-def _nothing_open() -> ApiError:
+def nothing_open() -> ApiError:
+    """The answer to whoever asks for what only an open sequence has."""
     return ApiError(
         409,
         "nothing_open",
@@ -261,6 +263,7 @@ def _nothing_open() -> ApiError:
     )
 
 
-def _file_name(name: str) -> str:
+def file_name(name: str, ending: str) -> str:
+    """Of a download: plain letters only."""
     plain = "".join(c if c.isascii() and (c.isalnum() or c in "-_.") else "-" for c in name)
-    return f"{plain}-tracks.csv"
+    return f"{plain}-{ending}"

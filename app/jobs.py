@@ -106,7 +106,7 @@ class Jobs:
         return future
 
     def _open(self, name: str, cancelled: threading.Event, future: Future[None]) -> None:
-        _be_nice()
+        be_nice()
 
         told_at = 0.0
 
@@ -204,7 +204,7 @@ class Jobs:
             self._condition.notify_all()
 
     def _work(self) -> None:
-        _be_nice()
+        be_nice()
         while True:
             with self._condition:
                 self._under_way = None
@@ -298,7 +298,7 @@ class Jobs:
             reader.close()
 
 
-def _be_nice() -> None:
+def be_nice() -> None:
     """Give this thread, and those it starts, less of a busy machine (where that can be said)."""
     set_priority: Callable[[int, int, int], None] | None = getattr(os, "setpriority", None)
     if set_priority is not None and sys.platform.startswith("linux"):

@@ -108,6 +108,18 @@ class RunInfo(Model):
     error: str | None
 
 
+class PinnedInfo(Model):
+    """The pinned run: the A of comparisons."""
+
+    key: str
+    parameters: dict[str, Any]
+    """Methods and values."""
+    changed: list[str]
+    """Keys whose value is not the default."""
+    differs: list[str]
+    """Keys whose value is not the one that the parameters have now."""
+
+
 class ViserInfo(Model):
     """Where the 3D view is."""
 
@@ -130,6 +142,7 @@ class State(Model):
     layers: dict[str, bool]
     """Of the 3D view."""
     run: RunInfo
+    pinned: PinnedInfo | None
     viser: ViserInfo
 
 

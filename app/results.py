@@ -34,6 +34,7 @@ def state_of(snapshot: Snapshot) -> models.State:
         selection=snapshot.selection,
         layers=dict(snapshot.layers),
         run=run_of(snapshot),
+        pinned=_pinned_of(snapshot),
         viser=models.ViserInfo(),
     )
 
@@ -41,6 +42,19 @@ def state_of(snapshot: Snapshot) -> models.State:
 def run_of(snapshot: Snapshot) -> models.RunInfo:
     """How far the run is."""
     return models.RunInfo(**asdict(snapshot.run_state))
+
+
+def _pinned_of(snapshot: Snapshot) -> models.PinnedInfo | None:
+    pinned = snapshot.scores.pinned
+    if pinned is None:
+        return None
+    values = pinned.parameters
+    return models.PinnedInfo(
+        key=pinned.key,
+        parameters={key: table.value(values, key) for key in (*table.METHODS, *table.PARAMETERS)},
+        changed=list(table.changed(values, snapshot.defaults)),
+        differs=list(table.changed(values, snapshot.parameters)),
+    )
 
 
 def schema() -> models.Schema:

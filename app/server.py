@@ -20,6 +20,8 @@ from starlette.types import Scope
 
 from app import api, errors, gateway, stream
 from app.errors import sentence
+from app.evaluation import routes as evaluation
+from app.evaluation.worker import Evaluator
 from app.gateway import Gateway
 from app.jobs import Jobs
 from app.paths import static_folder
@@ -73,6 +75,7 @@ def create_app(settings: Settings) -> FastAPI:
     )
     errors.install(app)
     app.include_router(api.router)
+    app.include_router(evaluation.router)
     app.include_router(stream.router)
     app.include_router(gateway.router)
     files = _PageFiles(directory=static_folder())
@@ -103,6 +106,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     jobs = app.state.jobs = Jobs(workbench, data=settings.data, seed=settings.seed)
     pictures = app.state.pictures = Pictures(workbench)
     app.state.timelines = Timelines()
+    evaluator = app.state.evaluator = Evaluator(workbench)
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
     told.start()
@@ -120,7 +124,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
             await asyncio.gather(starting, return_exceptions=True)
         told.stop()
         pictures.close()
-        await asyncio.gather(asyncio.to_thread(jobs.close), asyncio.to_thread(room.close))
+        await asyncio.gather(*(asyncio.to_thread(part.close) for part in (jobs, evaluator, room)))
 
 
 def _say_failure(name: str) -> Callable[..., None]:

@@ -44,6 +44,7 @@ class _Page:
         self.wake.set()
         self.told_step: tuple[Any, ...] = ()
         self.told_timeline: tuple[str, str, int] = ("", "", 0)
+        self.told_evaluation: tuple[str, int] | None = None
         self.due: set[str] = set()
         """Kinds of message that are held back for a moment."""
         self.told_at = dict.fromkeys(SECONDS_BETWEEN, 0.0)
@@ -161,9 +162,10 @@ class Stream:
                 origin = snapshot.playhead_origin
                 told = {"type": "playhead", "step": snapshot.playhead, "origin": origin}
                 await socket.send_text(json.dumps(told))
-            if news - {"playhead", "progress"}:
+            if news - {"playhead", "progress", "evaluation"}:
                 await socket.send_text(self._state_text(snapshot))
             await self._tell_step(socket, page, snapshot)
+            await self._tell_evaluation(socket, page, snapshot)
             await self._tell_progress(socket, page, news, snapshot)
 
     async def _tell_step(self, socket: WebSocket, page: _Page, snapshot: Snapshot) -> None:
@@ -184,6 +186,19 @@ class Stream:
                     self._steps.popitem(last=False)
         page.told_step = key
         await socket.send_text(text)
+
+    async def _tell_evaluation(self, socket: WebSocket, page: _Page, snapshot: Snapshot) -> None:
+        scored = snapshot.scores.shown
+        key = (scored.key, scored.steps) if scored is not None else None
+        if scored is not None and key != page.told_evaluation:
+            told = {
+                "type": "evaluation",
+                "run": scored.key,
+                "steps": scored.steps,
+                "partial": not scored.complete,
+            }
+            await socket.send_text(json.dumps(told))
+        page.told_evaluation = key
 
     async def _tell_progress(
         self, socket: WebSocket, page: _Page, news: set[Change], snapshot: Snapshot

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Literal
 
+from app.evaluation.scores import Scored, Scores
 from tracker import parameters as table
 from tracker.parameters import ParameterError, RunParameters
 from tracker.pipeline import Progress, Run
@@ -23,8 +24,9 @@ from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
 Change = Literal[
-    "sequence", "opening", "parameters", "playhead", "selection", "run", "progress", "layers"
-]
+    "sequence", "opening", "parameters", "playhead", "selection", "layers",
+    "run", "progress", "evaluation", "pinned",
+]  # fmt: skip
 """What is another now: ``run`` is a run's beginning and its end, ``progress`` its new steps."""
 
 RunPhase = Literal["idle", "computing", "done", "failed", "cancelled"]
@@ -111,6 +113,8 @@ class Snapshot:
     run: Run | None = None
     """What is shown; steps below its ``done`` are there."""
     run_state: RunState = RunState()
+    scores: Scores = field(default_factory=Scores)
+    """Runs against the truth, where there is one."""
     layers: Mapping[str, bool] = field(
         default_factory=lambda: MappingProxyType(dict.fromkeys(LAYERS, True))
     )
@@ -242,6 +246,20 @@ class Workbench:
             if layers != now.layers:
                 self._put("layers", layers=MappingProxyType(layers))
 
+    def pin(self) -> bool:
+        """Pin the shown run, to set others against it; whether it was a finished one."""
+        with self._edit() as now:
+            if now.run is None or not now.run.complete:
+                return False
+            self._put("pinned", scores=now.scores.pin(Scored.of(now.run)))
+            return True
+
+    def unpin(self) -> None:
+        """Nothing is pinned any more."""
+        with self._edit() as now:
+            if now.scores.pinned is not None:
+                self._put("pinned", scores=replace(now.scores, pinned=None))
+
     def view(self, camera: int | None) -> None:
         """Ask the 3D view to look through a camera; None is the free view."""
         self._tell(ViewRequest(camera))
@@ -290,6 +308,7 @@ class Workbench:
                 selection=None,
                 run=None,
                 run_state=RunState(total=sequence.frames),
+                scores=Scores(),
             )
             return before
 
@@ -328,6 +347,17 @@ class Workbench:
                 self._last_good = run
             state = replace(now.run_state, state=phase, seconds_left=None, message="", error=error)
             self._put("run", run=run, run_state=state)
+
+    def scored(self, scored: Scored) -> None:
+        """A run was scored against the truth."""
+        with self._edit() as now:
+            if scored.sequence is not now.sequence:
+                return
+            pinned = now.scores.pinned
+            if now.run is not None and scored.key == now.run.key:
+                self._put("evaluation", scores=now.scores.add(scored))
+            elif pinned is not None and scored.key == pinned.key:
+                self._put("evaluation", scores=now.scores.pin(scored))
 
     @contextmanager
     def _edit(self) -> Iterator[Snapshot]:

@@ -10,9 +10,13 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from app import cli
 from app.server import Settings, create_app
 from tests.app.folders import write_crossing
 from tests.synthetic import write_sequence
+
+Runs = Callable[..., tuple[int, str, str]]
+"""Runs a command: status, standard output, standard error."""
 
 ADDRESS = "http://127.0.0.1:8000"
 
@@ -28,6 +32,17 @@ def wait_until(holds: Callable[[], bool], seconds: float = 30.0) -> None:
 def run_is(client: TestClient, phase: str) -> Callable[[], bool]:
     """Whether the run of an application is in a phase."""
     return lambda: client.get("/api/state").json()["run"]["state"] == phase
+
+
+def is_evaluated(client: TestClient) -> Callable[[], bool]:
+    """Whether the run that the parameters ask for is there, and scored to its end."""
+
+    def holds() -> bool:
+        answer = client.get("/api/evaluation").json()
+        key = client.get("/api/state").json()["run"]["key"]
+        return "error" not in answer and answer["run"] == key and not answer["partial"]
+
+    return holds
 
 
 def connect(client: TestClient, path: str = "/api/stream", **headers: str) -> Any:
@@ -56,4 +71,20 @@ def client(data: Path) -> Iterator[TestClient]:
     app = create_app(Settings(sequence="crossing", data=data, with_viser=False))
     with TestClient(app, base_url=ADDRESS) as client:
         wait_until(run_is(client, "done"))
+        wait_until(is_evaluated(client))
         yield client
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Runs:
+    """Run a command in this process: status, standard output, standard error."""
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        try:
+            status = cli.main([str(argument) for argument in arguments])
+        except SystemExit as stop:
+            status = int(stop.code or 0)
+        captured = capsys.readouterr()
+        return status, captured.out, captured.err
+
+    return run

@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ import pytest
 
 from app import cli
 from app.flags import Track, parse
+from tests.app.conftest import Runs
 from tests.app.folders import write_crossing
 from tracker import export, parameters, pipeline
 from tracker.parameters import PARAMETERS, ParameterError
@@ -21,24 +21,6 @@ from tracker.pipeline import Run
 from tracker.sequences.reader import read_sequence
 
 P_D = "fusion.detection_probability"
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
-    """Run a command in this process: status, standard output, standard error."""
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        try:
-            status = cli.main([str(argument) for argument in arguments])
-        except SystemExit as stop:
-            status = int(stop.code or 0)
-        captured = capsys.readouterr()
-        return status, captured.out, captured.err
-
-    return run
-
-
-Runs = Callable[..., tuple[int, str, str]]
 
 
 def engine_csv(crossing: Path, path: Path, changes: dict[str, Any], seed: int = 0) -> str:

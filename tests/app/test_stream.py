@@ -32,7 +32,7 @@ def test_a_page_is_told_everything_when_it_comes(client: TestClient) -> None:
     with connect(client) as socket:
         messages = read_until(socket, is_type("timeline"))
     told = {message["type"]: message for message in messages}
-    assert set(told) == {"playhead", "state", "step", "timeline"}
+    assert set(told) == {"playhead", "state", "step", "evaluation", "timeline"}
     assert told["playhead"]["step"] == 40
     assert told["state"]["state"] == client.get("/api/state").json()
     step = {k: v for k, v in told["step"].items() if k != "type"}

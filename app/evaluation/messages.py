@@ -1,0 +1,172 @@
+"""Scored runs as the messages of :mod:`app.evaluation.models`."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from numpy import ndarray
+
+from app.evaluation import models
+from app.evaluation.scores import Reference, Scored
+from app.models import Model
+from tracker import parameters as table
+from tracker import pipeline
+from tracker.evaluation import Evaluation, compare
+from tracker.evaluation.figures import SOURCES
+
+DECIMALS = 4
+"""Of the series: a tenth of a millimetre."""
+
+
+def evaluation_of(scored: Scored, evaluation: Evaluation) -> models.EvaluationInfo:
+    """The figures, and the rows by person, track and camera."""
+    pairs = evaluation.pairs
+    switched = pairs.tracks[pairs.switch]
+    return models.EvaluationInfo(
+        run=scored.key,
+        steps=scored.steps,
+        partial=not scored.complete,
+        settings=evaluation.settings.model_dump(),
+        figures=[
+            models.FigureInfo(
+                name=figure.definition.key,
+                label=figure.definition.name,
+                group=figure.definition.group,
+                value=figure.value,
+                unit=figure.unit,
+                digits=figure.definition.digits,
+                direction=figure.definition.direction,
+                help=figure.definition.help,
+                settings=figure.stated,
+                source=SOURCES.get(figure.definition.source, ""),
+                headline=figure.definition.headline,
+            )
+            for figure in evaluation.figures
+        ],
+        per_person=[
+            models.PersonInfo(mean_error=row.error, **_shared(row, models.PersonInfo))
+            for row in evaluation.people
+        ],
+        per_track=[
+            models.ScoredTrackInfo(
+                mean_error=row.error,
+                switches=int((switched == row.id).sum()),
+                **_shared(row, models.ScoredTrackInfo),
+            )
+            for row in evaluation.tracks
+        ],
+        cameras=[
+            models.CameraScoreInfo(**_shared(row, models.CameraScoreInfo))
+            for row in evaluation.cameras
+        ],
+        notes=list(evaluation.notes),
+    )
+
+
+def _shared(row: Any, model: type[Model]) -> dict[str, Any]:
+    return {name: getattr(row, name) for name in model.model_fields if hasattr(row, name)}
+
+
+def series_of(
+    scored: Scored, evaluation: Evaluation, of: Literal["shown", "pinned", "previous"]
+) -> models.EvaluationSeries:
+    """Everything over time."""
+    settings, series = evaluation.settings, evaluation.series
+    names = set(type(series).__slots__) & set(models.EvaluationSeries.model_fields)
+    pairs = evaluation.pairs
+    return models.EvaluationSeries(
+        run=scored.key,
+        of=of,
+        steps=scored.steps,
+        partial=not scored.complete,
+        unit=settings.unit,
+        cost=settings.stated(("cutoff", "order")),
+        gate=settings.stated(("distance", "gate")),
+        errors=[
+            models.PersonError(person=person, **_trimmed(values))
+            for person, values in evaluation.errors.items()
+        ],
+        track_errors=[
+            models.TrackError(track=track, **_trimmed(_of_track(evaluation, track)))
+            for track in np.unique(pairs.tracks).tolist()
+        ],
+        switches=_switches(evaluation),
+        **{name: getattr(series, name).round(DECIMALS).tolist() for name in names},
+    )
+
+
+def _of_track(evaluation: Evaluation, track: int) -> ndarray:
+    pairs = evaluation.pairs
+    values = np.full(evaluation.steps, np.nan)
+    rows = pairs.tracks == track
+    values[pairs.steps[rows]] = pairs.distances[rows]
+    return values
+
+
+def _trimmed(values: ndarray) -> dict[str, Any]:
+    """From the first to the last value that there is."""
+    there = np.flatnonzero(np.isfinite(values))
+    first, last = (int(there[0]), int(there[-1])) if len(there) else (0, -1)
+    shown = values[first : last + 1].round(DECIMALS).tolist()
+    return {"first": first, "values": [v if v == v else None for v in shown]}
+
+
+def _switches(evaluation: Evaluation) -> list[models.Switch]:
+    pairs = evaluation.pairs
+    switches = []
+    for i in np.flatnonzero(pairs.switch).tolist():
+        earlier = np.flatnonzero(pairs.people[:i] == pairs.people[i])
+        switches.append(
+            models.Switch(
+                step=int(pairs.steps[i]),
+                person=int(pairs.people[i]),
+                before=int(pairs.tracks[earlier[-1]]),
+                track=int(pairs.tracks[i]),
+            )
+        )
+    return switches
+
+
+def comparison_of(
+    against: Reference, a: tuple[Scored, Evaluation], b: tuple[Scored, Evaluation]
+) -> models.Comparison:
+    """Every figure of B against A, and the parameters in which they differ."""
+    before, after = a[0].parameters, b[0].parameters
+    return models.Comparison(
+        against=against,
+        steps=b[1].steps,
+        a=_side(a[0]),
+        b=_side(b[0]),
+        parameters=[
+            models.ParameterDifference(key=key, a=table.value(before, key), b=value)
+            for key, value in table.changed(after, before).items()
+        ],
+        rows=[
+            models.DifferenceInfo(
+                name=row.key,
+                label=row.name,
+                settings=row.stated,
+                **{
+                    name: getattr(row, name)
+                    for name in models.DifferenceInfo.model_fields
+                    if name not in ("name", "label", "settings")
+                },
+            )
+            for row in compare(a[1], b[1])
+        ],
+    )
+
+
+def _side(scored: Scored) -> models.ComparedRun:
+    return models.ComparedRun(
+        run=scored.key,
+        steps=scored.steps,
+        partial=not scored.complete,
+        changed=changed(scored),
+    )
+
+
+def changed(scored: Scored) -> dict[str, Any]:
+    """The values of a run that are not the defaults of its sequence."""
+    return table.changed(scored.parameters, pipeline.default_parameters(scored.sequence))

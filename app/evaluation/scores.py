@@ -1,0 +1,89 @@
+"""The runs that have been scored: the shown one, the one before it, the pinned one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from tracker.evaluation import Evaluation
+from tracker.parameters import RunParameters
+from tracker.pipeline import Run
+from tracker.sequences.sequence import Sequence
+from tracker.trajectories import Trajectories
+
+Reference = Literal["pinned", "previous"]
+"""What the shown run is set against: the pinned one, else the finished one before it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scored:
+    """A run's tracks and their figures; without what the cameras found, which is large."""
+
+    key: str
+    sequence: Sequence
+    parameters: RunParameters
+    seed: int
+    tracks: Trajectories
+    steps: int
+    """Steps 0 … ``steps`` − 1 are there."""
+    evaluation: Evaluation | None = None
+    """None until it is made, and where there is no truth."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether every step is there."""
+        return self.steps == self.sequence.frames
+
+    @staticmethod
+    def of(run: Run) -> Scored:
+        """A run as far as it is computed, not scored yet."""
+        steps = run.done  # first: the tracks may grow meanwhile
+        return Scored(run.key, run.sequence, run.parameters, run.seed, run.tracks, steps)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scores:
+    """All of them. A value: what is new makes another."""
+
+    shown: Scored | None = None
+    """The newest that was scored; while a run computes, this may be the one before."""
+    finished: Scored | None = None
+    """The last complete one."""
+    previous: Scored | None = None
+    """The complete one before that, with other parameters."""
+    pinned: Scored | None = None
+
+    def add(self, scored: Scored) -> Scores:
+        """With one that has just been scored."""
+        new = self
+        if self.pinned is not None and self.pinned.key == scored.key and scored.complete:
+            new = replace(new, pinned=scored)
+        if scored.complete:
+            before = self.finished
+            if before is not None and before.key != scored.key:
+                new = replace(new, previous=before)
+            new = replace(new, finished=scored)
+        return replace(new, shown=scored)
+
+    def pin(self, scored: Scored) -> Scores:
+        """With one pinned; figures that it has already are taken along."""
+        if scored.evaluation is None:
+            for known in (self.previous, self.finished):
+                if known is not None and known.key == scored.key:
+                    scored = known
+        return replace(self, pinned=scored)
+
+    @property
+    def reference(self) -> tuple[Reference, Scored] | None:
+        """What the shown run is set against, if there is anything."""
+        if self.pinned is not None:
+            return "pinned", self.pinned
+        return ("previous", self.before) if self.before is not None else None
+
+    @property
+    def before(self) -> Scored | None:
+        """The last complete run with other parameters than the shown one's."""
+        shown, finished = self.shown, self.finished
+        if shown is not None and finished is not None and shown.key == finished.key:
+            return self.previous
+        return finished
