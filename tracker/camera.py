@@ -81,7 +81,7 @@ class Camera:
         return not np.any(self.distortion)
 
     @cached_property
-    def _largest_radius(self) -> float:
+    def largest_radius(self) -> float:
         """The normalised radius up to which the lens model is one-to-one.
 
         Beyond the first extremum of r (1 + k1 r² + k2 r⁴ + k3 r⁶) the polynomial
@@ -93,7 +93,7 @@ class Camera:
         return float(np.sqrt(real.min())) if len(real) else np.inf
 
     @cached_property
-    def _numbers(self) -> tuple[ndarray, ndarray, ndarray, ndarray]:
+    def numbers(self) -> tuple[ndarray, ndarray, ndarray, ndarray]:
         """R, t, K and the lens in the form that the compiled kernels know."""
         parts = (self.rotation, self.translation, self.intrinsics, self.distortion)
         rotation, translation, intrinsics, distortion = (
@@ -127,9 +127,9 @@ class Camera:
     ) -> tuple[Float[ndarray, "N 2"], Float[ndarray, "N 2 3"], Bool[ndarray, " N"]]:
         pixels, jacobians, valid = lens.project_points(
             np.ascontiguousarray(points, dtype=float),
-            *self._numbers,
+            *self.numbers,
             NEAREST_DEPTH,
-            self._largest_radius,
+            self.largest_radius,
             with_jacobian,
         )
         return pixels, jacobians, valid
@@ -144,7 +144,7 @@ class Camera:
             self.intrinsics[:2, :2], (np.asarray(pixels, float) - self.intrinsics[:2, 2]).T
         ).T
         if not self.is_pinhole:
-            drawn = lens.undistort(np.ascontiguousarray(drawn), self._numbers[3], _LENS_ITERATIONS)
+            drawn = lens.undistort(np.ascontiguousarray(drawn), self.numbers[3], _LENS_ITERATIONS)
         u, v = drawn.T
         directions = np.stack([u, v, np.ones_like(u)], axis=1) @ self.rotation
         return np.asarray(directions / np.linalg.norm(directions, axis=1, keepdims=True))

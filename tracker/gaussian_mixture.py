@@ -114,7 +114,9 @@ def prune(mixture: GaussianMixture, threshold: float) -> Int[ndarray, " K"]:
     return np.flatnonzero(mixture.weights >= threshold)
 
 
-def merge(mixture: GaussianMixture, threshold: float) -> tuple[GaussianMixture, Int[ndarray, " K"]]:
+def merge(
+    mixture: GaussianMixture, threshold: float, owners: Int[ndarray, " J"] | None = None
+) -> tuple[GaussianMixture, Int[ndarray, " K"]]:
     """Merge components that lie close to a heavier one, keeping the first two moments.
 
     Starting from the heaviest component l, every component i with
@@ -128,6 +130,8 @@ def merge(mixture: GaussianMixture, threshold: float) -> tuple[GaussianMixture, 
     Args:
         mixture: J components. An empty mixture is returned as it is.
         threshold: Squared Mahalanobis distance U >= 0, without unit.
+        owners: A component that has one (0 or more) is absorbed by components of the
+            same owner only; without any, everybody may absorb everybody.
 
     Returns:
         At most J components, the heaviest leader first, and for each the index
@@ -144,7 +148,9 @@ def merge(mixture: GaussianMixture, threshold: float) -> tuple[GaussianMixture, 
         return mixture, np.zeros(0, dtype=np.int64)
     precisions = np.linalg.inv(mixture.covariances)
     order = np.argsort(-mixture.weights, kind="stable")
-    group, leaders = kernels.merge_groups(mixture.means, precisions, order, threshold)
+    if owners is None:
+        owners = np.full(mixture.size, -1, dtype=np.int64)
+    group, leaders = kernels.merge_groups(mixture.means, precisions, order, owners, threshold)
     weights, means, covariances = kernels.merge_moments(
         mixture.weights, mixture.means, mixture.covariances, group, len(leaders)
     )
@@ -157,6 +163,7 @@ def reduce(
     pruning_threshold: float,
     merging_threshold: float,
     max_components: int,
+    owners: Int[ndarray, " J"] | None = None,
 ) -> tuple[GaussianMixture, Int[ndarray, " K"]]:
     """Prune, merge and cap: the step that keeps the recursion bounded (Table II of [VM06]_).
 
@@ -165,12 +172,15 @@ def reduce(
         pruning_threshold: T, the least weight a component must have.
         merging_threshold: U, the squared Mahalanobis distance of :func:`merge`.
         max_components: J_max; the heaviest are kept.
+        owners: Who may absorb whom, as in :func:`merge`.
 
     Returns:
         The reduced mixture, heaviest first, and the index into ``mixture`` of
         the component that led each.
     """
     kept = prune(mixture, pruning_threshold)
-    merged, leaders = merge(mixture.take(kept), merging_threshold)
+    merged, leaders = merge(
+        mixture.take(kept), merging_threshold, None if owners is None else owners[kept]
+    )
     heaviest = np.argsort(-merged.weights, kind="stable")[:max_components]
     return merged.take(heaviest), kept[leaders[heaviest]]

@@ -23,7 +23,7 @@ def _kernel(function: _F) -> _F:
 
 @_kernel
 def merge_groups(
-    means: ndarray, precisions: ndarray, order: ndarray, threshold: float
+    means: ndarray, precisions: ndarray, order: ndarray, owners: ndarray, threshold: float
 ) -> tuple[ndarray, ndarray]:
     """Group components around the heaviest ones left.
 
@@ -31,6 +31,7 @@ def merge_groups(
         means: (J, d).
         precisions: (J, d, d), the inverse covariances.
         order: (J,) indices, heaviest first.
+        owners: (J,); a component with an owner (0 or more) joins its owner's only.
         threshold: Squared Mahalanobis distance.
 
     Returns:
@@ -47,7 +48,7 @@ def merge_groups(
         group[leader] = count
         for later in range(rank + 1, size):
             i = order[later]
-            if group[i] >= 0:
+            if group[i] >= 0 or (owners[i] >= 0 and owners[i] != owners[leader]):
                 continue
             distance = 0.0
             for a in range(dimension):
@@ -104,6 +105,7 @@ def kalman_pairs(
     jacobians: ndarray,
     measurements: ndarray,
     noises: ndarray,
+    spreads: ndarray,
     gate: float,
 ) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
     """The Kalman update of every component by every measurement inside its gate.
@@ -115,6 +117,7 @@ def kalman_pairs(
         jacobians: (J, m, d), its derivative H.
         measurements: (M, m).
         noises: (1, m, m) for all, or (M, m, m).
+        spreads: (J, m, m), what a component adds to the noise, or (0, m, m) for nothing.
         gate: Squared Mahalanobis distance of the innovation; infinity for none.
 
     Returns:
@@ -128,6 +131,7 @@ def kalman_pairs(
     size, dimension = means.shape
     count, order = measurements.shape
     shared = noises.shape[0] == 1
+    spread = spreads.shape[0] > 0
     ph = np.empty((size, dimension, order))
     lower = np.empty((size, order, order))
     constants = np.empty(size)
@@ -143,11 +147,16 @@ def kalman_pairs(
 
     factor = np.empty((dimension, dimension))
     half = np.empty((dimension, dimension))
+    noise = np.empty((order, order))
     solved = np.empty(order)
     pairs = 0
     for z in range(count):
-        noise = noises[0] if shared else noises[z]
         for j in range(size):
+            for p in range(order):
+                for q in range(order):
+                    noise[p, q] = noises[0 if shared else z, p, q]
+                    if spread:
+                        noise[p, q] += spreads[j, p, q]
             if z == 0:
                 for a in range(dimension):
                     for p in range(order):

@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
 Stage = Literal["single_view", "fusion", "tracks"]
-SingleViewName = Literal["colour_phd", "none"]
+SingleViewName = Literal["colour_phd", "detection_phd", "none"]
 FusionName = Literal["sequential_phd", "multi_bernoulli"]
 
 
@@ -195,15 +195,72 @@ class DetectionBoxParams(Params):
     score_threshold: Annotated[float, Field(ge=0.0, le=1.0), ui("s_min", step=0.01)] = 0.0
     """Boxes with a lower score are left out."""
 
+    room_tolerance: Annotated[float, Field(ge=0.0, le=100.0), ui("d_r", unit="m", step=0.1)] = 1.0
+    """A box whose target would stand further outside the room's volume than this is clutter."""
+
     centre_sigma: Annotated[
-        float, Field(ge=0.01, le=3.0), ui("σ_x", unit="half sizes", step=0.01, log=True)
-    ] = 0.15
-    """Standard deviation of a box's centre, as a share of its half width and half height."""
+        float, Field(ge=0.005, le=3.0), ui("σ_x", unit="half heights", step=0.01, log=True)
+    ] = 0.05
+    """Standard deviation of a box's centre, across and down, as a share of its half height."""
 
     size_sigma: Annotated[
-        float, Field(ge=0.01, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
+        float, Field(ge=0.005, le=3.0), ui("σ_h", unit="half heights", step=0.01, log=True)
     ] = 0.1
-    """Standard deviation of a box's half width and half height, as a share of each."""
+    """Standard deviation of a box's half height, as a share of it: how far its edges tell depth."""
+
+    width_sigma: Annotated[
+        float, Field(ge=0.005, le=3.0), ui("σ_b", unit="half widths", step=0.01, log=True)
+    ] = 0.3
+    """Standard deviation of a box's half width, as a share of it: arms and turning change it."""
+
+    pixel_sigma: Annotated[float, Field(ge=0.0, le=50.0), ui("σ_px", unit="px", step=0.1)] = 1.5
+    """Noise of a box's centre and half sizes however small it is; it adds to the shares."""
+
+
+class DetectionPhdParams(DetectionBoxParams):
+    """Single-view GM-PHD filter on an outside detector's boxes."""
+
+    survival_probability: Annotated[float, Field(ge=0.5, le=1.0), ui("p_S", step=0.001)] = 0.99
+    """Probability that a person in the picture is still there a step later."""
+
+    detection_probability: Annotated[float, Field(ge=0.05, le=1.0), ui("p_D", step=0.01)] = 0.9
+    """Probability that a person in the picture gets a box."""
+
+    clutter_rate: Annotated[
+        float, Field(ge=0.001, le=50.0), ui("λ_c", unit="1/step", step=0.1, log=True)
+    ] = 1.0
+    """Expected number of boxes that are nobody, uniform over the picture and the sizes."""
+
+    score_clutter: Annotated[float, Field(ge=0.0, le=5.0), ui("b_s", step=0.1)] = 1.0
+    """How much likelier a box of low score is clutter: the rate times exp(2 b_s (½ − score))."""
+
+    birth_rate: Annotated[float, Field(ge=1e-3, le=50.0), ui("γ", unit="1/(box·s)", log=True)] = 1.0
+    """Expected number of people who appear in one second at a box that nobody explained."""
+
+    motion_sigma: Annotated[
+        float, Field(ge=0.05, le=50.0), ui("σ_w", unit="half heights/√s", step=0.1, log=True)
+    ] = 0.5
+    """How far a person strays in the picture in one second."""
+
+    growth_sigma: Annotated[
+        float, Field(ge=0.01, le=5.0), ui("σ_H", unit="half sizes/√s", step=0.01, log=True)
+    ] = 0.2
+    """How much a person's box grows or shrinks in one second."""
+
+    pruning_threshold: Annotated[float, Field(ge=1e-8, le=0.1), ui("T", log=True)] = 1e-4
+    """Components lighter than this are dropped."""
+
+    merging_threshold: Annotated[float, Field(ge=0.0, le=50.0), ui("U", step=0.5)] = 4.0
+    """Squared Mahalanobis distance within which a component joins a heavier one."""
+
+    max_components: Annotated[int, Field(ge=1, le=300), ui("J_max", step=1)] = 60
+    """The heaviest components that are kept."""
+
+    extraction_threshold: Annotated[float, Field(ge=0.01, le=0.99), ui("T_e", step=0.01)] = 0.5
+    """A component whose weight is above this is a 2D estimate."""
+
+    output: Annotated[Literal["boxes", "estimates"], ui("Y", published="estimates")] = "boxes"
+    """What goes to the fusion: the boxes that the filter believes in, or its estimates."""
 
 
 class FusionParams(Params):
@@ -229,6 +286,9 @@ class FusionParams(Params):
         Literal["centre", "box", "box_and_width"], ui("z", published="centre")
     ] = "centre"
     """What is used of a box: its centre; its horizontal centre, top and bottom; and its width."""
+
+    update: Annotated[Literal["extended", "unscented"], ui("h(x)")] = "extended"
+    """How the bend of the projection is met: a straight line at the mean, or unscented points."""
 
     motion: Annotated[
         Literal["random_walk", "constant_velocity"], ui("F", published="random_walk")
@@ -269,6 +329,9 @@ class FusionParams(Params):
     occlusion: Annotated[float, Field(ge=0.0, le=1.0), ui("ρ", step=0.05, published=0.0)] = 0.0
     """How surely a camera misses a person who is wholly covered by another."""
 
+    edge: Annotated[Literal["soft", "hard"], ui("∂I", published="hard")] = "soft"
+    """Whether p_D falls towards the picture's edge with a target's uncertainty, or ends there."""
+
     duplicate_distance: Annotated[float, Field(ge=0.0, le=2.0), ui("d_2", step=0.05)] = 0.5
     """Tracks nearer than this share of a target's width, without a box each, are one person."""
 
@@ -276,6 +339,14 @@ class FusionParams(Params):
         float, Field(ge=0.0, le=5.0), ui("m", unit="m", step=0.05, stage="tracks")
     ] = 0.1
     """How far outside the room's volume a person is still reported."""
+
+    followed_margin: Annotated[float, Field(ge=0.0, le=5.0), ui("m_f", unit="m", step=0.05)] = 0.5
+    """How much further out people are followed, unreported, so that they explain their boxes."""
+
+    memory: Annotated[
+        float, Field(ge=0.0, le=30.0), ui("t_m", unit="s", step=0.1, published=0.0)
+    ] = 3.0
+    """How long a person whom no camera sees may be gone and still come back under the same id."""
 
     measurement_sigma: Annotated[float, Field(ge=0.1, le=10.0), ui("σ_v", step=0.1, log=True)] = 1.0
     """Factor on the noise that the single-view stage states for its boxes."""
@@ -291,6 +362,11 @@ class FusionParams(Params):
 
     max_components: Annotated[int, Field(ge=5, le=500), ui("J_max", step=1)] = 60
     """The heaviest components that are kept."""
+
+    extraction: Annotated[
+        Literal["components", "boxes"], ui("W_z", stage="tracks", published="components")
+    ] = "components"
+    """What is reported: single components, or what each box made of all of them together."""
 
     extraction_threshold: Annotated[
         float, Field(ge=0.01, le=0.99), ui("T_e", step=0.01, stage="tracks")
@@ -309,6 +385,7 @@ class RunParameters(Params):
 
     colour_phd: ColourPhdParams = ColourPhdParams()
     detection_boxes: DetectionBoxParams = DetectionBoxParams()
+    detection_phd: DetectionPhdParams = DetectionPhdParams()
     fusion: FusionParams = FusionParams()
 
 

@@ -28,6 +28,8 @@ class PhdUpdate:
     """The predicted component that each posterior component comes from."""
     measurements: Int[ndarray, " K"]
     """The measurement that updated it, -1 where it was missed."""
+    log_odds: Float[ndarray, " P"]
+    """log(p_D w' q(z) / κ(z)) of each gated pair: this component against clutter."""
     measurement_weights: Float[ndarray, " M"]
     """W_z: the expected number of targets (0 … 1) that each measurement came from."""
 
@@ -39,6 +41,7 @@ def update(
     expected: Float[ndarray, "J m"],
     jacobians: Float[ndarray, "J m d"],
     noise: Float[ndarray, "N m m"],
+    spread: Float[ndarray, "J m m"] | None = None,
     detection_probability: float | Float[ndarray, " J"],
     clutter_intensity: float | Float[ndarray, " M"],
     gate: float = np.inf,
@@ -59,6 +62,7 @@ def update(
         expected: h(m_j) for each component; for a linear model H m_j.
         jacobians: H for each component.
         noise: R, one for all measurements (N = 1) or one each (N = M).
+        spread: What each component adds to the noise, where h bends; nothing, if none.
         detection_probability: p_D, one for all or one a component. Where it is
             0 the component is left as it is.
         clutter_intensity: κ(z) per unit of the measurement space.
@@ -74,7 +78,11 @@ def update(
     )
     if count == 0 or size == 0:
         return PhdUpdate(
-            missed, np.arange(size), np.full(size, -1, dtype=np.int64), np.zeros(count)
+            missed,
+            np.arange(size),
+            np.full(size, -1, dtype=np.int64),
+            np.zeros(0),
+            np.zeros(count),
         )
     detectable = np.flatnonzero(p_d * predicted.weights > 0.0)
     parent, measured, log_likelihood, means, covariances = kernels.kalman_pairs(
@@ -84,6 +92,7 @@ def update(
         np.asarray(jacobians, dtype=float)[detectable],
         np.ascontiguousarray(measurements, dtype=float),
         np.ascontiguousarray(noise, dtype=float),
+        np.zeros((0, *noise.shape[1:])) if spread is None else spread[detectable],
         gate,
     )
     parent = detectable[parent]
@@ -103,6 +112,7 @@ def update(
         posterior=concatenate([missed, detected]),
         parents=np.concatenate([np.arange(size), parent]),
         measurements=np.concatenate([np.full(size, -1, dtype=np.int64), measured]),
+        log_odds=log_terms - log_kappa[measured],
         measurement_weights=np.bincount(measured, weights, minlength=count),
     )
 

@@ -34,6 +34,7 @@ def update(
     expected: Float[ndarray, "n m"],
     jacobians: Float[ndarray, "n m d"],
     noise: Float[ndarray, "N m m"],
+    spread: Float[ndarray, "K m m"] | None = None,
     detection_probability: Float[ndarray, " n"],
     unexplained_intensity: Float[ndarray, " M"],
     gate: float,
@@ -53,6 +54,8 @@ def update(
         expected: h(m_i).
         jacobians: H_i.
         noise: R, one for all measurements (N = 1) or one each (N = M).
+        spread: What each track adds to the noise, where h bends (K = n); nothing, if none
+            (or K = 0).
         detection_probability: p_i of each track.
         unexplained_intensity: ρ_j = κ(z_j) + e_j, clutter and newborns at each measurement.
         gate: Squared Mahalanobis distance beyond which a pair is left out.
@@ -75,6 +78,7 @@ def update(
         np.ascontiguousarray(jacobians),
         np.ascontiguousarray(measurements),
         np.ascontiguousarray(noise),
+        np.zeros((0, *noise.shape[1:])) if spread is None else spread,
         gate,
     )
     pairs[track, measured] = existence[track] * p_d[track] * np.exp(log_likelihood)

@@ -32,7 +32,14 @@ def sequence_of(detections: Detections | None) -> Sequence:
 
 def test_boxes_scores_and_sigmas() -> None:
     detections = Detections(np.array([0, 0, 2]), BOXES, np.array([0.9, 0.3, 1.0]))
-    parameters = DetectionBoxParams(score_threshold=0.3, centre_sigma=0.2, size_sigma=0.1)
+    parameters = DetectionBoxParams(
+        score_threshold=0.3,
+        room_tolerance=100.0,
+        centre_sigma=0.2,
+        size_sigma=0.1,
+        width_sigma=0.2,
+        pixel_sigma=0.0,
+    )
     method = DetectionBoxes(sequence_of(detections), 0, parameters)
     assert not method.needs_pictures
     rng = np.random.default_rng(0)
@@ -41,7 +48,10 @@ def test_boxes_scores_and_sigmas() -> None:
     np.testing.assert_array_equal(results[0].boxes, [[25, 50, 15, 30], [104, 58, 4, 8]])
     np.testing.assert_array_equal([corner_box(box) for box in results[0].boxes], BOXES[:2])
     np.testing.assert_array_equal(results[0].weights, [0.9, 0.3])
-    np.testing.assert_allclose(results[0].sigmas[0], [3.0, 6.0, 1.5, 3.0])
+    np.testing.assert_allclose(results[0].sigmas[0], [6.0, 6.0, 3.0, 3.0])
+    floor = parameters.model_copy(update={"pixel_sigma": 8.0})
+    noisy = DetectionBoxes(sequence_of(detections), 0, floor).step(None, 0, None, rng)[1]
+    np.testing.assert_allclose(noisy.sigmas[0], np.hypot([6.0, 6.0, 3.0, 3.0], 8.0))
     strict = DetectionBoxes(sequence_of(detections), 0, DetectionBoxParams(score_threshold=0.5))
     assert len(strict.step(None, 0, None, rng)[1].boxes) == 1
 

@@ -320,5 +320,6 @@ def test_a_noise_that_is_no_covariance_is_refused() -> None:
             np.eye(2)[None],
             np.zeros((1, 2)),
             np.zeros((1, 2, 2)),
+            np.zeros((0, 2, 2)),
             np.inf,
         )

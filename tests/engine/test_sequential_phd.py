@@ -12,7 +12,6 @@ from tracker import trajectories
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.sequential_phd import SequentialPhd
 from tracker.fusion.target_model import TargetModel
-from tracker.fusion.visibility import covered_shares
 from tracker.parameters import PRESETS, FusionParams, RunParameters, with_values
 from tracker.sequences.sequence import Entrance, Room, Sequence
 from tracker.trajectories import Trajectories
@@ -332,8 +331,9 @@ def test_a_person_hides_another_once() -> None:
         occlusion=0.5, duplicate_distance=0.1, pruning_threshold=1e-8, misses="per_person"
     )
     model = TargetModel(whole.target_half_extents, "centre")
-    expected = [model.expected(front, place[None]) for place in (far, near)]
-    share = covered_shares(*expected)[0, 0]
+    behind, before = (model.expected(front, place[None]).boxes[0] for place in (far, near))
+    overlap = np.minimum(behind[2:], before[2:]) - np.maximum(behind[:2], before[:2])
+    share = overlap.clip(0.0).prod() / (behind[2:] - behind[:2]).prod()
     assert 0.5 < share < 0.9
     results = fuse(whole, parameters)
     tracks = tracked(whole, results)

@@ -15,14 +15,15 @@ from tracker.sequences.sequence import Room
 
 _REFINEMENTS = 3
 _START_SIGMA = 1.0  # metres: how loosely the meeting point of two rays binds the refinement
+_UNEXPLAINED = 0.5  # a box that somebody made with more than this probability starts nobody
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraEvidence:
     """What one camera leaves unexplained at one step. M boxes."""
 
-    rays: Float[ndarray, "M 3"]
-    """Unit directions through the boxes' centres, world axes."""
+    centres: Float[ndarray, "M 2"]
+    """Of the boxes, pixels."""
     values: Float[ndarray, "M m"]
     """Measurements of the target model, pixels."""
     noises: Float[ndarray, "M m m"]
@@ -33,14 +34,23 @@ class CameraEvidence:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Newborn:
-    """One newcomer: where, how sure, and which box of each camera says so."""
+class Newborns:
+    """N newcomers: where, how sure, and which box of each of C cameras says so."""
 
-    position: Float[ndarray, " 3"]
-    covariance: Float[ndarray, "3 3"]
-    existence: float
-    sources: Int[ndarray, " C"]
+    positions: Float[ndarray, "N 3"]
+    covariances: Float[ndarray, "N 3 3"]
+    existences: Float[ndarray, " N"]
+    sources: Int[ndarray, "C N"]
     """Index of the box in each camera, -1 for none."""
+
+    def take(self, indices: ndarray) -> Newborns:
+        """Some of them, in that order."""
+        return Newborns(
+            self.positions[indices],
+            self.covariances[indices],
+            self.existences[indices],
+            self.sources[:, indices],
+        )
 
 
 class MeasurementBirths:
@@ -70,6 +80,18 @@ class MeasurementBirths:
         margin: float,
         largest_gap: float,
     ) -> None:
+        """Prepare for one room.
+
+        Args:
+            cameras: Their evidence will come in this order.
+            room: Newcomers appear evenly in its volume.
+            model: Of a target's box.
+            birth_rate: λ_b, expected newcomers a step.
+            detection_probability: p_D of a target in the picture.
+            gate: Squared Mahalanobis distance of a box that belongs to a newcomer.
+            margin: Metres outside the volume within which newcomers are taken, too.
+            largest_gap: Metres by which the rays of two boxes of one target may miss each other.
+        """
         self._cameras = cameras
         self._room = room
         self._model = model
@@ -83,36 +105,34 @@ class MeasurementBirths:
         self._margin = margin
         self._largest_gap = largest_gap
 
-    def propose(self, evidence: list[CameraEvidence]) -> list[Newborn]:
-        """Newcomers that share no box, the surest first."""
+    def propose(self, evidence: list[CameraEvidence]) -> Newborns | None:
+        """Newcomers that share no box, the surest first; None for nobody."""
         seeds = self._meeting_points(evidence)
         if not len(seeds):
-            return []
-        proposals = [self._fit(seed, evidence) for seed in seeds]
-        found = sorted(
-            (p for p in proposals if p is not None), key=lambda p: p.existence, reverse=True
-        )
+            return None
+        found = self._fit(seeds, evidence)
         taken: set[tuple[int, int]] = set()
-        chosen: list[Newborn] = []
-        for newborn in found:
-            own = {(c, int(j)) for c, j in enumerate(newborn.sources) if j >= 0}
-            if own & taken:
-                continue
-            taken |= own
-            chosen.append(newborn)
-        return chosen
+        chosen: list[int] = []
+        for index in np.argsort(-found.existences, kind="stable").tolist():
+            boxes = enumerate(found.sources[:, index].tolist())
+            own = {(camera, box) for camera, box in boxes if box >= 0}
+            if not own & taken:
+                taken |= own
+                chosen.append(index)
+        return found.take(np.array(chosen)) if chosen else None
 
     def _meeting_points(self, evidence: list[CameraEvidence]) -> Float[ndarray, "N 3"]:
         """Where the rays of unexplained boxes of two cameras pass close by each other."""
-        points = []
-        for a in range(len(evidence)):
-            for b in range(a + 1, len(evidence)):
-                free_a = np.flatnonzero(evidence[a].unexplained > 0.5)
-                free_b = np.flatnonzero(evidence[b].unexplained > 0.5)
-                if not len(free_a) or not len(free_b):
+        rays = [
+            camera.back_project(one.centres[one.unexplained > _UNEXPLAINED])
+            for camera, one in zip(self._cameras, evidence, strict=True)
+        ]
+        points = [np.zeros((0, 3))]
+        for a in range(len(rays)):
+            for b in range(a + 1, len(rays)):
+                if not len(rays[a]) or not len(rays[b]):
                     continue
-                u = evidence[a].rays[free_a][:, None, :]
-                v = evidence[b].rays[free_b][None, :, :]
+                u, v = rays[a][:, None, :], rays[b][None, :, :]
                 base = self._cameras[b].centre - self._cameras[a].centre
                 uv = (u * v).sum(-1)
                 denominator = np.maximum(1.0 - uv**2, 1e-6)
@@ -124,61 +144,76 @@ class MeasurementBirths:
                 middle = (on_a + on_b) / 2.0
                 good = (gap < self._largest_gap) & (along_a > 0.1) & (along_b > 0.1)
                 points.append(middle[good])
-        if not points:
-            return np.zeros((0, 3))
         all_points = np.concatenate(points)
         return np.asarray(all_points[self._room.contains(all_points, self._margin)])
 
-    def _fit(self, seed: ndarray, evidence: list[CameraEvidence]) -> Newborn | None:
-        """The place that fits the seed's best box in every camera, and its odds."""
-        position = seed
-        precision = np.eye(3) / _START_SIGMA**2
-        covariance = np.eye(3) * _START_SIGMA**2
-        sources = np.full(len(evidence), -1, dtype=np.int64)
-        for refinement in range(_REFINEMENTS):
-            information = precision.copy()
-            pull = precision @ seed
-            fit = np.zeros(len(evidence))
+    def _fit(self, seeds: Float[ndarray, "N 3"], evidence: list[CameraEvidence]) -> Newborns:
+        """The places that fit best to the nearest box in every camera, and their odds.
+
+        A seed that ends outside the room or with fewer than two boxes is left out.
+        """
+        positions, covariances = seeds, np.tile(np.eye(3) * _START_SIGMA**2, (len(seeds), 1, 1))
+        for _ in range(_REFINEMENTS):
+            information = np.tile(np.eye(3) / _START_SIGMA**2, (len(seeds), 1, 1))
+            pull = seeds / _START_SIGMA**2
+            sources = np.full((len(evidence), len(seeds)), -1, dtype=np.int64)
             for c, camera in enumerate(self._cameras):
-                expected = self._model.expected(camera, position[None])
-                if not expected.valid[0] or not len(evidence[c].values):
-                    sources[c] = -1
+                if not len(evidence[c].values):
                     continue
-                jacobian = expected.jacobians[0]
-                residuals = evidence[c].values - expected.values[0]
-                if refinement < _REFINEMENTS - 1 or sources[c] >= 0:
-                    spread = evidence[c].noises + (jacobian @ covariance @ jacobian.T)
-                    distances = np.einsum(
-                        "mi,mi->m", residuals, np.linalg.solve(spread, residuals[..., None])[..., 0]
-                    )
-                    distances[evidence[c].unexplained <= 0.5] = np.inf
-                    best = int(np.argmin(distances))
-                    sources[c] = best if distances[best] <= self._gate else -1
-                if sources[c] < 0:
-                    continue
-                weight = jacobian.T @ np.linalg.inv(evidence[c].noises[sources[c]])
-                information += weight @ jacobian
-                pull += weight @ (residuals[sources[c]] + jacobian @ position)
-                fit[c] = 1.0
-            if np.count_nonzero(sources >= 0) < 2:
-                return None
-            covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
-            position = covariance @ pull
-        if not self._room.contains(position[None], self._margin)[0]:
-            return None
+                expected = self._model.expected(camera, positions)
+                slopes = expected.jacobians
+                residuals = evidence[c].values[None] - expected.values[:, None]
+                own = self._nearest(residuals, slopes, covariances, evidence[c])
+                sources[c] = own = np.where(expected.valid, own, -1)
+                weights = slopes.transpose(0, 2, 1) @ np.linalg.inv(evidence[c].noises[own])
+                weights[own < 0] = 0.0
+                residual = residuals[np.arange(len(seeds)), own]
+                information += weights @ slopes
+                pull = pull + _apply(weights, residual + _apply(slopes, positions))
+            covariances = np.asarray(np.linalg.inv(information), dtype=np.float64)
+            positions = _apply(covariances, pull)
+        found = Newborns(positions, covariances, np.zeros(len(seeds)), sources)
+        inside = self._room.contains(positions, self._margin)
+        found = found.take(np.flatnonzero(inside & ((sources >= 0).sum(axis=0) >= 2)))
+        existences = expit(self._log_odds(found, evidence))
+        return Newborns(found.positions, found.covariances, existences, found.sources)
+
+    def _nearest(
+        self,
+        residuals: Float[ndarray, "N M m"],
+        slopes: Float[ndarray, "N m 3"],
+        covariances: Float[ndarray, "N 3 3"],
+        evidence: CameraEvidence,
+    ) -> Int[ndarray, " N"]:
+        """The unexplained box that lies nearest, -1 where none is inside the gate."""
+        own_spread = slopes @ covariances @ slopes.transpose(0, 2, 1)
+        spread = evidence.noises[None] + own_spread[:, None]
+        solved = np.linalg.solve(spread, residuals[..., None])[..., 0]
+        distances = (residuals * solved).sum(axis=2)
+        distances[:, evidence.unexplained <= _UNEXPLAINED] = np.inf
+        best = distances.argmin(axis=1)
+        close = distances[np.arange(len(best)), best] <= self._gate
+        return np.asarray(np.where(close, best, -1))
+
+    def _log_odds(self, found: Newborns, evidence: list[CameraEvidence]) -> Float[ndarray, " N"]:
+        """log Λ of each newcomer."""
         log_odds = self._log_density + 1.5 * np.log(2.0 * np.pi)
-        log_odds += 0.5 * np.linalg.slogdet(covariance)[1]
+        log_odds = log_odds + 0.5 * np.linalg.slogdet(found.covariances)[1]
         for c, camera in enumerate(self._cameras):
-            expected = self._model.expected(camera, position[None])
-            seen = bool(camera.sees(position[None])[0])
-            if sources[c] < 0:
-                log_odds += self._log_miss if seen else 0.0
+            hit = found.sources[c] >= 0
+            missed = ~hit & camera.sees(found.positions)
+            log_odds[missed] += self._log_miss
+            if not hit.any():
                 continue
-            residual = evidence[c].values[sources[c]] - expected.values[0]
-            noise = evidence[c].noises[sources[c]]
-            log_odds += self._log_hit - np.log(evidence[c].clutter_intensity)
-            log_odds -= 0.5 * (
-                residual @ np.linalg.solve(noise, residual)
-                + np.linalg.slogdet(2.0 * np.pi * noise)[1]
-            )
-        return Newborn(position, covariance, float(expit(log_odds)), sources)
+            own, expected = found.sources[c][hit], self._model.expected(camera, found.positions)
+            residual = evidence[c].values[own] - expected.values[hit]
+            noise = evidence[c].noises[own]
+            distance = (residual * np.linalg.solve(noise, residual[..., None])[..., 0]).sum(axis=1)
+            log_odds[hit] += self._log_hit - np.log(evidence[c].clutter_intensity)
+            log_odds[hit] -= 0.5 * (distance + np.linalg.slogdet(2.0 * np.pi * noise)[1])
+        return np.asarray(log_odds)
+
+
+def _apply(matrices: Float[ndarray, "N a b"], vectors: Float[ndarray, "N b"]) -> ndarray:
+    """Each matrix times its vector."""
+    return np.asarray((matrices @ vectors[..., None])[..., 0])

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.stats import chi2
 
 from tracker import models
 from tracker.fusion import visibility
-from tracker.fusion.measurement_births import MeasurementBirths
+from tracker.fusion.measurement_births import CameraEvidence, MeasurementBirths, Newborns
 from tracker.fusion.target_model import ExpectedBoxes, TargetModel
 from tracker.fusion.visibility import Visibility
 from tracker.gaussian_mixture import GaussianMixture
 from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
+from tracker.single_view.protocol import ViewResult
 
 CONFIRMED = 0.5
 """A component surer than this stands for a person: it may hide others."""
-
-_STRAYED = 0.5
-"""Metres beyond the room's margin at which a component is given up."""
 
 
 class FusionModel:
@@ -30,7 +28,8 @@ class FusionModel:
         p = self.parameters = parameters
         self.room = sequence.room
         self.cameras = sequence.cameras
-        self.target = TargetModel(sequence.target_half_extents, p.measurement)
+        self.step_time = sequence.step_time
+        self.target = TargetModel(sequence.target_half_extents, p.measurement, p.update)
         self.motion = models.Motion.of(p, sequence.step_time)
         self.births = self.motion.at_rest(
             models.entrance_births(sequence.room, p.birth_rate * sequence.step_time)
@@ -45,15 +44,30 @@ class FusionModel:
         """Squared Mahalanobis distance of the innovation."""
         self.near = p.duplicate_distance * 2.0 * float(np.mean(sequence.target_half_extents[:2]))
         """Metres within which two components may be one person."""
-        self.newborns = MeasurementBirths(
+        self._newborns = MeasurementBirths(
             self.cameras,
             sequence.room,
             self.target,
             birth_rate=p.birth_rate * sequence.step_time,
             detection_probability=p.detection_probability,
             gate=self.gate,
-            margin=p.room_margin,
+            margin=p.room_margin + p.followed_margin,
             largest_gap=2.0 * float(np.max(sequence.target_half_extents)),
+        )
+
+    def expected(self, index: int, mixture: GaussianMixture) -> ExpectedBoxes:
+        """The box that a camera should give of every component."""
+        return self.target.expected(self.cameras[index], mixture.means, mixture.covariances)
+
+    def chances(
+        self, index: int, expected: ExpectedBoxes, mixture: GaussianMixture
+    ) -> Float[ndarray, " J"]:
+        """p_D of every component in one camera where nobody hides anybody."""
+        return self.parameters.detection_probability * visibility.inside_probability(
+            self.cameras[index],
+            expected,
+            mixture.covariances,
+            soft=self.parameters.edge == "soft",
         )
 
     def visible(
@@ -63,7 +77,7 @@ class FusionModel:
         mixture: GaussianMixture,
         occluders: Float[ndarray, " J"],
     ) -> Visibility:
-        """p_D of every component in one camera.
+        """p_D of every component in one camera, and who hides it.
 
         Args:
             index: Of the camera.
@@ -71,23 +85,66 @@ class FusionModel:
             mixture: The components.
             occluders: Weight of each component where it may hide others, else 0.
         """
-        p, means = self.parameters, mixture.means[:, :3]
-        inside = visibility.inside_probability(self.cameras[index], expected, mixture.covariances)
         hiding = np.flatnonzero(occluders > CONFIRMED)
-        if p.occlusion == 0.0 or not len(hiding):
-            return visibility.unhidden(p.detection_probability * inside)
-        others = mixture.labels[:, None] != mixture.labels[None, hiding]
-        distances = np.linalg.norm(means[:, None] - means[None, hiding], axis=2)
-        return visibility.behind_others(
-            p.detection_probability * inside,
-            visibility.covered_shares(expected, expected.take(hiding)),
-            occluders[hiding],
-            others & (distances > self.near),
-            mixture.labels[hiding],
-            p.occlusion,
+        return visibility.visibility(
+            self.chances(index, expected, mixture),
+            expected,
+            mixture,
+            occluders=hiding,
+            weights=occluders[hiding],
+            strength=self.parameters.occlusion,
+            near=self.near,
         )
+
+    def evidence(
+        self,
+        index: int,
+        view: ViewResult,
+        values: Float[ndarray, "M m"],
+        noises: Float[ndarray, "M m m"],
+        unexplained: Float[ndarray, " M"],
+    ) -> CameraEvidence:
+        """What one camera leaves to newcomers."""
+        return CameraEvidence(view.boxes[:, :2], values, noises, unexplained, self.clutter[index])
+
+    def newborns(self, evidence: list[CameraEvidence]) -> tuple[GaussianMixture, Newborns] | None:
+        """Newcomers where unexplained boxes of several cameras agree: components without labels,
+        and what says so; None for nobody."""
+        found = self._newborns.propose(evidence)
+        if found is None:
+            return None
+        nameless = np.zeros(len(found.existences), dtype=np.int64)
+        born = GaussianMixture(found.existences, found.positions, found.covariances, nameless)
+        return self.motion.at_rest(born), found
 
     def stays(self, mixture: GaussianMixture) -> Int[ndarray, " K"]:
         """Indices of the components that have not strayed from the room."""
-        margin = self.parameters.room_margin + _STRAYED
+        margin = self.parameters.room_margin + self.parameters.followed_margin
         return np.flatnonzero(self.room.contains(mixture.means[:, :3], margin))
+
+    def doubles(
+        self,
+        means: Float[ndarray, "n d"],
+        weights: Float[ndarray, " n"],
+        labels: Int[ndarray, " n"],
+        sources: Int[ndarray, "C n"],
+    ) -> Bool[ndarray, " n"]:
+        """Which of n people only repeat a surer or older one at the same place.
+
+        Two nearer than the target is wide are one person, unless some camera gave
+        each a box of its own. Among sure ones the older label stays; an unsure one
+        never displaces a sure one.
+        """
+        if len(means) < 2:
+            return np.zeros(len(means), dtype=bool)
+        offsets = means[:, None, :3] - means[None, :, :3]
+        near = (offsets**2).sum(axis=2) < self.near**2
+        np.fill_diagonal(near, False)
+        if not near.any():
+            return np.zeros(len(means), dtype=bool)
+        both = (sources[:, :, None] >= 0) & (sources[:, None, :] >= 0)
+        parted = (both & (sources[:, :, None] != sources[:, None, :])).any(axis=0)
+        older = labels[:, None] > labels[None, :]
+        sure = weights > CONFIRMED
+        yields = np.where(sure[:, None] == sure[None, :], older, sure[None, :])
+        return np.asarray((near & ~parted & yields).any(axis=1))

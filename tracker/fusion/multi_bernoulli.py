@@ -15,11 +15,12 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker import gaussian_mixture, kernels, models, phd, pmb
-from tracker.fusion import visibility
+from tracker.fusion import memory
 from tracker.fusion.measurement_births import CameraEvidence
+from tracker.fusion.memory import Memory
 from tracker.fusion.model import CONFIRMED, FusionModel
 from tracker.fusion.protocol import FusionResult
-from tracker.fusion.record import Record
+from tracker.fusion.record import Ledger, Record
 from tracker.gaussian_mixture import GaussianMixture
 from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
@@ -28,11 +29,12 @@ from tracker.single_view.protocol import ViewResult
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MultiBernoulliState:
-    """Tracks, the intensity of people never yet detected, and the first free label."""
+    """Tracks, people never yet detected, the first free label, and who is lost from sight."""
 
     tracks: GaussianMixture
     undetected: GaussianMixture
     next_label: int
+    memory: Memory
 
 
 @dataclass(slots=True, eq=False)
@@ -46,6 +48,7 @@ class _Work:
     """Predicted existence of the tracks that are sure enough to hide others, else 0."""
     record: Record
     evidence: list[CameraEvidence]
+    ledger: Ledger
 
     def add(self, newborns: GaussianMixture) -> None:
         """Append new tracks, which hide nobody yet, with labels of their own."""
@@ -54,6 +57,11 @@ class _Work:
         self.tracks = gaussian_mixture.concatenate([self.tracks, labelled])
         self.occluders = np.concatenate([self.occluders, np.zeros(labelled.size)])
         self.record = self.record.extended(labelled.size)
+
+    def take(self, indices: ndarray) -> None:
+        """Keep some tracks, in that order."""
+        self.tracks, self.record = self.tracks.take(indices), self.record.take(indices)
+        self.occluders = self.occluders[indices]
 
 
 class MultiBernoulli:
@@ -71,8 +79,9 @@ class MultiBernoulli:
 
     def start(self) -> MultiBernoulliState:
         """Nobody is in the room."""
-        empty = GaussianMixture.empty(self._model.motion.dimension)
-        return MultiBernoulliState(empty, empty, next_label=1)
+        dimension = self._model.motion.dimension
+        empty = GaussianMixture.empty(dimension)
+        return MultiBernoulliState(empty, empty, 1, Memory.start(dimension))
 
     def step(
         self, state: MultiBernoulliState, views: Many[ViewResult]
@@ -88,21 +97,22 @@ class MultiBernoulli:
             undetected=undetected,
             next_label=state.next_label,
             occluders=np.where(tracks.weights > CONFIRMED, tracks.weights, 0.0),
-            record=Record.blank(len(self._model.cameras), tracks.size),
+            record=Record.blank(len(views), tracks.size),
             evidence=[],
+            ledger=Ledger(),
         )
         for index, view in enumerate(views):
             self._update(work, index, view)
         if p.birth != "entrances":
             self._add_newborns(work, state.next_label)
-        return self._finish(work)
+        return self._finish(work, state)
 
     def _update(self, work: _Work, index: int, view: ViewResult) -> None:
         """The update of all tracks, and of the undetected, by the boxes of one camera."""
-        camera, tracks = self._model.cameras[index], work.tracks
-        values, noises = self._model.target.measured(view, self._parameters.measurement_sigma)
-        expected = self._model.target.expected(camera, tracks.means)
-        seen = self._model.visible(index, expected, tracks, work.occluders)
+        model, tracks, record = self._model, work.tracks, work.record
+        values, noises = model.target.measured(view, self._parameters.measurement_sigma)
+        expected = model.expected(index, tracks)
+        seen = model.visible(index, expected, tracks, work.occluders)
         newcomer, newborns = self._undetected(work, index, values, noises)
         updated = pmb.update(
             tracks,
@@ -110,28 +120,24 @@ class MultiBernoulli:
             expected=expected.values,
             jacobians=expected.jacobians,
             noise=noises,
+            spread=expected.spreads,
             detection_probability=seen.detection_probabilities,
-            unexplained_intensity=self._model.clutter[index] / (1.0 - newcomer),  # κ + e
-            gate=self._model.gate,
+            unexplained_intensity=model.clutter[index] / (1.0 - newcomer),  # κ + e
+            gate=model.gate,
         )
-        marginals, record = updated.marginals, work.record
+        marginals = updated.marginals
         work.tracks = updated.tracks
         record.detection_probabilities[index] = seen.detection_probabilities
         record.hidden_by[index] = seen.hidden_by
         if len(values) and tracks.size:
             best = marginals.detected.argmax(axis=1)
             share = marginals.detected[np.arange(tracks.size), best]
-            record.sources[index] = np.where(share > marginals.missed, best, -1)
-            record.source_weights[index] = share
-        work.evidence.append(
-            CameraEvidence(
-                rays=camera.back_project(view.boxes[:, :2]),
-                values=values,
-                noises=noises,
-                unexplained=marginals.unexplained,
-                clutter_intensity=self._model.clutter[index],
-            )
-        )
+            found = share > marginals.missed
+            record.sources[index] = np.where(found, best, -1)
+            record.source_weights[index] = np.where(found, share, 0.0)
+            who, what = np.nonzero(marginals.detected)
+            work.ledger.add(index, tracks.labels[who], what, marginals.detected[who, what])
+        work.evidence.append(model.evidence(index, view, values, noises, marginals.unexplained))
         self._begin_tracks(work, index, newborns, marginals.unexplained * newcomer)
 
     def _undetected(
@@ -147,39 +153,35 @@ class MultiBernoulli:
             e_j / (κ + e_j) for each box: the share of the unexplained that is a
             newcomer; and where that newcomer would be, one Gaussian a box.
         """
-        intensity, camera = work.undetected, self._model.cameras[index]
-        count = len(values)
-        nobody = GaussianMixture(
-            np.zeros(count),
-            np.zeros((count, intensity.dimension)),
-            np.tile(np.eye(intensity.dimension), (count, 1, 1)),
-            np.zeros(count, dtype=np.int64),
-        )
+        intensity, model = work.undetected, self._model
+        count, dimension = len(values), intensity.dimension
+        nameless = np.zeros(count, dtype=np.int64)
+        means, covariances = np.zeros((count, dimension)), np.tile(np.eye(dimension), (count, 1, 1))
         if intensity.size == 0:
-            return np.zeros(count), nobody
-        expected = self._model.target.expected(camera, intensity.means)
+            return np.zeros(count), GaussianMixture(np.zeros(count), means, covariances, nameless)
+        expected = model.expected(index, intensity)
         updated = phd.update(
             intensity,
             values,
             expected=expected.values,
             jacobians=expected.jacobians,
             noise=noises,
-            detection_probability=self._parameters.detection_probability
-            * visibility.inside_probability(camera, expected, intensity.covariances),
-            clutter_intensity=self._model.clutter[index],
-            gate=self._model.gate,
+            spread=expected.spreads if len(expected.spreads) else None,
+            detection_probability=model.chances(index, expected, intensity),
+            clutter_intensity=model.clutter[index],
+            gate=model.gate,
         )
+        pairs = slice(intensity.size, None)
         work.undetected = updated.posterior.take(np.arange(intensity.size))
-        pairs = updated.posterior.take(np.arange(intensity.size, updated.posterior.size))
         # a faint copy of nobody keeps every group filled
         weights, means, covariances = kernels.merge_moments(
-            np.concatenate([np.full(count, 1e-12), pairs.weights]),
-            np.concatenate([nobody.means, pairs.means]),
-            np.concatenate([nobody.covariances, pairs.covariances]),
-            np.concatenate([np.arange(count), updated.measurements[intensity.size :]]),
+            np.concatenate([np.full(count, 1e-12), updated.posterior.weights[pairs]]),
+            np.concatenate([means, updated.posterior.means[pairs]]),
+            np.concatenate([covariances, updated.posterior.covariances[pairs]]),
+            np.concatenate([np.arange(count), updated.measurements[pairs]]),
             count,
         )
-        newborns = GaussianMixture(weights, means, covariances, nobody.labels)
+        newborns = GaussianMixture(weights, means, covariances, nameless)
         return np.minimum(updated.measurement_weights, 1.0 - 1e-9), newborns
 
     def _begin_tracks(
@@ -187,75 +189,63 @@ class MultiBernoulli:
     ) -> None:
         """A track for every box that may be a newcomer's, with its existence."""
         chosen = np.flatnonzero(existences > self._parameters.pruning_threshold)
+        if not len(chosen):
+            return
         first = work.tracks.size
+        newborns = newborns.take(chosen)
         work.add(
             GaussianMixture(
-                existences[chosen],
-                newborns.means[chosen],
-                newborns.covariances[chosen],
-                newborns.labels[chosen],
+                existences[chosen], newborns.means, newborns.covariances, newborns.labels
             )
         )
         work.record.sources[index, first:] = chosen
         work.record.source_weights[index, first:] = 1.0
         work.record.detection_probabilities[index, first:] = self._parameters.detection_probability
+        work.ledger.add(index, work.tracks.labels[first:], chosen, existences[chosen])
 
     def _add_newborns(self, work: _Work, first_new_label: int) -> None:
         """Begin tracks where unexplained boxes of several cameras agree on a place."""
-        found = self._model.newborns.propose(work.evidence)
-        if not found:
+        found = self._model.newborns(work.evidence)
+        if found is None:
             return
+        born, newborns = found
         # a track begun at an entrance by one of the same boxes is the same person
-        sources = np.stack([newborn.sources for newborn in found], axis=1)
-        record = work.record
-        shares = (record.sources[:, :, None] == sources[:, None, :]) & (sources[:, None, :] >= 0)
-        twin = (work.tracks.labels >= first_new_label) & shares.any(axis=(0, 2))
-        kept = np.flatnonzero(~twin)
-        work.tracks, work.record = work.tracks.take(kept), record.take(kept)
-        work.occluders = work.occluders[kept]
-        born = GaussianMixture(
-            np.array([newborn.existence for newborn in found]),
-            np.stack([newborn.position for newborn in found]),
-            np.stack([newborn.covariance for newborn in found]),
-            np.zeros(len(found), dtype=np.int64),
-        )
+        own, theirs = work.record.sources[:, :, None], newborns.sources[:, None, :]
+        shared = ((own == theirs) & (theirs >= 0)).any(axis=(0, 2))
+        work.take(np.flatnonzero(~(shared & (work.tracks.labels >= first_new_label))))
         first = work.tracks.size
-        work.add(self._model.motion.at_rest(born))
-        work.record.sources[:, first:] = sources
-        work.record.source_weights[:, first:] = sources >= 0
+        work.add(born)
+        work.record.sources[:, first:] = newborns.sources
+        work.record.source_weights[:, first:] = newborns.sources >= 0
         work.record.detection_probabilities[:, first:] = self._parameters.detection_probability
 
-    def _finish(self, work: _Work) -> tuple[MultiBernoulliState, FusionResult]:
+    def _finish(
+        self, work: _Work, state: MultiBernoulliState
+    ) -> tuple[MultiBernoulliState, FusionResult]:
         """Drop the faint, the strayed and the doubles; the rest is the step's posterior."""
-        p, tracks = self._parameters, work.tracks
-        alive = self._model.stays(tracks)
-        alive = alive[tracks.weights[alive] >= p.pruning_threshold]
-        order = alive[np.argsort(-tracks.weights[alive], kind="stable")]
-        order = order[: p.max_components]
-        order = order[~self._doubles(work, order)]
-        posterior = tracks.take(order)
+        p, weights = self._parameters, work.tracks.weights
+        alive = self._model.stays(work.tracks)
+        alive = alive[weights[alive] >= p.pruning_threshold]
+        work.take(alive[np.argsort(-weights[alive], kind="stable")][: p.max_components])
+        tracks = work.tracks
+        work.take(
+            np.flatnonzero(
+                ~self._model.doubles(
+                    tracks.means, tracks.weights, tracks.labels, work.record.sources
+                )
+            )
+        )
+        tracks = work.tracks
+        labels, lost = memory.recall(state.memory, tracks, self._model, state.next_label)
+        posterior = GaussianMixture(tracks.weights, tracks.means, tracks.covariances, labels)
         undetected, _ = gaussian_mixture.reduce(
             work.undetected,
             pruning_threshold=p.pruning_threshold,
             merging_threshold=p.merging_threshold,
             max_components=p.max_components,
         )
-        state = MultiBernoulliState(posterior, undetected, work.next_label)
-        return state, work.record.take(order).result(posterior)
-
-    def _doubles(self, work: _Work, order: ndarray) -> ndarray:
-        """Which tracks only repeat a surer or older one at the same place.
-
-        Two tracks nearer than the target is wide are one person, unless some
-        camera gave each a box of its own.
-        """
-        means, labels = work.tracks.means[order, :3], work.tracks.labels[order]
-        sources = work.record.sources[:, order]
-        near = np.linalg.norm(means[:, None] - means[None], axis=2) < self._model.near
-        both = (sources[:, :, None] >= 0) & (sources[:, None, :] >= 0)
-        parted = (both & (sources[:, :, None] != sources[:, None, :])).any(axis=0)
-        older = labels[:, None] > labels[None, :]
-        sure = work.tracks.weights[order] > CONFIRMED
-        # among sure tracks the older label stays; an unsure one never displaces a sure one
-        yields = np.where(sure[:, None] == sure[None, :], older, sure[None, :])
-        return np.asarray((near & ~parted & yields).any(axis=1))
+        associations = work.ledger.associations(tracks.labels)
+        return (
+            MultiBernoulliState(posterior, undetected, work.next_label, lost),
+            work.record.result(posterior, associations),
+        )

@@ -3,14 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.gaussian_mixture import GaussianMixture
 from tracker.single_view.protocol import ViewResult
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Associations:
+    """Which box belongs to whom: the pairs worth telling of one step, camera after camera."""
+
+    cameras: Int[ndarray, " A"]
+    components: Int[ndarray, " A"]
+    """Index into the posterior; of several components with one label its heaviest."""
+    boxes: Int[ndarray, " A"]
+    """Index into ``ViewResult.boxes``."""
+    probabilities: Float[ndarray, " A"]
+    """That this target made the box; float32, pairs below one per cent are left out."""
+
+    @staticmethod
+    def none() -> Associations:
+        """No pair."""
+        nothing = np.zeros(0, dtype=np.int32)
+        return Associations(nothing, nothing, nothing, np.zeros(0, dtype=np.float32))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,6 +48,8 @@ class FusionResult:
     """The share of the component that its box made: an association probability, 0 … 1."""
     hidden_by: Int[ndarray, "C J"]
     """Label of the target that hides the component in each camera, -1 for none."""
+    associations: Associations = field(default_factory=Associations.none)
+    """All association probabilities, of which ``sources`` names the greatest."""
 
 
 class FusionMethod(Protocol):

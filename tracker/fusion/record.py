@@ -8,8 +8,11 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.fusion.protocol import FusionResult
+from tracker.fusion.protocol import Associations, FusionResult
 from tracker.gaussian_mixture import GaussianMixture
+
+_WORTH_TELLING = 0.01
+"""Association probability below which a pair is not kept."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +49,7 @@ class Record:
             np.concatenate([self.hidden_by, blank.hidden_by], axis=1),
         )
 
-    def result(self, posterior: GaussianMixture) -> FusionResult:
+    def result(self, posterior: GaussianMixture, associations: Associations) -> FusionResult:
         """The step's result, these being the components of ``posterior``."""
         return FusionResult(
             posterior,
@@ -54,4 +57,53 @@ class Record:
             self.sources,
             self.source_weights,
             self.hidden_by,
+            associations,
         )
+
+
+class Ledger:
+    """The association probabilities of one step, by label, while the components still change."""
+
+    def __init__(self) -> None:
+        self._cameras: list[ndarray] = []
+        self._labels: list[ndarray] = []
+        self._boxes: list[ndarray] = []
+        self._probabilities: list[ndarray] = []
+
+    def add(
+        self,
+        camera: int,
+        labels: Int[ndarray, " A"],
+        boxes: Int[ndarray, " A"],
+        probabilities: Float[ndarray, " A"],
+    ) -> None:
+        """Note one camera's pairs of label and box; pairs not worth telling are left out."""
+        told = np.flatnonzero(probabilities >= _WORTH_TELLING)
+        self._cameras.append(np.full(len(told), camera, dtype=np.int32))
+        self._labels.append(labels[told])
+        self._boxes.append(boxes[told])
+        self._probabilities.append(probabilities[told])
+
+    def associations(self, labels: Int[ndarray, " J"]) -> Associations:
+        """The pairs of those labels that lived on; several of one label and box are summed.
+
+        Args:
+            labels: Of the posterior's components, the heaviest first.
+        """
+        if not self._cameras or not len(labels):
+            return Associations.none()
+        alive, first = np.unique(labels, return_index=True)
+        of_pair = np.concatenate(self._labels)
+        place = np.minimum(np.searchsorted(alive, of_pair), len(alive) - 1)
+        kept = np.flatnonzero(alive[place] == of_pair)
+        keys = np.stack(
+            [
+                np.concatenate(self._cameras)[kept],
+                first[place[kept]],
+                np.concatenate(self._boxes)[kept],
+            ]
+        )
+        pairs, which = np.unique(keys, axis=1, return_inverse=True)
+        sums = np.bincount(which.ravel(), np.concatenate(self._probabilities)[kept], pairs.shape[1])
+        cameras, components, boxes = pairs.astype(np.int32)
+        return Associations(cameras, components, boxes, np.minimum(sums, 1.0).astype(np.float32))

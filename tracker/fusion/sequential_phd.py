@@ -14,23 +14,25 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker import gaussian_mixture, models, phd
+from tracker.fusion import memory, one_person
 from tracker.fusion.measurement_births import CameraEvidence
+from tracker.fusion.memory import Memory
 from tracker.fusion.model import CONFIRMED, FusionModel
 from tracker.fusion.protocol import FusionResult
-from tracker.fusion.record import Record
+from tracker.fusion.record import Ledger, Record
 from tracker.gaussian_mixture import GaussianMixture
 from tracker.parameters import FusionParams
-from tracker.phd import PhdUpdate
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SequentialPhdState:
-    """The posterior of the step before, and the first label that is still free."""
+    """The posterior of the step before, the first label that is still free, and who is lost."""
 
     mixture: GaussianMixture
     next_label: int
+    memory: Memory
 
 
 @dataclass(slots=True, eq=False)
@@ -40,9 +42,12 @@ class _Work:
     mixture: GaussianMixture
     record: Record
     next_label: int
+    births: range
+    """Labels of this step's births."""
     sure: dict[int, float]
     """Predicted weight of each label, where it is enough to hide others."""
     evidence: list[CameraEvidence]
+    ledger: Ledger
 
 
 class SequentialPhd:
@@ -61,7 +66,8 @@ class SequentialPhd:
 
     def start(self) -> SequentialPhdState:
         """Nobody is in the room."""
-        return SequentialPhdState(GaussianMixture.empty(self._model.motion.dimension), 1)
+        dimension = self._model.motion.dimension
+        return SequentialPhdState(GaussianMixture.empty(dimension), 1, Memory.start(dimension))
 
     def step(
         self, state: SequentialPhdState, views: Many[ViewResult]
@@ -77,82 +83,110 @@ class SequentialPhd:
             births = models.label_births(self._model.births, next_label)
             next_label += births.size
             mixture = gaussian_mixture.concatenate([mixture, births])
-        work = _Work(mixture, Record.blank(len(views), mixture.size), next_label, sure, evidence=[])
+        work = _Work(
+            mixture,
+            Record.blank(len(views), mixture.size),
+            next_label,
+            range(state.next_label, next_label),
+            sure,
+            evidence=[],
+            ledger=Ledger(),
+        )
         for index, view in enumerate(views):
             self._update(work, index, view)
         if p.birth != "entrances":
             self._add_newborns(work)
         inside = self._model.stays(work.mixture)
         mixture, record = work.mixture.take(inside), work.record.take(inside)
+        if p.misses == "per_person":
+            single = self._without_doubles(mixture, record)
+            mixture, record = mixture.take(single), record.take(single)
+        associations = work.ledger.associations(mixture.labels)
         labels, next_label = _one_person_a_label(mixture, previous, work.next_label)
-        mixture = GaussianMixture(mixture.weights, mixture.means, mixture.covariances, labels)
-        return SequentialPhdState(mixture, next_label), record.result(mixture)
+        mixture = _relabelled(mixture, labels)
+        labels, lost = memory.recall(state.memory, mixture, self._model, state.next_label)
+        mixture = _relabelled(mixture, labels)
+        return SequentialPhdState(mixture, next_label, lost), record.result(mixture, associations)
 
     def _update(self, work: _Work, index: int, view: ViewResult) -> None:
         """The update by the boxes of one camera, and its reduction."""
         p, model, mixture = self._parameters, self._model, work.mixture
         values, noises = model.target.measured(view, p.measurement_sigma)
-        expected = model.target.expected(model.cameras[index], mixture.means)
-        occluders = _occluders(mixture, work.sure)
-        seen = model.visible(index, expected, mixture, occluders)
+        expected = model.expected(index, mixture)
+        seen = model.visible(index, expected, mixture, _occluders(mixture, work.sure))
         updated = phd.update(
             mixture,
             values,
             expected=expected.values,
             jacobians=expected.jacobians,
             noise=noises,
+            spread=expected.spreads if len(expected.spreads) else None,
             detection_probability=seen.detection_probabilities,
             clutter_intensity=model.clutter[index],
             gate=model.gate,
         )
-        posterior = updated.posterior
+        owners = None
         if p.misses == "per_person":
-            posterior = _miss_per_person(mixture, updated, seen.detection_probabilities)
-        parents, sources = updated.parents, updated.measurements
+            updated = one_person.share_boxes(
+                mixture,
+                updated,
+                seen.detection_probabilities,
+                births=work.births,
+                next_label=work.next_label,
+            )
+            work.next_label += len(values)
+            owners = one_person.owners(updated.posterior)
+        posterior, parents, sources = updated.posterior, updated.parents, updated.measurements
         record = work.record.take(parents)
         record.detection_probabilities[index] = seen.detection_probabilities[parents]
         record.hidden_by[index] = seen.hidden_by[parents]
         record.sources[index] = sources
         record.source_weights[index] = np.where(sources >= 0, posterior.weights, 0.0)
+        pairs = slice(mixture.size, None)
+        work.ledger.add(index, posterior.labels[pairs], sources[pairs], posterior.weights[pairs])
         work.mixture, leaders = gaussian_mixture.reduce(
             posterior,
             pruning_threshold=p.pruning_threshold,
             merging_threshold=p.merging_threshold,
             max_components=p.max_components,
+            owners=owners,
         )
         work.record = record.take(leaders)
-        if p.birth == "entrances":
-            return
-        work.evidence.append(
-            CameraEvidence(
-                rays=model.cameras[index].back_project(view.boxes[:, :2]),
-                values=values,
-                noises=noises,
-                unexplained=1.0 - updated.measurement_weights,
-                clutter_intensity=model.clutter[index],
-            )
-        )
+        unexplained = 1.0 - updated.measurement_weights
+        work.evidence.append(model.evidence(index, view, values, noises, unexplained))
 
     def _add_newborns(self, work: _Work) -> None:
         """Components where unexplained boxes of several cameras agree on a place."""
-        found = self._model.newborns.propose(work.evidence)
-        if not found:
+        found = self._model.newborns(work.evidence)
+        if found is None:
             return
-        born = GaussianMixture(
-            np.array([newborn.existence for newborn in found]),
-            np.stack([newborn.position for newborn in found]),
-            np.stack([newborn.covariance for newborn in found]),
-            np.zeros(len(found), dtype=np.int64),
-        )
-        born = models.label_births(self._model.motion.at_rest(born), work.next_label)
+        born, newborns = found
+        born = models.label_births(born, work.next_label)
         work.next_label += born.size
         first = work.mixture.size
         work.mixture = gaussian_mixture.concatenate([work.mixture, born])
         work.record = work.record.extended(born.size)
-        sources = np.stack([newborn.sources for newborn in found], axis=1)
-        work.record.sources[:, first:] = sources
-        work.record.source_weights[:, first:] = sources >= 0
+        work.record.sources[:, first:] = newborns.sources
+        work.record.source_weights[:, first:] = newborns.sources >= 0
         work.record.detection_probabilities[:, first:] = self._parameters.detection_probability
+
+    def _without_doubles(self, mixture: GaussianMixture, record: Record) -> Int[ndarray, " K"]:
+        """Indices of the components of those labels that do not only repeat another."""
+        labels, label = np.unique(mixture.labels, return_inverse=True)
+        held = np.bincount(label, mixture.weights, len(labels))
+        # the heaviest component of a label has the last word on where its person is
+        order = np.argsort(mixture.weights, kind="stable")
+        heaviest = np.zeros(len(labels), dtype=np.int64)
+        heaviest[label[order]] = order
+        double = self._model.doubles(
+            mixture.means[heaviest], held, labels, record.sources[:, heaviest]
+        )
+        return np.flatnonzero(~double[label])
+
+
+def _relabelled(mixture: GaussianMixture, labels: Int[ndarray, " J"]) -> GaussianMixture:
+    """The same components under other labels."""
+    return GaussianMixture(mixture.weights, mixture.means, mixture.covariances, labels)
 
 
 def _confirmed_labels(mixture: GaussianMixture) -> dict[int, float]:
@@ -171,38 +205,6 @@ def _occluders(mixture: GaussianMixture, sure: dict[int, float]) -> Float[ndarra
     for component, label in enumerate(mixture.labels.tolist()):
         weights[component] = left.pop(label, 0.0)
     return weights
-
-
-def _miss_per_person(
-    predicted: GaussianMixture, updated: PhdUpdate, detection_probability: Float[ndarray, " J"]
-) -> GaussianMixture:
-    """Scale the missed components so that the order of the cameras does not matter.
-
-    The PHD takes the number of people as Poisson, so one camera's miss multiplies
-    a weight by 1 − p_D whatever the cameras before saw. Taken as one person who is
-    there with probability r, the components of one label keep
-
-        w ← w (1 − p_D) / (1 − r p_D) · (1 − D)
-
-    with D the share of the label that this camera's boxes explain. For one person
-    alone that is Bayes' rule for existence, which asks for no order.
-    """
-    size = predicted.size
-    labels, label = np.unique(predicted.labels, return_inverse=True)
-    weights = updated.posterior.weights.copy()
-    there = np.zeros(len(labels))
-    np.add.at(there, label, predicted.weights * detection_probability)
-    explained = np.zeros(len(labels))
-    np.add.at(explained, label[updated.parents[size:]], weights[size:])
-    factor = (1.0 - np.minimum(explained, 1.0)) / np.maximum(1.0 - np.minimum(there, 1.0), 1e-9)
-    # a lone, certain label that nobody could have missed keeps at most what it had
-    weights[:size] = np.minimum(weights[:size] * factor[label], predicted.weights)
-    return GaussianMixture(
-        weights,
-        updated.posterior.means,
-        updated.posterior.covariances,
-        updated.posterior.labels,
-    )
 
 
 def _one_person_a_label(

@@ -9,10 +9,12 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from tracker.camera import Camera
+from tracker import box_kernels
+from tracker.camera import NEAREST_DEPTH, Camera
 from tracker.single_view.protocol import ViewResult
 
 MeasurementKind = Literal["centre", "box", "box_and_width"]
+UpdateKind = Literal["extended", "unscented"]
 
 SIZES: dict[MeasurementKind, int] = {"centre": 2, "box": 3, "box_and_width": 4}
 """How many numbers of a box each kind of measurement uses."""
@@ -26,6 +28,9 @@ _FROM_BOX: dict[MeasurementKind, Float[ndarray, "m 4"]] = {
     ),
 }
 
+# the unscented points of a 3D position, in standard deviations: the axes at ±√3, each with 1/6
+_SIGMA_POINTS = np.sqrt(3.0) * np.concatenate([np.eye(3), -np.eye(3)])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExpectedBoxes:
@@ -35,22 +40,15 @@ class ExpectedBoxes:
     """Centre (x, y), or horizontal centre, top, bottom (and width), in pixels."""
     jacobians: Float[ndarray, "J m d"]
     """Derivative by the state, pixels a metre; zero for velocities."""
+    spreads: Float[ndarray, "K m m"]
+    """What the bend of the projection adds to the noise, squared pixels: one each (K = J),
+    or nothing (K = 0)."""
     boxes: Float[ndarray, "J 4"]
     """left, top, right, bottom in pixels, not clipped."""
     depths: Float[ndarray, " J"]
     """Distance from the lens, metres."""
     valid: Bool[ndarray, " J"]
-    """Whether head and foot lie in front of the lens."""
-
-    def take(self, indices: ndarray) -> ExpectedBoxes:
-        """Some of them, in that order."""
-        return ExpectedBoxes(
-            self.values[indices],
-            self.jacobians[indices],
-            self.boxes[indices],
-            self.depths[indices],
-            self.valid[indices],
-        )
+    """Whether middle, head and foot lie in front of the lens."""
 
 
 class TargetModel:
@@ -62,54 +60,105 @@ class TargetModel:
     real person detector this agrees with the truth to a few hundredths of the
     box's height, where the bounds of a projected cuboid are off by a sixth at
     the feet.
+
+    The projection bends. ``extended`` takes it as straight at the mean. With
+    ``unscented`` the values are the mean over the state's uncertainty, the
+    Jacobian is that of the best straight line through it (statistical linear
+    regression) and ``spreads`` holds what is left. Against a particle reference
+    the two are alike while the uncertainty is small against the distance, which
+    it is for every tracked person; within about 1.5 m of a lens and with an
+    uncertainty of a third of that distance or more, the unscented update is the
+    nearer one in mean and covariance. It costs about a third of the speed.
     """
 
-    def __init__(self, half_extents: Float[ndarray, " 3"], kind: MeasurementKind) -> None:
+    def __init__(
+        self,
+        half_extents: Float[ndarray, " 3"],
+        kind: MeasurementKind,
+        update: UpdateKind = "extended",
+    ) -> None:
         self.kind: MeasurementKind = kind
         self.size = SIZES[kind]
-        self._half_height = np.array([0.0, 0.0, float(half_extents[2])])
+        self._unscented = update == "unscented"
+        self._half_height = float(half_extents[2])
         self._half_width = float(np.mean(half_extents[:2]))
+        self._transform = _FROM_BOX[kind]
+        # R = T diag(σ²) Tᵀ is linear in σ²
+        self._products = np.einsum("pa,qa->apq", self._transform, self._transform)
 
-    def expected(self, camera: Camera, states: Float[ndarray, "J d"]) -> ExpectedBoxes:
-        """Predict the box of each state (position first, metres, world frame)."""
-        count, dimension = states.shape
-        centres = states[:, :3]
-        points = np.concatenate([centres, centres - self._half_height, centres + self._half_height])
-        pixels, slopes, valid = camera.project_with_jacobian(points)
-        pixels = np.where(valid[:, None], pixels, 0.0).reshape(3, count, 2)
-        slopes = slopes.reshape(3, count, 2, 3)
-        whole = np.asarray(valid.reshape(3, count).all(axis=0))
-        (middle, foot, head), (d_middle, d_foot, d_head) = pixels, slopes
+    def expected(
+        self,
+        camera: Camera,
+        states: Float[ndarray, "J d"],
+        covariances: Float[ndarray, "J d d"] | None = None,
+    ) -> ExpectedBoxes:
+        """Predict the box of each state.
 
-        offsets = centres - camera.centre
-        depths = np.sqrt(np.einsum("ji,ji->j", offsets, offsets))
-        height = np.abs(foot[:, 1] - head[:, 1])
-        width = height * (self._half_width / self._half_height[2])
-        across = (head[:, 0] + foot[:, 0]) / 2.0
-        boxes = np.stack(
-            [across - width / 2.0, head[:, 1], across + width / 2.0, foot[:, 1]], axis=1
+        Args:
+            camera: The calibrated camera.
+            states: Position first, metres, world frame.
+            covariances: Their uncertainty, for the unscented kind; none is taken as 0.
+        """
+        values, jacobians, boxes, depths, valid = self._project(camera, states)
+        no_spread = np.zeros((0, self.size, self.size))
+        straight = ExpectedBoxes(values, jacobians, no_spread, boxes, depths, valid)
+        if not self._unscented or covariances is None or not len(states):
+            return straight
+        return self._bent(camera, straight, states, covariances)
+
+    def _project(
+        self, camera: Camera, states: Float[ndarray, "J d"]
+    ) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
+        found: tuple[ndarray, ndarray, ndarray, ndarray, ndarray] = box_kernels.expected_boxes(
+            np.ascontiguousarray(states, dtype=float),
+            self._half_height,
+            self._half_width,
+            self.size,
+            camera.image_size,
+            *camera.numbers,
+            NEAREST_DEPTH,
+            camera.largest_radius,
         )
-        jacobians = np.zeros((count, self.size, dimension))
-        if self.kind == "centre":
-            values = middle
-            jacobians[:, :, :3] = d_middle
-        else:
-            values = np.empty((count, self.size))
-            values[:, 0], values[:, 1], values[:, 2] = across, head[:, 1], foot[:, 1]
-            jacobians[:, 0, :3] = (d_head[:, 0] + d_foot[:, 0]) / 2.0
-            jacobians[:, 1, :3] = d_head[:, 1]
-            jacobians[:, 2, :3] = d_foot[:, 1]
-            if self.kind == "box_and_width":
-                values[:, 3] = width
-                share = self._half_width / self._half_height[2]
-                jacobians[:, 3, :3] = share * (d_foot[:, 1] - d_head[:, 1])
-            # a box ends at the picture's edge, and what lies beyond tells nothing of depth
-            bottom = float(camera.image_size[1] - 1)
-            for row in (1, 2):
-                outside = (values[:, row] < 0.0) | (values[:, row] > bottom)
-                values[outside, row] = np.clip(values[outside, row], 0.0, bottom)
-                jacobians[outside, row] = 0.0
-        return ExpectedBoxes(values, jacobians, boxes, depths, whole)
+        return found
+
+    def _bent(
+        self,
+        camera: Camera,
+        straight: ExpectedBoxes,
+        states: Float[ndarray, "J d"],
+        covariances: Float[ndarray, "J d d"],
+    ) -> ExpectedBoxes:
+        """The statistical linear regression over each state's uncertainty.
+
+            ẑ = Σ w h(χ),  H = [Σ w (h(χ) − ẑ)(χ − m)ᵀ] P⁻¹,
+            Ω = Σ w (h(χ) − ẑ)(h(χ) − ẑ)ᵀ − H P Hᵀ
+
+        over the unscented points χ of the position. Where one of them lies behind
+        the lens the straight prediction stays.
+        """
+        count = len(states)
+        spread = covariances[:, :3, :3]
+        offsets = _SIGMA_POINTS @ np.linalg.cholesky(spread).transpose(0, 2, 1)
+        points = (states[:, None, :3] + offsets).reshape(-1, 3)
+        values, _, _, _, valid = self._project(camera, points)
+        values = values.reshape(count, 6, self.size)
+        means = values.mean(axis=1)
+        off = values - means[:, None]
+        cross = np.einsum("jkm,jka->jma", off, offsets) / 6.0
+        slopes = np.linalg.solve(spread, cross.transpose(0, 2, 1)).transpose(0, 2, 1)
+        rest = np.einsum("jkm,jkn->jmn", off, off) / 6.0 - slopes @ cross.transpose(0, 2, 1)
+        bent = valid.reshape(count, 6).all(axis=1) & straight.valid
+        jacobians = straight.jacobians.copy()
+        jacobians[bent, :, :3] = slopes[bent]
+        rest = np.where(bent[:, None, None], (rest + rest.transpose(0, 2, 1)) / 2.0, 0.0)
+        return ExpectedBoxes(
+            np.where(bent[:, None], means, straight.values),
+            jacobians,
+            rest,
+            straight.boxes,
+            straight.depths,
+            straight.valid,
+        )
 
     def measured(
         self, view: ViewResult, factor: float
@@ -120,7 +169,5 @@ class TargetModel:
             view: Boxes and how far each is to be trusted.
             factor: On the standard deviations.
         """
-        transform = _FROM_BOX[self.kind]
-        variances = (factor * view.sigmas) ** 2
-        noise = np.einsum("pa,na,qa->npq", transform, variances, transform)
-        return view.boxes @ transform.T, noise
+        noise = np.tensordot((factor * view.sigmas) ** 2, self._products, axes=1)
+        return view.boxes @ self._transform.T, noise

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from numpy import ndarray
-from scipy.special import ndtr
 
+from tracker import box_kernels
 from tracker.camera import Camera
 from tracker.fusion.target_model import ExpectedBoxes
+from tracker.gaussian_mixture import GaussianMixture
 
 _WORTH_TELLING = 0.2
 """Share of a target's box that must be covered for its occluder to be named."""
@@ -26,69 +27,76 @@ class Visibility:
 
 
 def inside_probability(
-    camera: Camera, expected: ExpectedBoxes, covariances: Float[ndarray, "J d d"]
+    camera: Camera,
+    expected: ExpectedBoxes,
+    covariances: Float[ndarray, "J d d"],
+    *,
+    soft: bool = True,
 ) -> Float[ndarray, " J"]:
     """Probability that the middle of each target falls inside the picture.
 
     The predicted position is taken as Gaussian in the picture, so the value falls
     smoothly towards the edge, over the width of its own uncertainty; it is 0 where
     head or foot is behind the lens.
+
+    Args:
+        camera: Its picture's size counts.
+        expected: The boxes that the targets should give there.
+        covariances: Of their states.
+        soft: False for the published edge: 1 inside, 0 outside.
     """
-    boxes = expected.boxes
-    middle = (boxes[:, :2] + boxes[:, 2:]) / 2.0
-    slopes = expected.jacobians[:, :2]
-    spread = np.sqrt(np.einsum("jma,jab,jmb->jm", slopes, covariances, slopes)) + 1.0
-    size = np.array(camera.image_size, dtype=float)
-    inside = ndtr((size - 0.5 - middle) / spread) - ndtr((-0.5 - middle) / spread)
-    return np.asarray(np.where(expected.valid, inside.prod(axis=1), 0.0))
-
-
-def covered_shares(expected: ExpectedBoxes, occluders: ExpectedBoxes) -> Float[ndarray, "J L"]:
-    """Share of each target's box that each nearer occluder's box covers.
-
-    a(j, l) = [l is nearer to the lens than j] · area(box_j ∩ box_l) / area(box_j)
-    """
-    a, b = expected.boxes[:, None, :], occluders.boxes[None, :, :]
-    overlap = np.minimum(a[..., 2:], b[..., 2:]) - np.maximum(a[..., :2], b[..., :2])
-    area = np.maximum((expected.boxes[:, 2:] - expected.boxes[:, :2]).prod(axis=1), 1e-9)
-    nearer = occluders.depths[None, :] < expected.depths[:, None]
-    shares = np.clip(overlap, 0.0, None).prod(axis=2) / area[:, None]
-    return np.asarray(shares * (nearer & occluders.valid[None, :]))
-
-
-def unhidden(detection_probabilities: Float[ndarray, " J"]) -> Visibility:
-    """Nobody is hidden by anybody."""
-    return Visibility(
-        detection_probabilities, np.full(len(detection_probabilities), -1, dtype=np.int64)
+    inside: ndarray = box_kernels.inside_probability(
+        expected.boxes,
+        expected.jacobians,
+        np.ascontiguousarray(covariances),
+        expected.valid,
+        camera.image_size,
+        soft,
     )
+    return inside
 
 
-def behind_others(
-    detection_probabilities: Float[ndarray, " J"],
-    shares: Float[ndarray, "J L"],
+def visibility(
+    chances: Float[ndarray, " J"],
+    expected: ExpectedBoxes,
+    mixture: GaussianMixture,
+    *,
+    occluders: Int[ndarray, " L"],
     weights: Float[ndarray, " L"],
-    others: Bool[ndarray, "J L"],
-    labels: Int[ndarray, " L"],
     strength: float,
+    near: float,
 ) -> Visibility:
     """Lower each p_D where other people stand in front.
 
-        p_j ← p_j Π_l (1 − ρ · w_l · a(j, l))
+        p_j ← p_j Π_l (1 − ρ w_l a(j, l))
+        a(j, l) = [l is nearer to the lens than j] · area(box_j ∩ box_l) / area(box_j)
 
     over the occluders that are somebody else: the chance that nobody hides j, for
     independent occluders that exist with probability w_l.
 
     Args:
-        detection_probabilities: p_j without occlusion.
-        shares: a(j, l) of :func:`covered_shares`.
-        weights: Existence of each occluder; at most 1 counts.
-        others: False where the occluder is the target itself, or so near that it may
-            be its double: a target must not hide behind itself.
-        labels: Of the occluders.
+        chances: p_j without occlusion.
+        expected: The boxes that the components should give in this camera.
+        mixture: The components, with their labels.
+        occluders: Indices of the components that may hide others: sure ones, one a person.
+        weights: Their existence; at most 1 counts.
         strength: ρ, 0 for no occlusion at all, 1 where a covered person is never seen.
+        near: Metres within which an occluder may be the target's double; a target must
+            not hide behind itself.
     """
-    effect = np.where(others, shares * np.minimum(weights, 1.0), 0.0)
-    free = np.clip(1.0 - strength * effect, 0.0, 1.0).prod(axis=1)
-    strongest = effect.argmax(axis=1)
-    hidden = effect[np.arange(len(effect)), strongest] > _WORTH_TELLING
-    return Visibility(detection_probabilities * free, np.where(hidden, labels[strongest], -1))
+    if strength == 0.0 or not len(occluders):
+        return Visibility(chances, np.full(len(chances), -1, dtype=np.int64))
+    return Visibility(
+        *box_kernels.hide(
+            chances,
+            expected.boxes,
+            expected.depths,
+            mixture.means,
+            mixture.labels,
+            occluders,
+            weights,
+            near,
+            strength,
+            _WORTH_TELLING,
+        )
+    )

@@ -6,6 +6,7 @@ from tracker.parameters import RunParameters
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour_phd import ColourPhd
+from tracker.single_view.detection_phd import DetectionPhd
 from tracker.single_view.none import DetectionBoxes
 from tracker.single_view.protocol import SingleViewMethod, ViewResult
 
@@ -26,6 +27,8 @@ def create(
     """
     if name == "colour_phd":
         return ColourPhd(sequence, camera_index, parameters.colour_phd, reader)
+    if name == "detection_phd":
+        return DetectionPhd(sequence, camera_index, parameters.detection_phd)
     if name == "none":
         return DetectionBoxes(sequence, camera_index, parameters.detection_boxes)
-    raise ValueError(f"single_view: expected colour_phd or none, got {name!r}")
+    raise ValueError(f"single_view: expected colour_phd, detection_phd or none, got {name!r}")

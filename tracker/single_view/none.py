@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy import ndarray
 
 from tracker.parameters import DetectionBoxParams
 from tracker.sequences.sequence import Sequence
+from tracker.single_view.detector_boxes import DetectorBoxes
 from tracker.single_view.protocol import ViewResult
 
 
 class DetectionBoxes:
-    """The boxes of the sequence's ``detections``, with the trust that the parameters state."""
+    """The boxes of the sequence's ``detections``, with the trust that the parameters state.
+
+    Boxes that contradict the room stay among the measurements and go no further.
+    """
 
     needs_pictures = False
 
@@ -23,14 +29,7 @@ class DetectionBoxes:
         Raises:
             ValueError: If the camera has no detections.
         """
-        view = sequence.views[camera_index]
-        if view.detections is None:
-            raise ValueError(
-                f'camera "{view.camera.name}" of {sequence.name} has no detections; name a CSV '
-                "file as its `detections` in sequence.toml, or choose single_view colour_phd"
-            )
-        self._detections = view.detections
-        self._parameters = parameters
+        self._boxes = DetectorBoxes(sequence, camera_index, parameters)
 
     def start(self) -> None:
         """There is no state."""
@@ -38,15 +37,15 @@ class DetectionBoxes:
     def step(
         self, state: None, frame: int, picture: ndarray | None, rng: np.random.Generator
     ) -> tuple[None, ViewResult]:
-        """The boxes of one step whose score is high enough."""
-        rows = self._detections.at(frame)
-        scores = self._detections.scores[rows]
-        good = scores >= self._parameters.score_threshold
-        half_sizes = self._detections.boxes[rows][good, 2:] / 2.0
-        centres = self._detections.boxes[rows][good, :2] + half_sizes
-        sigmas = np.concatenate(
-            [self._parameters.centre_sigma * half_sizes, self._parameters.size_sigma * half_sizes],
-            axis=1,
+        """The boxes of one step whose score is high enough and whose place is possible."""
+        found = self._boxes.at(frame)
+        good = found.plausible
+        result = ViewResult.of_boxes(found.boxes[good], found.scores[good], found.sigmas[good])
+        if good.all():
+            return None, result
+        return None, replace(
+            result,
+            measurements=found.boxes,
+            measurement_scores=found.scores,
+            information={"boxes outside the room": float((~good).sum())},
         )
-        boxes = np.concatenate([centres, half_sizes], axis=1)
-        return None, ViewResult.of_boxes(boxes, scores[good], sigmas)

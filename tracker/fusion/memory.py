@@ -1,0 +1,111 @@
+"""People lately lost from sight: who comes back near where he should be gets his label back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+from scipy.optimize import linear_sum_assignment
+from scipy.stats import chi2
+
+from tracker import gaussian_mixture
+from tracker.fusion.model import CONFIRMED, FusionModel
+from tracker.gaussian_mixture import GaussianMixture
+
+_REACH = float(chi2.ppf(0.9, df=3))
+"""Squared Mahalanobis distance within which a newcomer may be somebody lately lost."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Memory:
+    """Who is known, and who of them was lost a short while ago.
+
+    A filter forgets a person whom no camera sees within a step or two: that is right
+    for the picture of the room, and wrong for the name. So the last place of a sure
+    person who vanished inside the room is predicted on for a while, and the first
+    newcomer to become sure near it is taken for the same person. Nothing else of
+    the filter changes.
+    """
+
+    known: GaussianMixture
+    """The sure people of the last step, the heaviest component of each."""
+    lost: GaussianMixture
+    """Where each lost one may be by now."""
+    ages: Float[ndarray, " L"]
+    """Seconds since each was lost."""
+    newer: Int[ndarray, " L"]
+    """The first label that was given only after each was lost."""
+
+    @staticmethod
+    def start(dimension: int) -> Memory:
+        """Nobody is known."""
+        nobody = GaussianMixture.empty(dimension)
+        return Memory(nobody, nobody, np.zeros(0), np.zeros(0, dtype=np.int64))
+
+    def take(self, indices: ndarray) -> Memory:
+        """Some of the lost."""
+        return Memory(self.known, self.lost.take(indices), self.ages[indices], self.newer[indices])
+
+
+def recall(
+    memory: Memory, mixture: GaussianMixture, model: FusionModel, first_label: int
+) -> tuple[Int[ndarray, " J"], Memory]:
+    """Give their labels back to people who return, and remember who is lost now.
+
+    Args:
+        memory: Of the step before.
+        mixture: The posterior of this step, the heaviest component of a label first.
+        model: Its motion predicts the lost, and its room ends the wait for who left it.
+        first_label: The first label that was given in this step.
+
+    Returns:
+        The labels of this step's components, and the memory after it.
+    """
+    seconds, labels = model.parameters.memory, mixture.labels
+    if seconds == 0.0:
+        return labels, memory
+    sure = np.flatnonzero(mixture.weights > CONFIRMED)
+    names, first = np.unique(labels[sure], return_index=True)
+    bearers = sure[first]
+    count = memory.known.size
+    missing = Memory(
+        memory.known,
+        gaussian_mixture.concatenate([memory.lost, memory.known]),
+        np.concatenate([memory.ages, np.zeros(count)]) + model.step_time,
+        np.concatenate([memory.newer, np.full(count, first_label)]),
+    )
+    missing = missing.take(~np.isin(missing.lost.labels, names))
+    lost = model.motion.predict(missing.lost, 1.0)
+    waiting = model.room.contains(lost.means[:, :3]) & (missing.ages <= seconds + 1e-9)
+    missing = Memory(memory.known, lost, missing.ages, missing.newer).take(waiting)
+    if missing.lost.size and len(bearers):
+        labels, back = _returned(missing, mixture.take(bearers), labels)
+        missing = missing.take(~back)
+    known = mixture.take(bearers)
+    known = GaussianMixture(known.weights, known.means, known.covariances, labels[bearers])
+    return labels, Memory(known, missing.lost, missing.ages, missing.newer)
+
+
+def _returned(
+    memory: Memory, people: GaussianMixture, labels: Int[ndarray, " J"]
+) -> tuple[Int[ndarray, " J"], Bool[ndarray, " L"]]:
+    """The labels with the old names of those who are back, and which of the lost these are."""
+    lost, back = memory.lost, np.zeros(memory.lost.size, dtype=bool)
+    offsets = people.means[None, :, :3] - lost.means[:, None, :3]
+    spread = lost.covariances[:, None, :3, :3] + people.covariances[None, :, :3, :3]
+    solved = np.linalg.solve(spread, offsets[..., None])[..., 0]
+    distances = (offsets * solved).sum(axis=2)
+    may = (distances <= _REACH) & (people.labels[None, :] >= memory.newer[:, None])
+    if not may.any():
+        return labels, back
+    labels = labels.copy()
+    for old, newcomer in zip(*linear_sum_assignment(np.where(may, distances, 1e6)), strict=True):
+        if may[old, newcomer]:
+            # what is left of the old label goes on as the newcomer's
+            name, other = lost.labels[old], people.labels[newcomer]
+            was_old, was_new = labels == name, labels == other
+            labels[was_old], labels[was_new] = other, name
+            back[old] = True
+    return labels, back

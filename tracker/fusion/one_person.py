@@ -1,0 +1,99 @@
+"""One label, one person: what the plain PHD recursion does not know of a labelled intensity.
+
+The PHD takes people as Poisson: a camera's miss multiplies every weight by 1 − p_D
+whatever the cameras before saw, one component may explain two boxes, and two labels
+may share one person. Here a label stands for one person who is there with
+probability r, the sum of its components' weights.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from tracker import association
+from tracker.fusion.model import CONFIRMED
+from tracker.gaussian_mixture import GaussianMixture
+from tracker.phd import PhdUpdate
+
+_LARGEST_ODDS = 600.0  # the logarithm of what still fits a float with room to spare
+
+
+def share_boxes(
+    predicted: GaussianMixture,
+    updated: PhdUpdate,
+    detection_probability: Float[ndarray, " J"],
+    *,
+    births: range,
+    next_label: int,
+) -> PhdUpdate:
+    """Weigh the update anew: each person makes at most one box, each box at most one person.
+
+    With o_l(z) = Σ_{j∈l} p_j w_j q_j(z) / κ the odds of label l for box z, the
+    association probabilities P(l ← z) and P(l misses) are the marginals of the
+    one-to-one association with weights 1 − Σ_{j∈l} p_j w_j for a miss and o_l(z) for a
+    box, by belief propagation. Then
+
+        w_j(z) = P(l ← z) p_j w_j q_j(z) / (κ o_l(z))
+        w_j ← w_j (1 − p_j) P(l misses) / (1 − Σ_{i∈l} p_i w_i)
+
+    For one person alone that is Bayes' rule for existence, r' = r(1 − p)/(1 − r p) on
+    a miss, which asks for no order of the cameras. Births of this step stay Poisson:
+    they compete with the clutter, and what a box makes of them gets a label of its own.
+
+    Args:
+        predicted: J components before this camera.
+        updated: The plain update by its boxes.
+        detection_probability: p_j.
+        births: The labels of this step's births.
+        next_label: The first label that is free.
+
+    Returns:
+        The update with these weights and labels.
+    """
+    size, boxes = predicted.size, len(updated.measurement_weights)
+    labels, label = np.unique(predicted.labels, return_inverse=True)
+    held = np.bincount(label, predicted.weights)
+    scale = 1.0 / np.maximum(held, 1.0)  # merging may have left a little more than one person
+    there = np.bincount(label, predicted.weights * detection_probability) * scale
+    missed = np.maximum(1.0 - there, 1e-9)
+    person = (labels < births.start) | (labels >= births.stop)
+    owner, box = label[updated.parents[size:]], updated.measurements[size:]
+    odds = np.exp(np.minimum(updated.log_odds, _LARGEST_ODDS)) * scale[owner]
+    table = np.bincount(owner * boxes + box, odds, len(labels) * boxes).reshape(len(labels), boxes)
+    nobody = 1.0 + table[~person].sum(axis=0)  # clutter or a newcomer, in units of κ
+    marginals = association.marginals(missed[person], table[person], nobody)
+    factors = np.ones(len(labels))
+    factors[person] = marginals.missed / missed[person]
+    # the share of a box's pair in what its label, or the newcomers, got of the box
+    parts = np.zeros((len(labels), boxes))
+    parts[person] = marginals.detected / np.maximum(table[person], 1e-300)
+    parts[~person] = marginals.unexplained / nobody
+    weights = np.concatenate(
+        [
+            updated.posterior.weights[:size] * (factors * scale)[label],
+            odds * parts[owner, box],
+        ]
+    )
+    names = np.where(person[owner], labels[owner], next_label + box)
+    posterior = GaussianMixture(
+        weights,
+        updated.posterior.means,
+        updated.posterior.covariances,
+        np.concatenate([predicted.labels, names]),
+    )
+    return PhdUpdate(
+        posterior,
+        updated.parents,
+        updated.measurements,
+        updated.log_odds,
+        np.bincount(box, weights[size:], boxes),
+    )
+
+
+def owners(mixture: GaussianMixture) -> Int[ndarray, " J"]:
+    """Who may be merged with whom: a sure person's components with nobody else's, -1 for others."""
+    _, label = np.unique(mixture.labels, return_inverse=True)
+    sure = np.bincount(label, mixture.weights) > CONFIRMED
+    return np.asarray(np.where(sure[label], mixture.labels, -1))

@@ -1,0 +1,175 @@
+"""GM-PHD filter in one camera on the boxes of an outside detector.
+
+[VM06] B.-N. Vo, W.-K. Ma, "The Gaussian mixture probability hypothesis density
+filter", IEEE Transactions on Signal Processing 54(11), 2006.
+[RCVV12] Ristic, Clark, Vo, Vo, "Adaptive target birth intensity for PHD and CPHD
+filters", IEEE TAES 48(2), 2012.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+from scipy.stats import chi2
+
+from tracker import gaussian_mixture, models, phd
+from tracker.gaussian_mixture import GaussianMixture
+from tracker.parameters import DetectionPhdParams
+from tracker.phd import PhdUpdate
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.detector_boxes import Detected, DetectorBoxes, trust
+from tracker.single_view.protocol import ViewResult
+
+GATE = float(chi2.ppf(0.9999, df=4))
+"""Squared Mahalanobis distance: a person's own box lies inside with this probability."""
+
+BELIEVED = 0.5
+"""A box that people explain with more than this weight goes to the fusion."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DetectionPhdState:
+    """The posterior of the step before, what it left unexplained, and the next free label."""
+
+    mixture: GaussianMixture
+    unexplained: Float[ndarray, "B 4"]
+    """Boxes that no component explained: where somebody may have appeared."""
+    next_label: int
+
+
+class DetectionPhd:
+    """The GM-PHD filter of a single view, fed by a detector instead of colour peaks.
+
+    State {x_c, y_c, H_x, H_y}: a box by its centre and half sizes, in pixels; random
+    walk; H = I. The clutter intensity of a box falls with its score s,
+
+        κ(z) = λ_c exp(2 b_s (½ − s)) / V
+
+    with V the volume of the picture and the sizes. People appear where a box of the
+    step before was left unexplained ([RCVV12]), so a newcomer counts from the second
+    box on. Boxes that contradict the room are shown and not used.
+    """
+
+    needs_pictures = False
+
+    def __init__(
+        self, sequence: Sequence, camera_index: int, parameters: DetectionPhdParams
+    ) -> None:
+        """Prepare for one camera.
+
+        Raises:
+            ValueError: If the camera has no detections.
+        """
+        self._parameters = parameters
+        self._boxes = DetectorBoxes(sequence, camera_index, parameters)
+        self._step_time = sequence.step_time
+        width, height = sequence.cameras[camera_index].image_size
+        # half sizes up to half of the picture's, as the fusion's clutter has them
+        self._clutter = parameters.clutter_rate / (width * height * width / 2.0 * height / 2.0)
+
+    def start(self) -> DetectionPhdState:
+        """Nobody is in the picture."""
+        return DetectionPhdState(GaussianMixture.empty(4), np.zeros((0, 4)), next_label=1)
+
+    def step(
+        self,
+        state: DetectionPhdState,
+        frame: int,
+        picture: ndarray | None,
+        rng: np.random.Generator,
+    ) -> tuple[DetectionPhdState, ViewResult]:
+        """One step."""
+        p, found = self._parameters, self._boxes.at(frame)
+        good = np.flatnonzero(found.plausible)
+        births = models.label_births(self._births(state.unexplained), state.next_label)
+        predicted = gaussian_mixture.concatenate([self._predict(state.mixture), births])
+        updated = phd.update(
+            predicted,
+            found.boxes[good],
+            expected=predicted.means,
+            jacobians=np.tile(np.eye(4), (predicted.size, 1, 1)),
+            noise=found.sigmas[good][:, :, None] ** 2 * np.eye(4),
+            detection_probability=p.detection_probability,
+            clutter_intensity=self._clutter
+            * np.exp(2.0 * p.score_clutter * (0.5 - found.scores[good])),
+            gate=GATE,
+        )
+        mixture, _ = gaussian_mixture.reduce(
+            updated.posterior,
+            pruning_threshold=p.pruning_threshold,
+            merging_threshold=p.merging_threshold,
+            max_components=p.max_components,
+        )
+        unexplained = found.boxes[good][updated.measurement_weights < BELIEVED]
+        after = DetectionPhdState(mixture, unexplained, state.next_label + births.size)
+        return after, self._result(found, good, updated, mixture)
+
+    def _births(self, unexplained: Float[ndarray, "B 4"]) -> GaussianMixture:
+        p = self._parameters
+        variances = trust(unexplained, p) ** 2 + self._walk(unexplained)
+        return GaussianMixture(
+            weights=np.full(len(unexplained), min(1.0, p.birth_rate * self._step_time)),
+            means=unexplained,
+            covariances=variances[:, :, None] * np.eye(4),
+            labels=np.zeros(len(unexplained), dtype=np.int64),
+        )
+
+    def _walk(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
+        """Variances of one step of the random walk: a person nearby moves further."""
+        p, sizes = self._parameters, np.maximum(boxes[:, 2:], 0.5)
+        across = p.motion_sigma * sizes[:, 1:]
+        sigmas = np.concatenate([across, across, p.growth_sigma * sizes], axis=1)
+        return sigmas**2 * self._step_time
+
+    def _predict(self, mixture: GaussianMixture) -> GaussianMixture:
+        noise = self._walk(mixture.means)[:, :, None] * np.eye(4)
+        return gaussian_mixture.predict(
+            mixture, np.eye(4), noise, self._parameters.survival_probability
+        )
+
+    def _result(
+        self, found: Detected, good: ndarray, updated: PhdUpdate, mixture: GaussianMixture
+    ) -> ViewResult:
+        p = self._parameters
+        chosen = phd.extract(mixture, p.extraction_threshold)
+        estimates, weights = mixture.means[chosen], mixture.weights[chosen]
+        labels = mixture.labels[chosen]
+        if p.output == "estimates":
+            boxes, box_weights, box_labels = estimates, weights, labels
+            sigmas = np.sqrt(np.diagonal(mixture.covariances[chosen], axis1=1, axis2=2))
+        else:
+            believed = updated.measurement_weights > BELIEVED
+            taken = good[believed]
+            boxes, sigmas = found.boxes[taken], found.sigmas[taken]
+            box_weights = updated.measurement_weights[believed]
+            box_labels = _labels_of_boxes(updated, len(good))[believed]
+        return ViewResult(
+            boxes=boxes,
+            weights=box_weights,
+            labels=box_labels,
+            sigmas=sigmas,
+            estimates=estimates,
+            estimate_weights=weights,
+            estimate_labels=labels,
+            measurements=found.boxes,
+            measurement_scores=found.scores,
+            samples=np.zeros((0, 4), np.float32),
+            sample_weights=np.zeros(0, np.float32),
+            information={
+                "boxes outside the room": float((~found.plausible).sum()),
+                "cardinality": mixture.cardinality,
+            },
+        )
+
+
+def _labels_of_boxes(updated: PhdUpdate, count: int) -> ndarray:
+    """The label that explains most of each box, -1 where nobody explains any of it."""
+    labels = np.full(count, -1, dtype=np.int64)
+    pairs = updated.measurements >= 0
+    order = np.argsort(updated.posterior.weights[pairs], kind="stable")
+    # the heaviest pair of a box is written last
+    labels[updated.measurements[pairs][order]] = updated.posterior.labels[pairs][order]
+    return labels

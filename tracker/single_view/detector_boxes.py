@@ -1,0 +1,139 @@
+"""The boxes of an outside detector: how far to trust them, and which contradict the room."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray
+
+from tracker.camera import Camera
+from tracker.parameters import DetectionBoxParams
+from tracker.sequences.sequence import Room, Sequence
+
+_DEPTH_SIGMAS = 3.0  # a box's size may be off by so many standard deviations
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Detected:
+    """The boxes of one camera at one step whose score is high enough."""
+
+    boxes: Float[ndarray, "N 4"]
+    """centre_x, centre_y, half_width, half_height, pixels."""
+    scores: Float[ndarray, " N"]
+    sigmas: Float[ndarray, "N 4"]
+    """Standard deviations of the same four numbers, pixels."""
+    plausible: Bool[ndarray, " N"]
+    """False where the box contradicts the room: it is clutter."""
+
+
+class DetectorBoxes:
+    """The ``detections`` of one camera, with the trust that the parameters state."""
+
+    def __init__(
+        self, sequence: Sequence, camera_index: int, parameters: DetectionBoxParams
+    ) -> None:
+        """Prepare for one camera.
+
+        Raises:
+            ValueError: If the camera has no detections.
+        """
+        view = sequence.views[camera_index]
+        if view.detections is None:
+            raise ValueError(
+                f'camera "{view.camera.name}" of {sequence.name} has no detections; name a CSV '
+                "file as its `detections` in sequence.toml, or choose single_view colour_phd"
+            )
+        self._detections = view.detections
+        self._camera = view.camera
+        self._room = sequence.room
+        self._half_height = float(sequence.target_half_extents[2])
+        self._parameters = parameters
+
+    def at(self, frame: int) -> Detected:
+        """The boxes of one step."""
+        p, rows = self._parameters, self._detections.at(frame)
+        rows_above = np.flatnonzero(self._detections.scores[rows] >= p.score_threshold)
+        corners = self._detections.boxes[rows][rows_above]
+        half_sizes = corners[:, 2:] / 2.0
+        boxes = np.concatenate([corners[:, :2] + half_sizes, half_sizes], axis=1)
+        sigmas = trust(boxes, p)
+        return Detected(
+            boxes, self._detections.scores[rows][rows_above], sigmas, self._plausible(boxes, sigmas)
+        )
+
+    def _plausible(
+        self, boxes: Float[ndarray, "N 4"], sigmas: Float[ndarray, "N 4"]
+    ) -> Bool[ndarray, " N"]:
+        nearest, farthest = standing_between(
+            self._camera, boxes, self._half_height, _DEPTH_SIGMAS * sigmas[:, 3] / boxes[:, 3]
+        )
+        return meets(self._room, nearest, farthest, self._parameters.room_tolerance)
+
+
+def trust(boxes: Float[ndarray, "N 4"], parameters: DetectionBoxParams) -> Float[ndarray, "N 4"]:
+    """Standard deviations of centre and half sizes: shares of the box, and a floor in pixels."""
+    p = parameters
+    half_width, half_height = boxes[:, 2], boxes[:, 3]
+    shares = [
+        p.centre_sigma * half_height,
+        p.centre_sigma * half_height,
+        p.width_sigma * half_width,
+        p.size_sigma * half_height,
+    ]
+    return np.hypot(np.stack(shares, axis=1), p.pixel_sigma)
+
+
+def standing_between(
+    camera: Camera,
+    boxes: Float[ndarray, "N 4"],
+    half_height: float,
+    relative_error: Float[ndarray, " N"],
+) -> tuple[Float[ndarray, "N 3"], Float[ndarray, "N 3"]]:
+    """The nearest and the farthest place where an upright target may stand that gives each box.
+
+    The rays through the middle of the box's top and of its bottom are met by an
+    upright stick of the target's height where
+
+        s u − t v = (0, 0, 2h)
+
+    best in the least squares; the middle of the stick lies on a ray from the lens,
+    and an error of the box's height moves it along that ray in proportion.
+
+    Args:
+        camera: The calibrated camera.
+        boxes: centre_x, centre_y, half_width, half_height, pixels.
+        half_height: h, metres.
+        relative_error: By which share a box's height may be wrong; from 1 on a box that is
+            far too tall may stand anywhere behind.
+    """
+    heads = camera.back_project(boxes[:, :2] - boxes[:, 3:] * [0.0, 1.0])
+    feet = camera.back_project(boxes[:, :2] + boxes[:, 3:] * [0.0, 1.0])
+    together = (heads * feet).sum(axis=1)
+    rise = 2.0 * half_height
+    # the normal equations of [u, −v] [s; t] = (0, 0, 2h), for unit vectors
+    determinant = np.maximum(1.0 - together**2, 1e-12)
+    s = rise * (heads[:, 2] - together * feet[:, 2]) / determinant
+    t = rise * (together * heads[:, 2] - feet[:, 2]) / determinant
+    middle = (s[:, None] * heads + t[:, None] * feet) / 2.0
+    nearest = camera.centre + middle / (1.0 + relative_error)[:, None]
+    farthest = camera.centre + middle / np.maximum(1.0 - relative_error, 0.05)[:, None]
+    return nearest, farthest
+
+
+def meets(
+    room: Room, starts: Float[ndarray, "N 3"], ends: Float[ndarray, "N 3"], margin: float
+) -> Bool[ndarray, " N"]:
+    """Whether each straight way comes within ``margin`` metres of the room's volume."""
+    low, high = room.minimum - margin, room.maximum + margin
+    way = ends - starts
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first, second = (low - starts) / way, (high - starts) / way
+    # a line along a pair of walls is between them all the way, or never
+    still = np.abs(way) < 1e-12
+    between = (starts >= low) & (starts <= high)
+    enter = np.where(still, np.where(between, 0.0, np.inf), np.minimum(first, second))
+    leave = np.where(still, 1.0, np.maximum(first, second))
+    entered = np.maximum(enter.max(axis=1), 0.0)
+    return np.asarray(entered <= np.minimum(leave.min(axis=1), 1.0))
