@@ -11,12 +11,12 @@ import os
 import sys
 import threading
 import time
-from pathlib import Path
 from typing import Any
 
 from app.flags import (
     Arguments,
     Evaluate,
+    Experiment,
     Parameters,
     Render,
     Sequences,
@@ -26,7 +26,7 @@ from app.flags import (
     parse,
     show,
 )
-from app.terminal import Bar, CommandError, print_table, say
+from app.terminal import Bar, CommandError, check_data, print_table, say
 from tracker import parameters as table
 from tracker.parameters import ParameterError
 
@@ -66,6 +66,10 @@ def _run(command: Arguments) -> int:
             from app.evaluation.command import evaluate
 
             evaluate(command)
+        case Experiment():
+            from app.experiment import experiment
+
+            experiment(command)
         case Sequences():
             _sequences(command)
         case Render():
@@ -88,7 +92,7 @@ def _sentence(error: Exception) -> str:
 
 
 def _serve(command: Serve) -> int:
-    _check_data(command.data)
+    check_data(command.data)
     from app import server
     from app.jobs import locate
     from app.security import is_loopback
@@ -154,11 +158,6 @@ def _leave(status: int) -> None:
     os._exit(status)
 
 
-def _check_data(data: Path | None) -> None:
-    if data is not None and not data.is_dir():
-        raise CommandError(f"--data {data}: expected a folder, found none")
-
-
 # track
 
 
@@ -199,7 +198,7 @@ def _track(command: Track) -> None:
 
 
 def _sequences(command: Sequences) -> None:
-    _check_data(command.data)
+    check_data(command.data)
     from tracker.sequences import library
 
     rows = [

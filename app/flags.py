@@ -132,6 +132,24 @@ class Evaluate:
 
 
 @dataclass
+class Experiment:
+    """Run a claim of the papers again; without a name, list them."""
+
+    name: Annotated[
+        Positional[str | None],
+        arg(metavar="NAME", help="Which one.", help_behavior_hint="(optional)"),
+    ] = None
+    all: FlagCreatePairsOff[bool] = False
+    """Run every one, a few minutes in all."""
+    quick: FlagCreatePairsOff[bool] = False
+    """Shortened to what shows the direction of each claim."""
+    output: Annotated[Path, arg(metavar="DIR")] = Path("experiment-results")
+    """Folder for the figures (PNG) and numbers (JSON)."""
+    data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None
+    """Folder that holds the real recordings, for the experiments that need one."""
+
+
+@dataclass
 class Sequences:
     """List the sequences that can be opened by name."""
 
@@ -224,7 +242,7 @@ def _evaluate_with_flags() -> Any:
     return with_flags
 
 
-Arguments = Serve | Track | Evaluate | Sequences | Render | Parameters
+Arguments = Serve | Track | Evaluate | Experiment | Sequences | Render | Parameters
 
 
 def parse(arguments: list[str] | None = None) -> Arguments:
@@ -237,6 +255,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         Annotated[Serve, subcommand("serve")]
         | Annotated[track, subcommand("track")]
         | Annotated[evaluate, subcommand("evaluate")]
+        | Annotated[Experiment, subcommand("experiment")]
         | Annotated[Sequences, subcommand("sequences")]
         | Annotated[Render, subcommand("render")]
         | Annotated[Parameters, subcommand("parameters")]

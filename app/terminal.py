@@ -6,11 +6,22 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 
 class CommandError(Exception):
     """A failure with its sentence."""
+
+
+def check_data(data: Path | None) -> None:
+    """Whether ``--data`` names a folder.
+
+    Raises:
+        CommandError: If not.
+    """
+    if data is not None and not data.is_dir():
+        raise CommandError(f"--data {data}: expected a folder, found none")
 
 
 def say(text: str) -> None:

@@ -5,6 +5,7 @@ One module a claim; its ``EXPERIMENT`` is entered here under its name.
 
 from __future__ import annotations
 
+from tracker.experiments import cameras, fig1, fig2, fig3, sequences
 from tracker.experiments.experiment import (
     Context,
     Experiment,
@@ -14,7 +15,16 @@ from tracker.experiments.experiment import (
     Verdict,
 )
 
-EXPERIMENTS: dict[str, Experiment] = {}
+EXPERIMENTS: dict[str, Experiment] = {
+    experiment.name: experiment
+    for experiment in (
+        fig1.EXPERIMENT,
+        fig2.EXPERIMENT,
+        fig3.EXPERIMENT,
+        cameras.EXPERIMENT,
+        sequences.EXPERIMENT,
+    )
+}
 """By name, in the order in which ``--all`` runs them."""
 
 __all__ = [

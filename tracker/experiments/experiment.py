@@ -34,6 +34,8 @@ class Context:
     told: Told = lambda words, done, total: None
     cancelled: Callable[[], bool] = lambda: False
     """Asked now and then; an experiment that hears yes raises ``tracker.pipeline.Cancelled``."""
+    shared: dict[str, Any] = field(default_factory=dict, compare=False)
+    """Runs that several experiments use."""
 
 
 @dataclass(frozen=True, slots=True)
