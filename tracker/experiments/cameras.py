@@ -154,20 +154,16 @@ def _draw(name: str, measured: dict[str, Any], seeds: int) -> Figure:
         "found_share": "share found within 0.3 m, higher is better",
         "ospa": "OSPA (m), lower is better",
     }
-    tones = {3: drawing.colour(2), 2: drawing.NEAR, 1: drawing.LINE}
-    places = np.arange(len(measured))[::-1]
+    tones = {1: drawing.LINE, 2: drawing.NEAR}
     for key, plot in plots.items():
-        values = [m[key] or 0.0 for m in measured.values()]
-        tone = [tones.get(m["cameras"], drawing.LINE) for m in measured.values()]
-        errors = [m["ospa_deviation"] or 0.0 for m in measured.values()] if key == "ospa" else None
-        plot.barh(places, values, color=tone, height=0.66, xerr=errors,
-                  error_kw={"ecolor": drawing.INK, "elinewidth": 0.9})  # fmt: skip
-        for place, value in zip(places.tolist(), values, strict=True):
-            plot.annotate(number(value, 3), (0.0, place), xytext=(4, 0), fontsize=8,
-                          textcoords="offset points", va="center", color="#ffffff")  # fmt: skip
+        drawing.bars(
+            plot,
+            list(measured),
+            [m[key] for m in measured.values()],
+            [tones.get(m["cameras"], drawing.colour(2)) for m in measured.values()],
+            named=key == "position_error",
+        )
         plot.set_title(words[key])
-        plot.grid(visible=False, axis="y")
-        plot.set_yticks(places, list(measured) if key == "position_error" else [""] * len(places))
     return figure
 
 

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy import ndarray
 
+from tracker.evaluation.figures import number
 from tracker.evaluation.report_figures import (
     DARK_IDS,
     GRID,
@@ -103,6 +104,23 @@ def circles(
         frames[kept], values[kept], "o", ms=4.2, mfc="none", mec=MUTED, mew=0.8, ls="none",
         zorder=2,
     )  # fmt: skip
+
+
+def bars(
+    axes: Axes, names: list[str], values: list[float | None], tones: list[str], *, named: bool
+) -> None:
+    """Values side by side, the first at the top, each with its number."""
+    places = np.arange(len(names))[::-1]
+    lengths = [0.0 if value is None else value for value in values]
+    axes.barh(places, lengths, color=tones, height=0.62)
+    for place, value, length in zip(places.tolist(), values, lengths, strict=True):
+        axes.annotate(
+            number(value, 3), (max(length, 0.0), place), xytext=(4, 0), fontsize=8,
+            textcoords="offset points", va="center", color=INK,
+        )  # fmt: skip
+    axes.set_xlim(min(0.0, *lengths), 1.36 * max(1e-6, *lengths))
+    axes.grid(visible=False, axis="y")
+    axes.set_yticks(places, names if named else [""] * len(names))
 
 
 def box(

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from tracker.evaluation import evaluate_sequence
 from tracker.evaluation.figures import number
 from tracker.experiments import runs
@@ -105,7 +103,7 @@ def _findings(measured: dict[str, Any]) -> tuple[Finding, ...]:
 def _draw(measured: dict[str, Any]) -> Figure:
     from tracker.experiments import drawing
 
-    figure = drawing.sheet(11.0, 0.75 * len(measured) + 1.6, "All scenes, default parameters")
+    figure = drawing.sheet(11.0, 0.5 * len(measured) + 1.3, "All scenes, default parameters")
     words = {
         "mota": "MOTA",
         "idf1": "IDF1",
@@ -114,18 +112,12 @@ def _draw(measured: dict[str, Any]) -> Figure:
         "position_error": "error (m), lower is better",
     }
     plots = drawing.panels(figure, [list(words)])
-    places = np.arange(len(measured))[::-1]
     for key, plot in plots.items():
-        values = [m[key] or 0.0 for m in measured.values()]
         metres = key in ("ospa", "position_error")
-        plot.barh(places, values, color=drawing.LINE if metres else drawing.colour(2), height=0.6)
-        for place, value in zip(places.tolist(), values, strict=True):
-            plot.annotate(number(value, 3), (max(value, 0.0), place), xytext=(3, 0),
-                          fontsize=8, textcoords="offset points", va="center")  # fmt: skip
+        tone = drawing.LINE if metres else drawing.colour(2)
+        values = [m[key] for m in measured.values()]
+        drawing.bars(plot, list(measured), values, [tone] * len(values), named=key == "mota")
         plot.set_title(words[key])
-        plot.set_xlim(min(0.0, *values), 1.28 * max([*values, 1e-9]) if metres else 1.25)
-        plot.grid(visible=False, axis="y")
-        plot.set_yticks(places, list(measured) if key == "mota" else [""] * len(places))
     return figure
 
 
