@@ -250,6 +250,45 @@ def kalman_pairs(
 
 
 @_kernel
+def phd_weights(
+    log_terms: ndarray, measured: ndarray, log_clutter: ndarray
+) -> tuple[ndarray, ndarray, ndarray]:
+    """Weights of a PHD update, in logarithms: a far measurement still goes to its nearest.
+
+    Args:
+        log_terms: (P,), log(p_D w q(z)) of each pair.
+        measured: (P,), its measurement.
+        log_clutter: (M,), log κ(z); minus infinity without clutter.
+
+    Returns:
+        (P,) weights; (P,) log odds against clutter; (M,) sums of the weights.
+    """
+    count = len(log_clutter)
+    largest = np.empty(count)
+    for z in range(count):
+        largest[z] = max(log_clutter[z], -1e300)
+    for pair in range(len(log_terms)):
+        z = measured[pair]
+        largest[z] = max(largest[z], log_terms[pair])
+    totals = np.empty(count)
+    for z in range(count):
+        totals[z] = math.exp(log_clutter[z] - largest[z])
+    weights = np.empty(len(log_terms))
+    odds = np.empty(len(log_terms))
+    for pair in range(len(log_terms)):
+        z = measured[pair]
+        weights[pair] = math.exp(log_terms[pair] - largest[z])
+        totals[z] += weights[pair]
+        odds[pair] = log_terms[pair] - log_clutter[z]
+    sums = np.zeros(count)
+    for pair in range(len(log_terms)):
+        z = measured[pair]
+        weights[pair] /= totals[z]
+        sums[z] += weights[pair]
+    return weights, odds, sums
+
+
+@_kernel
 def belief_propagation(
     missed: ndarray, detected: ndarray, unexplained: ndarray, tolerance: float, iterations: int
 ) -> tuple[ndarray, ndarray]:

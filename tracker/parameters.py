@@ -366,7 +366,7 @@ class FusionParams(Params):
     extraction: Annotated[
         Literal["components", "boxes"], ui("W_z", stage="tracks", published="components")
     ] = "components"
-    """What is reported: single components, or what each box made of all of them together."""
+    """Sequential PHD: whether the components that one box made are reported singly or as one."""
 
     extraction_threshold: Annotated[
         float, Field(ge=0.01, le=0.99), ui("T_e", step=0.01, stage="tracks")

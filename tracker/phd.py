@@ -99,21 +99,15 @@ def update(
     kappa = np.broadcast_to(np.asarray(clutter_intensity, dtype=float), (count,))
     with np.errstate(divide="ignore"):
         log_kappa = np.log(kappa)
-    # in logarithms: without clutter a far measurement still goes to its nearest component
     log_terms = np.log(p_d[parent] * predicted.weights[parent]) + log_likelihood
-    largest = np.maximum(log_kappa, np.finfo(float).min)
-    np.maximum.at(largest, measured, log_terms)
-    sums = np.exp(log_kappa - largest)
-    terms = np.exp(log_terms - largest[measured])
-    np.add.at(sums, measured, terms)
-    weights = terms / sums[measured]
+    weights, log_odds, sums = kernels.phd_weights(log_terms, measured, log_kappa)
     detected = GaussianMixture(weights, means, covariances, predicted.labels[parent])
     return PhdUpdate(
         posterior=concatenate([missed, detected]),
         parents=np.concatenate([np.arange(size), parent]),
         measurements=np.concatenate([np.full(size, -1, dtype=np.int64), measured]),
-        log_odds=log_terms - log_kappa[measured],
-        measurement_weights=np.bincount(measured, weights, minlength=count),
+        log_odds=log_odds,
+        measurement_weights=sums,
     )
 
 

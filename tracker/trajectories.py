@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker import phd
+from tracker import kernels, phd
 from tracker.fusion.protocol import FusionResult
+from tracker.gaussian_mixture import GaussianMixture
 from tracker.sequences.sequence import Room
+
+Rule = Literal["components", "boxes"]
+"""What counts as a target: a component, or what one box made of all components together."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +67,7 @@ def extract(
     *,
     cameras: int,
     extraction_threshold: float,
+    rule: Rule = "components",
     room: Room | None = None,
     margin: float = np.inf,
     first_frame: int = 0,
@@ -69,12 +75,15 @@ def extract(
 ) -> Trajectories:
     """The targets of each step: components above the threshold, one a label.
 
-    Of several components with one label the heaviest stands for it.
+    Of several components with one label the heaviest stands for it. With the rule
+    ``boxes``, for a PHD intensity, the components that one box made count together;
+    see :func:`by_boxes`.
 
     Args:
         results: The posterior of each step, from ``first_frame`` on.
         cameras: C.
         extraction_threshold: T_e; a component is a target where its weight is above it.
+        rule: Whether the components that one box made count by themselves or together.
         room: Where people are tracked; None for everywhere.
         margin: Metres beyond the room's volume within which a target still counts.
         first_frame: The step of the first result.
@@ -84,31 +93,66 @@ def extract(
     ids = {} if ids is None else ids
     rows: list[Trajectories] = []
     for offset, result in enumerate(results):
-        chosen = phd.extract(result.posterior, extraction_threshold)
+        targets, leaders = result.posterior, np.arange(result.posterior.size)
+        if rule == "boxes":
+            targets, leaders = by_boxes(result)
+        chosen = phd.extract(targets, extraction_threshold)
         if room is not None:
-            chosen = chosen[room.contains(result.posterior.means[chosen, :3], margin)]
+            chosen = chosen[room.contains(targets.means[chosen, :3], margin)]
         if not len(chosen):
             continue
-        labels, first = np.unique(result.posterior.labels[chosen], return_index=True)
+        labels, first = np.unique(targets.labels[chosen], return_index=True)
         for label in labels.tolist():
             ids.setdefault(label, len(ids) + 1)
         numbers = np.array([ids[label] for label in labels.tolist()], dtype=np.int64)
         order = np.argsort(numbers)
-        components = chosen[first][order]
-        variances = np.diagonal(result.posterior.covariances[components], axis1=1, axis2=2)
+        found = targets.take(chosen[first][order])
+        components = leaders[chosen[first][order]]
+        variances = np.diagonal(found.covariances, axis1=1, axis2=2)
         rows.append(
             Trajectories(
                 frames=np.full(len(labels), first_frame + offset, dtype=np.int64),
                 ids=numbers[order],
-                positions=result.posterior.means[components, :3],
-                existences=result.posterior.weights[components],
+                positions=found.means[:, :3],
+                existences=found.weights,
                 sigmas=np.sqrt(variances[:, :3]),
                 seen=(result.sources[:, components] >= 0).T,
                 components=components,
-                labels=labels[order],
+                labels=found.labels,
             )
         )
     return concatenate(rows, cameras)
+
+
+def by_boxes(result: FusionResult) -> tuple[GaussianMixture, Int[ndarray, " K"]]:
+    """The intensity gathered by the boxes that made it: W_z of Ristic, Clark and Vo (FUSION 2010).
+
+    The components that one box z of the last camera made become one, with the weight
+    W_z = Σ_j w_j(z), the mean Σ_j w_j(z) m_j / W_z and the label of the heaviest; those
+    that this camera missed are gathered by the boxes of the camera before, and so on;
+    what no camera saw stays as it is. So a person whose weight is spread over several
+    components is found, and a box is nobody's twice.
+
+    Returns:
+        One component a group, and the heaviest component of each.
+    """
+    posterior, group = result.posterior, np.full(result.posterior.size, -1, dtype=np.int64)
+    count = 0
+    for boxes in result.sources[::-1]:
+        open_ones = np.flatnonzero((group < 0) & (boxes >= 0))
+        names, which = np.unique(boxes[open_ones], return_inverse=True)
+        group[open_ones] = count + which
+        count += len(names)
+    rest = np.flatnonzero(group < 0)
+    group[rest] = count + np.arange(len(rest))
+    count += len(rest)
+    order = np.argsort(posterior.weights, kind="stable")
+    leaders = np.zeros(count, dtype=np.int64)
+    leaders[group[order]] = order  # the heaviest comes last and stays
+    weights, means, covariances = kernels.merge_moments(
+        posterior.weights, posterior.means, posterior.covariances, group, count
+    )
+    return GaussianMixture(weights, means, covariances, posterior.labels[leaders]), leaders
 
 
 def concatenate(parts: Iterable[Trajectories], cameras: int) -> Trajectories:

@@ -123,9 +123,12 @@ class MeasurementBirths:
 
     def _meeting_points(self, evidence: list[CameraEvidence]) -> Float[ndarray, "N 3"]:
         """Where the rays of unexplained boxes of two cameras pass close by each other."""
+        free = [one.centres[one.unexplained > _UNEXPLAINED] for one in evidence]
+        if sum(len(centres) > 0 for centres in free) < 2:
+            return np.zeros((0, 3))
         rays = [
-            camera.back_project(one.centres[one.unexplained > _UNEXPLAINED])
-            for camera, one in zip(self._cameras, evidence, strict=True)
+            camera.back_project(centres)
+            for camera, centres in zip(self._cameras, free, strict=True)
         ]
         points = [np.zeros((0, 3))]
         for a in range(len(rays)):

@@ -79,7 +79,7 @@ class Ledger:
     ) -> None:
         """Note one camera's pairs of label and box; pairs not worth telling are left out."""
         told = np.flatnonzero(probabilities >= _WORTH_TELLING)
-        self._cameras.append(np.full(len(told), camera, dtype=np.int32))
+        self._cameras.append(np.full(len(told), camera, dtype=np.int64))
         self._labels.append(labels[told])
         self._boxes.append(boxes[told])
         self._probabilities.append(probabilities[told])
@@ -96,14 +96,18 @@ class Ledger:
         of_pair = np.concatenate(self._labels)
         place = np.minimum(np.searchsorted(alive, of_pair), len(alive) - 1)
         kept = np.flatnonzero(alive[place] == of_pair)
-        keys = np.stack(
-            [
-                np.concatenate(self._cameras)[kept],
-                first[place[kept]],
-                np.concatenate(self._boxes)[kept],
-            ]
+        cameras = np.concatenate(self._cameras)[kept]
+        components, boxes = first[place[kept]], np.concatenate(self._boxes)[kept]
+        # camera, component and box as the digits of one number
+        bases = (len(labels), int(boxes.max(initial=0)) + 1)
+        keys = (cameras * bases[0] + components) * bases[1] + boxes
+        pairs, which = np.unique(keys, return_inverse=True)
+        sums = np.bincount(which, np.concatenate(self._probabilities)[kept], len(pairs))
+        rest, boxes = np.divmod(pairs, bases[1])
+        cameras, components = np.divmod(rest, bases[0])
+        return Associations(
+            cameras.astype(np.int32),
+            components.astype(np.int32),
+            boxes.astype(np.int32),
+            np.minimum(sums, 1.0).astype(np.float32),
         )
-        pairs, which = np.unique(keys, axis=1, return_inverse=True)
-        sums = np.bincount(which.ravel(), np.concatenate(self._probabilities)[kept], pairs.shape[1])
-        cameras, components, boxes = pairs.astype(np.int32)
-        return Associations(cameras, components, boxes, np.minimum(sums, 1.0).astype(np.float32))

@@ -64,11 +64,13 @@ class TargetModel:
     The projection bends. ``extended`` takes it as straight at the mean. With
     ``unscented`` the values are the mean over the state's uncertainty, the
     Jacobian is that of the best straight line through it (statistical linear
-    regression) and ``spreads`` holds what is left. Against a particle reference
-    the two are alike while the uncertainty is small against the distance, which
-    it is for every tracked person; within about 1.5 m of a lens and with an
-    uncertainty of a third of that distance or more, the unscented update is the
-    nearer one in mean and covariance. It costs about a third of the speed.
+    regression) and ``spreads`` holds what is left. Against a particle reference,
+    2 m before a lens and for a place known to 0.3 m, the whole box updates the mean
+    to 7 cm by the first and to 4 cm by the second, and the divergence of the
+    Gaussian falls from 1.2 to 0.3; a place known to 0.1 m, as of every person who
+    is followed, or a distance of 4 m, and both lie within a centimetre of the
+    reference. With the centre alone neither is the better one. The unscented
+    update takes about a third more time.
     """
 
     def __init__(
@@ -84,7 +86,8 @@ class TargetModel:
         self._half_width = float(np.mean(half_extents[:2]))
         self._transform = _FROM_BOX[kind]
         # R = T diag(σ²) Tᵀ is linear in σ²
-        self._products = np.einsum("pa,qa->apq", self._transform, self._transform)
+        products = np.einsum("pa,qa->apq", self._transform, self._transform)
+        self._products = products.reshape(4, self.size**2)
 
     def expected(
         self,
@@ -169,5 +172,5 @@ class TargetModel:
             view: Boxes and how far each is to be trusted.
             factor: On the standard deviations.
         """
-        noise = np.tensordot((factor * view.sigmas) ** 2, self._products, axes=1)
+        noise = ((factor * view.sigmas) ** 2 @ self._products).reshape(-1, self.size, self.size)
         return view.boxes @ self._transform.T, noise
