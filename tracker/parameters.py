@@ -273,18 +273,20 @@ class FusionParams(Params):
     """Probability that a camera's boxes include a person that its picture holds."""
 
     clutter_rate: Annotated[
-        float, Field(ge=0.001, le=50.0), ui("λ_c", unit="1/(camera·step)", step=0.1, log=True)
-    ] = 0.5
+        float,
+        Field(ge=0.001, le=50.0),
+        ui("λ_c", unit="1/(camera·step)", step=0.1, log=True, published=0.5),
+    ] = 3.0
     """Expected number of false boxes that a camera gives at each step."""
 
     birth_rate: Annotated[
-        float, Field(ge=1e-4, le=10.0), ui("γ", unit="1/(entrance·s)", log=True)
-    ] = 0.5
+        float, Field(ge=1e-4, le=10.0), ui("γ", unit="1/(entrance·s)", log=True, published=0.5)
+    ] = 0.05
     """Expected number of people who come in at each entrance in one second."""
 
     measurement: Annotated[
         Literal["centre", "box", "box_and_width"], ui("z", published="centre")
-    ] = "centre"
+    ] = "box"
     """What is used of a box: its centre; its horizontal centre, top and bottom; and its width."""
 
     update: Annotated[Literal["extended", "unscented"], ui("h(x)")] = "extended"
@@ -292,7 +294,7 @@ class FusionParams(Params):
 
     motion: Annotated[
         Literal["random_walk", "constant_velocity"], ui("F", published="random_walk")
-    ] = "random_walk"
+    ] = "constant_velocity"
     """How people move between two steps."""
 
     motion_sigma: Annotated[
@@ -318,15 +320,15 @@ class FusionParams(Params):
 
     birth: Annotated[
         Literal["entrances", "measurements", "both"], ui("γ(x)", published="entrances")
-    ] = "entrances"
+    ] = "both"
     """Where people may appear: at the entrances, where boxes of two cameras agree, or both."""
 
     misses: Annotated[Literal["per_camera", "per_person"], ui("1−p_D", published="per_camera")] = (
-        "per_camera"
+        "per_person"
     )
-    """Sequential PHD: whether a camera's miss forgets what the cameras before it saw."""
+    """Sequential PHD: whether a miss forgets what other cameras saw, or a label is one person."""
 
-    occlusion: Annotated[float, Field(ge=0.0, le=1.0), ui("ρ", step=0.05, published=0.0)] = 0.0
+    occlusion: Annotated[float, Field(ge=0.0, le=1.0), ui("ρ", step=0.05, published=0.0)] = 0.8
     """How surely a camera misses a person who is wholly covered by another."""
 
     edge: Annotated[Literal["soft", "hard"], ui("∂I", published="hard")] = "soft"
@@ -336,12 +338,16 @@ class FusionParams(Params):
     """Tracks nearer than this share of a target's width, without a box each, are one person."""
 
     room_margin: Annotated[
-        float, Field(ge=0.0, le=5.0), ui("m", unit="m", step=0.05, stage="tracks")
-    ] = 0.1
+        float,
+        Field(ge=0.0, le=5.0),
+        ui("m", unit="m", step=0.05, stage="tracks", published=0.1),
+    ] = 0.0
     """How far outside the room's volume a person is still reported."""
 
-    followed_margin: Annotated[float, Field(ge=0.0, le=5.0), ui("m_f", unit="m", step=0.05)] = 0.5
-    """How much further out people are followed, unreported, so that they explain their boxes."""
+    followed_margin: Annotated[
+        float, Field(ge=0.0, le=5.0), ui("m_f", unit="m", step=0.05, published=0.6)
+    ] = 0.5
+    """How far outside the room people are followed, unreported, so that their boxes are theirs."""
 
     memory: Annotated[
         float, Field(ge=0.0, le=30.0), ui("t_m", unit="s", step=0.1, published=0.0)
@@ -378,7 +384,7 @@ class RunParameters(Params):
     """Everything that a run depends on, besides the sequence and the seed."""
 
     single_view: SingleViewName = "colour_phd"
-    """Method of stage 1: boxes from each camera's pictures, or the detector's boxes as they are."""
+    """Method of stage 1: boxes from each camera's pictures, or a detector's, filtered or not."""
 
     fusion_method: FusionName = "sequential_phd"
     """Method of stage 2: how the cameras' boxes become 3D positions."""

@@ -116,15 +116,17 @@ def stage_keys(sequence: Sequence, parameters: RunParameters, seed: int) -> dict
 def default_parameters(sequence: Sequence) -> RunParameters:
     """Which methods follow from what the sequence has: pictures with templates, or boxes.
 
+    People are fused by ``multi_bernoulli`` in either case.
+
     Raises:
         ValueError: If the sequence has neither.
     """
     if sequence.has_pictures and sequence.templates:
-        return RunParameters(single_view="colour_phd")
+        return RunParameters(single_view="colour_phd", fusion_method="multi_bernoulli")
     if sequence.has_detections:
-        return RunParameters(single_view="none")
+        return RunParameters(single_view="none", fusion_method="multi_bernoulli")
     if sequence.has_pictures:
-        return RunParameters(single_view="colour_phd")
+        return RunParameters(single_view="colour_phd", fusion_method="multi_bernoulli")
     raise ValueError(
         f"{sequence.name}: every camera needs pictures (video or images), or every camera "
         "needs detections; add what is missing to sequence.toml"
@@ -136,6 +138,7 @@ def compute(
     parameters: RunParameters,
     *,
     seed: int = 0,
+    steps: int | None = None,
     reader: FrameReader | None = None,
     previous: Run | None = None,
     on_progress: Callable[[Run, Progress], None] | None = None,
@@ -148,6 +151,7 @@ def compute(
         parameters: Methods and their numbers.
         seed: Every camera and step draws from a generator of its own made of it, so
             the result depends neither on threads nor on where a run was resumed.
+        steps: Stop after this many steps, for a first look; None for all.
         reader: The pictures; one is opened for the run where none is given.
         previous: A run, complete or not, whose stages are re-used as far as their
             keys agree. It is left as it is.
@@ -156,17 +160,18 @@ def compute(
         cancelled: Asked between steps.
 
     Returns:
-        The complete run.
+        The run, complete unless ``steps`` says otherwise.
 
     Raises:
         Cancelled: If ``cancelled`` said so.
         ValueError: If the methods do not fit the sequence.
     """
+    total = sequence.frames if steps is None else min(steps, sequence.frames)
     run = Run(sequence, parameters, seed, stage_keys(sequence, parameters, seed))
     _adopt(run, previous)
     stage: Stage = "single_view"
-    if len(run.views) == sequence.frames:
-        stage = "fusion" if len(run.fused) < sequence.frames else "tracks"
+    if len(run.views) >= total:
+        stage = "fusion" if len(run.fused) < total else "tracks"
     begin = time.perf_counter()
     first = len(run.fused)
     last_told = begin
@@ -179,6 +184,11 @@ def compute(
                 run.fused[run.done :],
                 cameras=len(sequence.views),
                 extraction_threshold=parameters.fusion.extraction_threshold,
+                rule=(
+                    parameters.fusion.extraction
+                    if parameters.fusion_method == "sequential_phd"
+                    else "components"
+                ),
                 room=sequence.room,
                 margin=parameters.fusion.room_margin,
                 first_frame=run.done,
@@ -190,22 +200,22 @@ def compute(
         run.done = len(run.fused)
         if on_progress is not None:
             seconds = time.perf_counter() - begin
-            on_progress(run, Progress(stage, run.done, sequence.frames, seconds, run.done - first))
+            on_progress(run, Progress(stage, run.done, total, seconds, run.done - first))
 
     publish()
     method = fusion.create(sequence, parameters)
     state = run.fusion_state if run.fused else method.start()
     with ExitStack() as stack:
-        if len(run.views) < sequence.frames:
+        if len(run.views) < total:
             if reader is None:
                 reader = FrameReader(sequence)
                 stack.callback(reader.close)
-            steps = stack.enter_context(_SingleViews(run, reader, cancelled))
-        for frame in range(len(run.fused), sequence.frames):
+            single_views = stack.enter_context(_SingleViews(run, reader, cancelled))
+        for frame in range(len(run.fused), total):
             if cancelled():
                 raise Cancelled
             if frame == len(run.views):
-                views, view_states = next(steps)
+                views, view_states = next(single_views)
                 run.views.append(views)
                 run.view_states = view_states
             state, result = method.step(state, run.views[frame])

@@ -140,8 +140,8 @@ def test_what_was_seen_of_a_stopped_run_is_the_beginning_of_the_whole() -> None:
 def test_a_changed_extraction_threshold_reruns_no_filter() -> None:
     # who is hidden in the last camera keeps a weight of about 1 - p_D
     whole = sequence(crossing(STEPS), STEPS, hidden=[(2, 0, range(30, 40))])
-    first = compute(whole, BOXES)
-    parameters = changed(extraction_threshold=0.01)
+    first = compute(whole, changed(misses="per_camera"))
+    parameters = changed(misses="per_camera", extraction_threshold=0.01)
     second = compute(whole, parameters, previous=first)
     assert all(a is b for a, b in zip(second.fused, first.fused, strict=True))
     assert all(a is b for a, b in zip(second.views, first.views, strict=True))
@@ -254,7 +254,7 @@ def test_one_step_is_a_sequence_too() -> None:
 def test_the_keys_follow_the_stages() -> None:
     keys = stage_keys(WHOLE, BOXES, 0)
     tracks = stage_keys(WHOLE, changed(extraction_threshold=0.7), 0)
-    fusion = stage_keys(WHOLE, changed(clutter_rate=3.0), 0)
+    fusion = stage_keys(WHOLE, changed(clutter_rate=2.0), 0)
     views = stage_keys(WHOLE, with_values(BOXES, {"detection_boxes.size_sigma": 0.3}), 0)
     seed = stage_keys(WHOLE, BOXES, 1)
     digest = stage_keys(replace(WHOLE, digest="other"), BOXES, 0)

@@ -51,7 +51,7 @@ class FusionModel:
             birth_rate=p.birth_rate * sequence.step_time,
             detection_probability=p.detection_probability,
             gate=self.gate,
-            margin=p.room_margin + p.followed_margin,
+            margin=p.followed_margin,
             largest_gap=2.0 * float(np.max(sequence.target_half_extents)),
         )
 
@@ -119,7 +119,7 @@ class FusionModel:
 
     def stays(self, mixture: GaussianMixture) -> Int[ndarray, " K"]:
         """Indices of the components that have not strayed from the room."""
-        margin = self.parameters.room_margin + self.parameters.followed_margin
+        margin = self.parameters.followed_margin
         return np.flatnonzero(self.room.contains(mixture.means[:, :3], margin))
 
     def doubles(
@@ -131,15 +131,17 @@ class FusionModel:
     ) -> Bool[ndarray, " n"]:
         """Which of n people only repeat a surer or older one at the same place.
 
-        Two nearer than the target is wide are one person, unless some camera gave
-        each a box of its own. Among sure ones the older label stays; an unsure one
-        never displaces a sure one.
+        Two nearer than ``near`` are one person, unless some camera gave each a box of
+        its own; at half of it they are one even so, for a detector may draw two boxes
+        around one person, and two people cannot stand in one place. Among sure ones
+        the older label stays; an unsure one never displaces a sure one.
         """
         if len(means) < 2:
             return np.zeros(len(means), dtype=bool)
         offsets = means[:, None, :3] - means[None, :, :3]
-        near = (offsets**2).sum(axis=2) < self.near**2
-        np.fill_diagonal(near, False)
+        distances = (offsets**2).sum(axis=2)
+        np.fill_diagonal(distances, np.inf)
+        near = distances < self.near**2
         if not near.any():
             return np.zeros(len(means), dtype=bool)
         both = (sources[:, :, None] >= 0) & (sources[:, None, :] >= 0)
@@ -147,4 +149,5 @@ class FusionModel:
         older = labels[:, None] > labels[None, :]
         sure = weights > CONFIRMED
         yields = np.where(sure[:, None] == sure[None, :], older, sure[None, :])
-        return np.asarray((near & ~parted & yields).any(axis=1))
+        one = near & (~parted | (distances < (self.near / 2.0) ** 2))
+        return np.asarray((one & yields).any(axis=1))
