@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import os
-import re
 import shutil
-import signal
-import subprocess
-import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
-import httpx2
 import pytest
 from playwright.sync_api import Browser, Page, sync_playwright
 
+from tests.browser.serving import Server
 from tests.browser.walkers import write_walkers
 
 FLAGS = [
@@ -46,69 +40,6 @@ def browser() -> Iterator[Browser]:
         chromium = playwright.chromium.launch(executable_path=path, args=FLAGS)
         yield chromium
         chromium.close()
-
-
-class Server:
-    """`multiview-phd serve` as a person starts it, on a free port."""
-
-    def __init__(self, sequence: Path, cache: Path, port: int = 0) -> None:
-        self.folder = sequence
-        self._arguments = [str(sequence), "--no-open", "--data", str(sequence.parent)]
-        self._environment = os.environ | {"MULTIVIEW_PHD_CACHE": str(cache)}
-        self.port = port
-        self.start()
-
-    def start(self) -> None:
-        """Start, on the port used before if there was one, and wait for the first answer."""
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "app", "serve", *self._arguments, "--port", str(self.port)],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            env=self._environment,
-        )
-        assert self.process.stdout is not None
-        line = self.process.stdout.readline()
-        found = re.search(r"http://[\w.]+:(\d+)", line)
-        assert found, f"the server did not say where it is: {line}"
-        self.port = int(found[1])
-        self.wait(lambda state: state["sequence"] is not None and state["opening"] is None)
-
-    @property
-    def address(self) -> str:
-        """Of the page."""
-        return f"http://127.0.0.1:{self.port}/"
-
-    def get(self, path: str) -> httpx2.Response:
-        """One answer."""
-        return httpx2.get(self.address.rstrip("/") + path, timeout=30.0)
-
-    def wait(self, condition: Callable[[dict], bool], seconds: float = 60.0) -> dict:
-        """The state, once it is as wished."""
-        deadline = time.monotonic() + seconds
-        state: dict = {}
-        while time.monotonic() < deadline:
-            try:
-                state = self.get("/api/state").json()
-                if condition(state):
-                    return state
-            except httpx2.TransportError:
-                pass
-            time.sleep(0.1)
-        raise AssertionError(f"the server did not get there within {seconds} s: {state}")
-
-    def wait_for_run(self) -> dict:
-        """The state with a finished run of the parameters that hold now."""
-        return self.wait(lambda state: state["run"]["state"] == "done")
-
-    def stop(self) -> float:
-        """End it as Ctrl-C does; the seconds that took."""
-        begin = time.monotonic()
-        self.process.send_signal(signal.SIGINT)
-        self.process.wait(timeout=20.0)
-        if self.process.stdout is not None:
-            self.process.stdout.close()
-        return time.monotonic() - begin
 
 
 @pytest.fixture(scope="module")

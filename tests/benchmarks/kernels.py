@@ -1,0 +1,85 @@
+"""The compiled kernels against their plain NumPy references, in one run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from tests.benchmarks.measure import Measurement, ratio, seconds
+from tests.engine.mixtures import random_mixture, reference_merge, reference_update
+from tracker import colour, gaussian_mixture, phd
+
+
+def run(short: bool) -> Iterator[Measurement]:
+    """Update and merging of a mixture of a single view's size; colour distances of its samples."""
+    rng = np.random.default_rng(1)
+    mixture = random_mixture(rng, 30, 4)
+    jacobians = np.tile(np.eye(4), (30, 1, 1))
+    measurements = mixture.means[:8] + rng.normal(0.0, 0.3, (8, 4))
+    noise = np.eye(4)[None]
+    p_d = np.full(30, 0.9)
+
+    def update() -> object:
+        return phd.update(
+            mixture,
+            measurements,
+            expected=mixture.means,
+            jacobians=jacobians,
+            noise=noise,
+            detection_probability=p_d,
+            clutter_intensity=1e-3,
+        )
+
+    def reference() -> object:
+        return reference_update(mixture, measurements, mixture.means, jacobians, noise, p_d, 1e-3)
+
+    pairs = 3 if short else 9
+    yield Measurement(
+        "PHD update, 30 × 8, kernel against NumPy",
+        ratio(update, reference, pairs=pairs),
+        "×",
+        "≥ 5",
+        5.0,
+    )
+    posterior = phd.update(
+        mixture,
+        measurements,
+        expected=mixture.means,
+        jacobians=jacobians,
+        noise=noise,
+        detection_probability=p_d,
+        clutter_intensity=1e-3,
+    ).posterior
+    yield Measurement(
+        f"merging of {posterior.size} components, kernel against NumPy",
+        ratio(
+            lambda: gaussian_mixture.merge(posterior, 4.0),
+            lambda: reference_merge(posterior, 4.0),
+            pairs=pairs,
+        ),
+        "×",
+        "≥ 5",
+        5.0,
+    )
+    yield from _colour(rng)
+
+
+def _colour(rng: np.random.Generator) -> Iterator[Measurement]:
+    """Boxes a second: 400 samples a camera, head-sized boxes, 272 bins."""
+    for width, height, half in ((360, 288, 12.0), (1920, 1080, 60.0)):
+        picture = rng.integers(0, 255, (height, width, 3), dtype=np.uint8)
+        boxes = np.stack(
+            [
+                rng.uniform(half, width - half, 400),
+                rng.uniform(half, height - half, 400),
+                np.full(400, half),
+                np.full(400, 1.4 * half),
+            ],
+            axis=1,
+        )
+        bins = colour.bin_map(picture, "hue_saturation")
+        templates = colour.histograms(bins, boxes[:6], "hue_saturation", "epanechnikov")
+        model = colour.ColourModel.of(templates, "aabbcc", "hue_saturation", "epanechnikov")
+        taken = seconds(lambda: model.distances(bins, boxes))  # noqa: B023
+        yield Measurement(f"colour distances at {width}×{height}", 400.0 / taken, "boxes/s")

@@ -1,0 +1,69 @@
+"""The stages over whole sequences: how many times faster than the recording."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from tests.benchmarks.measure import Measurement
+from tests.engine import synthetic
+from tracker import fusion, pipeline
+from tracker.parameters import PRESETS, RunParameters, with_values
+from tracker.sequences.reader import read_sequence
+
+DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
+
+
+def run(short: bool) -> Iterator[Measurement]:
+    """Fusion alone, 500 steps and 3 cameras; the whole pipeline on real video, where at hand."""
+    yield from _fusion()
+    video = DATA / "av163-seq30-2p-1101"
+    if video.is_dir():
+        yield from _video(video, 100 if short else 500)
+
+
+def _fusion() -> Iterator[Measurement]:
+    whole = synthetic.sequence(synthetic.crossing(500), 500)
+    views = [synthetic.views_at(whole, frame) for frame in range(500)]
+    variants: dict[str, RunParameters] = {
+        "sequential_phd as published": with_values(RunParameters(), PRESETS["published"]),
+        "sequential_phd": with_values(RunParameters(), {"fusion_method": "sequential_phd"}),
+        "multi_bernoulli": with_values(RunParameters(), {"fusion_method": "multi_bernoulli"}),
+    }
+    for name, parameters in variants.items():
+        method = fusion.create(whole, parameters)
+        for _ in range(2):  # the first compiles
+            state = method.start()
+            begin = time.perf_counter()
+            for boxes in views:
+                state, _ = method.step(state, boxes)
+            taken = time.perf_counter() - begin
+        yield Measurement(
+            f"fusion alone, 500 steps × {len(whole.views)} cameras, {name}", taken, "s", "≤ 1 s"
+        )
+
+
+def _video(folder: Path, frames: int) -> Iterator[Measurement]:
+    sequence = read_sequence(folder)
+    parameters = pipeline.default_parameters(sequence)
+    pipeline.compute(sequence, parameters, steps=10)  # compiles
+    begin = time.perf_counter()
+    views = pipeline.compute(sequence, parameters, steps=frames)
+    whole = time.perf_counter() - begin
+    recorded = frames / sequence.fps
+    yield Measurement(
+        f"pipeline on {sequence.name}, {frames} steps × {len(sequence.views)} cameras",
+        recorded / whole,
+        "× real time",
+        "≥ 1, better 2",
+    )
+    again = with_values(parameters, {"fusion.survival_probability": 0.985})
+    begin = time.perf_counter()
+    pipeline.compute(sequence, again, steps=frames, previous=views)
+    yield Measurement(
+        f"the same after a change of the fusion's p_S, {frames} steps",
+        time.perf_counter() - begin,
+        "s",
+        "≤ 1 s for 500",
+    )

@@ -1,0 +1,81 @@
+"""`multiview-phd serve` as a person starts it."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import httpx2
+
+
+class Server:
+    """`multiview-phd serve` as a person starts it, on a free port."""
+
+    def __init__(self, sequence: Path | str, cache: Path | None, *, wait: bool = True) -> None:
+        """Start it on a sequence, with a cache folder of its own or the person's."""
+        self.folder = sequence
+        self._arguments = [str(sequence), "--no-open"]
+        self._environment = dict(os.environ)
+        if cache is not None:
+            self._environment["MULTIVIEW_PHD_CACHE"] = str(cache)
+        self.port = 0
+        self.start()
+        if wait:
+            self.wait(lambda state: state["sequence"] is not None and state["opening"] is None)
+
+    def start(self) -> None:
+        """Start, on the port used before if there was one; it then answers."""
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "app", "serve", *self._arguments, "--port", str(self.port)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=self._environment,
+        )
+        assert self.process.stdout is not None
+        line = self.process.stdout.readline()
+        found = re.search(r"http://[\w.]+:(\d+)", line)
+        assert found, f"the server did not say where it is: {line}"
+        self.port = int(found[1])
+
+    @property
+    def address(self) -> str:
+        """Of the page."""
+        return f"http://127.0.0.1:{self.port}/"
+
+    def get(self, path: str) -> httpx2.Response:
+        """One answer."""
+        return httpx2.get(self.address.rstrip("/") + path, timeout=30.0)
+
+    def wait(self, condition: Callable[[dict], bool], seconds: float = 60.0) -> dict:
+        """The state, once it is as wished."""
+        deadline = time.monotonic() + seconds
+        state: dict = {}
+        while time.monotonic() < deadline:
+            try:
+                state = self.get("/api/state").json()
+                if condition(state):
+                    return state
+            except httpx2.TransportError:
+                pass
+            time.sleep(0.1)
+        raise AssertionError(f"the server did not get there within {seconds} s: {state}")
+
+    def wait_for_run(self, seconds: float = 60.0) -> dict:
+        """The state with a finished run of the parameters that hold now."""
+        return self.wait(lambda state: state["run"]["state"] == "done", seconds)
+
+    def stop(self) -> float:
+        """End it as Ctrl-C does; the seconds that took."""
+        begin = time.monotonic()
+        self.process.send_signal(signal.SIGINT)
+        self.process.wait(timeout=20.0)
+        if self.process.stdout is not None:
+            self.process.stdout.close()
+        return time.monotonic() - begin
