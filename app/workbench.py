@@ -193,7 +193,9 @@ class Workbench:
             return self._put_parameters(table.with_values(now.parameters, changes), origin)
 
     def apply_preset(self, name: str, origin: str = "") -> RunParameters:
-        """Take a preset's values, and the defaults where it has none; the methods stay.
+        """Take a preset's values, and the defaults where it has none.
+
+        The single-view method stays: it follows from what the sequence has.
 
         Raises:
             ParameterError: If there is no such preset.
@@ -202,8 +204,7 @@ class Workbench:
             known = ", ".join(table.PRESETS)
             raise ParameterError("preset", f"expected one of {known}, got {name!r}")
         with self._edit() as now:
-            methods = {key: table.value(now.parameters, key) for key in table.METHODS}
-            changes = {**methods, **table.PRESETS[name]}
+            changes = {"single_view": now.parameters.single_view, **table.PRESETS[name]}
             return self._put_parameters(table.with_values(now.defaults, changes), origin)
 
     def _put_parameters(self, parameters: RunParameters, origin: str) -> RunParameters:

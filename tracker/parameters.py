@@ -485,7 +485,10 @@ METHODS: dict[str, tuple[str, ...]] = {
 
 PRESETS: dict[str, dict[str, Any]] = {
     "robust": {},
-    "published": {key: p.published for key, p in PARAMETERS.items() if p.published is not None},
+    "published": {
+        **{key: p.published for key, p in PARAMETERS.items() if p.published is not None},
+        "fusion_method": "sequential_phd",
+    },
 }
 """Named sets of values, each against the defaults: ``robust`` is the defaults themselves."""
 

@@ -249,7 +249,7 @@ def test_a_preset_moves_the_sliders(panel: Controls, workbench: Workbench) -> No
 
 def test_keys_and_names_are_those_of_the_page(workbench: Workbench) -> None:
     text = COMMANDS_JS.read_text(encoding="utf-8")
-    listed = re.findall(r'name: "([\w-]+)".*?keys: \[(.*?)\]', text)
+    listed = re.findall(r'\["([\w-]+)", "[^"]+", \[([^\]]*\]?"?)\], \(a\)', text)
     page = {name: re.findall(r'"([^"]+)"', keys) for name, keys in listed}
     page |= {f"camera-{digit}": [str(digit)] for digit in range(1, 10)}
     for name, _, key, modifier in controls.COMMANDS:

@@ -77,7 +77,7 @@ def test_reset_of_some_and_of_all(bench: Workbench) -> None:
         bench.reset_parameters(["fusion.nonsense"])
 
 
-def test_a_preset_replaces_every_number_and_no_method(bench: Workbench) -> None:
+def test_a_preset_replaces_every_number_and_the_fusion(bench: Workbench) -> None:
     bench.set_parameters({P_D: 0.7}, "test")
     bench.apply_preset("published")
     now = bench.snapshot()
