@@ -59,8 +59,8 @@ class _Errors:
     scheme: Float[ndarray, "P S"]
     single: Float[ndarray, "C P S"]
     """By each camera alone."""
-    single_box: Float[ndarray, "C P S"]
-    """The same where the box's size counts too, which tells one camera how far a person is."""
+    others: dict[str, Float[ndarray, "C P S"]]
+    """By other ways, in words, for the reader of the table; of each single camera's positions."""
 
 
 def run(context: Context) -> Result:
@@ -73,7 +73,8 @@ def run(context: Context) -> Result:
     answers = spread(work, seeds, context, words=f"{len(seeds)} seeds", steps=steps * len(seeds))
     scheme = np.stack([answer.scheme for answer in answers])
     single = np.stack([answer.single for answer in answers])
-    single_box = np.stack([answer.single_box for answer in answers])
+    others = {name: np.stack([answer.others[name] for answer in answers])
+              for name in answers[0].others}  # fmt: skip
     visible = read_visibility(sequence.folder)[:steps].transpose(2, 1, 0)
     groups = {
         "without occlusion": _clear(visible),
@@ -84,8 +85,10 @@ def run(context: Context) -> Result:
     for name, where in groups.items():
         figures = _compare(scheme, single, where)
         measured[name] = figures
-        figures["single_box"] = _mean(single_box[:, where])
-        figures["single_box_found"] = _mean(np.isfinite(single_box[:, where]).astype(float))
+        figures["others"] = {
+            words: {"error": _mean(errors[:, where]), "found": _share(errors[:, where])}
+            for words, errors in others.items()
+        }
         rows.append(
             (
                 name,
@@ -123,9 +126,7 @@ def run(context: Context) -> Result:
             "single camera is each of the two in turn, with the same boxes.",
             f"Errors of pairs: {settings.stated(('distance', 'gate'))}; in the last column a "
             "missed person counts as an error of the gate.",
-            "A single camera that uses the size of the boxes too: "
-            + ", ".join(f"{name} {number(m['single_box'], 3)} m" for name, m in measured.items())
-            + ".",
+            *(_other(words, measured) for words in others),
             f"Without occlusion: both cameras see {100 * CLEAR:.0f} % of the person or more; with: "
             f"the single camera sees less; more than half hidden: less than {100 * HALF:.0f} %.",
         ),
@@ -154,8 +155,21 @@ def _one_seed(
         ]
         return np.stack([_errors(sequence, tracks, steps) for tracks in each])
 
-    with_size = table.with_values(parameters, {"fusion.measurement": "box"})
-    return _Errors(_errors(sequence, tracked.tracks, steps), alone(parameters), alone(with_size))
+    others = {
+        f"one camera that measures {words}": alone(
+            table.with_values(parameters, {"fusion.measurement": measurement})
+        )
+        for measurement, words in (("centre", "the boxes' centres"), ("box", "whole boxes"))
+        if measurement != parameters.fusion.measurement
+    }
+    default = pipeline.default_parameters(sequence)
+    if default.fusion_method != parameters.fusion_method:
+        both = runs.fused_again(tracked, range(len(sequence.views)), default)
+        errors = _errors(sequence, both, steps)
+        others[f"two cameras by the default, {default.fusion_method}"] = np.stack(
+            [errors] * len(sequence.views)
+        )
+    return _Errors(_errors(sequence, tracked.tracks, steps), alone(parameters), others)
 
 
 def _errors(sequence: Sequence, tracks: Trajectories, steps: int) -> Float[ndarray, "P S"]:
@@ -192,8 +206,8 @@ def _compare(
         "single": one,
         "less": 100.0 * (1.0 - two / one) if two and one else None,
         "ratio": one / two if two and one else None,
-        "scheme_found": _mean(np.isfinite(both).astype(float)),
-        "single_found": _mean(np.isfinite(alone).astype(float)),
+        "scheme_found": _share(both),
+        "single_found": _share(alone),
         "scheme_all": _mean(np.nan_to_num(both, nan=gate)),
         "single_all": _mean(np.nan_to_num(alone, nan=gate)),
     }
@@ -202,6 +216,19 @@ def _compare(
 def _mean(values: ndarray) -> float | None:
     finite = values[np.isfinite(values)]
     return float(finite.mean()) if len(finite) else None
+
+
+def _share(values: ndarray) -> float | None:
+    return float(np.isfinite(values).mean()) if values.size else None
+
+
+def _other(words: str, measured: dict[str, dict[str, Any]]) -> str:
+    """A line for those who ask how another way does."""
+    parts = []
+    for name, figures in measured.items():
+        other = figures["others"][words]
+        parts.append(f"{name} {number(other['error'], 3)} m (found {_percent(other['found'])})")
+    return f"{words[0].upper()}{words[1:]}: {', '.join(parts)}."
 
 
 def _findings(measured: dict[str, dict[str, Any]]) -> tuple[Finding, ...]:

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from tracker.evaluation import evaluate_sequence
 from tracker.evaluation.figures import number
-from tracker.experiments import runs
-from tracker.experiments.cameras import RECORDING
+from tracker.experiments import cameras, fig1, runs
 from tracker.experiments.experiment import Context, Experiment, Finding, Result, Unavailable
-from tracker.experiments.fig1 import QUICK_STEPS, ROOM
+from tracker.experiments.fig1 import ROOM
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,17 +28,20 @@ def run(context: Context) -> Result:
     measured: dict[str, Any] = {}
     notes = []
     rows = []
-    for name in (*((ROOM,) if context.quick else ROOMS), RECORDING):
+    for name in (*((ROOM,) if context.quick else ROOMS), cameras.RECORDING):
+        steps = None
+        if context.quick:
+            steps = cameras.QUICK_STEPS if name == cameras.RECORDING else fig1.QUICK_STEPS
         try:
-            if name == RECORDING:
+            if name == cameras.RECORDING:
                 sequence = runs.recording(context, name)
             else:
-                sequence = runs.room(context, name, QUICK_STEPS if context.quick else None)
+                sequence = runs.room(context, name, steps)
         except Unavailable as missing:
             notes.append(f"Left out: {missing}.")
             continue
-        timed = runs.computed(context, sequence)
-        evaluation = evaluate_sequence(sequence, timed.run.tracks)
+        timed = runs.computed(context, sequence, steps)
+        evaluation = evaluate_sequence(sequence, timed.run.tracks, steps=timed.run.done)
         figures: dict[str, Any] = {key: evaluation[key] for key in (*FIGURES, "found_share")}
         figures |= {
             "steps": timed.run.done,
