@@ -93,13 +93,13 @@ def test_series_are_the_engines(client: TestClient, crossing: Path) -> None:
 def test_a_run_is_set_against_the_one_before_it(client: TestClient, crossing: Path) -> None:
     assert client.get("/api/evaluation/comparison").json()["error"]["code"] == "nothing_to_compare"
     assert client.get("/api/evaluation/series?of=previous").status_code == 409
-    change(client, **{P_D: 0.5})
+    change(client, **{P_D: 0.05})
     found = get(client, "/api/evaluation/comparison")
-    before, after = engine(crossing), engine(crossing, **{P_D: 0.5})
+    before, after = engine(crossing), engine(crossing, **{P_D: 0.05})
     a, b = (evaluate_sequence(run.sequence, run.tracks) for run in (before, after))
     assert (found["against"], found["steps"]) == ("previous", FRAMES)
     assert (found["a"]["run"], found["b"]["run"]) == (before.key, after.key)
-    assert found["b"]["changed"] == {P_D: 0.5}
+    assert found["b"]["changed"] == {P_D: 0.05}
     assert [row["key"] for row in found["parameters"]] == [P_D]
     rows = [(row["name"], row["a"], row["b"], row["verdict"]) for row in found["rows"]]
     assert rows == [(row.key, row.a, row.b, row.verdict) for row in compare(a, b)]

@@ -83,8 +83,8 @@ def test_one_file_that_needs_nothing(scene, tmp_path):
 def test_changed_parameters_are_marked(scene):
     sequence, tracks = scene
     evaluation = evaluate_sequence(sequence, tracks)
-    changed = with_values(RunParameters(), {"fusion.clutter_rate": 3.0})
-    for parameters in (changed, {"fusion.clutter_rate": "3.0", "sequence": "room", "seed": "0"}):
+    changed = with_values(RunParameters(), {"fusion.clutter_rate": 7.0})
+    for parameters in (changed, {"fusion.clutter_rate": "7.0", "sequence": "room", "seed": "0"}):
         text = body_of(report_html(sequence, tracks, parameters, evaluation))
         assert text.count('<tr class="changed">') == 1
         assert re.search(r'<tr class="changed"><th scope="row">Clutter rate', text)
