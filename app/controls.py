@@ -91,7 +91,9 @@ class Controls:
         server.gui.add_html(scene_style.PANEL)
         self._values = server.gui.add_html("")
         self._presets = server.gui.add_button_group(
-            "Preset", tuple(table.PRESETS), hint="Takes a named set of values and the fusion that goes with it."
+            "Preset",
+            tuple(table.PRESETS),
+            hint="Takes a named set of values and the fusion that goes with it.",
         )
         self._presets.on_click(self._take_preset)
         for stage, title in STAGES.items():
