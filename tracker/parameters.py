@@ -200,12 +200,12 @@ class DetectionBoxParams(Params):
 
     centre_sigma: Annotated[
         float, Field(ge=0.005, le=3.0), ui("σ_x", unit="half heights", step=0.01, log=True)
-    ] = 0.05
+    ] = 0.08
     """Standard deviation of a box's centre, across and down, as a share of its half height."""
 
     size_sigma: Annotated[
         float, Field(ge=0.005, le=3.0), ui("σ_h", unit="half heights", step=0.01, log=True)
-    ] = 0.1
+    ] = 0.12
     """Standard deviation of a box's half height, as a share of it: how far its edges tell depth."""
 
     width_sigma: Annotated[
@@ -304,7 +304,7 @@ class FusionParams(Params):
 
     acceleration_sigma: Annotated[
         float, Field(ge=0.05, le=10.0), ui("σ_a", unit="m/s per √s", step=0.05, log=True)
-    ] = 1.0
+    ] = 0.8
     """Constant velocity: how much a person's speed changes in one second, along each axis."""
 
     vertical_share: Annotated[float, Field(ge=0.01, le=1.0), ui("σ_z/σ_x", step=0.01)] = 0.2
