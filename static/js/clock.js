@@ -2,8 +2,6 @@
 /**
  * Arithmetic of the only clock, the step index, and of the axis it is drawn on.
  * Steps are 0-based and inclusive everywhere. Nothing here touches the page.
- *
- * @typedef {{first: number, last: number, width: number}} View  the steps an axis of `width` CSS pixels shows
  */
 
 /** Speeds that can be chosen, slowest first. */
@@ -15,7 +13,7 @@ export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
  * @returns {number} a whole step of the sequence, 0 for an empty one
  */
 export function clampStep(step, frames) {
-  return Math.max(0, Math.min(frames - 1, Math.round(step)));
+	return Math.max(0, Math.min(frames - 1, Math.round(step)));
 }
 
 /**
@@ -25,8 +23,8 @@ export function clampStep(step, frames) {
  * @returns {[number, number]} first and last step
  */
 export function playedRange([from, to], frames) {
-  const first = clampStep(from ?? 0, frames);
-  return [first, Math.max(first, clampStep(to ?? frames - 1, frames))];
+	const first = clampStep(from ?? 0, frames);
+	return [first, Math.max(first, clampStep(to ?? frames - 1, frames))];
 }
 
 /**
@@ -34,55 +32,53 @@ export function playedRange([from, to], frames) {
  *
  * At normal speed and below every step is shown: if painting is slower than the
  * clock, play slows down and nothing is skipped. Above, steps may be skipped.
- *
  * @param {{step: number, rest: number}} now  `rest` is the part of a step already waited for
  * @param {number} seconds  since the last call
  * @param {{fps: number, speed: number, direction: 1 | -1, first: number, last: number, loop: boolean}} how
  * @returns {{step: number, rest: number, ended: boolean}}
  */
 export function advance({ step, rest }, seconds, { fps, speed, direction, first, last, loop }) {
-  const due = rest + Math.max(0, seconds) * fps * speed;
-  const whole = Math.floor(due + 1e-9);
-  if (whole === 0) return { step, rest: due, ended: false };
-  const limit = speed <= 1 ? 1 : Math.max(1, Math.ceil(speed * 2));
-  const stride = Math.min(whole, limit);
-  // Up to a step of lateness is caught up; more is forgotten: play is late, it does not race afterwards.
-  const left = Math.min(1, due - stride);
-  const next = step + direction * stride;
-  if (next >= first && next <= last) return { step: next, rest: left, ended: false };
-  const end = direction > 0 ? last : first;
-  if (loop) {
-    const start = direction > 0 ? first : last;
-    return { step: step === end || step < first || step > last ? start : end, rest: left, ended: false };
-  }
-  return { step: end, rest: 0, ended: true };
+	const due = rest + Math.max(0, seconds) * fps * speed;
+	const whole = Math.floor(due + 1e-9);
+	if (whole === 0) return { step, rest: due, ended: false };
+	const limit = speed <= 1 ? 1 : Math.max(1, Math.ceil(speed * 2));
+	const stride = Math.min(whole, limit);
+	// Up to a step of lateness is caught up; more is forgotten: play is late, it does not race afterwards.
+	const left = Math.min(1, due - stride);
+	const next = step + direction * stride;
+	if (next >= first && next <= last) return { step: next, rest: left, ended: false };
+	const end = direction > 0 ? last : first;
+	if (loop) {
+		const start = direction > 0 ? first : last;
+		return { step: step === end || step < first || step > last ? start : end, rest: left, ended: false };
+	}
+	return { step: end, rest: 0, ended: true };
 }
 
 /**
  * The steps to have ready, nearest first: the step itself, then ahead in the direction of
  * play, then a few behind.
- *
  * @param {number} step
  * @param {{frames: number, fps: number, speed: number, direction: 0 | 1 | -1, most: number, seconds?: number}} how
  *   `most` is the number of steps that the memory holds
  * @returns {number[]}
  */
 export function prefetchWindow(step, { frames, fps, speed, direction, most, seconds = 1.5 }) {
-  const stride = direction && speed > 1 ? Math.max(1, Math.floor(speed * fps / 60)) : 1;
-  const ahead = direction ? Math.ceil(Math.max(8, speed * fps * seconds) / stride) : 12;
-  const behind = direction ? 0 : 6;
-  const sign = direction || 1;
-  /** @type {number[]} */
-  const steps = [];
-  const add = (/** @type {number} */ candidate) => {
-    if (candidate >= 0 && candidate < frames && steps.length < Math.max(1, most)) steps.push(candidate);
-  };
-  add(step);
-  for (let k = 1; k <= Math.max(ahead, behind); k += 1) {
-    if (k <= ahead) add(step + sign * k * stride);
-    if (k <= behind) add(step - sign * k);
-  }
-  return steps;
+	const stride = direction && speed > 1 ? Math.max(1, Math.floor(speed * fps / 60)) : 1;
+	const ahead = direction ? Math.ceil(Math.max(8, speed * fps * seconds) / stride) : 12;
+	const behind = direction ? 0 : 6;
+	const sign = direction || 1;
+	/** @type {number[]} */
+	const steps = [];
+	const add = (/** @type {number} */ candidate) => {
+		if (candidate >= 0 && candidate < frames && steps.length < Math.max(1, most)) steps.push(candidate);
+	};
+	add(step);
+	for (let k = 1; k <= Math.max(ahead, behind); k += 1) {
+		if (k <= ahead) add(step + sign * k * stride);
+		if (k <= behind) add(step - sign * k);
+	}
+	return steps;
 }
 
 /**
@@ -91,14 +87,14 @@ export function prefetchWindow(step, { frames, fps, speed, direction, most, seco
  * @returns {[number, number][]} ascending, inclusive
  */
 export function rangesOf(steps) {
-  /** @type {[number, number][]} */
-  const ranges = [];
-  for (const step of [...steps].sort((a, b) => a - b)) {
-    const last = ranges[ranges.length - 1];
-    if (last && step <= last[1] + 1) last[1] = Math.max(last[1], step);
-    else ranges.push([step, step]);
-  }
-  return ranges;
+	/** @type {[number, number][]} */
+	const ranges = [];
+	for (const step of [...steps].sort((a, b) => a - b)) {
+		const last = ranges[ranges.length - 1];
+		if (last && step <= last[1] + 1) last[1] = Math.max(last[1], step);
+		else ranges.push([step, step]);
+	}
+	return ranges;
 }
 
 /**
@@ -107,7 +103,7 @@ export function rangesOf(steps) {
  * @returns {number} CSS pixels from the left end of the axis
  */
 export function xOf(step, { first, last, width }) {
-  return last > first ? ((step - first) / (last - first)) * width : 0;
+	return last > first ? ((step - first) / (last - first)) * width : 0;
 }
 
 /**
@@ -117,8 +113,8 @@ export function xOf(step, { first, last, width }) {
  * @returns {number} a whole step, clamped to the view
  */
 export function stepAt(x, { first, last, width }) {
-  const step = width > 0 ? first + (x / width) * (last - first) : first;
-  return Math.round(Math.max(first, Math.min(last, step)));
+	const step = width > 0 ? first + (x / width) * (last - first) : first;
+	return Math.round(Math.max(first, Math.min(last, step)));
 }
 
 /**
@@ -130,11 +126,11 @@ export function stepAt(x, { first, last, width }) {
  * @returns {View}
  */
 export function zoomed(view, factor, x, frames) {
-  const whole = Math.max(1, frames - 1);
-  const span = Math.max(Math.min(20, whole), Math.min(whole, (view.last - view.first) * factor));
-  const at = view.first + (x / Math.max(1, view.width)) * (view.last - view.first);
-  const first = at - (x / Math.max(1, view.width)) * span;
-  return panned({ ...view, first, last: first + span }, 0, frames);
+	const whole = Math.max(1, frames - 1);
+	const span = Math.max(Math.min(20, whole), Math.min(whole, (view.last - view.first) * factor));
+	const at = view.first + (x / Math.max(1, view.width)) * (view.last - view.first);
+	const first = at - (x / Math.max(1, view.width)) * span;
+	return panned({ ...view, first, last: first + span }, 0, frames);
 }
 
 /**
@@ -145,9 +141,9 @@ export function zoomed(view, factor, x, frames) {
  * @returns {View}
  */
 export function panned(view, steps, frames) {
-  const span = view.last - view.first;
-  const first = Math.max(0, Math.min(frames - 1 - span, view.first + steps));
-  return { ...view, first, last: first + span };
+	const span = view.last - view.first;
+	const first = Math.max(0, Math.min(frames - 1 - span, view.first + steps));
+	return { ...view, first, last: first + span };
 }
 
 /**
@@ -157,10 +153,10 @@ export function panned(view, steps, frames) {
  * @returns {{major: number, minor: number}}
  */
 export function tickSteps({ first, last, width }, pixels = 80) {
-  const raw = Math.max(1, ((last - first) / Math.max(1, width)) * pixels);
-  const power = 10 ** Math.floor(Math.log10(raw));
-  const major = [1, 2, 5, 10].map((k) => k * power).find((k) => k >= raw - 1e-9) ?? 10 * power;
-  return { major, minor: Math.max(1, major / (String(major)[0] === "2" ? 4 : 5)) };
+	const raw = Math.max(1, ((last - first) / Math.max(1, width)) * pixels);
+	const power = 10 ** Math.floor(Math.log10(raw));
+	const major = [1, 2, 5, 10].map((k) => k * power).find((k) => k >= raw - 1e-9) ?? 10 * power;
+	return { major, minor: Math.max(1, major / (String(major)[0] === "2" ? 4 : 5)) };
 }
 
 /**
@@ -169,7 +165,7 @@ export function tickSteps({ first, last, width }, pixels = 80) {
  * @returns {string} seconds with two decimals
  */
 export function secondsOf(step, fps) {
-  return (step / fps).toFixed(2);
+	return (step / fps).toFixed(2);
 }
 
 /**
@@ -180,8 +176,8 @@ export function secondsOf(step, fps) {
  * @returns {number | null} null where it is neither
  */
 export function parseStep(text, fps, frames) {
-  const match = /^\s*(\d+(?:[.,]\d+)?)\s*(s?)\s*$/.exec(text);
-  if (!match) return null;
-  const number = Number(match[1].replace(",", "."));
-  return clampStep(match[2] ? number * fps : number, frames);
+	const match = /^\s*(\d+(?:[.,]\d+)?)\s*(s?)\s*$/.exec(text);
+	if (!match) return null;
+	const number = Number(match[1].replace(",", "."));
+	return clampStep(match[2] ? number * fps : number, frames);
 }

@@ -7,7 +7,6 @@ import { COMMANDS, keyLabel } from "./commands.js";
 /**
  * An element with attributes and children. `on…` is a listener, `class` and the rest are
  * attributes; `true` sets an empty one, `false` and `null` none; `--x` is a style property.
- *
  * @template {keyof HTMLElementTagNameMap} K
  * @param {K} tag
  * @param {Record<string, any>} [attributes]
@@ -15,15 +14,15 @@ import { COMMANDS, keyLabel } from "./commands.js";
  * @returns {HTMLElementTagNameMap[K]}
  */
 export function h(tag, attributes = {}, ...children) {
-  const element = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) {
-    if (value === null || value === undefined || value === false) continue;
-    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
-    else if (name.startsWith("--")) element.style.setProperty(name, value);
-    else element.setAttribute(name, value === true ? "" : String(value));
-  }
-  fill(element, ...children);
-  return element;
+	const element = document.createElement(tag);
+	for (const [name, value] of Object.entries(attributes)) {
+		if (value === null || value === undefined || value === false) continue;
+		if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+		else if (name.startsWith("--")) element.style.setProperty(name, value);
+		else element.setAttribute(name, value === true ? "" : String(value));
+	}
+	fill(element, ...children);
+	return element;
 }
 
 /**
@@ -32,8 +31,8 @@ export function h(tag, attributes = {}, ...children) {
  * @param {...(Child | Child[])} children
  */
 export function fill(element, ...children) {
-  const nodes = children.flat().filter((child) => child !== null && child !== undefined && child !== false);
-  element.replaceChildren(.../** @type {(Node | string)[]} */ (nodes.map((n) => (typeof n === "number" ? String(n) : n))));
+	const nodes = children.flat().filter((child) => child !== null && child !== undefined && child !== false);
+	element.replaceChildren(.../** @type {(Node | string)[]} */ (nodes.map((n) => (typeof n === "number" ? String(n) : n))));
 }
 
 /**
@@ -42,7 +41,7 @@ export function fill(element, ...children) {
  * @param {string} text
  */
 export function write(node, text) {
-  if (node.textContent !== text) node.textContent = text;
+	if (node.textContent !== text) node.textContent = text;
 }
 
 /**
@@ -51,15 +50,15 @@ export function write(node, text) {
  * @param {string} [box]
  */
 export function icon(name, kind = "", box = "") {
-  const ns = "http://www.w3.org/2000/svg";
-  const svg = document.createElementNS(ns, "svg");
-  svg.setAttribute("class", name.startsWith("l-") ? "" : `i ${kind}`);
-  svg.setAttribute("aria-hidden", "true");
-  if (box) svg.setAttribute("viewBox", box);
-  const use = document.createElementNS(ns, "use");
-  use.setAttribute("href", `#${name}`);
-  svg.append(use);
-  return svg;
+	const ns = "http://www.w3.org/2000/svg";
+	const svg = document.createElementNS(ns, "svg");
+	svg.setAttribute("class", name.startsWith("l-") ? "" : `i ${kind}`);
+	svg.setAttribute("aria-hidden", "true");
+	if (box) svg.setAttribute("viewBox", box);
+	const use = document.createElementNS(ns, "use");
+	use.setAttribute("href", `#${name}`);
+	svg.append(use);
+	return svg;
 }
 
 /**
@@ -67,8 +66,8 @@ export function icon(name, kind = "", box = "") {
  * @param {number} id
  */
 export function idTag(id) {
-  const n = colourIndex(id);
-  return h("span", { class: "id", "--c": `var(--id-${n})`, "--on-id": `var(--on-${n})` }, id);
+	const n = colourIndex(id);
+	return h("span", { class: "id", "--c": `var(--id-${n})`, "--on-id": `var(--on-${n})` }, id);
 }
 
 /**
@@ -76,7 +75,7 @@ export function idTag(id) {
  * @returns {number} 1 … 24
  */
 export function colourIndex(id) {
-  return ((((id - 1) % 24) + 24) % 24) + 1;
+	return ((((id - 1) % 24) + 24) % 24) + 1;
 }
 
 /**
@@ -85,8 +84,8 @@ export function colourIndex(id) {
  * @param {string} [tip]  where the title says too much
  */
 export function tipOf(name, tip) {
-  const command = COMMANDS.find((c) => c.name === name);
-  return { "data-tip": tip ?? command?.title ?? "", "data-key": command ? keyLabel(command.keys[0]) : "" };
+	const command = COMMANDS.find((c) => c.name === name);
+	return { "data-tip": tip ?? command?.title ?? "", "data-key": command ? keyLabel(command.keys[0]) : "" };
 }
 
 /**
@@ -95,8 +94,8 @@ export function tipOf(name, tip) {
  * @returns {Node[]}
  */
 export function symbolNodes(symbol) {
-  const [base, index] = symbol.split("_");
-  return [h("i", {}, base), ...(index ? [h("sub", {}, index)] : [])];
+	const [base, index] = symbol.split("_");
+	return [h("i", {}, base), ...(index ? [h("sub", {}, index)] : [])];
 }
 
 /**
@@ -104,10 +103,10 @@ export function symbolNodes(symbol) {
  * @returns {string} a number as short as it stays readable
  */
 export function show(value) {
-  if (typeof value === "boolean") return value ? "on" : "off";
-  if (typeof value !== "number") return value === null || value === undefined ? "–" : String(value);
-  if (Number.isInteger(value)) return String(value);
-  return Math.abs(value) < 1e-3 ? value.toExponential().replace("e-", "e−") : String(Number(value.toPrecision(5)));
+	if (typeof value === "boolean") return value ? "on" : "off";
+	if (typeof value !== "number") return value === null || value === undefined ? "–" : String(value);
+	if (Number.isInteger(value)) return String(value);
+	return Math.abs(value) < 1e-3 ? value.toExponential().replace("e-", "e−") : String(Number(value.toPrecision(5)));
 }
 
 /**
@@ -119,13 +118,13 @@ export function show(value) {
  * @param {(value: string) => void} how.choose
  */
 export function chooser({ label, box = false, word = "", choose }) {
-  const select = h("select", {
-    "aria-label": label,
-    onchange: () => {
-      choose(select.value);
-      select.blur();
-    },
-  });
-  const root = h("label", { class: box ? "chooser box" : "chooser" }, word && h("span", { class: "k opt-2" }, word), select, icon("i-down", "s"));
-  return { root, select };
+	const select = h("select", {
+		"aria-label": label,
+		onchange: () => {
+			choose(select.value);
+			select.blur();
+		},
+	});
+	const root = h("label", { class: box ? "chooser box" : "chooser" }, word && h("span", { class: "k opt-2" }, word), select, icon("i-down", "s"));
+	return { root, select };
 }

@@ -1,8 +1,6 @@
 // @ts-check
 /**
  * What happens to tracks, as a list of steps to jump to.
- * @typedef {import("./types.js").TrackLane} TrackLane
- * @typedef {{step: number, id: number, kind: "birth" | "death" | "long miss"}} TrackEvent
  */
 
 /** Steps without a box from any camera that make a miss long, in seconds. */
@@ -14,38 +12,55 @@ export const LONG_MISS = 1.5;
  * @returns {[number, number][]} spans, inclusive
  */
 export function longMisses({ spans }, fps) {
-  return spans.flatMap(([from, to, kind]) =>
-    kind === "coasting" && to - from + 1 >= LONG_MISS * fps ? [/** @type {[number, number]} */ ([from, to])] : [],
-  );
+	return spans.flatMap(([from, to, kind]) =>
+		kind === "coasting" && to - from + 1 >= LONG_MISS * fps ? [/** @type {[number, number]} */ ([from, to])] : [],
+	);
 }
 
 /**
  * @param {TrackLane[]} tracks
- * @param {{fps: number, done: number}} run
- * @returns {TrackEvent[]} by step, then id
+ * @param {{fps: number, done: number, switches?: Switch[]}} run
+ * @returns {LaneEvent[]} by step, then id
  */
-export function eventsOf(tracks, { fps, done }) {
-  /** @type {TrackEvent[]} */
-  const events = [];
-  for (const track of tracks) {
-    if (track.first > 0) events.push({ step: track.first, id: track.id, kind: "birth" });
-    // A track that reaches the newest step has not ended.
-    if (track.last < done - 1) events.push({ step: track.last, id: track.id, kind: "death" });
-    for (const [from] of longMisses(track, fps)) events.push({ step: from, id: track.id, kind: "long miss" });
-  }
-  return events.sort((a, b) => a.step - b.step || a.id - b.id);
+export function eventsOf(tracks, { fps, done, switches = [] }) {
+	/** @type {LaneEvent[]} */
+	const events = [];
+	for (const track of tracks) {
+		if (track.first > 0) events.push({ step: track.first, id: track.id, kind: "birth" });
+		// A track that reaches the newest step has not ended.
+		if (track.last < done - 1) events.push({ step: track.last, id: track.id, kind: "death" });
+		for (const [from] of longMisses(track, fps)) events.push({ step: from, id: track.id, kind: "long miss" });
+	}
+	for (const { step, track } of switches) events.push({ step, id: track, kind: "switch" });
+	return events.sort((a, b) => a.step - b.step || a.id - b.id);
+}
+
+/**
+ * The scores, where they are of the run that is shown.
+ * @param {Readonly<PageState>} state
+ */
+export const scoresOf = ({ scores, basis }) => (scores?.series.run === basis ? scores : null);
+
+/**
+ * Events of the shown run, switches among them where there is truth.
+ * @param {Readonly<PageState>} state
+ */
+export function eventsNow(state) {
+	const { timeline, server } = state;
+	const { done = 0, tracks = [] } = timeline ?? {};
+	return eventsOf(tracks, { fps: server?.sequence?.fps ?? 25, done, switches: scoresOf(state)?.series.switches });
 }
 
 /**
  * The nearest event after or before a step.
- * @param {TrackEvent[]} events  by step
+ * @param {LaneEvent[]} events  by step
  * @param {number} step
  * @param {-1 | 1} direction
- * @returns {TrackEvent | undefined}
+ * @returns {LaneEvent | undefined}
  */
 export function nextEvent(events, step, direction) {
-  if (direction > 0) return events.find((event) => event.step > step);
-  return [...events].reverse().find((event) => event.step < step);
+	if (direction > 0) return events.find((event) => event.step > step);
+	return [...events].reverse().find((event) => event.step < step);
 }
 
 /**
@@ -55,8 +70,8 @@ export function nextEvent(events, step, direction) {
  * @returns {TrackLane[]}
  */
 export function ordered(tracks, order) {
-  const length = (/** @type {TrackLane} */ { first, last }) => last - first;
-  return [...tracks].sort((a, b) => (order === "longest" ? length(b) - length(a) : a.first - b.first) || a.id - b.id);
+	const length = (/** @type {TrackLane} */ { first, last }) => last - first;
+	return [...tracks].sort((a, b) => (order === "longest" ? length(b) - length(a) : a.first - b.first) || a.id - b.id);
 }
 
 /**
@@ -65,8 +80,8 @@ export function ordered(tracks, order) {
  * @returns {number} 0 … 1
  */
 export function seenShare({ first, last, spans }) {
-  const seen = spans.reduce((sum, [from, to, kind]) => sum + (kind === "seen" ? to - from + 1 : 0), 0);
-  return seen / Math.max(1, last - first + 1);
+	const seen = spans.reduce((sum, [from, to, kind]) => sum + (kind === "seen" ? to - from + 1 : 0), 0);
+	return seen / Math.max(1, last - first + 1);
 }
 
 /**
@@ -76,8 +91,8 @@ export function seenShare({ first, last, spans }) {
  * @returns {"not yet" | "ended" | "seen" | "coasting" | "lost"} lost: not reported at this step, but later again
  */
 export function stateAt({ first, last, spans }, step) {
-  if (step < first) return "not yet";
-  if (step > last) return "ended";
-  const span = spans.find(([from, to]) => step >= from && step <= to);
-  return span?.[2] ?? "lost";
+	if (step < first) return "not yet";
+	if (step > last) return "ended";
+	const span = spans.find(([from, to]) => step >= from && step <= to);
+	return span?.[2] ?? "lost";
 }

@@ -1,7 +1,7 @@
 // @ts-check
 /** Wires the page: one store, one socket, one playback, and the panes that look at them. */
 import { createActions } from "./actions.js";
-import { getJson, openStream } from "./api.js";
+import { fetcher, getJson, openStream } from "./api.js";
 import { commandFor, commandOf, keyOf } from "./commands.js";
 import { mountCameras } from "./panes/cameras.js";
 import { mountHelp } from "./panes/help.js";
@@ -14,57 +14,54 @@ import { createPlayback } from "./playback.js";
 import { createStore } from "./store.js";
 import { readPlace, writePlace } from "./url.js";
 
-/**
- * @typedef {import("./types.js").PageState} PageState
- * @typedef {import("./types.js").ServerState} ServerState
- */
-
 /** What is remembered in this browser: how the page looks, never what it shows. */
-const KEPT = /** @type {const} */ (["theme", "tab", "layers2d", "laneOrder", "singleKeys"]);
+const KEPT = /** @type {const} */ (["theme", "tab", "layers2d", "laneOrder", "measure", "singleKeys"]);
 
 /** @returns {Partial<PageState>} */
 function remembered() {
-  try {
-    return JSON.parse(localStorage.getItem("page") ?? "{}");
-  } catch {
-    return {};
-  }
+	try {
+		return JSON.parse(localStorage.getItem("page") ?? "{}");
+	} catch {
+		return {};
+	}
 }
 
 const start = readPlace(location.search);
-/** @type {import("./store.js").Store<PageState>} */
+/** @type {Store<PageState>} */
 const store = createStore(
-  /** @type {PageState} */ ({
-    link: "connecting",
-    lostAt: 0,
-    retryAt: 0,
-    server: null,
-    run: null,
-    schema: null,
-    sequences: [],
-    basis: "",
-    timeline: null,
-    step: 0,
-    shown: -1,
-    result: null,
-    loaded: 0,
-    playing: 0,
-    speed: 1,
-    loop: false,
-    range: [null, null],
-    selection: start.place.selection,
-    hover: null,
-    layers3d: { boxes: true, ellipsoids: true, trails: true, truth: false, volume: true },
-    view3d: -1,
-    large: start.place.camera,
-    tab: "tracks",
-    laneOrder: "longest",
-    singleKeys: true,
-    notes: [],
-    ...remembered(),
-    layers2d: { measurements: true, estimates: false, boxes: true, samples: false, truth: true, ...remembered().layers2d },
-    theme: document.documentElement.dataset.theme ?? "dark",
-  }),
+	/** @type {PageState} */ ({
+		link: "connecting",
+		lostAt: 0,
+		retryAt: 0,
+		server: null,
+		run: null,
+		schema: null,
+		sequences: [],
+		basis: "",
+		timeline: null,
+		step: 0,
+		shown: -1,
+		result: null,
+		loaded: 0,
+		playing: 0,
+		speed: 1,
+		loop: false,
+		range: [null, null],
+		selection: start.place.selection,
+		hover: null,
+		layers3d: { boxes: true, ellipsoids: true, trails: true, truth: false, volume: true },
+		view3d: -1,
+		large: start.place.camera,
+		tab: "tracks",
+		scores: null,
+		measure: "ospa",
+		laneOrder: "longest",
+		singleKeys: true,
+		notes: [],
+		...remembered(),
+		layers2d: { measurements: true, estimates: false, boxes: true, samples: false, truth: true, ...remembered().layers2d },
+		theme: document.documentElement.dataset.theme ?? "dark",
+	}),
 );
 
 const origin = Math.random().toString(36).slice(2);
@@ -72,11 +69,11 @@ const playback = createPlayback(store, (step) => stream.send({ type: "seek", ste
 /** @type {() => void} */
 let toggleHelp = () => {};
 const { actions, page } = createActions({
-  store,
-  seek: playback.seek,
-  send: (message) => stream.send(message),
-  help: () => toggleHelp(),
-  receive: (state) => receiveState(state),
+	store,
+	seek: playback.seek,
+	send: (message) => stream.send(message),
+	help: () => toggleHelp(),
+	receive: (state) => receiveState(state),
 });
 
 const element = (/** @type {string} */ selector) => /** @type {HTMLElement} */ (document.querySelector(selector));
@@ -98,41 +95,42 @@ if (start.unknown.length) page.note("warn", `The address has unknown parts: ${st
  * @param {boolean} [streamed]  it came over the socket, in order
  */
 function receiveState(told, streamed = false) {
-  // A method is a choice like any other: it is listed, undone and taken up again with the values.
-  const server = { ...told, parameters: { ...told.parameters, ...told.methods } };
-  const before = store.get().server;
-  // An answer to a request may be older than what the socket has brought since.
-  if (!streamed && before && server.version < before.version) return;
-  const changed = before?.sequence?.key !== server.sequence?.key;
-  if (before?.sequence && !server.sequence) {
-    // The server was started anew: when the same sequence is open again, go where we were.
-    const { shown, selection, large } = store.get();
-    place = { sequence: before.sequence.name, step: Math.max(0, shown), selection, camera: large };
-  }
-  const first = before === null;
-  if (first && place.sequence && server.sequence?.name !== place.sequence && server.opening?.name !== place.sequence) {
-    void page.open(place.sequence);
-  }
-  if (changed) {
-    playback.clear();
-    page.forget();
-    const here = place.step !== null && (!place.sequence || place.sequence === server.sequence?.name);
-    const step = here ? Number(place.step) : server.playhead;
-    const cameras = server.sequence?.cameras.length ?? 0;
-    const large = place.camera !== null && place.camera < cameras ? place.camera : cameras > 2 ? 0 : null;
-    const known = place.selection !== null && here ? place.selection : server.selection;
-    store.set({ basis: "", timeline: null, result: null, shown: -1, step: 0, playing: 0, range: [null, null], loop: false, hover: null, large, selection: known });
-    if (server.sequence) store.set({ step: Math.max(0, Math.min(server.sequence.frames - 1, step)) });
-    if (known !== server.selection) stream.send({ type: "select", id: known });
-    if (server.sequence && (!place.sequence || place.sequence === server.sequence.name)) {
-      place = { sequence: null, step: null, selection: null, camera: null };
-    }
-  } else if (before) {
-    page.remember(before.parameters, server.parameters);
-    if (before.selection !== server.selection) store.set({ selection: server.selection });
-  }
-  store.set({ server, run: server.run, ...(server.layers ? { layers3d: { ...store.get().layers3d, ...server.layers } } : {}) });
-  if (first || before?.opening?.name !== server.opening?.name) fetchSequences();
+	// A method is a choice like any other: it is listed, undone and taken up again with the values.
+	const server = { ...told, parameters: { ...told.parameters, ...told.methods } };
+	const before = store.get().server;
+	// An answer to a request may be older than what the socket has brought since.
+	if (!streamed && before && server.version < before.version) return;
+	const changed = before?.sequence?.key !== server.sequence?.key;
+	if (before?.sequence && !server.sequence) {
+		// The server was started anew: when the same sequence is open again, go where we were.
+		const { shown, selection, large } = store.get();
+		place = { sequence: before.sequence.name, step: Math.max(0, shown), selection, camera: large };
+	}
+	const first = before === null;
+	if (first && place.sequence && server.sequence?.name !== place.sequence && server.opening?.name !== place.sequence) {
+		void page.open(place.sequence);
+	}
+	if (changed) {
+		playback.clear();
+		page.forget();
+		const here = place.step !== null && (!place.sequence || place.sequence === server.sequence?.name);
+		const step = here ? Number(place.step) : server.playhead;
+		const cameras = server.sequence?.cameras.length ?? 0;
+		const large = place.camera !== null && place.camera < cameras ? place.camera : cameras > 2 ? 0 : null;
+		const known = place.selection !== null && here ? place.selection : server.selection;
+		store.set({ basis: "", timeline: null, scores: null, result: null, shown: -1, step: 0, playing: 0, range: [null, null], loop: false, hover: null, large, selection: known });
+		if (server.sequence) store.set({ step: Math.max(0, Math.min(server.sequence.frames - 1, step)) });
+		if (known !== server.selection) stream.send({ type: "select", id: known });
+		if (server.sequence && (!place.sequence || place.sequence === server.sequence.name)) {
+			place = { sequence: null, step: null, selection: null, camera: null };
+		}
+	} else if (before) {
+		page.remember(before.parameters, server.parameters);
+		if (before.selection !== server.selection) store.set({ selection: server.selection });
+	}
+	store.set({ server, run: server.run, ...(server.layers ? { layers3d: { ...store.get().layers3d, ...server.layers } } : {}) });
+	if (changed || before?.pinned?.key !== server.pinned?.key) void fetchScores();
+	if (first || before?.opening?.name !== server.opening?.name) void fetchSequences();
 }
 
 /**
@@ -140,145 +138,130 @@ function receiveState(told, streamed = false) {
  * @param {string} run
  */
 function showRun(run) {
-  if (run === store.get().basis) return;
-  store.set({ basis: run, timeline: null });
-  void fetchTimeline();
+	if (run === store.get().basis) return;
+	store.set({ basis: run, timeline: null });
+	void fetchTimeline();
 }
 
-let timelineBusy = false;
-let timelineAgain = false;
-async function fetchTimeline() {
-  timelineAgain = true;
-  if (timelineBusy) return;
-  timelineBusy = true;
-  while (timelineAgain) {
-    timelineAgain = false;
-    if (!store.get().server?.sequence) break;
-    try {
-      const timeline = await getJson("/api/timeline");
-      // Lanes of another run than the one that is shown would mix the two; its own news is on the way.
-      if (timeline.run === store.get().basis) store.set({ timeline });
-    } catch {
-      break;
-    }
-    await new Promise((resolve) => setTimeout(resolve, 150));
-  }
-  timelineBusy = false;
-}
+const fetchTimeline = fetcher(async () => {
+	if (!store.get().server?.sequence) return;
+	const timeline = await getJson("/api/timeline");
+	// Lanes of another run than the one that is shown would mix the two; its own news is on the way.
+	if (timeline.run === store.get().basis) store.set({ timeline });
+});
 
-async function fetchSequences() {
-  try {
-    const { sequences } = await getJson("/api/sequences");
-    store.set({ sequences });
-  } catch {
-    // The socket tells whether the server is there; the list is asked for again on the next opening.
-  }
-}
+const fetchScores = fetcher(async () => {
+	const sequence = store.get().server?.sequence;
+	if (!sequence?.has_truth) return;
+	const told = (/** @type {string} */ what) => getJson(`/api/evaluation${what}`);
+	const [evaluation, series, comparison] = await Promise.all([told(""), told("/series"), told("/comparison").catch(() => null)]);
+	const reference = comparison && (await told(`/series?of=${comparison.against}`).catch(() => null));
+	if (store.get().server?.sequence?.key === sequence.key) store.set({ scores: { evaluation, series, comparison, reference } });
+});
 
-async function fetchSchema() {
-  try {
-    store.set({ schema: await getJson("/api/schema") });
-  } catch {
-    // As above: asked for again when the connection is back.
-  }
-}
+const fetchSequences = fetcher(async () => store.set({ sequences: (await getJson("/api/sequences")).sequences }));
+const fetchSchema = fetcher(async () => store.set({ schema: await getJson("/api/schema") }));
 
 /** @param {any} message */
 function receive(message) {
-  switch (message.type) {
-    case "state":
-      receiveState(message.state, true);
-      break;
-    case "progress":
-      if (message.run.key === store.get().server?.run.key) store.set({ run: message.run });
-      break;
-    case "playhead":
-      if (message.origin !== origin && store.get().server?.sequence) playback.follow(message.step);
-      break;
-    case "step":
-      showRun(message.run);
-      playback.receive(message);
-      break;
-    case "timeline":
-      showRun(message.run);
-      void fetchTimeline();
-      break;
-    case "notice":
-      page.note(message.level, message.message, message.hint ?? "");
-      break;
-    case "command":
-      try {
-        commandOf(message.name).run(actions);
-      } catch (error) {
-        console.warn(error);
-      }
-      break;
-  }
+	switch (message.type) {
+		case "state":
+			receiveState(message.state, true);
+			break;
+		case "progress":
+			if (message.run.key === store.get().server?.run.key) store.set({ run: message.run });
+			break;
+		case "playhead":
+			if (message.origin !== origin && store.get().server?.sequence) playback.follow(message.step);
+			break;
+		case "step":
+			showRun(message.run);
+			playback.receive(message);
+			break;
+		case "timeline":
+			showRun(message.run);
+			void fetchTimeline();
+			break;
+		case "evaluation":
+			void fetchScores();
+			break;
+		case "notice":
+			page.note(message.level, message.message, message.hint ?? "");
+			break;
+		case "command":
+			try {
+				commandOf(message.name).run(actions);
+			} catch (error) {
+				console.warn(error);
+			}
+			break;
+	}
 }
 
 const stream = openStream("/api/stream", {
-  open() {
-    store.set({ link: "open" });
-    if (!store.get().schema) void fetchSchema();
-    void fetchSequences();
-    void fetchTimeline();
-  },
-  lost(retryAt) {
-    const { link, lostAt } = store.get();
-    store.set({ link: "lost", retryAt, playing: 0, lostAt: link === "lost" ? lostAt : Date.now() });
-  },
-  message: receive,
+	open() {
+		store.set({ link: "open" });
+		if (!store.get().schema) void fetchSchema();
+		void fetchSequences();
+		void fetchTimeline();
+		void fetchScores();
+	},
+	lost(retryAt) {
+		const { link, lostAt } = store.get();
+		store.set({ link: "lost", retryAt, playing: 0, lostAt: link === "lost" ? lostAt : Date.now() });
+	},
+	message: receive,
 });
 
 /** @param {EventTarget | null} target */
 function isTyping(target) {
-  if (!(target instanceof HTMLElement)) return false;
-  if (target instanceof HTMLInputElement) return target.type !== "range" && target.type !== "checkbox";
-  return target.isContentEditable || target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement;
+	if (!(target instanceof HTMLElement)) return false;
+	if (target instanceof HTMLInputElement) return target.type !== "range" && target.type !== "checkbox";
+	return target.isContentEditable || target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement;
 }
 
 document.addEventListener("keydown", (event) => {
-  const key = keyOf(event);
-  const inDialog = document.querySelector("dialog[open]") !== null;
-  if (isTyping(event.target) || (inDialog && key !== "?")) return;
-  // Space and Enter on a focused control press that control.
-  if (key === "Space" && event.target instanceof Element && event.target.closest("button, a, summary, [role=button]")) return;
-  const command = commandFor(key, store.get().singleKeys);
-  if (!command) return;
-  event.preventDefault();
-  command.run(actions);
+	const key = keyOf(event);
+	const inDialog = document.querySelector("dialog[open]") !== null;
+	if (isTyping(event.target) || (inDialog && key !== "?")) return;
+	// Space and Enter on a focused control press that control.
+	if (key === "Space" && event.target instanceof Element && event.target.closest("button, a, summary, [role=button]")) return;
+	const command = commandFor(key, store.get().singleKeys);
+	if (!command) return;
+	event.preventDefault();
+	command.run(actions);
 });
 
 // A click leaves the focus where it was, so that Space goes on meaning play; only the 3D view,
 // which keeps all keys to itself while it has the focus, gives it back.
 document.addEventListener("mousedown", (event) => {
-  if (document.activeElement instanceof HTMLIFrameElement) document.activeElement.blur();
-  if (event.target instanceof Element && event.target.closest("button, tr, .cam")) event.preventDefault();
+	if (document.activeElement instanceof HTMLIFrameElement) document.activeElement.blur();
+	if (event.target instanceof Element && event.target.closest("button, tr, .cam")) event.preventDefault();
 });
 
 store.on(["theme"], ({ theme }) => {
-  document.documentElement.dataset.theme = theme;
-  playback.repaint();
+	document.documentElement.dataset.theme = theme;
+	playback.repaint();
 });
 store.on([...KEPT], (state) => {
-  try {
-    localStorage.setItem("theme", state.theme);
-    localStorage.setItem("page", JSON.stringify(Object.fromEntries(KEPT.map((key) => [key, state[key]]))));
-  } catch {
-    // Without storage the page forgets; nothing else changes.
-  }
+	try {
+		localStorage.setItem("theme", state.theme);
+		localStorage.setItem("page", JSON.stringify(Object.fromEntries(KEPT.map((key) => [key, state[key]]))));
+	} catch {
+		// Without storage the page forgets; nothing else changes.
+	}
 });
 
 /** @type {ReturnType<typeof setTimeout> | undefined} */
 let writing;
 store.on(["shown", "selection", "large", "server"], () => {
-  // Browsers limit how often the address may change; while it plays, it follows slowly.
-  writing ??= setTimeout(() => {
-    writing = undefined;
-    const { server, shown, selection, large } = store.get();
-    if (!server?.sequence || shown < 0 || server.opening) return;
-    const search = writePlace({ sequence: server.sequence.name, step: shown, selection, camera: large });
-    if (search !== location.search) history.replaceState(null, "", search || location.pathname);
-    document.title = `${server.sequence.name} · multiview-phd`;
-  }, 400);
+	// Browsers limit how often the address may change; while it plays, it follows slowly.
+	writing ??= setTimeout(() => {
+		writing = undefined;
+		const { server, shown, selection, large } = store.get();
+		if (!server?.sequence || shown < 0 || server.opening) return;
+		const search = writePlace({ sequence: server.sequence.name, step: shown, selection, camera: large });
+		if (search !== location.search) history.replaceState(null, "", search || location.pathname);
+		document.title = `${server.sequence.name} · multiview-phd`;
+	}, 400);
 });

@@ -11,12 +11,6 @@ import { createCache } from "./cache.js";
 import { advance, clampStep, playedRange, prefetchWindow } from "./clock.js";
 import { createPictures, pictureName, PICTURE_BUDGET } from "./pictures.js";
 
-/**
- * @typedef {import("./types.js").StepResult} StepResult
- * @typedef {import("./types.js").PageState} PageState
- * @typedef {import("./types.js").Frame} Frame
- */
-
 const RESULTS_KEPT = 600;
 
 /**
@@ -25,237 +19,230 @@ const RESULTS_KEPT = 600;
  * @returns {number}
  */
 export function shownDone({ basis, run, timeline }) {
-  return run && basis === run.key ? run.done : (timeline?.done ?? 0);
+	return run && basis === run.key ? run.done : (timeline?.done ?? 0);
 }
 
-/**
- * @param {import("./store.js").Store<PageState>} store
- * @param {(step: number) => void} sendSeek
- */
+/** @param {Store<PageState>} store @param {(step: number) => void} sendSeek */
 export function createPlayback(store, sendSeek) {
-  /** @type {((frame: Frame) => void)[]} */
-  const painters = [];
-  let frameAsked = false;
-  let dirty = true;
-  let windowDirty = true;
-  let lastTick = 0;
-  let rest = 0;
-  let lastSent = -1;
+	/** @type {((frame: Frame) => void)[]} */
+	const painters = [];
+	let frameAsked = false;
+	let dirty = true;
+	let windowDirty = true;
+	let lastTick = 0;
+	let rest = 0;
+	let lastSent = -1;
 
-  const pictures = createPictures(() => {
-    store.set({ loaded: store.get().loaded + 1 });
-    ask();
-  });
+	const pictures = createPictures(() => {
+		store.set({ loaded: store.get().loaded + 1 });
+		ask();
+	});
 
-  const results = createCache({
-    load: async (name, signal) => {
-      const [, step, samples] = name.split("/");
-      /** @type {StepResult} */
-      const result = await getJson(`/api/step/${step}${samples ? "?samples=1" : ""}`, { signal });
-      if (name !== resultName(result.run, result.step, Boolean(samples))) {
-        throw new Error(`asked for ${name}, the server shows run ${result.run} by now`);
-      }
-      return result;
-    },
-    sizeOf: () => 1,
-    budget: RESULTS_KEPT,
-    parallel: 2,
-    arrived: (name) => {
-      if (Number(name.split("/")[1]) === store.get().step) dirty = true;
-      ask();
-    },
-    failed: () => {
-      later();
-      return undefined;
-    },
-  });
+	const results = createCache({
+		load: async (name, signal) => {
+			const [, step, samples] = name.split("/");
+			/** @type {StepResult} */
+			const result = await getJson(`/api/step/${step}${samples ? "?samples=1" : ""}`, { signal });
+			if (name !== resultName(result.run, result.step, Boolean(samples))) {
+				throw new Error(`asked for ${name}, the server shows run ${result.run} by now`);
+			}
+			return result;
+		},
+		sizeOf: () => 1,
+		budget: RESULTS_KEPT,
+		parallel: 2,
+		arrived: (name) => {
+			if (Number(name.split("/")[1]) === store.get().step) dirty = true;
+			ask();
+		},
+		failed: () => {
+			later();
+			return undefined;
+		},
+	});
 
-  /**
-   * @param {string} run
-   * @param {number} step
-   * @param {boolean} samples
-   */
-  function resultName(run, step, samples) {
-    return `${run || "none"}/${step}${samples ? "/samples" : ""}`;
-  }
+	/** @param {string} run @param {number} step @param {boolean} samples */
+	function resultName(run, step, samples) {
+		return `${run || "none"}/${step}${samples ? "/samples" : ""}`;
+	}
 
-  /** Try again after something failed that may come back. */
-  function later() {
-    setTimeout(() => {
-      windowDirty = true;
-      ask();
-    }, 500);
-  }
+	/** Try again after something failed that may come back. */
+	function later() {
+		setTimeout(() => {
+			windowDirty = true;
+			ask();
+		}, 500);
+	}
 
-  function ask() {
-    if (frameAsked) return;
-    frameAsked = true;
-    requestAnimationFrame(tick);
-  }
+	function ask() {
+		if (frameAsked) return;
+		frameAsked = true;
+		requestAnimationFrame(tick);
+	}
 
-  /** @param {PageState} state */
-  function refreshWindow(state) {
-    windowDirty = false;
-    const { server, basis, step, speed, playing, layers2d } = state;
-    const sequence = server?.sequence;
-    if (!sequence) {
-      pictures.want([]);
-      results.want([]);
-      return;
-    }
-    const bytes = sequence.cameras.reduce((sum, c) => sum + (c.has_pictures ? c.width * c.height * 4 : 0), 0);
-    const how = { frames: sequence.frames, fps: sequence.fps, speed, direction: playing };
-    const most = Math.min(400, Math.floor((PICTURE_BUDGET * 0.9) / Math.max(1, bytes)));
-    const steps = prefetchWindow(step, { ...how, most });
-    pictures.want(
-      steps.flatMap((k) =>
-        sequence.cameras.flatMap((camera, index) =>
-          camera.has_pictures ? [pictureName({ sequence: sequence.key, camera: index, step: k })] : [],
-        ),
-      ),
-    );
-    const done = shownDone(state);
-    const useful = steps.filter((k) => k === step || k < done);
-    results.want(useful.slice(0, RESULTS_KEPT / 2).map((k) => resultName(basis, k, layers2d.samples)));
-  }
+	/** @param {PageState} state */
+	function refreshWindow(state) {
+		windowDirty = false;
+		const { server, basis, step, speed, playing, layers2d } = state;
+		const sequence = server?.sequence;
+		if (!sequence) {
+			pictures.want([]);
+			results.want([]);
+			return;
+		}
+		const bytes = sequence.cameras.reduce((sum, c) => sum + (c.has_pictures ? c.width * c.height * 4 : 0), 0);
+		const how = { frames: sequence.frames, fps: sequence.fps, speed, direction: playing };
+		const most = Math.min(400, Math.floor((PICTURE_BUDGET * 0.9) / Math.max(1, bytes)));
+		const steps = prefetchWindow(step, { ...how, most });
+		pictures.want(
+			steps.flatMap((k) =>
+				sequence.cameras.flatMap((camera, index) =>
+					camera.has_pictures ? [pictureName({ sequence: sequence.key, camera: index, step: k })] : [],
+				),
+			),
+		);
+		const done = shownDone(state);
+		const useful = steps.filter((k) => k === step || k < done);
+		results.want(useful.slice(0, RESULTS_KEPT / 2).map((k) => resultName(basis, k, layers2d.samples)));
+	}
 
-  /**
-   * @param {PageState} state
-   * @param {number} step
-   * @returns {Frame | null} null while something that will come is missing
-   */
-  function assemble(state, step) {
-    const sequence = state.server?.sequence;
-    if (!sequence) return null;
-    const lost = state.link === "lost";
-    const found = sequence.cameras.map((camera, index) =>
-      camera.has_pictures
-        ? pictures.get(pictureName({ sequence: sequence.key, camera: index, step }))
-        : { bitmap: null, missing: null },
-    );
-    if (!lost && found.some((picture) => picture === undefined)) return null;
-    const { samples } = state.layers2d;
-    const result =
-      results.get(resultName(state.basis, step, samples)) ?? results.get(resultName(state.basis, step, !samples));
-    const computing = state.run?.state === "computing";
-    if (result?.computed) return { step, pictures: found, result, stale: computing && result.run !== state.run?.key };
-    // Until the new run comes to this step, the one before is faintly better than nothing.
-    const before = state.result;
-    if (computing && before?.computed && before.step === step && state.shown === step) {
-      return { step, pictures: found, result: before, stale: true };
-    }
-    return result || lost ? { step, pictures: found, result: result ?? null, stale: false } : null;
-  }
+	/**
+	 * @param {PageState} state
+	 * @param {number} step
+	 * @returns {Frame | null} null while something that will come is missing
+	 */
+	function assemble(state, step) {
+		const sequence = state.server?.sequence;
+		if (!sequence) return null;
+		const lost = state.link === "lost";
+		const found = sequence.cameras.map((camera, index) =>
+			camera.has_pictures
+				? pictures.get(pictureName({ sequence: sequence.key, camera: index, step }))
+				: { bitmap: null, missing: null },
+		);
+		if (!lost && found.some((picture) => picture === undefined)) return null;
+		const { samples } = state.layers2d;
+		const result =
+			results.get(resultName(state.basis, step, samples)) ?? results.get(resultName(state.basis, step, !samples));
+		const computing = state.run?.state === "computing";
+		if (result?.computed) return { step, pictures: found, result, stale: computing && result.run !== state.run?.key };
+		// Until the new run comes to this step, the one before is faintly better than nothing.
+		const before = state.result;
+		if (computing && before?.computed && before.step === step && state.shown === step) {
+			return { step, pictures: found, result: before, stale: true };
+		}
+		return result || lost ? { step, pictures: found, result: result ?? null, stale: false } : null;
+	}
 
-  /** @param {number} now */
-  function tick(now) {
-    frameAsked = false;
-    let state = store.get();
-    const sequence = state.server?.sequence;
-    if (!sequence) return;
-    if (state.playing && state.step === state.shown) {
-      const [first, last] = playedRange(state.range, sequence.frames);
-      const how = { fps: sequence.fps, speed: state.speed, direction: state.playing, first, last, loop: state.loop };
-      const next = advance({ step: state.step, rest }, lastTick ? (now - lastTick) / 1000 : 0, how);
-      rest = next.rest;
-      lastTick = now;
-      if (next.step !== state.step) windowDirty = true;
-      store.set({ step: next.step, playing: next.ended ? 0 : state.playing });
-      state = store.get();
-    }
-    if (windowDirty) refreshWindow(state);
-    if (state.step !== state.shown || dirty) {
-      const frame = assemble(state, state.step);
-      if (frame) {
-        dirty = frame.stale;
-        for (const paint of painters) paint(frame);
-        store.set({ shown: state.step, result: frame.result });
-      }
-    }
-    if (state.step !== lastSent) {
-      lastSent = state.step;
-      sendSeek(state.step);
-    }
-    if (state.playing) ask();
-  }
+	/** @param {number} now */
+	function tick(now) {
+		frameAsked = false;
+		let state = store.get();
+		const sequence = state.server?.sequence;
+		if (!sequence) return;
+		if (state.playing && state.step === state.shown) {
+			const [first, last] = playedRange(state.range, sequence.frames);
+			const how = { fps: sequence.fps, speed: state.speed, direction: state.playing, first, last, loop: state.loop };
+			const next = advance({ step: state.step, rest }, lastTick ? (now - lastTick) / 1000 : 0, how);
+			rest = next.rest;
+			lastTick = now;
+			if (next.step !== state.step) windowDirty = true;
+			store.set({ step: next.step, playing: next.ended ? 0 : state.playing });
+			state = store.get();
+		}
+		if (windowDirty) refreshWindow(state);
+		if (state.step !== state.shown || dirty) {
+			const frame = assemble(state, state.step);
+			if (frame) {
+				dirty = frame.stale;
+				for (const paint of painters) paint(frame);
+				store.set({ shown: state.step, result: frame.result });
+			}
+		}
+		if (state.step !== lastSent) {
+			lastSent = state.step;
+			sendSeek(state.step);
+		}
+		if (state.playing) ask();
+	}
 
-  store.on(["server", "run", "basis", "timeline"], (state) => {
-    const done = shownDone(state);
-    for (const name of [...results.names()]) {
-      const result = results.get(name);
-      if (result && !result.computed && (result.run !== state.basis || result.step < done)) results.forget(name);
-    }
-    dirty = true;
-    windowDirty = true;
-    ask();
-  });
-  store.on(["step", "playing", "speed", "layers2d", "link"], () => {
-    windowDirty = true;
-    ask();
-  });
-  store.on(["link"], () => {
-    // A server that was started anew stands at its own first step.
-    lastSent = -1;
-  });
-  store.on(["playing"], () => {
-    lastTick = 0;
-    rest = 0;
-  });
+	store.on(["server", "run", "basis", "timeline"], (state) => {
+		const done = shownDone(state);
+		for (const name of [...results.names()]) {
+			const result = results.get(name);
+			if (result && !result.computed && (result.run !== state.basis || result.step < done)) results.forget(name);
+		}
+		dirty = true;
+		windowDirty = true;
+		ask();
+	});
+	store.on(["step", "playing", "speed", "layers2d", "link"], () => {
+		windowDirty = true;
+		ask();
+	});
+	store.on(["link"], () => {
+		// A server that was started anew stands at its own first step.
+		lastSent = -1;
+	});
+	store.on(["playing"], () => {
+		lastTick = 0;
+		rest = 0;
+	});
 
-  return {
-    /** @param {(frame: Frame) => void} painter */
-    onPaint(painter) {
-      painters.push(painter);
-    },
-    /** Paint the shown step again: sizes, layers, selection or theme changed. */
-    repaint() {
-      dirty = true;
-      ask();
-    },
-    /**
-     * A result that came by itself.
-     * @param {StepResult} result
-     */
-    receive(result) {
-      const samples = result.cameras.some((camera) => (camera.samples?.length ?? 0) > 0);
-      results.put(resultName(result.run, result.step, samples), result);
-      if (result.step === store.get().step) dirty = true;
-      ask();
-    },
-    /** @param {number} step */
-    seek(step) {
-      const frames = store.get().server?.sequence?.frames ?? 0;
-      if (frames > 0) store.set({ step: clampStep(step, frames) });
-    },
-    /**
-     * Another tab or the 3D view moved the playhead.
-     * @param {number} step
-     */
-    follow(step) {
-      lastSent = step;
-      store.set({ step, playing: 0 });
-    },
-    /** Forget everything of the sequence before. */
-    clear() {
-      pictures.clear();
-      results.clear();
-      lastSent = -1;
-      dirty = true;
-      windowDirty = true;
-      ask();
-    },
-    /** @returns {number[]} steps with the pictures of all cameras */
-    loadedSteps() {
-      const sequence = store.get().server?.sequence;
-      if (!sequence) return [];
-      const cameras = sequence.cameras.filter((camera) => camera.has_pictures).length;
-      /** @type {Map<number, number>} */
-      const counts = new Map();
-      for (const name of pictures.names()) {
-        const step = Number(name.slice(name.lastIndexOf("/") + 1));
-        counts.set(step, (counts.get(step) ?? 0) + 1);
-      }
-      return [...counts].filter(([, count]) => count === cameras).map(([step]) => step);
-    },
-  };
+	return {
+		/** @param {(frame: Frame) => void} painter */
+		onPaint(painter) {
+			painters.push(painter);
+		},
+		/** Paint the shown step again: sizes, layers, selection or theme changed. */
+		repaint() {
+			dirty = true;
+			ask();
+		},
+		/**
+		 * A result that came by itself.
+		 * @param {StepResult} result
+		 */
+		receive(result) {
+			const samples = result.cameras.some((camera) => (camera.samples?.length ?? 0) > 0);
+			results.put(resultName(result.run, result.step, samples), result);
+			if (result.step === store.get().step) dirty = true;
+			ask();
+		},
+		/** @param {number} step */
+		seek(step) {
+			const frames = store.get().server?.sequence?.frames ?? 0;
+			if (frames > 0) store.set({ step: clampStep(step, frames) });
+		},
+		/**
+		 * Another tab or the 3D view moved the playhead.
+		 * @param {number} step
+		 */
+		follow(step) {
+			lastSent = step;
+			store.set({ step, playing: 0 });
+		},
+		/** Forget everything of the sequence before. */
+		clear() {
+			pictures.clear();
+			results.clear();
+			lastSent = -1;
+			dirty = true;
+			windowDirty = true;
+			ask();
+		},
+		/** @returns {number[]} steps with the pictures of all cameras */
+		loadedSteps() {
+			const sequence = store.get().server?.sequence;
+			if (!sequence) return [];
+			const cameras = sequence.cameras.filter((camera) => camera.has_pictures).length;
+			/** @type {Map<number, number>} */
+			const counts = new Map();
+			for (const name of pictures.names()) {
+				const step = Number(name.slice(name.lastIndexOf("/") + 1));
+				counts.set(step, (counts.get(step) ?? 0) + 1);
+			}
+			return [...counts].filter(([, count]) => count === cameras).map(([step]) => step);
+		},
+	};
 }

@@ -2,12 +2,6 @@
 /**
  * One plain object, changed by `set`, read by everyone. Listeners name the keys they
  * depend on and are told once a turn, however many changes that turn brought.
- *
- * @template {object} T
- * @typedef {object} Store
- * @property {() => Readonly<T>} get
- * @property {(patch: Partial<T>) => void} set
- * @property {(keys: (keyof T)[], listener: (state: Readonly<T>) => void) => () => void} on
  */
 
 /**
@@ -17,40 +11,40 @@
  * @returns {Store<T>}
  */
 export function createStore(initial, schedule = queueMicrotask) {
-  let state = { ...initial };
-  /** @type {Set<keyof T>} */
-  let pending = new Set();
-  /** @type {Set<{keys: Set<keyof T>, listener: (state: Readonly<T>) => void}>} */
-  const listeners = new Set();
+	let state = { ...initial };
+	/** @type {Set<keyof T>} */
+	let pending = new Set();
+	/** @type {Set<{keys: Set<keyof T>, listener: (state: Readonly<T>) => void}>} */
+	const listeners = new Set();
 
-  function flush() {
-    const changed = pending;
-    pending = new Set();
-    for (const { keys, listener } of [...listeners]) {
-      for (const key of changed) {
-        if (keys.has(key)) {
-          listener(state);
-          break;
-        }
-      }
-    }
-  }
+	function flush() {
+		const changed = pending;
+		pending = new Set();
+		for (const { keys, listener } of [...listeners]) {
+			for (const key of changed) {
+				if (keys.has(key)) {
+					listener(state);
+					break;
+				}
+			}
+		}
+	}
 
-  return {
-    get: () => state,
-    set(patch) {
-      const next = { ...state, ...patch };
-      const wasIdle = pending.size === 0;
-      for (const key of /** @type {(keyof T)[]} */ (Object.keys(patch))) {
-        if (!Object.is(state[key], next[key])) pending.add(key);
-      }
-      state = next;
-      if (wasIdle && pending.size > 0) schedule(flush);
-    },
-    on(keys, listener) {
-      const entry = { keys: new Set(keys), listener };
-      listeners.add(entry);
-      return () => listeners.delete(entry);
-    },
-  };
+	return {
+		get: () => state,
+		set(patch) {
+			const next = { ...state, ...patch };
+			const wasIdle = pending.size === 0;
+			for (const key of /** @type {(keyof T)[]} */ (Object.keys(patch))) {
+				if (!Object.is(state[key], next[key])) pending.add(key);
+			}
+			state = next;
+			if (wasIdle && pending.size > 0) schedule(flush);
+		},
+		on(keys, listener) {
+			const entry = { keys: new Set(keys), listener };
+			listeners.add(entry);
+			return () => listeners.delete(entry);
+		},
+	};
 }

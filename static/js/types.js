@@ -1,6 +1,7 @@
 // @ts-check
 /**
- * What comes over the wire and what the page keeps. Types only.
+ * What comes over the wire and what the page keeps. Types only, known in every module:
+ * this file is no module itself, and no browser loads it.
  * Steps are 0-based; boxes are `[left, top, width, height]` in pixels; positions are metres.
  *
  * @typedef {[number, number, number, number]} Box
@@ -45,6 +46,7 @@
  * @property {number} playhead
  * @property {number | null} selection
  * @property {RunState} run
+ * @property {{key: string, changed: string[]} | null} pinned
  * @property {{path: string}} viser
  * @property {Record<string, boolean>} [layers]
  * @property {number | null} [view]
@@ -142,11 +144,41 @@
  * @property {Record<string, boolean>} layers3d
  * @property {number} view3d  -1 is the free view, otherwise a camera's index
  * @property {number | null} large  the camera that is shown large; null: all alike
- * @property {"tracks" | "changes" | "runs"} tab
+ * @property {"tracks" | "changes" | "compare" | "runs"} tab
+ * @property {Scores | null} scores  of the run that was set against the truth last
+ * @property {"ospa" | "gospa"} measure  what the timeline plots
  * @property {"longest" | "born"} laneOrder
  * @property {string} theme
  * @property {boolean} singleKeys
  * @property {Note[]} notes
+ *
+ * @typedef {"better" | "worse" | "same" | "different" | "undefined"} Verdict
+ * @typedef {{name: string, label: string, unit: string, digits: number, headline: boolean, settings: string}} FigureHead
+ * @typedef {FigureHead & {value: number | null, help: string}} Figure
+ * @typedef {FigureHead & {a: number | null, b: number | null, difference: number | null, verdict: Verdict, comparable: boolean}} Difference
+ * @typedef {{id: number, kind: string, person: number | null, mean_error: number | null, switches: number}} ScoredTrack
+ * @typedef {{run: string, steps: number, partial: boolean, figures: Figure[], per_track: ScoredTrack[], notes: string[]}} Evaluation
+ * @typedef {{run: string, partial: boolean, changed: Record<string, any>}} ComparedRun
+ * @typedef {{against: "pinned" | "previous", steps: number, a: ComparedRun, b: ComparedRun, parameters: {key: string, a: any, b: any}[], rows: Difference[]}} Comparison
+ * @typedef {{first: number, values: (number | null)[]}} Course  metres over the steps; null where there is no pair
+ * @typedef {{step: number, before: number, track: number}} Switch  of a person's identity, from one track to another
+ *
+ * @typedef {object} ScoreSeries
+ * @property {string} run
+ * @property {string} unit
+ * @property {string} cost  cut-off and order, in words
+ * @property {string} gate
+ * @property {number[]} ospa
+ * @property {number[]} ospa_localisation
+ * @property {number[]} ospa_cardinality
+ * @property {number[]} gospa
+ * @property {number[]} gospa_localisation
+ * @property {number[]} gospa_missed
+ * @property {number[]} gospa_false
+ * @property {(Course & {track: number})[]} track_errors
+ * @property {Switch[]} switches
+ *
+ * @typedef {{evaluation: Evaluation, series: ScoreSeries, comparison: Comparison | null, reference: ScoreSeries | null}} Scores
  *
  * @typedef {object} Command
  * @property {string} name
@@ -177,16 +209,51 @@
  *
  * @typedef {object} Frame  what is painted at once
  * @property {number} step
- * @property {(import("./pictures.js").Picture | undefined)[]} pictures  by camera; undefined where it is not loaded and will not be
+ * @property {(Picture | undefined)[]} pictures  by camera; undefined where it is not loaded and will not be
  * @property {StepResult | null} result
  * @property {boolean} stale  the result is of the run before, shown faintly until the new one is there
  *
  * @typedef {object} Context  what every pane is given
- * @property {import("./store.js").Store<PageState>} store
+ * @property {Store<PageState>} store
  * @property {ReturnType<typeof import("./playback.js").createPlayback>} playback
  * @property {Actions} actions
  * @property {ReturnType<typeof import("./actions.js").createActions>["page"]} page
  * @property {() => void} retry  connect now
+ *
+ * @typedef {{y: number, height: number}} Row  of the timeline, CSS pixels
+ * @typedef {{first: number, last: number, width: number}} View  the steps an axis of `width` CSS pixels shows
+ * @typedef {{step: number, id: number, kind: "birth" | "death" | "long miss" | "switch"}} LaneEvent
+ * @typedef {{x: number, y: number, width: number, height: number}} Cell  of the mosaic of pictures
+ * @typedef {{sequence: string | null, step: number | null, selection: number | null, camera: number | null}} Place
+ * @typedef {{bitmap: ImageBitmap | null, missing: string | null}} Picture
+ * @typedef {{key: string, number: number, at: string, sequence: string, state: string, done: number, total: number, speed: string, changes: number, parameters: Record<string, any>}} PastRun
+ *
+ * @typedef {object} Palette
+ * @property {(name: string) => string} get  a token without its dashes
+ * @property {(id: number) => string} id
+ * @property {(id: number) => string} on  ink on the colour of an id
+ * @property {string} font
+ *
+ * @typedef {object} Scene
+ * @property {number} scale  CSS pixels a picture pixel
+ * @property {number} width  CSS pixels
+ * @property {number} height  CSS pixels
+ * @property {Record<string, boolean>} layers
+ * @property {number | null} selection
+ * @property {number | null} hover
+ * @property {number} opacity
+ * @property {Palette} ink
+ *
+ * @typedef {{row: HTMLTableRowElement, cells: HTMLElement[]}} TrackRow
+ * @typedef {{name: string, word: string, number: boolean, give: string, value: (track: TrackLane, at: {step: number, done: number, scored: Map<number, ScoredTrack>}) => number | string}} TrackColumn
  */
 
-export {};
+/**
+ * @template {object} T
+ * @typedef {object} Store
+ * @property {() => Readonly<T>} get
+ * @property {(patch: Partial<T>) => void} set
+ * @property {(keys: (keyof T)[], listener: (state: Readonly<T>) => void) => () => void} on
+ */
+
+/** @typedef {CanvasRenderingContext2D} Brush */

@@ -6,91 +6,71 @@
 import { faded } from "../palette.js";
 import { stroke } from "./canvas.js";
 
-/**
- * @typedef {import("../types.js").CameraStep} CameraStep
- * @typedef {import("../types.js").TrackInView} TrackInView
- * @typedef {import("../types.js").Box} Box
- *
- * @typedef {object} Scene
- * @property {number} scale  CSS pixels a picture pixel
- * @property {number} width  CSS pixels
- * @property {number} height  CSS pixels
- * @property {Record<string, boolean>} layers
- * @property {number | null} selection
- * @property {number | null} hover
- * @property {number} opacity
- * @property {import("../palette.js").Palette} ink
- */
-
 const WHITE = "#f4f4f4";
 
 /**
  * A box on whole pixels of the screen, so that thin lines stay thin.
- * @param {CanvasRenderingContext2D} g
+ * @param {Brush} g
  * @param {Box} box
  * @param {number} scale
  */
 function trace(g, [left, top, width, height], scale) {
-  const x = Math.round(left * scale);
-  const y = Math.round(top * scale);
-  g.beginPath();
-  g.rect(x + 0.5, y + 0.5, Math.round((left + width) * scale) - x, Math.round((top + height) * scale) - y);
+	const x = Math.round(left * scale);
+	const y = Math.round(top * scale);
+	g.beginPath();
+	g.rect(x + 0.5, y + 0.5, Math.round((left + width) * scale) - x, Math.round((top + height) * scale) - y);
 }
 
 /**
  * The corners of a box: a 2D estimate.
- * @param {CanvasRenderingContext2D} g
+ * @param {Brush} g
  * @param {Box} box
  * @param {number} scale
  */
 function corners(g, [left, top, width, height], scale) {
-  const x0 = Math.round(left * scale) + 0.5;
-  const y0 = Math.round(top * scale) + 0.5;
-  const x1 = Math.round((left + width) * scale) + 0.5;
-  const y1 = Math.round((top + height) * scale) + 0.5;
-  const arm = Math.max(3, Math.min(10, (x1 - x0) * 0.3, (y1 - y0) * 0.3));
-  g.beginPath();
-  for (const [x, y, sx, sy] of [[x0, y0, 1, 1], [x1, y0, -1, 1], [x1, y1, -1, -1], [x0, y1, 1, -1]]) {
-    g.moveTo(x + sx * arm, y);
-    g.lineTo(x, y);
-    g.lineTo(x, y + sy * arm);
-  }
+	const x0 = Math.round(left * scale) + 0.5;
+	const y0 = Math.round(top * scale) + 0.5;
+	const x1 = Math.round((left + width) * scale) + 0.5;
+	const y1 = Math.round((top + height) * scale) + 0.5;
+	const arm = Math.max(3, Math.min(10, (x1 - x0) * 0.3, (y1 - y0) * 0.3));
+	g.beginPath();
+	for (const [x, y, sx, sy] of [[x0, y0, 1, 1], [x1, y0, -1, 1], [x1, y1, -1, -1], [x0, y1, 1, -1]]) {
+		g.moveTo(x + sx * arm, y);
+		g.lineTo(x, y);
+		g.lineTo(x, y + sy * arm);
+	}
 }
 
-/**
- * @param {CanvasRenderingContext2D} g
- * @param {CameraStep} view
- * @param {Scene} scene
- */
+/** @param {Brush} g @param {CameraStep} view @param {Scene} scene */
 export function drawOverlay(g, view, scene) {
-  const { layers, width, scale } = scene;
-  const roomy = width > 260;
-  g.globalAlpha = scene.opacity;
-  g.lineJoin = "miter";
-  if (layers.samples && view.samples) drawSamples(g, view.samples, scale);
-  if (layers.truth && roomy) {
-    for (const { box, valid } of view.truth) {
-      if (!box) continue;
-      g.globalAlpha = scene.opacity * (valid ? 1 : 0.5);
-      trace(g, box, scale);
-      stroke(g, "#fff", 1.25, [4, 3], 0.45);
-    }
-    g.globalAlpha = scene.opacity;
-  }
-  if (layers.measurements) {
-    for (const { box } of view.measurements) {
-      trace(g, box, scale);
-      stroke(g, WHITE, 1, [], 0.4);
-    }
-  }
-  if (layers.estimates) {
-    for (const { box } of view.estimates) {
-      corners(g, box, scale);
-      stroke(g, WHITE, 1.75, [], 0.5);
-    }
-  }
-  if (layers.boxes) drawTracks(g, visibleTracks(view), scene, roomy);
-  g.globalAlpha = 1;
+	const { layers, width, scale } = scene;
+	const roomy = width > 260;
+	g.globalAlpha = scene.opacity;
+	g.lineJoin = "miter";
+	if (layers.samples && view.samples) drawSamples(g, view.samples, scale);
+	if (layers.truth && roomy) {
+		for (const { box, valid } of view.truth) {
+			if (!box) continue;
+			g.globalAlpha = scene.opacity * (valid ? 1 : 0.5);
+			trace(g, box, scale);
+			stroke(g, "#fff", 1.25, [4, 3], 0.45);
+		}
+		g.globalAlpha = scene.opacity;
+	}
+	if (layers.measurements) {
+		for (const { box } of view.measurements) {
+			trace(g, box, scale);
+			stroke(g, WHITE, 1, [], 0.4);
+		}
+	}
+	if (layers.estimates) {
+		for (const { box } of view.estimates) {
+			corners(g, box, scale);
+			stroke(g, WHITE, 1.75, [], 0.5);
+		}
+	}
+	if (layers.boxes) drawTracks(g, visibleTracks(view), scene, roomy);
+	g.globalAlpha = 1;
 }
 
 /**
@@ -99,100 +79,96 @@ export function drawOverlay(g, view, scene) {
  * @returns {(TrackInView & {box: Box})[]}
  */
 export function visibleTracks(view) {
-  const tracks = /** @type {(TrackInView & {box: Box})[]} */ (view.tracks.filter((track) => track.visible && track.box));
-  return tracks.sort((a, b) => a.box[1] + a.box[3] - b.box[1] - b.box[3]);
+	const tracks = /** @type {(TrackInView & {box: Box})[]} */ (view.tracks.filter((track) => track.visible && track.box));
+	return tracks.sort((a, b) => a.box[1] + a.box[3] - b.box[1] - b.box[3]);
 }
 
-/**
- * @param {CanvasRenderingContext2D} g
- * @param {[number, number, number][]} samples
- * @param {number} scale
- */
+/** @param {Brush} g @param {[number, number, number][]} samples @param {number} scale */
 function drawSamples(g, samples, scale) {
-  const heaviest = samples.reduce((most, [, , weight]) => Math.max(most, weight), 1e-12);
-  const opacity = g.globalAlpha;
-  for (const [x, y, weight] of samples) {
-    const px = Math.round(x * scale);
-    const py = Math.round(y * scale);
-    g.globalAlpha = opacity * (0.25 + 0.75 * Math.sqrt(Math.max(0, weight) / heaviest));
-    g.fillStyle = "rgb(0 0 0 / .5)";
-    g.fillRect(px - 1.5, py - 1.5, 3, 3);
-    g.fillStyle = WHITE;
-    g.fillRect(px - 0.75, py - 0.75, 1.5, 1.5);
-  }
-  g.globalAlpha = opacity;
+	const heaviest = samples.reduce((most, [, , weight]) => Math.max(most, weight), 1e-12);
+	const opacity = g.globalAlpha;
+	for (const [x, y, weight] of samples) {
+		const px = Math.round(x * scale);
+		const py = Math.round(y * scale);
+		g.globalAlpha = opacity * (0.25 + 0.75 * Math.sqrt(Math.max(0, weight) / heaviest));
+		g.fillStyle = "rgb(0 0 0 / .5)";
+		g.fillRect(px - 1.5, py - 1.5, 3, 3);
+		g.fillStyle = WHITE;
+		g.fillRect(px - 0.75, py - 0.75, 1.5, 1.5);
+	}
+	g.globalAlpha = opacity;
 }
 
 /**
- * @param {CanvasRenderingContext2D} g
+ * @param {Brush} g
  * @param {(TrackInView & {box: Box})[]} tracks
  * @param {Scene} scene
  * @param {boolean} roomy
  */
 function drawTracks(g, tracks, { scale, selection, hover, ink, width }, roomy) {
-  const huge = width > 800 ? 1.4 : 1;
-  for (const { id, box, seen } of tracks) {
-    const marked = id === selection || id === hover;
-    const colour = ink.id(id);
-    trace(g, box, scale);
-    if (marked) {
-      g.fillStyle = faded(colour, 0.16);
-      g.fill();
-    }
-    stroke(g, colour, (roomy ? 2.5 : 2) * huge + (marked ? 0.5 : 0), seen ? [] : [7, 4], 0.55);
-  }
-  const size = Math.round((roomy ? 15 : 13) * huge);
-  g.font = `600 ${Math.round((roomy ? 11 : 10) * huge)}px ${ink.font}`;
-  g.textAlign = "center";
-  g.textBaseline = "middle";
-  /** @type {[number, number, number][]} */
-  const placed = [];
-  for (const { id, box } of [...tracks].reverse()) {
-    const text = String(id);
-    const wide = Math.max(size + 1, Math.ceil(g.measureText(text).width) + 6);
-    const above = Math.round(box[1] * scale) - size - 1;
-    const y = above < 2 ? Math.max(2, Math.round(box[1] * scale) + 2) : above;
-    let x = Math.max(1, Math.min(width - wide - 1, Math.round(box[0] * scale) - 1));
-    // The nearest person's tag keeps its corner; the others step aside.
-    for (let k = 0; k < placed.length; k += 1) {
-      const [px, py, pw] = placed[k];
-      if (Math.abs(y - py) < size + 2 && x < px + pw + 2 && px < x + wide + 2 && px + pw + 2 + wide < width) {
-        x = px + pw + 2;
-        k = -1;
-      }
-    }
-    placed.push([x, y, wide]);
-    g.fillStyle = "rgb(0 0 0 / .55)";
-    g.fillRect(x - 1, y - 1, wide + 2, size + 2);
-    g.fillStyle = ink.id(id);
-    g.fillRect(x, y, wide, size);
-    g.fillStyle = ink.on(id);
-    g.fillText(text, x + wide / 2, y + size / 2 + 0.5);
-  }
+	const huge = width > 800 ? 1.4 : 1;
+	for (const { id, box, seen } of tracks) {
+		const marked = id === selection || id === hover;
+		const colour = ink.id(id);
+		trace(g, box, scale);
+		if (marked) {
+			g.fillStyle = faded(colour, 0.16);
+			g.fill();
+		}
+		stroke(g, colour, (roomy ? 2.5 : 2) * huge + (marked ? 0.5 : 0), seen ? [] : [7, 4], 0.55);
+	}
+	const size = Math.round((roomy ? 15 : 13) * huge);
+	g.font = `600 ${Math.round((roomy ? 11 : 10) * huge)}px ${ink.font}`;
+	g.textAlign = "center";
+	g.textBaseline = "middle";
+	/** @type {[number, number, number][]} */
+	const placed = [];
+	for (const { id, box } of [...tracks].reverse()) {
+		const text = String(id);
+		const wide = Math.max(size + 1, Math.ceil(g.measureText(text).width) + 6);
+		const above = Math.round(box[1] * scale) - size - 1;
+		const y = above < 2 ? Math.max(2, Math.round(box[1] * scale) + 2) : above;
+		let x = Math.max(1, Math.min(width - wide - 1, Math.round(box[0] * scale) - 1));
+		// The nearest person's tag keeps its corner; the others step aside.
+		for (let k = 0; k < placed.length; k += 1) {
+			const [px, py, pw] = placed[k];
+			if (Math.abs(y - py) < size + 2 && x < px + pw + 2 && px < x + wide + 2 && px + pw + 2 + wide < width) {
+				x = px + pw + 2;
+				k = -1;
+			}
+		}
+		placed.push([x, y, wide]);
+		g.fillStyle = "rgb(0 0 0 / .55)";
+		g.fillRect(x - 1, y - 1, wide + 2, size + 2);
+		g.fillStyle = ink.id(id);
+		g.fillRect(x, y, wide, size);
+		g.fillStyle = ink.on(id);
+		g.fillText(text, x + wide / 2, y + size / 2 + 0.5);
+	}
 }
 
 /**
  * The picture of a camera that has none: its right shape, a border and a quiet grid.
- * @param {CanvasRenderingContext2D} g
+ * @param {Brush} g
  * @param {number} width
  * @param {number} height
  */
 export function drawEmptyPicture(g, width, height) {
-  g.fillStyle = "#1c1c1c";
-  g.fillRect(0, 0, width, height);
-  g.beginPath();
-  for (let k = 1; k < 8; k += 1) {
-    const x = Math.round((width * k) / 8) + 0.5;
-    g.moveTo(x, 0);
-    g.lineTo(x, height);
-  }
-  for (let k = 1; k < 6; k += 1) {
-    const y = Math.round((height * k) / 6) + 0.5;
-    g.moveTo(0, y);
-    g.lineTo(width, y);
-  }
-  stroke(g, "#262626", 1);
-  g.beginPath();
-  g.rect(0.5, 0.5, width - 1, height - 1);
-  stroke(g, "#3b3b3b", 1);
+	g.fillStyle = "#1c1c1c";
+	g.fillRect(0, 0, width, height);
+	g.beginPath();
+	for (let k = 1; k < 8; k += 1) {
+		const x = Math.round((width * k) / 8) + 0.5;
+		g.moveTo(x, 0);
+		g.lineTo(x, height);
+	}
+	for (let k = 1; k < 6; k += 1) {
+		const y = Math.round((height * k) / 6) + 0.5;
+		g.moveTo(0, y);
+		g.lineTo(width, y);
+	}
+	stroke(g, "#262626", 1);
+	g.beginPath();
+	g.rect(0.5, 0.5, width - 1, height - 1);
+	stroke(g, "#3b3b3b", 1);
 }

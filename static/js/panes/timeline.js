@@ -4,253 +4,299 @@ import { panned, secondsOf, stepAt, xOf, zoomed } from "../clock.js";
 import { fill, h, idTag, write } from "../dom.js";
 import { hatch, prepare } from "../draw/canvas.js";
 import { drawLanes, drawRange, drawRuler } from "../draw/lanes.js";
-import { drawCardinality } from "../draw/strips.js";
-import { ordered, seenShare } from "../events.js";
+import { drawCardinality, drawErrors, drawParts, meanOf, scaleOf } from "../draw/strips.js";
+import { ordered, scoresOf, seenShare } from "../events.js";
 import { faded, palette } from "../palette.js";
 import { shownDone } from "../playback.js";
 import { mountTransport } from "./transport.js";
 
-/**
- * @typedef {import("../types.js").TrackLane} TrackLane
- */
-
-/**
- * @param {HTMLElement} root
- * @param {import("../types.js").Context} context
- */
+/** @param {HTMLElement} root @param {Context} context */
 export function mountTimeline(root, context) {
-  const { store, page, playback } = context;
-  const lanes = h("div", { class: "lanes", tabindex: -1, "aria-label": "Tracks" });
-  const people = h("span", { class: "r" });
-  const order = h("button", { class: "start", "data-tip": "Order of the lanes: longest first, or as they were born" });
-  order.addEventListener("click", () => store.set({ laneOrder: store.get().laneOrder === "longest" ? "born" : "longest" }));
-  const sign = (/** @type {string} */ word, /** @type {string} */ token, /** @type {number} */ width) => {
-    const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-    svg.setAttribute("viewBox", "0 0 12 8");
-    svg.innerHTML = `<path d="M0 4h12" stroke="var(--${token})" stroke-width="${width}"/>`;
-    return h("span", { class: "lg" }, svg, word);
-  };
-  const truthSign = sign("truth", "p-truth", 3);
-  const gutter = h(
-    "div",
-    { class: "gut" },
-    h("div", { class: "gr over" }),
-    h("div", { class: "gr ruler" }, order, h("span", { class: "r" }, "seen")),
-    lanes,
-    h("div", { class: "gr strip" }, h("span", { class: "n" }, "People"), people, h("span", { class: "brk" }), truthSign, sign("estimate", "p-est", 1.25)),
-  );
-  const fixed = h("canvas", { "aria-hidden": "true" });
-  const seekBar = h("input", { class: "seek", type: "range", min: 0, max: 0, step: 1, value: 0, "aria-label": "Step" });
-  const head = h("div", { class: "ph" }, h("b", {}, "0"));
-  const wanted = h("div", { class: "ph wanted", hidden: true });
-  const empty = h("div", { class: "empty" });
-  const plot = h("div", { class: "plot" }, fixed, empty, seekBar, wanted, head);
-  root.append(mountTransport(context), gutter, plot);
+	const { store, page, playback } = context;
+	const lanes = h("div", { class: "lanes", tabindex: -1, "aria-label": "Tracks" });
+	const people = h("span", { class: "r" });
+	const order = h("button", { class: "start", "data-tip": "Order of the lanes: longest first, or as they were born" });
+	order.addEventListener("click", () => store.set({ laneOrder: store.get().laneOrder === "longest" ? "born" : "longest" }));
+	const sign = (/** @type {string} */ word, /** @type {string} */ kind = word) => h("span", { class: `lg ${kind}` }, word);
+	const truthSign = sign("truth");
+	const value = h("span", { class: "r" });
+	const range0 = h("span", { class: "lg" });
+	const referenceSign = sign("A");
+	const countSign = sign("count");
+	const measure = h("button", { class: "n start up", onclick: () => store.set({ measure: store.get().measure === "ospa" ? "gospa" : "ospa" }) });
+	const parts = h("div", { class: "gr strip" }, measure, value, h("span", { class: "brk" }), sign("location"), countSign, referenceSign, range0);
+	const error = h("span", { class: "r" });
+	const whose = h("span", { class: "lg" });
+	const errors = h("div", { class: "gr strip tall" }, h("span", { class: "n" }, "Position error"), error, h("span", { class: "brk" }), whose);
+	const gutter = h(
+		"div",
+		{ class: "gut" },
+		h("div", { class: "gr over" }),
+		h("div", { class: "gr ruler" }, order, h("span", { class: "r" }, "seen")),
+		lanes,
+		h("div", { class: "gr strip" }, h("span", { class: "n" }, "People"), people, h("span", { class: "brk" }), truthSign, sign("estimate")),
+		parts,
+		errors,
+	);
+	const fixed = h("canvas", { "aria-hidden": "true" });
+	const seekBar = h("input", { class: "seek", type: "range", min: 0, max: 0, step: 1, value: 0, "aria-label": "Step" });
+	const head = h("div", { class: "ph" }, h("b", {}, "0"));
+	const wanted = h("div", { class: "ph wanted", hidden: true });
+	const empty = h("div", { class: "empty" });
+	const plot = h("div", { class: "plot" }, fixed, empty, seekBar, wanted, head);
+	root.append(mountTransport(context), gutter, plot);
 
-  /** @type {import("../clock.js").View} */
-  let view = { first: 0, last: 1, width: 1 };
-  let frames = 0;
-  let asked = false;
-  let spoken = 0;
+	/** @type {View} */
+	let view = { first: 0, last: 1, width: 1 };
+	let frames = 0;
+	let asked = false;
+	let spoken = 0;
 
-  const token = (/** @type {string} */ name) => parseFloat(getComputedStyle(document.documentElement).getPropertyValue(`--${name}`));
+	const token = (/** @type {string} */ name) => parseFloat(getComputedStyle(document.documentElement).getPropertyValue(`--${name}`));
 
-  function measure() {
-    view = { ...view, width: Math.max(1, plot.clientWidth - token("pad-end")) };
-    draw();
-    placeHead();
-  }
+	/** Height of what stands over the lanes. */
+	const above = () => token("h-over") + token("h-ruler");
 
-  function draw() {
-    if (asked) return;
-    asked = true;
-    requestAnimationFrame(() => {
-      asked = false;
-      paint();
-    });
-  }
+	function resize() {
+		view = { ...view, width: Math.max(1, plot.clientWidth - token("pad-end")) };
+		draw();
+		placeHead();
+	}
 
-  /** @type {{of: any, by: string, tracks: TrackLane[]}} */
-  let sorted = { of: null, by: "", tracks: [] };
-  /** @returns {TrackLane[]} */
-  function shownTracks() {
-    const { timeline, laneOrder } = store.get();
-    if (timeline !== sorted.of || laneOrder !== sorted.by) {
-      sorted = { of: timeline, by: laneOrder, tracks: ordered(timeline?.tracks ?? [], laneOrder) };
-    }
-    return sorted.tracks;
-  }
+	function draw() {
+		if (asked) return;
+		asked = true;
+		requestAnimationFrame(() => {
+			asked = false;
+			paint();
+		});
+	}
 
-  function paint() {
-    const { timeline, range, selection, hover, server, loop } = store.get();
-    const ink = palette();
-    const height = plot.clientHeight;
-    const g = prepare(fixed, plot.clientWidth, height);
-    const over = { y: 0, height: token("h-over") };
-    const ruler = { y: over.height, height: token("h-ruler") };
-    const laneHeight = token("h-lane");
-    const block = { y: ruler.y + ruler.height, height: laneHeight * token("n-lanes") };
-    const strip = { y: block.y + block.height, height: token("h-strip") };
-    if (frames < 1) return;
-    if (loop && (range[0] !== null || range[1] !== null)) {
-      const x0 = xOf(Math.max(view.first, range[0] ?? 0), view);
-      const x1 = xOf(Math.min(view.last, range[1] ?? frames - 1), view);
-      g.fillStyle = faded(ink.get("accent"), 0.07);
-      if (x1 > x0) g.fillRect(x0, ruler.y, x1 - x0, height - ruler.y);
-    }
-    const done = shownDone(store.get());
-    const fps = server?.sequence?.fps ?? 25;
-    drawLanes(g, block, view, { tracks: shownTracks(), scroll: lanes.scrollTop, laneHeight, done: timeline?.done ?? 0, fps, selection, hover: hover?.id ?? null }, ink);
-    drawRange(g, over, view, { loaded: playback.loadedSteps(), done, frames }, ink);
-    drawRuler(g, ruler, view, { range }, ink);
-    drawCardinality(g, strip, view, { count: timeline?.count ?? [], truth: timeline?.truth ?? null }, ink);
-    if (done < frames) {
-      const x = Math.max(0, xOf(done, view));
-      hatch(g, x, block.y, view.width - x, height - block.y - 2, ink.get("line"), 6);
-    }
-  }
+	/** @type {{of: any, by: string, tracks: TrackLane[]}} */
+	let sorted = { of: null, by: "", tracks: [] };
+	/** @returns {TrackLane[]} */
+	function shownTracks() {
+		const { timeline, laneOrder } = store.get();
+		if (timeline !== sorted.of || laneOrder !== sorted.by) {
+			sorted = { of: timeline, by: laneOrder, tracks: ordered(timeline?.tracks ?? [], laneOrder) };
+		}
+		return sorted.tracks;
+	}
 
-  /** The playhead moves by transform alone; nothing is drawn again while it plays. */
-  function placeHead() {
-    const { shown, step, server, result, timeline, playing } = store.get();
-    const at = Math.max(0, shown);
-    const x = xOf(at, view);
-    head.hidden = frames < 1 || x < -1 || x > view.width + 1;
-    head.style.transform = `translateX(${Math.round(x)}px)`;
-    const label = /** @type {HTMLElement} */ (head.firstElementChild);
-    write(label, String(at));
-    label.style.marginLeft = `${Math.max(0, 17 - x)}px`;
-    wanted.hidden = step === shown || Math.abs(xOf(step, view) - x) < 2;
-    wanted.style.transform = `translateX(${Math.round(xOf(step, view))}px)`;
-    if (seekBar.valueAsNumber !== step) seekBar.value = String(step);
-    const now = performance.now();
-    if (!playing || now - spoken > 1000) {
-      spoken = now;
-      const fps = server?.sequence?.fps ?? 25;
-      const count = result?.computed ? `, ${result.tracks.length} people` : "";
-      seekBar.setAttribute("aria-valuetext", `step ${at} of ${frames}, ${secondsOf(at, fps)} s${count}`);
-    }
-    const estimate = timeline?.count[at];
-    const truth = timeline?.truth?.[at];
-    fill(people, estimate === undefined ? "–" : estimate, truth !== undefined && h("span", { class: "sub" }, ` of ${truth}`));
-  }
+	/** What is plotted of the scores, made once for each of them. */
+	function plotted() {
+		const { measure: name } = store.get();
+		const scores = scoresOf(store.get());
+		if (scores !== plots.of || name !== plots.by) {
+			const series = scores?.series;
+			const total = series?.[name] ?? [];
+			const reference = scores?.reference?.[name] ?? null;
+			// The parts are of powers in GOSPA and of roots in OSPA: drawn are their shares of the whole.
+			const place = series ? series[`${name}_localisation`].map((part, k) => part / Math.max(1e-12, part + (name === "ospa" ? series.ospa_cardinality[k] : series.gospa_missed[k] + series.gospa_false[k]))) : [];
+			const courses = series?.track_errors ?? [];
+			const top = scaleOf([...total, ...(reference ?? [])]);
+			plots = { of: scores, by: name, total, reference, place, courses, top, mean: meanOf(courses, total.length), most: scaleOf(courses.flatMap((course) => course.values)) };
+		}
+		return plots;
+	}
+	/** @type {{of: Scores | null, by: string, total: number[], reference: number[] | null, place: number[], top: number, courses: ScoreSeries["track_errors"], mean: (number | null)[], most: number}} */
+	let plots = { of: null, by: "", total: [], reference: null, place: [], top: 1, courses: [], mean: [], most: 1 };
 
-  /** @type {Map<number, {element: HTMLElement, share: HTMLElement}>} */
-  const labels = new Map();
-  function listLanes() {
-    const tracks = shownTracks();
-    const ids = new Set(tracks.map((track) => track.id));
-    for (const [id, { element }] of labels) {
-      if (!ids.has(id)) {
-        element.remove();
-        labels.delete(id);
-      }
-    }
-    const selection = store.get().selection;
-    tracks.forEach((track, index) => {
-      let label = labels.get(track.id);
-      if (!label) {
-        const share = h("span", { class: "r" });
-        const element = h(
-          "button",
-          {
-            class: "gr lane",
-            "aria-label": `Track ${track.id}`,
-            onclick: () => page.select(track.id),
-            onpointerenter: () => store.set({ hover: { id: track.id, camera: -1 } }),
-            onpointerleave: () => store.set({ hover: null }),
-          },
-          idTag(track.id),
-          share,
-        );
-        label = { element, share };
-        labels.set(track.id, label);
-      }
-      label.element.setAttribute("aria-pressed", String(track.id === selection));
-      write(label.share, `${Math.round(seenShare(track) * 100)} %`);
-      if (lanes.children[index] !== label.element) lanes.insertBefore(label.element, lanes.children[index] ?? null);
-    });
-    const { run, server, laneOrder } = store.get();
-    write(order, laneOrder === "longest" ? "tracks, longest first" : "tracks, first born first");
-    const idle = tracks.length === 0 && Boolean(server?.sequence);
-    write(empty, !idle ? "" : run?.state === "computing" ? "" : run?.state === "failed" ? "The run failed before a track was found." : "No track was found with these parameters.");
-    empty.style.top = `${token("h-over") + token("h-ruler") + 8}px`;
-  }
+	/** The values at the playhead, beside their plots. */
+	function writeScores() {
+		const { shown, selection, measure: name } = store.get();
+		const { of, total, reference, top, courses, mean, most } = plotted();
+		const at = Math.max(0, shown);
+		const unit = of?.series.unit ?? "";
+		const text = (/** @type {number | null | undefined} */ number) => number?.toFixed(2) ?? "–";
+		write(value, reference ? `A ${text(reference[at])} · B ${text(total[at])} ${unit}` : `${text(total[at])} ${unit}`);
+		write(range0, `0–${top}`);
+		write(measure, name.toUpperCase());
+		measure.dataset.tip = `${of?.series.cost ?? "not scored yet"}; press for ${name === "ospa" ? "GOSPA" : "OSPA"}`;
+		countSign.dataset.tip = name === "ospa" ? "number of people" : "missed and false people";
+		referenceSign.hidden = !reference;
+		const course = courses.find(({ track }) => track === selection);
+		write(error, `${text(course ? course.values[at - course.first] : mean[at])} ${unit}`);
+		write(whose, `${course ? `track ${course.track}` : "mean"} in front · 0–${most} ${unit}`);
+	}
 
-  plot.addEventListener("pointerdown", (event) => {
-    if (event.button !== 0 || frames < 1) return;
-    event.preventDefault();
-    plot.setPointerCapture(event.pointerId);
-    const box = plot.getBoundingClientRect();
-    const lane = Math.floor((event.clientY - box.top - token("h-over") - token("h-ruler") + lanes.scrollTop) / token("h-lane"));
-    const inLanes = event.clientY - box.top > token("h-over") + token("h-ruler") && event.clientY - box.top < token("h-over") + token("h-ruler") + lanes.clientHeight;
-    const track = shownTracks()[lane];
-    const at = stepAt(event.clientX - box.left, view);
-    if (inLanes && track && at >= track.first && at <= track.last) page.select(track.id);
-    store.set({ playing: 0 });
-    playback.seek(at);
-  });
-  plot.addEventListener("pointermove", (event) => {
-    if (!plot.hasPointerCapture(event.pointerId)) return;
-    playback.seek(stepAt(event.clientX - plot.getBoundingClientRect().left, view));
-  });
-  plot.addEventListener(
-    "wheel",
-    (event) => {
-      event.preventDefault();
-      const box = plot.getBoundingClientRect();
-      const overLanes = event.clientY - box.top > token("h-over") + token("h-ruler") && lanes.scrollHeight > lanes.clientHeight;
-      if (overLanes && !event.ctrlKey && !event.shiftKey) lanes.scrollTop += event.deltaY;
-      else if (event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY)) {
-        const pixels = event.deltaX || event.deltaY;
-        view = panned(view, (pixels / view.width) * (view.last - view.first), frames);
-      } else view = zoomed(view, Math.exp(event.deltaY * 0.0015), event.clientX - box.left, frames);
-      draw();
-      placeHead();
-    },
-    { passive: false },
-  );
-  plot.addEventListener("dblclick", () => {
-    view = { ...view, first: 0, last: Math.max(1, frames - 1) };
-    draw();
-    placeHead();
-  });
-  seekBar.addEventListener("input", () => playback.seek(seekBar.valueAsNumber));
-  lanes.addEventListener("scroll", draw);
+	function paint() {
+		const { timeline, range, selection, hover, server, loop } = store.get();
+		const ink = palette();
+		const height = plot.clientHeight;
+		const g = prepare(fixed, plot.clientWidth, height);
+		const over = { y: 0, height: token("h-over") };
+		const ruler = { y: over.height, height: token("h-ruler") };
+		const laneHeight = token("h-lane");
+		const block = { y: ruler.y + ruler.height, height: laneHeight * token("n-lanes") };
+		const strip = { y: block.y + block.height, height: token("h-strip") };
+		if (frames < 1) return;
+		if (loop && (range[0] !== null || range[1] !== null)) {
+			const x0 = xOf(Math.max(view.first, range[0] ?? 0), view);
+			const x1 = xOf(Math.min(view.last, range[1] ?? frames - 1), view);
+			g.fillStyle = faded(ink.get("accent"), 0.07);
+			if (x1 > x0) g.fillRect(x0, ruler.y, x1 - x0, height - ruler.y);
+		}
+		const done = shownDone(store.get());
+		const fps = server?.sequence?.fps ?? 25;
+		drawLanes(g, block, view, { tracks: shownTracks(), scroll: lanes.scrollTop, laneHeight, done: timeline?.done ?? 0, fps, selection, hover: hover?.id ?? null, switches: scoresOf(store.get())?.series.switches ?? [] }, ink);
+		drawRange(g, over, view, { loaded: playback.loadedSteps(), done, frames }, ink);
+		drawRuler(g, ruler, view, { range }, ink);
+		drawCardinality(g, strip, view, { count: timeline?.count ?? [], truth: timeline?.truth ?? null }, ink);
+		if (!parts.hidden) {
+			const { total, place, top, reference, courses, mean, most } = plotted();
+			drawParts(g, { ...strip, y: strip.y + strip.height }, view, { total, place, top, reference }, ink);
+			if (errors.offsetHeight) drawErrors(g, { ...strip, y: strip.y + 2 * strip.height }, view, { courses, mean, selection, top: most }, ink);
+		}
+		if (done < frames) {
+			const x = Math.max(0, xOf(done, view));
+			hatch(g, x, block.y, view.width - x, height - block.y - 2, ink.get("line"), 6);
+		}
+	}
 
-  store.on(["server"], ({ server }) => {
-    const now = server?.sequence?.frames ?? 0;
-    truthSign.hidden = !server?.sequence?.has_truth;
-    if (now === frames) return;
-    frames = now;
-    view = { ...view, first: 0, last: Math.max(1, frames - 1) };
-    seekBar.max = String(Math.max(0, frames - 1));
-    measure();
-  });
-  store.on(["timeline", "run", "basis", "laneOrder"], () => {
-    listLanes();
-    draw();
-    placeHead();
-  });
-  store.on(["selection"], () => {
-    listLanes();
-    const { selection } = store.get();
-    if (selection !== null) labels.get(selection)?.element.scrollIntoView({ block: "nearest" });
-    draw();
-  });
-  store.on(["range", "loop", "hover", "theme"], draw);
-  store.on(["shown", "step"], placeHead);
-  let waiting = false;
-  store.on(["loaded"], () => {
-    // Pictures arrive many times a second; the bar needs a few of them only.
-    if (waiting) return;
-    waiting = true;
-    setTimeout(() => {
-      waiting = false;
-      draw();
-    }, 200);
-  });
-  listLanes();
-  new ResizeObserver(measure).observe(plot);
-  measure();
+	/** The playhead moves by transform alone; nothing is drawn again while it plays. */
+	function placeHead() {
+		const { shown, step, server, result, timeline, playing } = store.get();
+		const at = Math.max(0, shown);
+		const x = xOf(at, view);
+		head.hidden = frames < 1 || x < -1 || x > view.width + 1;
+		head.style.transform = `translateX(${Math.round(x)}px)`;
+		const label = /** @type {HTMLElement} */ (head.firstElementChild);
+		write(label, String(at));
+		label.style.marginLeft = `${Math.max(0, 17 - x)}px`;
+		wanted.hidden = step === shown || Math.abs(xOf(step, view) - x) < 2;
+		wanted.style.transform = `translateX(${Math.round(xOf(step, view))}px)`;
+		if (seekBar.valueAsNumber !== step) seekBar.value = String(step);
+		const now = performance.now();
+		if (!playing || now - spoken > 1000) {
+			spoken = now;
+			const fps = server?.sequence?.fps ?? 25;
+			const count = result?.computed ? `, ${result.tracks.length} people` : "";
+			seekBar.setAttribute("aria-valuetext", `step ${at} of ${frames}, ${secondsOf(at, fps)} s${count}`);
+		}
+		const estimate = timeline?.count[at];
+		const truth = timeline?.truth?.[at];
+		fill(people, estimate === undefined ? "–" : estimate, truth !== undefined && h("span", { class: "sub" }, ` of ${truth}`));
+		if (!parts.hidden) writeScores();
+	}
+
+	/** @type {Map<number, {element: HTMLElement, share: HTMLElement}>} */
+	const labels = new Map();
+	function listLanes() {
+		const tracks = shownTracks();
+		const ids = new Set(tracks.map((track) => track.id));
+		for (const [id, { element }] of labels) {
+			if (!ids.has(id)) {
+				element.remove();
+				labels.delete(id);
+			}
+		}
+		const selection = store.get().selection;
+		tracks.forEach((track, index) => {
+			let label = labels.get(track.id);
+			if (!label) {
+				const share = h("span", { class: "r" });
+				const element = h(
+					"button",
+					{
+						class: "gr lane",
+						"aria-label": `Track ${track.id}`,
+						onclick: () => page.select(track.id),
+						onpointerenter: () => store.set({ hover: { id: track.id, camera: -1 } }),
+						onpointerleave: () => store.set({ hover: null }),
+					},
+					idTag(track.id),
+					share,
+				);
+				label = { element, share };
+				labels.set(track.id, label);
+			}
+			label.element.setAttribute("aria-pressed", String(track.id === selection));
+			write(label.share, `${Math.round(seenShare(track) * 100)} %`);
+			if (lanes.children[index] !== label.element) lanes.insertBefore(label.element, lanes.children[index] ?? null);
+		});
+		const { run, server, laneOrder } = store.get();
+		write(order, laneOrder === "longest" ? "tracks, longest first" : "tracks, first born first");
+		const idle = tracks.length === 0 && Boolean(server?.sequence);
+		write(empty, !idle ? "" : run?.state === "computing" ? "" : run?.state === "failed" ? "The run failed before a track was found." : "No track was found with these parameters.");
+		empty.style.top = `${above() + 8}px`;
+	}
+
+	plot.addEventListener("pointerdown", (event) => {
+		if (event.button !== 0 || frames < 1) return;
+		event.preventDefault();
+		plot.setPointerCapture(event.pointerId);
+		const box = plot.getBoundingClientRect();
+		const lane = Math.floor((event.clientY - box.top - above() + lanes.scrollTop) / token("h-lane"));
+		const inLanes = event.clientY - box.top > above() && event.clientY - box.top < above() + lanes.clientHeight;
+		const track = shownTracks()[lane];
+		const at = stepAt(event.clientX - box.left, view);
+		if (inLanes && track && at >= track.first && at <= track.last) page.select(track.id);
+		store.set({ playing: 0 });
+		playback.seek(at);
+	});
+	plot.addEventListener("pointermove", (event) => {
+		if (!plot.hasPointerCapture(event.pointerId)) return;
+		playback.seek(stepAt(event.clientX - plot.getBoundingClientRect().left, view));
+	});
+	plot.addEventListener(
+		"wheel",
+		(event) => {
+			event.preventDefault();
+			const box = plot.getBoundingClientRect();
+			const overLanes = event.clientY - box.top > above() && lanes.scrollHeight > lanes.clientHeight;
+			if (overLanes && !event.ctrlKey && !event.shiftKey) lanes.scrollTop += event.deltaY;
+			else if (event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY)) {
+				const pixels = event.deltaX || event.deltaY;
+				view = panned(view, (pixels / view.width) * (view.last - view.first), frames);
+			} else view = zoomed(view, Math.exp(event.deltaY * 0.0015), event.clientX - box.left, frames);
+			draw();
+			placeHead();
+		},
+		{ passive: false },
+	);
+	plot.addEventListener("dblclick", () => {
+		view = { ...view, first: 0, last: Math.max(1, frames - 1) };
+		draw();
+		placeHead();
+	});
+	seekBar.addEventListener("input", () => playback.seek(seekBar.valueAsNumber));
+	lanes.addEventListener("scroll", draw);
+
+	store.on(["server"], ({ server }) => {
+		const now = server?.sequence?.frames ?? 0;
+		truthSign.hidden = parts.hidden = errors.hidden = !server?.sequence?.has_truth;
+		if (now === frames) return;
+		frames = now;
+		view = { ...view, first: 0, last: Math.max(1, frames - 1) };
+		seekBar.max = String(Math.max(0, frames - 1));
+		resize();
+	});
+	store.on(["timeline", "run", "basis", "laneOrder", "scores", "measure"], () => {
+		listLanes();
+		draw();
+		placeHead();
+	});
+	store.on(["selection"], () => {
+		listLanes();
+		const { selection } = store.get();
+		if (selection !== null) labels.get(selection)?.element.scrollIntoView({ block: "nearest" });
+		draw();
+		placeHead();
+	});
+	store.on(["range", "loop", "hover", "theme"], draw);
+	store.on(["shown", "step"], placeHead);
+	let waiting = false;
+	store.on(["loaded"], () => {
+		// Pictures arrive many times a second; the bar needs a few of them only.
+		if (waiting) return;
+		waiting = true;
+		setTimeout(() => {
+			waiting = false;
+			draw();
+		}, 200);
+	});
+	listLanes();
+	new ResizeObserver(resize).observe(plot);
+	resize();
 }

@@ -4,116 +4,100 @@ import { SPEEDS, parseStep, secondsOf } from "../clock.js";
 import { commandOf } from "../commands.js";
 import { chooser, fill, h, icon, tipOf, write } from "../dom.js";
 
-const LEGEND = [
-  ["seen", '<path d="M0 2h16v6H0z" fill="currentColor"/>'],
-  ["coasting", '<path d="M0 5h16" stroke="currentColor" stroke-width="2" stroke-dasharray="2.500 2"/>'],
-  ["long miss", '<path d="M.5 2.500h15v5H.5zM3 7.500l5-5M8 7.500l5-5" fill="none" stroke="currentColor"/>'],
-  ["birth", '<path d="M5 1l5 4-5 4z" fill="currentColor"/>'],
-  ["death", '<path d="M6 2.500h5v5H6z" fill="currentColor"/>'],
-];
+const LEGEND = ["seen", "coasting", "miss", "birth", "death", "switch"];
 
-/** @param {import("../types.js").Context} context */
+/** @param {Context} context */
 export function mountTransport({ store, actions, playback }) {
-  /**
-   * @param {string} name
-   * @param {string} sign
-   * @param {string} [classes]
-   */
-  const button = (name, sign, classes = "") =>
-    h(
-      "button",
-      { class: `btn icon up ${classes}`, "aria-label": commandOf(name).title, ...tipOf(name), onclick: () => commandOf(name).run(actions) },
-      icon(sign),
-    );
-  const play = button("play", "i-play", "play");
-  const step = h("b", {}, "0");
-  const of = h("span", {}, "/ 0");
-  const time = h("b", { class: "time-of" }, "0.00");
-  const read = h("button", { class: "read up", "data-tip": "Type a step, or seconds with an s", "aria-label": "Go to step" }, step, of, h("span", {}, "·"), time, h("span", {}, "s"));
-  const typed = h("input", { "aria-label": "Step, or seconds with an s", hidden: true });
-  const holder = h("div", { class: "read" }, read, typed);
+	/** @param {string} name @param {string} sign @param {string} [classes] */
+	const button = (name, sign, classes = "") =>
+		h(
+			"button",
+			{ class: `btn icon up ${classes}`, "aria-label": commandOf(name).title, ...tipOf(name), onclick: () => commandOf(name).run(actions) },
+			icon(sign),
+		);
+	const play = button("play", "i-play", "play");
+	const step = h("b", {}, "0");
+	const of = h("span", {}, "/ 0");
+	const time = h("b", { class: "time-of" }, "0.00");
+	const read = h("button", { class: "read up", "data-tip": "Type a step, or seconds with an s", "aria-label": "Go to step" }, step, of, h("span", {}, "·"), time, h("span", {}, "s"));
+	const typed = h("input", { "aria-label": "Step, or seconds with an s", hidden: true });
+	const holder = h("div", { class: "read" }, read, typed);
 
-  read.addEventListener("click", () => {
-    typed.value = String(store.get().shown);
-    typed.hidden = false;
-    read.hidden = true;
-    typed.focus();
-    typed.select();
-  });
-  const close = () => {
-    typed.hidden = true;
-    read.hidden = false;
-  };
-  typed.addEventListener("blur", close);
-  typed.addEventListener("keydown", (event) => {
-    event.stopPropagation();
-    if (event.key === "Escape") close();
-    if (event.key !== "Enter") return;
-    const sequence = store.get().server?.sequence;
-    const wanted = sequence ? parseStep(typed.value, sequence.fps, sequence.frames) : null;
-    if (wanted !== null) playback.seek(wanted);
-    close();
-  });
+	read.addEventListener("click", () => {
+		typed.value = String(store.get().shown);
+		typed.hidden = false;
+		read.hidden = true;
+		typed.focus();
+		typed.select();
+	});
+	const close = () => {
+		typed.hidden = true;
+		read.hidden = false;
+	};
+	typed.addEventListener("blur", close);
+	typed.addEventListener("keydown", (event) => {
+		event.stopPropagation();
+		if (event.key === "Escape") close();
+		if (event.key !== "Enter") return;
+		const sequence = store.get().server?.sequence;
+		const wanted = sequence ? parseStep(typed.value, sequence.fps, sequence.frames) : null;
+		if (wanted !== null) playback.seek(wanted);
+		close();
+	});
 
-  const speed = chooser({ label: "Speed", choose: (value) => store.set({ speed: Number(value) }) });
-  fill(speed.select, SPEEDS.map((value) => h("option", { value }, `${value}×`)));
-  const loopText = h("span", { class: "v" });
-  const loop = h("button", { class: "btn up", ...tipOf("loop", "Loop; I and O set its ends"), onclick: () => actions.toggleLoop() }, icon("i-loop"), loopText);
+	const speed = chooser({ label: "Speed", choose: (value) => store.set({ speed: Number(value) }) });
+	fill(speed.select, SPEEDS.map((value) => h("option", { value }, `${value}×`)));
+	const loopText = h("span", { class: "v" });
+	const loop = h("button", { class: "btn up", ...tipOf("loop", "Loop; I and O set its ends"), onclick: () => actions.toggleLoop() }, icon("i-loop"), loopText);
 
-  const legend = h("div", { class: "legend", "aria-label": "Signs in the lanes" });
-  for (const [word, path] of LEGEND) {
-    const sign = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-    sign.setAttribute("viewBox", "0 0 16 10");
-    sign.setAttribute("aria-hidden", "true");
-    sign.innerHTML = path;
-    legend.append(h("span", {}, sign, word));
-  }
+	const legend = h("div", { class: "legend", "aria-label": "Signs in the lanes" });
+	for (const word of LEGEND) legend.append(h("span", {}, icon(`l-${word}`), word));
 
-  const root = h(
-    "div",
-    { class: "trans" },
-    h(
-      "div",
-      { class: "keys" },
-      button("first", "i-start", "start"),
-      button("previous-event", "i-evp", "start"),
-      button("step-back", "i-prev", "start"),
-      play,
-      button("step-forward", "i-next"),
-      button("next-event", "i-evn"),
-      button("last", "i-end"),
-    ),
-    holder,
-    h("span", { class: "rule" }),
-    speed.root,
-    loop,
-    h("span", { class: "grow" }),
-    legend,
-  );
+	const root = h(
+		"div",
+		{ class: "trans" },
+		h(
+			"div",
+			{ class: "keys" },
+			button("first", "i-start", "start"),
+			button("previous-event", "i-evp", "start"),
+			button("step-back", "i-prev", "start"),
+			play,
+			button("step-forward", "i-next"),
+			button("next-event", "i-evn"),
+			button("last", "i-end"),
+		),
+		holder,
+		h("span", { class: "rule" }),
+		speed.root,
+		loop,
+		h("span", { class: "grow" }),
+		legend,
+	);
 
-  store.on(["shown", "server"], ({ shown, server }) => {
-    const sequence = server?.sequence;
-    write(step, String(shown < 0 ? 0 : shown));
-    write(of, `/ ${sequence?.frames ?? 0}`);
-    write(time, sequence ? secondsOf(Math.max(0, shown), sequence.fps) : "0.00");
-    // Room for the largest number, so that nothing moves sideways.
-    step.style.minWidth = `${String(sequence?.frames ?? 0).length}ch`;
-    time.style.minWidth = `${secondsOf(sequence?.frames ?? 0, sequence?.fps ?? 25).length}ch`;
-  });
-  store.on(["playing"], ({ playing }) => {
-    play.querySelector("use")?.setAttribute("href", playing ? "#i-pause" : "#i-play");
-    play.setAttribute("aria-label", playing ? "Pause" : "Play");
-  });
-  const buttons = [...root.querySelectorAll("button"), speed.select];
-  const marks = () => {
-    const { loop: on, range: [from, to], server, speed: now } = store.get();
-    const frames = server?.sequence?.frames ?? 1;
-    for (const button of buttons) button.toggleAttribute("disabled", !server?.sequence);
-    loop.setAttribute("aria-pressed", String(on));
-    write(loopText, from === null && to === null ? "all" : `${from ?? 0} – ${to ?? frames - 1}`);
-    speed.select.value = String(now);
-  };
-  store.on(["loop", "range", "server", "speed"], marks);
-  marks();
-  return root;
+	store.on(["shown", "server"], ({ shown, server }) => {
+		const sequence = server?.sequence;
+		write(step, String(shown < 0 ? 0 : shown));
+		write(of, `/ ${sequence?.frames ?? 0}`);
+		write(time, sequence ? secondsOf(Math.max(0, shown), sequence.fps) : "0.00");
+		// Room for the largest number, so that nothing moves sideways.
+		step.style.minWidth = `${String(sequence?.frames ?? 0).length}ch`;
+		time.style.minWidth = `${secondsOf(sequence?.frames ?? 0, sequence?.fps ?? 25).length}ch`;
+	});
+	store.on(["playing"], ({ playing }) => {
+		play.querySelector("use")?.setAttribute("href", playing ? "#i-pause" : "#i-play");
+		play.setAttribute("aria-label", playing ? "Pause" : "Play");
+	});
+	const buttons = [...root.querySelectorAll("button"), speed.select];
+	const marks = () => {
+		const { loop: on, range: [from, to], server, speed: now } = store.get();
+		const frames = server?.sequence?.frames ?? 1;
+		for (const button of buttons) button.toggleAttribute("disabled", !server?.sequence);
+		loop.setAttribute("aria-pressed", String(on));
+		write(loopText, from === null && to === null ? "all" : `${from ?? 0} – ${to ?? frames - 1}`);
+		speed.select.value = String(now);
+	};
+	store.on(["loop", "range", "server", "speed"], marks);
+	marks();
+	return root;
 }
