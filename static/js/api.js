@@ -18,7 +18,6 @@ export class ApiError extends Error {
 
 /**
  * @param {Response} response
- * @returns {Promise<ApiError>}
  */
 async function failureOf(response) {
 	try {
@@ -38,7 +37,6 @@ async function failureOf(response) {
 /**
  * @param {string} path
  * @param {RequestInit} [options]
- * @returns {Promise<Response>}
  */
 export async function request(path, options) {
 	/** @type {Response} */
@@ -56,7 +54,6 @@ export async function request(path, options) {
 /**
  * @param {string} path
  * @param {RequestInit} [options]
- * @returns {Promise<any>}
  */
 export async function getJson(path, options) {
 	return (await request(path, options)).json();
@@ -66,7 +63,6 @@ export async function getJson(path, options) {
  * @param {"POST" | "PATCH" | "DELETE"} method
  * @param {string} path
  * @param {object} [body]
- * @returns {Promise<any>}
  */
 export async function sendJson(method, path, body = {}) {
 	const headers = { "Content-Type": "application/json" };

@@ -61,7 +61,6 @@ export function advance({ step, rest }, seconds, { fps, speed, direction, first,
  * @param {number} step
  * @param {{frames: number, fps: number, speed: number, direction: 0 | 1 | -1, most: number, seconds?: number}} how
  *   `most` is the number of steps that the memory holds
- * @returns {number[]}
  */
 export function prefetchWindow(step, { frames, fps, speed, direction, most, seconds = 1.5 }) {
 	const stride = direction && speed > 1 ? Math.max(1, Math.floor(speed * fps / 60)) : 1;
@@ -123,7 +122,6 @@ export function stepAt(x, { first, last, width }) {
  * @param {number} factor  below 1 shows fewer steps
  * @param {number} x  CSS pixels
  * @param {number} frames
- * @returns {View}
  */
 export function zoomed(view, factor, x, frames) {
 	const whole = Math.max(1, frames - 1);
@@ -138,7 +136,6 @@ export function zoomed(view, factor, x, frames) {
  * @param {View} view
  * @param {number} steps
  * @param {number} frames
- * @returns {View}
  */
 export function panned(view, steps, frames) {
 	const span = view.last - view.first;

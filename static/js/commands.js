@@ -101,7 +101,6 @@ export function commandOf(name) {
  * The command of a key.
  * @param {string} key  as `keyOf` names it
  * @param {boolean} singleKeys  whether keys without Ctrl are on
- * @returns {Command | undefined}
  */
 export function commandFor(key, singleKeys = true) {
 	if (!key) return undefined;
@@ -112,7 +111,6 @@ export function commandFor(key, singleKeys = true) {
 /**
  * Keys that more than one command claims.
  * @param {Command[]} commands
- * @returns {string[]}
  */
 export function clashes(commands) {
 	const all = commands.flatMap((command) => command.keys);

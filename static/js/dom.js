@@ -11,7 +11,6 @@ import { COMMANDS, keyLabel } from "./commands.js";
  * @param {K} tag
  * @param {Record<string, any>} [attributes]
  * @param {...(Child | Child[])} children
- * @returns {HTMLElementTagNameMap[K]}
  */
 export function h(tag, attributes = {}, ...children) {
 	const element = document.createElement(tag);
@@ -91,7 +90,6 @@ export function tipOf(name, tip) {
 /**
  * A symbol such as `p_S` or `J_max` with its index lowered.
  * @param {string} symbol
- * @returns {Node[]}
  */
 export function symbolNodes(symbol) {
 	const [base, index] = symbol.split("_");

@@ -56,7 +56,6 @@ export function eventsNow(state) {
  * @param {LaneEvent[]} events  by step
  * @param {number} step
  * @param {-1 | 1} direction
- * @returns {LaneEvent | undefined}
  */
 export function nextEvent(events, step, direction) {
 	if (direction > 0) return events.find((event) => event.step > step);
@@ -67,7 +66,6 @@ export function nextEvent(events, step, direction) {
  * Tracks in the order of the lanes.
  * @param {TrackLane[]} tracks
  * @param {"longest" | "born"} order  longest: people first, ghosts of a few steps last
- * @returns {TrackLane[]}
  */
 export function ordered(tracks, order) {
 	const length = (/** @type {TrackLane} */ { first, last }) => last - first;

@@ -70,7 +70,6 @@ function oneLarge(aspects, large, inner, tall, gap) {
  * The largest picture of a shape in the middle of a frame, on whole pixels.
  * @param {number} aspect
  * @param {Cell} frame
- * @returns {Cell}
  */
 function fit(aspect, { x, y, width, height }) {
 	const w = Math.min(width, height * aspect);

@@ -12,7 +12,6 @@ export const PICTURE_BUDGET = 256 * 2 ** 20;
 
 /**
  * @param {{sequence: string, camera: number, step: number}} what
- * @returns {string}
  */
 export function pictureName({ sequence, camera, step }) {
 	return `${sequence}/${camera}/${step}`;

@@ -16,7 +16,6 @@ const RESULTS_KEPT = 600;
 /**
  * How many steps of the shown run are there.
  * @param {Readonly<PageState>} state
- * @returns {number}
  */
 export function shownDone({ basis, run, timeline }) {
 	return run && basis === run.key ? run.done : (timeline?.done ?? 0);

@@ -34,9 +34,9 @@ test("nothing comes from another host", () => {
   }
 });
 
-test("the page stays light: at most 150 kB of JavaScript", () => {
+test("the page stays light: at most 150 KiB of JavaScript", () => {
   const bytes = loaded.reduce((sum, name) => sum + statSync(join(ROOT, name)).size, 0);
-  assert.ok(bytes <= 150_000, `${bytes} bytes`);
+  assert.ok(bytes <= 150 * 1024, `${bytes} bytes`);
 });
 
 test("every symbol that is used is in the page", () => {

@@ -7,7 +7,6 @@ import { chooser, fill, h, icon, show, symbolNodes, tipOf } from "../dom.js";
  * @param {string} sequence
  * @param {Record<string, any>} parameters
  * @param {string[]} changed
- * @returns {string}
  */
 export function commandLine(sequence, parameters, changed) {
 	const quote = (/** @type {string} */ text) => (/^[\w./+-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
