@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from playwright.sync_api import Browser
 
 from tests.evaluation.scenes import HALF_EXTENTS, Columns, perturbed, truth_of, walks
 from tracker.camera import Camera
@@ -164,31 +164,22 @@ def test_paths_that_cannot_be_written(scene, tmp_path):
 
 @pytest.mark.browser
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_a_browser_draws_it(scene, tmp_path, scheme: str):
-    sync_api = pytest.importorskip("playwright.sync_api")
-    chromium = shutil.which("chromium") or shutil.which("google-chrome")
-    if chromium is None:
-        pytest.skip("there is no Chromium to draw with")
+def test_a_browser_draws_it(scene, tmp_path, browser: Browser, scheme: str):
     sequence, tracks = scene
     path = tmp_path / "report.html"
     write_report(path, sequence, tracks, RunParameters(), evaluate_sequence(sequence, tracks))
     complaints: list[str] = []
     requests: list[str] = []
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=chromium,
-            args=["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
-        )
-        page = browser.new_page(color_scheme=scheme, viewport={"width": 1100, "height": 800})
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
-        page.on("request", lambda request: requests.append(request.url))
-        page.goto(path.as_uri())
-        page.wait_for_function("document.querySelectorAll('.plot .main-svg').length >= 2")
-        surface = page.eval_on_selector("body", "e => getComputedStyle(e).backgroundColor")
-        painted = page.eval_on_selector(".plot .main-svg", "e => e.style.background")
-        width = page.evaluate("document.documentElement.scrollWidth")
-        browser.close()
+    page = browser.new_page(color_scheme=scheme, viewport={"width": 1100, "height": 800})
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
+    page.on("request", lambda request: requests.append(request.url))
+    page.goto(path.as_uri())
+    page.wait_for_function("document.querySelectorAll('.plot .main-svg').length >= 2")
+    surface = page.eval_on_selector("body", "e => getComputedStyle(e).backgroundColor")
+    painted = page.eval_on_selector(".plot .main-svg", "e => e.style.background")
+    width = page.evaluate("document.documentElement.scrollWidth")
+    page.close()
     assert complaints == []
     assert requests == [path.as_uri()]
     assert painted == surface
