@@ -121,8 +121,9 @@ def test_behind_the_camera_nobody_is_seen() -> None:
 
 def test_the_less_is_known_the_softer_the_edge() -> None:
     # a place whose picture is a little outside
-    outside = people(np.array([[3.6, 0.0, 0.85]]))
+    outside = people(np.array([[4.5, 0.0, 0.85]]))
     expected = MODEL.expected(FRONT, outside.means)
+    assert not FRONT.sees(outside.means)[0]
     chances = [
         inside_probability(FRONT, expected, np.eye(3)[None] * sigma**2)[0]
         for sigma in (0.01, 0.1, 0.3)
