@@ -149,3 +149,57 @@ def test_nobody(results: list[FusionResult]) -> None:
     assert tracks.seen.shape == (0, CAMERAS)
     assert_same(tracks, Trajectories.empty(CAMERAS))
     assert tracks.at(0) == slice(0, 0)
+
+
+def boxed(weights: list[float], labels: list[int], sources: list[list[int]]) -> FusionResult:
+    """The same components, fed by the given boxes of each camera."""
+    plain = posterior(weights, labels)
+    return FusionResult(
+        plain.posterior,
+        plain.detection_probabilities,
+        np.array(sources, dtype=np.int64),
+        plain.source_weights,
+        plain.hidden_by,
+    )
+
+
+def test_components_of_one_box_count_together_where_asked() -> None:
+    # the last camera's box 4 made two components, its box 2 one, and it missed the others
+    result = boxed(
+        [0.3, 0.4, 0.2, 0.3, 0.35, 0.6],
+        [1, 2, 3, 4, 5, 6],
+        [[0, 0, 0, 7, 7, -1], [1, 1, 1, 5, 5, -1], [4, 4, 2, -1, -1, -1]],
+    )
+    assert_array_equal(extract([result]).labels, [6])
+    tracks = extract([result], rule="boxes")
+    assert_array_equal(np.sort(tracks.labels), [2, 5, 6])
+    row = int(np.flatnonzero(tracks.labels == 2)[0])
+    assert tracks.existences[row] == pytest.approx(0.7)
+    assert tracks.positions[row] == pytest.approx(np.array([1.0, 10.0, 100.0]) * 0.4 / 0.7)
+    assert tracks.components[row] == 1, "the heaviest stands for them"
+    spread = 1.0 + 0.3 / 0.7 * 0.4 / 0.7  # of a component, and between the two
+    assert tracks.sigmas[row, 0] == pytest.approx(np.sqrt(spread))
+
+
+def test_by_boxes_keeps_the_cardinality_and_the_mean() -> None:
+    rng = np.random.default_rng(0)
+    for size in (0, 1, 7, 20):
+        result = boxed(
+            rng.uniform(0.0, 0.6, size).tolist(),
+            rng.integers(1, 9, size).tolist(),
+            rng.integers(-1, 4, (CAMERAS, size)).tolist(),
+        )
+        if size == 0:
+            result = boxed([], [], np.zeros((CAMERAS, 0)).tolist())
+        gathered, leaders = trajectories.by_boxes(result)
+        assert gathered.cardinality == pytest.approx(result.posterior.cardinality)
+        assert len(leaders) == gathered.size <= size
+        np.testing.assert_allclose(
+            gathered.weights @ gathered.means,
+            result.posterior.weights @ result.posterior.means,
+        )
+
+
+def test_without_boxes_both_rules_agree() -> None:
+    result = boxed([0.7, 0.2, 0.9], [3, 4, 5], np.full((CAMERAS, 3), -1).tolist())
+    assert_same(extract([result]), extract([result], rule="boxes"))

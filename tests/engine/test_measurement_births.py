@@ -1,0 +1,116 @@
+"""Newcomers where unexplained boxes of two or more cameras agree on a place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy import ndarray
+from numpy.testing import assert_allclose
+
+from tests.engine.standing import CAMERAS, HALF_EXTENTS, ROOM, watch
+from tracker.fusion.measurement_births import CameraEvidence, MeasurementBirths, Newborns
+from tracker.fusion.target_model import MeasurementKind, TargetModel
+from tracker.single_view.protocol import ViewResult
+
+
+def births(kind: MeasurementKind = "box", margin: float = 0.0) -> MeasurementBirths:
+    """With the numbers of the defaults at ten steps a second."""
+    return MeasurementBirths(
+        CAMERAS,
+        ROOM,
+        TargetModel(HALF_EXTENTS, kind),
+        birth_rate=0.005,
+        detection_probability=0.98,
+        gate=21.0,
+        margin=margin,
+        largest_gap=1.0,
+    )
+
+
+def evidence(
+    views: tuple[ViewResult, ...], kind: MeasurementKind = "box", unexplained: float = 1.0
+) -> list[CameraEvidence]:
+    """All boxes equally unexplained."""
+    model = TargetModel(HALF_EXTENTS, kind)
+    return [
+        CameraEvidence(
+            view.boxes[:, :2],
+            *model.measured(view, 1.0),
+            np.full(len(view.boxes), unexplained),
+            1e-8 if kind != "centre" else 1e-6,
+        )
+        for view in views
+    ]
+
+
+def seen(places: ndarray, clutter_rate: float = 0.0, seed: int = 0) -> tuple[ViewResult, ...]:
+    """One step's boxes of people at some places."""
+    return watch(places[None], miss_rate=0.0, clutter_rate=clutter_rate, seed=seed)[0]
+
+
+def proposed(newborns: Newborns | None) -> Newborns:
+    assert newborns is not None
+    return newborns
+
+
+@pytest.mark.parametrize("kind", ["centre", "box"])
+def test_people_are_found_where_they_stand(kind: MeasurementKind) -> None:
+    places = np.array([[0.5, -0.8, 0.85], [-1.2, 1.0, 0.85]])
+    found = proposed(births(kind).propose(evidence(seen(places), kind)))
+    sure = found.take(np.flatnonzero(found.existences > 0.9))
+    order = np.argsort(-sure.positions[:, 0])
+    assert_allclose(sure.positions[order], places, atol=0.12)
+    assert (sure.sources >= 0).sum(axis=0).tolist() == [4, 4]
+    sigmas = np.sqrt(np.diagonal(sure.covariances, axis1=1, axis2=2))
+    assert (np.abs(sure.positions[order] - places) < 5.0 * sigmas[order]).all()
+
+
+def test_no_box_is_used_twice() -> None:
+    rng = np.random.default_rng(1)
+    for seed in range(10):
+        places = np.append(rng.uniform(-2, 2, (5, 2)), np.full((5, 1), 0.85), axis=1)
+        found = proposed(births().propose(evidence(seen(places, 2.0, seed))))
+        for row in found.sources:
+            used = row[row >= 0]
+            assert len(set(used.tolist())) == len(used)
+        assert (np.diff(found.existences) <= 0.0).all(), "the surest first"
+
+
+def test_one_camera_alone_starts_nobody() -> None:
+    views = seen(np.array([[0.5, -0.8, 0.85]]))
+    none = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
+    for camera in range(4):
+        alone = tuple(view if c == camera else none for c, view in enumerate(views))
+        assert births().propose(evidence(alone)) is None
+    assert births().propose(evidence((none,) * 4)) is None
+
+
+def test_the_more_cameras_agree_the_surer() -> None:
+    views = seen(np.array([[0.3, 0.2, 0.85]]))
+    none = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
+    odds = []
+    for count in (2, 3, 4):
+        some = tuple(view if c < count else none for c, view in enumerate(views))
+        found = proposed(births().propose(evidence(some)))
+        odds.append(found.existences[0] / (1.0 - found.existences[0] + 1e-15))
+    assert odds[0] < odds[1] < odds[2]
+
+
+def test_boxes_that_somebody_explains_start_nobody() -> None:
+    views = seen(np.array([[0.5, -0.8, 0.85]]))
+    assert births().propose(evidence(views, unexplained=0.3)) is None
+    mixed = evidence(views)
+    mixed[2] = replace(mixed[2], unexplained=np.zeros(1))
+    found = proposed(births().propose(mixed))
+    assert found.sources[:, 0].tolist() == [0, 0, -1, 0]
+
+
+def test_nobody_appears_outside_the_room() -> None:
+    views = seen(np.array([[2.6, 0.0, 0.85]]))
+    inside = births().propose(evidence(views))
+    assert inside is None or (inside.existences < 0.01).all()
+    around = proposed(births(margin=0.6).propose(evidence(views)))
+    assert around.existences[0] > 0.9
+    assert_allclose(around.positions[0], [2.6, 0.0, 0.85], atol=0.15)
