@@ -13,7 +13,7 @@ from tracker.experiments.cmc import BEST_PUBLISHED, GATES, methods
 
 def test_without_the_recordings_it_says_what_is_missing(tmp_path: Path) -> None:
     for data in (None, tmp_path):
-        with pytest.raises(Unavailable, match="cmc1 is not at hand .* --data DIR"):
+        with pytest.raises(Unavailable, match=r"cmc1 is not at hand .* --data DIR"):
             EXPERIMENTS["cmc"].run(Context(data=data))
 
 
