@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Protocol
+from dataclasses import dataclass, field
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
+
+
+EventKind = Literal["new", "vanished", "returned", "occluded", "merged", "split"]
+
+
+@dataclass(frozen=True, slots=True)
+class ViewEvent:
+    """Something that happened to people in one camera's picture, as the method tells it."""
+
+    kind: EventKind
+    labels: tuple[int, ...]
+    """Whom it happened to, by their ids within this camera."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,6 +51,11 @@ class ViewResult:
     """Their weights relative to the largest, float32."""
     information: dict[str, float]
     """Numbers worth showing of this step, by name."""
+    events: tuple[ViewEvent, ...] = ()
+    """What happened at this step, where the method tells such things."""
+    gates: Float[ndarray, "G 5"] = field(default_factory=lambda: np.zeros((0, 5)))
+    """Ellipses around where the method expects its targets: centre x and y, and the
+    covariance's xx, xy, yy scaled to the gate's border; pixels, pixels squared."""
 
     @staticmethod
     def of_boxes(

@@ -1,0 +1,47 @@
+"""Every tunable number, once: default, range, unit, symbol, help and stage.
+
+From these definitions come the sliders, the command-line flags, the table of
+``multiview-phd parameters``, the schema of the API and the cache keys.
+
+[ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
+density filtering", 2021. A field's ``published`` value is the one of that paper,
+where ours differs.
+"""
+
+from __future__ import annotations
+
+from tracker.parameters.changing import (
+    ParameterError,
+    changed,
+    stage_values,
+    value,
+    with_values,
+)
+from tracker.parameters.colour_phd import ColourPhdParams
+from tracker.parameters.definition import Params, Stage
+from tracker.parameters.detections import DetectionBoxParams, DetectionPhdParams
+from tracker.parameters.fusion import FusionParams
+from tracker.parameters.run import FusionName, RunParameters, SingleViewName
+from tracker.parameters.table import GROUPS, METHODS, PARAMETERS, PRESETS, Parameter
+
+__all__ = [
+    "GROUPS",
+    "METHODS",
+    "PARAMETERS",
+    "PRESETS",
+    "ColourPhdParams",
+    "DetectionBoxParams",
+    "DetectionPhdParams",
+    "FusionName",
+    "FusionParams",
+    "Parameter",
+    "ParameterError",
+    "Params",
+    "RunParameters",
+    "SingleViewName",
+    "Stage",
+    "changed",
+    "stage_values",
+    "value",
+    "with_values",
+]

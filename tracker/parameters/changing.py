@@ -1,0 +1,114 @@
+"""Values by key: read, changed with all checks, compared, and split by stage."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from typing import Any
+
+from tracker.parameters.definition import Stage
+from tracker.parameters.run import RunParameters
+from tracker.parameters.table import METHODS, PARAMETERS, Parameter
+
+
+class ParameterError(ValueError):
+    """A parameter does not exist or its value is out of range; the message says what to do."""
+
+    def __init__(self, key: str, message: str) -> None:
+        super().__init__(f"{key}: {message}")
+        self.key = key
+
+
+def value(parameters: RunParameters, key: str) -> Any:
+    """The value of one parameter (``group.name``), or of a method choice."""
+    if key in METHODS:
+        return getattr(parameters, key)
+    return getattr(getattr(parameters, key.split(".")[0]), key.split(".", 1)[1])
+
+
+def with_values(parameters: RunParameters, changes: Mapping[str, Any]) -> RunParameters:
+    """The parameters with some values changed, all checked.
+
+    Args:
+        parameters: What to start from.
+        changes: By key; numbers may come as text, as on a command line.
+
+    Raises:
+        ParameterError: If a key does not exist or a value does not fit, with its range.
+    """
+    data = parameters.model_dump()
+    for key, new in changes.items():
+        if key in METHODS:
+            if new not in METHODS[key]:
+                raise ParameterError(key, f"expected one of {', '.join(METHODS[key])}, got {new!r}")
+            data[key] = new
+        elif key in PARAMETERS:
+            group, name = key.split(".", 1)
+            data[group][name] = _checked(PARAMETERS[key], new)
+        else:
+            raise ParameterError(key, _unknown(key))
+    return RunParameters.model_validate(data)
+
+
+def _unknown(key: str) -> str:
+    near = difflib.get_close_matches(key, [*PARAMETERS, *METHODS], n=1, cutoff=0.5)
+    hint = f"did you mean {near[0]}? " if near else ""
+    return f"there is no such parameter; {hint}`multiview-phd parameters` lists them all"
+
+
+def _checked(parameter: Parameter, new: Any) -> Any:
+    if parameter.kind == "choice":
+        if new not in parameter.choices:
+            choices = ", ".join(parameter.choices)
+            raise ParameterError(parameter.key, f"expected one of {choices}, got {new!r}")
+        return new
+    if parameter.kind == "bool":
+        words = {"true": True, "on": True, "1": True, "false": False, "off": False, "0": False}
+        known = words.get(str(new).lower())
+        if known is None:
+            raise ParameterError(parameter.key, f"expected true or false, got {new!r}")
+        return known
+    try:
+        if isinstance(new, bool):
+            raise TypeError
+        number = float(new)
+    except (TypeError, ValueError):
+        raise ParameterError(parameter.key, f"expected a number, got {new!r}") from None
+    if parameter.kind == "int":
+        if number != int(number) if abs(number) < 1e18 else True:
+            raise ParameterError(parameter.key, f"expected a whole number, got {new!r}")
+        number = int(number)
+    assert parameter.minimum is not None
+    assert parameter.maximum is not None
+    if not parameter.minimum <= number <= parameter.maximum:
+        unit = f" {parameter.unit}" if parameter.unit else ""
+        raise ParameterError(
+            parameter.key,
+            f"must be between {parameter.minimum:g} and {parameter.maximum:g}{unit}, got {new}",
+        )
+    return number
+
+
+def changed(parameters: RunParameters, reference: RunParameters | None = None) -> dict[str, Any]:
+    """The values that differ from the reference (the defaults, if none), by key."""
+    reference = reference or RunParameters()
+    return {
+        key: value(parameters, key)
+        for key in (*METHODS, *PARAMETERS)
+        if value(parameters, key) != value(reference, key)
+    }
+
+
+def stage_values(parameters: RunParameters, stage: Stage) -> dict[str, Any]:
+    """What the result of one stage depends on by itself: its method and its parameters."""
+    single_view = "detection_boxes" if parameters.single_view == "none" else parameters.single_view
+    group = {"single_view": single_view, "fusion": "fusion", "tracks": "fusion"}[stage]
+    values: dict[str, Any] = {}
+    if stage == "single_view":
+        values["single_view"] = parameters.single_view
+    if stage == "fusion":
+        values["fusion_method"] = parameters.fusion_method
+    for key, parameter in PARAMETERS.items():
+        if parameter.group == group and parameter.stage == stage:
+            values[key] = value(parameters, key)
+    return values

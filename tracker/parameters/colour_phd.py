@@ -1,0 +1,135 @@
+"""Numbers of the single-view filter on colour.
+
+[ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
+density filtering", 2021.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from tracker.parameters.definition import Params, ui
+
+
+class ColourPhdParams(Params):
+    """Single-view GM-PHD filter on colour likelihood ([ZW21] §2.1–2.3)."""
+
+    survival_probability: Annotated[float, Field(ge=0.5, le=1.0), ui("p_S", step=0.001)] = 0.99
+    """Probability that a person in the picture is still there a step later."""
+
+    detection_probability: Annotated[
+        float, Field(ge=0.05, le=1.0), ui("p_D", step=0.01, published=0.98)
+    ] = 0.8
+    """Probability that a person in the picture makes a colour peak."""
+
+    colour_space: Annotated[Literal["hue_saturation", "rgb"], ui("u", published="rgb")] = (
+        "hue_saturation"
+    )
+    """Bins of the histograms: 16 hues × 16 saturations and 16 greys, or RGB 8×8×8."""
+
+    histogram_kernel: Annotated[Literal["epanechnikov", "flat"], ui("k(r)", published="flat")] = (
+        "epanechnikov"
+    )
+    """How a box's pixels count: less towards the edge of the ellipse in it, or all the same."""
+
+    likelihood_sigma: Annotated[float, Field(ge=0.02, le=0.5), ui("σ", step=0.01)] = 0.1
+    """Spread of the distance D to the nearest template in the colour likelihood N(D; 0, σ²)."""
+
+    acceptance_distance: Annotated[
+        float, Field(ge=0.05, le=1.0), ui("D_max", step=0.01, published=1.0)
+    ] = 0.52
+    """A peak less likely, with its foreground, than a box at this distance is not taken."""
+
+    acceptance_foreground: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("f_min", step=0.01, published=0.0)
+    ] = 0.35
+    """A peak with a smaller share of foreground in its box is not taken."""
+
+    foreground_threshold: Annotated[
+        float, Field(ge=2.0, le=128.0), ui("θ", unit="16 √level", step=1.0)
+    ] = 24.0
+    """A pixel that differs more than this from the background is foreground."""
+
+    foreground_weight: Annotated[
+        float, Field(ge=0.0, le=10.0), ui("a", step=0.1, published=0.0)
+    ] = 3.0
+    """The likelihood is multiplied by the share of foreground in the box to this power."""
+
+    surroundings_weight: Annotated[
+        float, Field(ge=0.0, le=10.0), ui("b", step=0.1, published=0.0)
+    ] = 3.0
+    """The likelihood falls by exp(-b · share of foreground above and beside the box)."""
+
+    samples: Annotated[int, Field(ge=20, le=5000), ui("S", unit="1/(camera·step)", log=True)] = 400
+    """Boxes that are compared with the templates."""
+
+    foreground_samples: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("s", step=0.05, published=0.0)
+    ] = 0.5
+    """Share of the samples drawn anywhere on the foreground; the rest from the prediction."""
+
+    peaks_per_person: Annotated[bool, ui("l_z", published=False)] = True
+    """Whether peaks are sought for each person's templates by themselves, not for all at once."""
+
+    mean_shift_starts: Annotated[int, Field(ge=1, le=100), ui("K", step=1)] = 20
+    """Samples at most from which the search for peaks starts."""
+
+    spread_starts: Annotated[bool, ui("K_s", published=False)] = True
+    """Whether starts keep apart; else the heaviest samples are taken, often all on one person."""
+
+    bandwidth: Annotated[
+        float, Field(ge=0.1, le=3.0), ui("h", unit="half sizes", step=0.05, log=True)
+    ] = 0.8
+    """Width of the mean shift's kernel."""
+
+    motion_sigma: Annotated[
+        float, Field(ge=0.1, le=50.0), ui("σ_w", unit="half sizes/√s", step=0.1, log=True)
+    ] = 3.0
+    """How far a person strays in the picture in one second."""
+
+    growth_sigma: Annotated[
+        float, Field(ge=0.01, le=5.0), ui("σ_H", unit="half sizes/√s", step=0.01, log=True)
+    ] = 0.4
+    """How much a person's box grows or shrinks in one second."""
+
+    birth: Annotated[Literal["peaks", "entrances", "both"], ui("γ(x)", published="entrances")] = (
+        "peaks"
+    )
+    """Where people may appear: at peaks that nothing explained, at the entrances, or both."""
+
+    birth_rate: Annotated[float, Field(ge=1e-3, le=50.0), ui("γ", unit="1/(place·s)", log=True)] = (
+        1.0
+    )
+    """Expected number of people who appear at each such place in one second."""
+
+    clutter_rate: Annotated[
+        float, Field(ge=0.001, le=50.0), ui("λ_c", unit="1/step", step=0.1, log=True)
+    ] = 1.0
+    """Expected number of peaks that are nobody, uniform over the picture and the sizes."""
+
+    centre_sigma: Annotated[
+        float, Field(ge=0.02, le=3.0), ui("σ_x", unit="half sizes", step=0.01, log=True)
+    ] = 0.5
+    """Standard deviation of a peak's centre."""
+
+    size_sigma: Annotated[
+        float, Field(ge=0.02, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
+    ] = 0.5
+    """Standard deviation of a peak's half sizes: colour alone hardly tells them."""
+
+    pruning_threshold: Annotated[float, Field(ge=1e-8, le=0.1), ui("T", log=True)] = 1e-4
+    """Components lighter than this are dropped."""
+
+    merging_threshold: Annotated[float, Field(ge=0.0, le=50.0), ui("U", step=0.5)] = 4.0
+    """Squared Mahalanobis distance within which a component joins a heavier one."""
+
+    max_components: Annotated[int, Field(ge=1, le=300), ui("J_max", step=1)] = 30
+    """The heaviest components that are kept."""
+
+    extraction_threshold: Annotated[float, Field(ge=0.01, le=0.99), ui("T_e", step=0.01)] = 0.5
+    """A component whose weight is above this is a 2D estimate."""
+
+    output: Annotated[Literal["peaks", "estimates"], ui("Y", published="estimates")] = "peaks"
+    """What goes to the fusion: this step's peaks, which lag less, or the filter's estimates."""

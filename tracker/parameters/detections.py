@@ -1,0 +1,83 @@
+"""Numbers of the single-view methods on an outside detector's boxes."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from tracker.parameters.definition import Params, ui
+
+
+class DetectionBoxParams(Params):
+    """An outside detector's boxes, as they are."""
+
+    score_threshold: Annotated[float, Field(ge=0.0, le=1.0), ui("s_min", step=0.01)] = 0.0
+    """Boxes with a lower score are left out."""
+
+    room_tolerance: Annotated[float, Field(ge=0.0, le=100.0), ui("d_r", unit="m", step=0.1)] = 1.0
+    """A box whose target would stand further outside the room's volume than this is clutter."""
+
+    centre_sigma: Annotated[
+        float, Field(ge=0.005, le=3.0), ui("σ_x", unit="half heights", step=0.01, log=True)
+    ] = 0.08
+    """Standard deviation of a box's centre, across and down, as a share of its half height."""
+
+    size_sigma: Annotated[
+        float, Field(ge=0.005, le=3.0), ui("σ_h", unit="half heights", step=0.01, log=True)
+    ] = 0.12
+    """Standard deviation of a box's half height, as a share of it: how far its edges tell depth."""
+
+    width_sigma: Annotated[
+        float, Field(ge=0.005, le=3.0), ui("σ_b", unit="half widths", step=0.01, log=True)
+    ] = 0.3
+    """Standard deviation of a box's half width, as a share of it: arms and turning change it."""
+
+    pixel_sigma: Annotated[float, Field(ge=0.0, le=50.0), ui("σ_px", unit="px", step=0.1)] = 1.5
+    """Noise of a box's centre and half sizes however small it is; it adds to the shares."""
+
+
+class DetectionPhdParams(DetectionBoxParams):
+    """Single-view GM-PHD filter on an outside detector's boxes."""
+
+    survival_probability: Annotated[float, Field(ge=0.5, le=1.0), ui("p_S", step=0.001)] = 0.99
+    """Probability that a person in the picture is still there a step later."""
+
+    detection_probability: Annotated[float, Field(ge=0.05, le=1.0), ui("p_D", step=0.01)] = 0.9
+    """Probability that a person in the picture gets a box."""
+
+    clutter_rate: Annotated[
+        float, Field(ge=0.001, le=50.0), ui("λ_c", unit="1/step", step=0.1, log=True)
+    ] = 1.0
+    """Expected number of boxes that are nobody, uniform over the picture and the sizes."""
+
+    score_clutter: Annotated[float, Field(ge=0.0, le=5.0), ui("b_s", step=0.1)] = 1.0
+    """How much likelier a box of low score is clutter: the rate times exp(2 b_s (½ − score))."""
+
+    birth_rate: Annotated[float, Field(ge=1e-3, le=50.0), ui("γ", unit="1/(box·s)", log=True)] = 1.0
+    """Expected number of people who appear in one second at a box that nobody explained."""
+
+    motion_sigma: Annotated[
+        float, Field(ge=0.05, le=50.0), ui("σ_w", unit="half heights/√s", step=0.1, log=True)
+    ] = 0.5
+    """How far a person strays in the picture in one second."""
+
+    growth_sigma: Annotated[
+        float, Field(ge=0.01, le=5.0), ui("σ_H", unit="half sizes/√s", step=0.01, log=True)
+    ] = 0.2
+    """How much a person's box grows or shrinks in one second."""
+
+    pruning_threshold: Annotated[float, Field(ge=1e-8, le=0.1), ui("T", log=True)] = 1e-4
+    """Components lighter than this are dropped."""
+
+    merging_threshold: Annotated[float, Field(ge=0.0, le=50.0), ui("U", step=0.5)] = 4.0
+    """Squared Mahalanobis distance within which a component joins a heavier one."""
+
+    max_components: Annotated[int, Field(ge=1, le=300), ui("J_max", step=1)] = 60
+    """The heaviest components that are kept."""
+
+    extraction_threshold: Annotated[float, Field(ge=0.01, le=0.99), ui("T_e", step=0.01)] = 0.5
+    """A component whose weight is above this is a 2D estimate."""
+
+    output: Annotated[Literal["boxes", "estimates"], ui("Y", published="estimates")] = "boxes"
+    """What goes to the fusion: the boxes that the filter believes in, or its estimates."""

@@ -1,0 +1,130 @@
+"""Numbers of the fusion of all cameras.
+
+[ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
+density filtering", 2021.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from tracker.parameters.definition import Params, ui
+
+
+class FusionParams(Params):
+    """Fusion of the cameras in 3D ([ZW21] §2.4)."""
+
+    survival_probability: Annotated[float, Field(ge=0.5, le=1.0), ui("p_S", step=0.001)] = 0.99
+    """Probability that a person in the room is still there a step later."""
+
+    detection_probability: Annotated[float, Field(ge=0.05, le=1.0), ui("p_D", step=0.01)] = 0.98
+    """Probability that a camera's boxes include a person that its picture holds."""
+
+    clutter_rate: Annotated[
+        float,
+        Field(ge=0.001, le=50.0),
+        ui("λ_c", unit="1/(camera·step)", step=0.1, log=True, published=0.5),
+    ] = 3.0
+    """Expected number of false boxes that a camera gives at each step."""
+
+    birth_rate: Annotated[
+        float, Field(ge=1e-4, le=10.0), ui("γ", unit="1/(entrance·s)", log=True, published=0.5)
+    ] = 0.05
+    """Expected number of people who come in at each entrance in one second."""
+
+    measurement: Annotated[
+        Literal["centre", "box", "box_and_width"], ui("z", published="centre")
+    ] = "box"
+    """What is used of a box: its centre; its horizontal centre, top and bottom; and its width."""
+
+    update: Annotated[Literal["extended", "unscented"], ui("h(x)")] = "extended"
+    """How the bend of the projection is met: a straight line at the mean, or unscented points."""
+
+    motion: Annotated[
+        Literal["random_walk", "constant_velocity"], ui("F", published="random_walk")
+    ] = "constant_velocity"
+    """How people move between two steps."""
+
+    motion_sigma: Annotated[
+        float, Field(ge=0.01, le=3.0), ui("σ_w", unit="m/√s", step=0.01, log=True)
+    ] = 0.4
+    """Random walk: how far a person strays in one second, along each axis."""
+
+    acceleration_sigma: Annotated[
+        float, Field(ge=0.05, le=10.0), ui("σ_a", unit="m/s per √s", step=0.05, log=True)
+    ] = 0.8
+    """Constant velocity: how much a person's speed changes in one second, along each axis."""
+
+    vertical_share: Annotated[float, Field(ge=0.01, le=1.0), ui("σ_z/σ_x", step=0.01)] = 0.2
+    """Constant velocity: how lively the height is, relative to the ground plane."""
+
+    velocity_memory: Annotated[
+        float, Field(ge=0.1, le=100.0), ui("τ", unit="s", step=0.1, log=True)
+    ] = 2.0
+    """Constant velocity: time after which a person who is not seen has slowed to a third."""
+
+    start_velocity: Annotated[float, Field(ge=0.0, le=5.0), ui("σ_v0", unit="m/s", step=0.1)] = 0.7
+    """Constant velocity: spread of a newcomer's speed along each axis."""
+
+    birth: Annotated[
+        Literal["entrances", "measurements", "both"], ui("γ(x)", published="entrances")
+    ] = "both"
+    """Where people may appear: at the entrances, where boxes of two cameras agree, or both."""
+
+    misses: Annotated[Literal["per_camera", "per_person"], ui("1−p_D", published="per_camera")] = (
+        "per_person"
+    )
+    """Sequential PHD: whether a miss forgets what other cameras saw, or a label is one person."""
+
+    occlusion: Annotated[float, Field(ge=0.0, le=1.0), ui("ρ", step=0.05, published=0.0)] = 0.8
+    """How surely a camera misses a person who is wholly covered by another."""
+
+    edge: Annotated[Literal["soft", "hard"], ui("∂I", published="hard")] = "soft"
+    """Whether p_D falls towards the picture's edge with a target's uncertainty, or ends there."""
+
+    duplicate_distance: Annotated[float, Field(ge=0.0, le=2.0), ui("d_2", step=0.05)] = 0.5
+    """Tracks nearer than this share of a target's width, without a box each, are one person."""
+
+    room_margin: Annotated[
+        float,
+        Field(ge=0.0, le=5.0),
+        ui("m", unit="m", step=0.05, stage="tracks", published=0.1),
+    ] = 0.0
+    """How far outside the room's volume a person is still reported."""
+
+    followed_margin: Annotated[
+        float, Field(ge=0.0, le=5.0), ui("m_f", unit="m", step=0.05, published=0.6)
+    ] = 0.5
+    """How far outside the room people are followed, unreported, so that their boxes are theirs."""
+
+    memory: Annotated[
+        float, Field(ge=0.0, le=30.0), ui("t_m", unit="s", step=0.1, published=0.0)
+    ] = 3.0
+    """How long a person whom no camera sees may be gone and still come back under the same id."""
+
+    measurement_sigma: Annotated[float, Field(ge=0.1, le=10.0), ui("σ_v", step=0.1, log=True)] = 1.0
+    """Factor on the noise that the single-view stage states for its boxes."""
+
+    gate_probability: Annotated[float, Field(ge=0.5, le=1.0), ui("P_G", step=0.0001)] = 0.9999
+    """Probability that a person's own box lies inside the gate; 1 switches gating off."""
+
+    pruning_threshold: Annotated[float, Field(ge=1e-8, le=0.1), ui("T", log=True)] = 1e-4
+    """Components lighter than this are dropped."""
+
+    merging_threshold: Annotated[float, Field(ge=0.0, le=50.0), ui("U", step=0.5)] = 4.0
+    """Squared Mahalanobis distance within which a component joins a heavier one."""
+
+    max_components: Annotated[int, Field(ge=5, le=500), ui("J_max", step=1)] = 60
+    """The heaviest components that are kept."""
+
+    extraction: Annotated[
+        Literal["components", "boxes"], ui("W_z", stage="tracks", published="components")
+    ] = "components"
+    """Sequential PHD: whether the components that one box made are reported singly or as one."""
+
+    extraction_threshold: Annotated[
+        float, Field(ge=0.01, le=0.99), ui("T_e", step=0.01, stage="tracks")
+    ] = 0.5
+    """A component whose weight is above this is reported as a person."""

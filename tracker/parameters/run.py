@@ -1,0 +1,28 @@
+"""The methods that can be chosen, and all groups of parameters of a run."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from tracker.parameters.colour_phd import ColourPhdParams
+from tracker.parameters.definition import Params
+from tracker.parameters.detections import DetectionBoxParams, DetectionPhdParams
+from tracker.parameters.fusion import FusionParams
+
+SingleViewName = Literal["colour_phd", "detection_phd", "none"]
+FusionName = Literal["sequential_phd", "multi_bernoulli"]
+
+
+class RunParameters(Params):
+    """Everything that a run depends on, besides the sequence and the seed."""
+
+    single_view: SingleViewName = "colour_phd"
+    """Method of stage 1: boxes from each camera's pictures, or a detector's, filtered or not."""
+
+    fusion_method: FusionName = "sequential_phd"
+    """Method of stage 2: how the cameras' boxes become 3D positions."""
+
+    colour_phd: ColourPhdParams = ColourPhdParams()
+    detection_boxes: DetectionBoxParams = DetectionBoxParams()
+    detection_phd: DetectionPhdParams = DetectionPhdParams()
+    fusion: FusionParams = FusionParams()

@@ -1,0 +1,110 @@
+"""The table of all parameters, made from their definitions, and the presets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+from pydantic.fields import FieldInfo
+
+from tracker.parameters.definition import Params, Stage
+from tracker.parameters.run import FusionName, RunParameters, SingleViewName
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One parameter as its faces see it."""
+
+    key: str
+    """``group.name``, for instance ``fusion.survival_probability``."""
+    group: str
+    name: str
+    label: str
+    """The name in words."""
+    help: str
+    symbol: str
+    unit: str
+    stage: Stage
+    kind: Literal["float", "int", "bool", "choice"]
+    default: Any
+    minimum: float | None
+    maximum: float | None
+    step: float | None
+    log: bool
+    choices: tuple[str, ...]
+    published: Any
+    advanced: bool
+
+
+def _group_stage(group: str) -> Stage:
+    return "fusion" if group == "fusion" else "single_view"
+
+
+def _describe(group: str, name: str, field: FieldInfo) -> Parameter:
+    assert isinstance(field.json_schema_extra, dict)
+    extra: Any = field.json_schema_extra["x-ui"]
+    bounds: dict[str, Any] = {}
+    for item in field.metadata:
+        bounds.update({k: getattr(item, k) for k in ("ge", "le") if hasattr(item, k)})
+    annotation = field.annotation
+    kind: Literal["float", "int", "bool", "choice"] = "choice"
+    if annotation is float:
+        kind = "float"
+    elif annotation is int:
+        kind = "int"
+    elif annotation is bool:
+        kind = "bool"
+    return Parameter(
+        key=f"{group}.{name}",
+        group=group,
+        name=name,
+        label=name.replace("_", " ").capitalize(),
+        help=field.description or "",
+        symbol=extra["symbol"],
+        unit=extra["unit"],
+        stage=extra["stage"] or _group_stage(group),
+        kind=kind,
+        default=field.default,
+        minimum=bounds.get("ge"),
+        maximum=bounds.get("le"),
+        step=extra["step"],
+        log=extra["log"],
+        choices=tuple(get_args(annotation)) if kind == "choice" else (),
+        published=extra["published"],
+        advanced=extra["advanced"],
+    )
+
+
+def _collect() -> Iterator[Parameter]:
+    for group, group_field in RunParameters.model_fields.items():
+        model = group_field.annotation
+        if isinstance(model, type) and issubclass(model, Params):
+            for name, field in model.model_fields.items():
+                yield _describe(group, name, field)
+
+
+PARAMETERS: dict[str, Parameter] = {p.key: p for p in _collect()}
+"""Every parameter by its key, in the order of definition."""
+
+GROUPS: dict[str, str] = {
+    name: (field.annotation.__doc__ or "").strip()
+    for name, field in RunParameters.model_fields.items()
+    if isinstance(field.annotation, type) and issubclass(field.annotation, Params)
+}
+"""Every group of parameters and what it is for."""
+
+METHODS: dict[str, tuple[str, ...]] = {
+    "single_view": get_args(SingleViewName),
+    "fusion_method": get_args(FusionName),
+}
+"""The methods that can be chosen for stage 1 and stage 2."""
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "robust": {},
+    "published": {
+        **{key: p.published for key, p in PARAMETERS.items() if p.published is not None},
+        "fusion_method": "sequential_phd",
+    },
+}
+"""Named sets of values, each against the defaults: ``robust`` is the defaults themselves."""
