@@ -9,7 +9,6 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-
 EventKind = Literal["new", "vanished", "returned", "occluded", "merged", "split"]
 
 
