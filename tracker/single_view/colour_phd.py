@@ -15,18 +15,14 @@ from jaxtyping import Float, UInt8
 from numpy import ndarray
 from scipy.stats import chi2
 
-from tracker import colour, foreground, gaussian_mixture, mean_shift, models, phd
-from tracker.foreground import BackgroundModel
+from tracker import gaussian_mixture, mean_shift, models, phd
 from tracker.gaussian_mixture import GaussianMixture
 from tracker.parameters import ColourPhdParams
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.box_sizes import BoxSizes, entrance_boxes
+from tracker.single_view.appearance import Appearance, Scene
+from tracker.single_view.box_sizes import entrance_boxes
 from tracker.single_view.protocol import ViewResult
-from tracker.single_view.templates import read_templates
-
-BACKGROUND_PICTURES = 32
-"""Pictures spread over the clip that the background is learnt from."""
 
 GATE = float(chi2.ppf(0.9999, df=4))
 """Squared Mahalanobis distance: a person's own peak lies inside with this probability."""
@@ -37,19 +33,6 @@ MERGE_DISTANCE = 0.8
 SAME_PERSON_DISTANCE = 1.5
 """Peaks of the same person's colours closer than this, in half sizes, are one."""
 
-SIZE_JITTER = 0.1
-"""Relative spread around the size that the target has at a place of the room: people differ."""
-
-# in half sizes from a box's centre, left, top, right, bottom: inside, above, left and right
-_PARTS = np.array(
-    [
-        [-1.0, -1.0, 1.0, 1.0],
-        [-1.0, -2.0, 1.0, -1.3],
-        [-2.2, -1.0, -1.4, 0.3],
-        [1.4, -1.0, 2.2, 0.3],
-    ]
-)
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColourPhdState:
@@ -59,15 +42,6 @@ class ColourPhdState:
     unexplained: Float[ndarray, "B 4"]
     """Peaks that no component explained: where somebody may have appeared."""
     next_label: int
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Scene:
-    """One picture, prepared for the comparison of many boxes."""
-
-    bins: ndarray
-    mask: ndarray | None
-    sums: ndarray | None
 
 
 class ColourPhd:
@@ -100,34 +74,29 @@ class ColourPhd:
         Raises:
             ValueError: If there are no pictures or templates, or a template cannot be read.
         """
-        view = sequence.views[camera_index]
-        if not view.has_pictures:
-            raise ValueError(
-                f'camera "{view.camera.name}" of {sequence.name} has no pictures; give it a video '
-                "or images in sequence.toml, or choose single_view none to use its detections"
-            )
         self._parameters = parameters
-        self._model = read_templates(sequence, parameters, reader)
-        self._sizes = BoxSizes.of(view.camera, sequence.room, sequence.target_half_extents)
-        self._image_size = view.camera.image_size
+        self._appearance = Appearance(
+            sequence,
+            camera_index,
+            reader,
+            colour_space=parameters.colour_space,
+            histogram_kernel=parameters.histogram_kernel,
+            with_foreground=self._needs_foreground,
+        )
         self._step_time = sequence.step_time
-        self._background: BackgroundModel | None = None
-        if self._needs_foreground:
-            count = min(BACKGROUND_PICTURES, sequence.frames)
-            steps = np.linspace(0, sequence.frames - 1, count).astype(int)
-            pictures = (reader.picture(camera_index, int(step)) for step in steps)
-            self._background = BackgroundModel.learn(p for p in pictures if p is not None)
+        camera = sequence.cameras[camera_index]
         births = GaussianMixture.empty(4)
         if parameters.birth != "peaks":
             births = entrance_boxes(
-                view.camera, sequence.room, sequence.target_half_extents, parameters.birth_rate
+                camera, sequence.room, sequence.target_half_extents, parameters.birth_rate
             )
         self._entrances = GaussianMixture(
             births.weights * self._step_time, births.means, births.covariances, births.labels
         )
-        width, height = self._image_size
+        width, height = camera.image_size
         # uniform over the picture and the range of half sizes, of which a pixel each at least
-        sizes = np.maximum(self._sizes.largest - self._sizes.smallest, 1.0)
+        possible = self._appearance.sizes
+        sizes = np.maximum(possible.largest - possible.smallest, 1.0)
         volume = width * height * float(np.prod(sizes))
         self._clutter = parameters.clutter_rate / volume
 
@@ -164,7 +133,7 @@ class ColourPhd:
             mixture = self._reduce(predicted)
             return ColourPhdState(mixture, np.zeros((0, 4)), next_label), self._result(mixture)
 
-        scene = self._look(picture)
+        scene = self._appearance.look(picture, p.foreground_threshold)
         samples = self._sample(predicted, scene, rng)
         scores, _, _ = self._score(scene, samples)
         candidates = self._climb(samples, scores)
@@ -192,7 +161,7 @@ class ColourPhd:
             information={
                 "peaks before acceptance": float(len(candidates)),
                 "least distance": float(distances.min()) if len(distances) else 1.0,
-                "foreground share": float(scene.mask.mean()) if scene.mask is not None else 0.0,
+                "foreground share": scene.foreground_share,
                 "cardinality": mixture.cardinality,
             },
         )
@@ -218,22 +187,15 @@ class ColourPhd:
         noise = sigmas[:, :, None] ** 2 * np.eye(4) * self._step_time
         return gaussian_mixture.predict(mixture, np.eye(4), noise, p.survival_probability)
 
-    def _look(self, picture: UInt8[ndarray, "h w 3"]) -> _Scene:
-        bins = colour.bin_map(picture, self._parameters.colour_space)
-        if self._background is None:
-            return _Scene(bins, None, None)
-        mask = self._background.foreground(picture, self._parameters.foreground_threshold)
-        return _Scene(bins, mask, foreground.integral(mask))
-
     def _sample(
-        self, predicted: GaussianMixture, scene: _Scene, rng: np.random.Generator
+        self, predicted: GaussianMixture, scene: Scene, rng: np.random.Generator
     ) -> Float[ndarray, "S 4"]:
         """Boxes from the predicted intensity and from the foreground."""
         p = self._parameters
         everywhere = round(p.samples * p.foreground_samples)
         if predicted.size == 0 and p.foreground_samples > 0.0:
             everywhere = p.samples
-        parts = [self._sample_foreground(everywhere, scene, rng)]
+        parts = [self._appearance.draw_on_foreground(everywhere, scene, rng)]
         count = p.samples - everywhere
         if predicted.size and count:
             chosen = rng.choice(
@@ -242,44 +204,23 @@ class ColourPhd:
             factors = np.linalg.cholesky(predicted.covariances)
             offsets = np.einsum("nab,nb->na", factors[chosen], rng.standard_normal((count, 4)))
             parts.append(predicted.means[chosen] + offsets)
-        samples = np.concatenate(parts)
-        samples[:, 2:] = np.clip(samples[:, 2:], self._sizes.smallest, self._sizes.largest)
-        last = np.array(self._image_size) - 1
-        inside = ((samples[:, :2] >= 0.0) & (samples[:, :2] <= last)).all(axis=1)
-        return np.asarray(samples[inside])
-
-    def _sample_foreground(
-        self, count: int, scene: _Scene, rng: np.random.Generator
-    ) -> Float[ndarray, "S 4"]:
-        """Boxes centred on foreground pixels, of the sizes that a target can have there."""
-        if scene.mask is None or count == 0:
-            return np.zeros((0, 4))
-        pixels = np.flatnonzero(scene.mask)
-        if not len(pixels):
-            return np.zeros((0, 4))
-        rows, columns = np.divmod(rng.choice(pixels, count), scene.mask.shape[1])
-        centres = np.stack([columns, rows], axis=1) + rng.uniform(-0.5, 0.5, (count, 2))
-        sizes, possible = self._sizes.draw(centres, rng)
-        sizes *= np.exp(SIZE_JITTER * rng.standard_normal((count, 1)))
-        return np.concatenate([centres[possible], sizes[possible]], axis=1)
+        return self._appearance.within(np.concatenate(parts))
 
     def _score(
-        self, scene: _Scene, boxes: Float[ndarray, "N 4"]
+        self, scene: Scene, boxes: Float[ndarray, "N 4"]
     ) -> tuple[Float[ndarray, "N G"], Float[ndarray, "N G"], Float[ndarray, " N"]]:
         """Log-likelihood and distance D of each box for each person, and share of foreground."""
         p = self._parameters
-        distances = self._model.distances(scene.bins, boxes)
+        distances = self._appearance.distances(scene, boxes)
         if not p.peaks_per_person:
             distances = distances.min(axis=1, keepdims=True)
         scores = -0.5 * (distances / p.likelihood_sigma) ** 2
-        if scene.sums is None:
-            return scores, distances, np.ones(len(boxes))
-        middles, half_sizes = boxes[:, [0, 1, 0, 1]], boxes[:, [2, 3, 2, 3]]
-        inside, above, left, right = (
-            foreground.box_shares(scene.sums, middles + part * half_sizes) for part in _PARTS
+        factors, inside = self._appearance.shape_scores(
+            scene,
+            boxes,
+            inside_weight=p.foreground_weight,
+            around_weight=p.surroundings_weight,
         )
-        around = above + (left + right) / 2.0
-        factors = p.foreground_weight * np.log(inside + 0.02) - p.surroundings_weight * around
         return scores + factors[:, None], distances, inside
 
     def _climb(
@@ -304,14 +245,14 @@ class ColourPhd:
         return np.concatenate(found)
 
     def _accept(
-        self, scene: _Scene, candidates: Float[ndarray, "M 4"]
+        self, scene: Scene, candidates: Float[ndarray, "M 4"]
     ) -> tuple[Float[ndarray, "K 4"], Float[ndarray, " K"]]:
         """The peaks that look enough like a person, and their distances; one at each place."""
         p = self._parameters
         scores, distances, inside = self._score(scene, candidates)
         best, nearest, person = scores.max(axis=1), distances.min(axis=1), scores.argmax(axis=1)
         good = best >= -0.5 * (p.acceptance_distance / p.likelihood_sigma) ** 2
-        if scene.sums is not None:
+        if scene.mask is not None:
             good &= inside >= p.acceptance_foreground
         kept: list[int] = []
         for i in np.argsort(-best, kind="stable"):

@@ -5,16 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from tracker import colour
-from tracker.colour import ColourModel
-from tracker.parameters import ColourPhdParams
+from tracker.colour import ColourModel, ColourSpaceName, KernelName
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
 
 def read_templates(
-    sequence: Sequence, parameters: ColourPhdParams, reader: FrameReader
+    sequence: Sequence, space: ColourSpaceName, kernel: KernelName, reader: FrameReader
 ) -> ColourModel:
     """The colour model of the sequence's templates.
+
+    Args:
+        sequence: Templates of one name are of one person.
+        space: The histograms' bins.
+        kernel: How the pixels of a box count.
+        reader: Of the pictures.
 
     Raises:
         ValueError: If there is none, or one's picture or box cannot be used.
@@ -35,10 +40,7 @@ def read_templates(
             raise ValueError(f"{place}: its picture cannot be read; choose another frame")
         left, top, width, height = template.box
         box = np.array([[left + width / 2, top + height / 2, width / 2, height / 2]])
-        bins = colour.bin_map(picture, parameters.colour_space)
-        histogram = colour.histograms(
-            bins, box, parameters.colour_space, parameters.histogram_kernel
-        )[0]
+        histogram = colour.histograms(colour.bin_map(picture, space), box, space, kernel)[0]
         if not histogram.any():
             raise ValueError(
                 f"{place}: the box {template.box.tolist()} lies outside the picture of "
@@ -48,6 +50,6 @@ def read_templates(
     return ColourModel.of(
         np.array(histograms),
         [template.name for template in sequence.templates],
-        parameters.colour_space,
-        parameters.histogram_kernel,
+        space,
+        kernel,
     )
