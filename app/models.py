@@ -220,6 +220,18 @@ class Estimate(Model):
     """-1 where the method has no labels."""
 
 
+class CameraEvent(Model):
+    """Something that happened to people in a camera's picture, as its method tells it."""
+
+    kind: Literal["new", "vanished", "returned", "occluded", "merged", "split"]
+    labels: list[int]
+    """Labels of the camera's own 2D estimates."""
+
+
+Gate = tuple[float, float, float, float, float]
+"""An ellipse: centre x and y, and xx, xy, yy of the matrix C with (z − c)ᵀ C⁻¹ (z − c) = 1."""
+
+
 class CameraTrack(Model):
     """One 3D target as one camera should see it, and what that camera said of it."""
 
@@ -256,6 +268,9 @@ class CameraStep(Model):
     estimates: list[Estimate]
     samples: list[tuple[float, float, float]] | None = None
     """x, y and relative weight; only where asked for."""
+    events: list[CameraEvent] = Field(default_factory=list)
+    gates: list[Gate] = Field(default_factory=list)
+    """Where the method expects its targets, in pixels."""
     tracks: list[CameraTrack]
     truth: list[CameraTruth]
     information: dict[str, float]

@@ -52,6 +52,14 @@ export function eventsNow(state) {
 }
 
 /**
+ * What a camera's method says of the people in its picture: "3 and 5 occluded, 7 new".
+ * @param {ViewEvent[]} events
+ */
+export function viewWords(events) {
+	return events.map(({ kind, labels }) => `${labels.join(", ").replace(/, (?!.*,)/, " and ")} ${kind}`).join(", ");
+}
+
+/**
  * The nearest event after or before a step.
  * @param {LaneEvent[]} events  by step
  * @param {number} step

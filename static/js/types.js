@@ -62,11 +62,15 @@
  * @property {string | null} reason
  * @property {[number, number] | null} centre
  *
+ * @typedef {{kind: string, labels: number[]}} ViewEvent  labels of the camera's own estimates
+ *
  * @typedef {object} CameraStep
  * @property {string} name
  * @property {{box: Box, score: number}[]} measurements
  * @property {{box: Box, weight: number, label: number}[]} estimates
  * @property {[number, number, number][] | null} [samples]
+ * @property {ViewEvent[]} events
+ * @property {[number, number, number, number, number][]} gates  centre x and y; xx, xy, yy of the ellipse's matrix
  * @property {TrackInView[]} tracks
  * @property {{id: number, box: Box | null, valid: boolean}[]} truth
  *

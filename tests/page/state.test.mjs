@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { createCache } from "../../static/js/cache.js";
-import { eventsOf, longMisses, nextEvent, ordered, seenShare, stateAt } from "../../static/js/events.js";
+import { eventsOf, longMisses, nextEvent, ordered, seenShare, stateAt, viewWords } from "../../static/js/events.js";
 import { mosaic } from "../../static/js/mosaic.js";
 import { createStore } from "../../static/js/store.js";
 import { readPlace, writePlace } from "../../static/js/url.js";
@@ -148,4 +148,14 @@ test("pictures keep their shape, stay inside and do not overlap", () => {
     }
   }
   assert.deepEqual(mosaic([], null, { width: 610, most: 338, gap: 4 }), { cells: [], height: 0 });
+});
+
+test("what a camera tells of its people is one line of words", () => {
+  assert.equal(viewWords([]), "");
+  assert.equal(viewWords([{ kind: "new", labels: [7] }]), "7 new");
+  const events = [
+    { kind: "occluded", labels: [3, 5] },
+    { kind: "vanished", labels: [1, 2, 4] },
+  ];
+  assert.equal(viewWords(events), "3 and 5 occluded, 1, 2 and 4 vanished");
 });

@@ -53,8 +53,8 @@ class ViewResult:
     events: tuple[ViewEvent, ...] = ()
     """What happened at this step, where the method tells such things."""
     gates: Float[ndarray, "G 5"] = field(default_factory=lambda: np.zeros((0, 5)))
-    """Ellipses around where the method expects its targets: centre x and y, and the
-    covariance's xx, xy, yy scaled to the gate's border; pixels, pixels squared."""
+    """Ellipses around where the method expects its targets: centre x and y in pixels, and
+    xx, xy, yy of the matrix C with (z − c)ᵀ C⁻¹ (z − c) = 1 on the border, pixels squared."""
 
     @staticmethod
     def of_boxes(

@@ -8,12 +8,7 @@ import { stroke } from "./canvas.js";
 
 const WHITE = "#f4f4f4";
 
-/**
- * A box on whole pixels of the screen, so that thin lines stay thin.
- * @param {Brush} g
- * @param {Box} box
- * @param {number} scale
- */
+/** A box on whole pixels, so that thin lines stay thin. @param {Brush} g @param {Box} box @param {number} scale */
 function trace(g, [left, top, width, height], scale) {
 	const x = Math.round(left * scale);
 	const y = Math.round(top * scale);
@@ -21,12 +16,7 @@ function trace(g, [left, top, width, height], scale) {
 	g.rect(x + 0.5, y + 0.5, Math.round((left + width) * scale) - x, Math.round((top + height) * scale) - y);
 }
 
-/**
- * The corners of a box: a 2D estimate.
- * @param {Brush} g
- * @param {Box} box
- * @param {number} scale
- */
+/** The corners of a box: a 2D estimate. @param {Brush} g @param {Box} box @param {number} scale */
 function corners(g, [left, top, width, height], scale) {
 	const x0 = Math.round(left * scale) + 0.5;
 	const y0 = Math.round(top * scale) + 0.5;
@@ -38,6 +28,29 @@ function corners(g, [left, top, width, height], scale) {
 		g.moveTo(x + sx * arm, y);
 		g.lineTo(x, y);
 		g.lineTo(x, y + sy * arm);
+	}
+}
+
+/** Gates, and the labels that the camera's events speak of. @param {Brush} g @param {CameraStep} view @param {Scene} scene */
+function drawGates(g, { gates, estimates }, { scale, ink }) {
+	for (const [x, y, xx, xy, yy] of gates) {
+		const reach = Math.hypot((xx - yy) / 2, xy);
+		// eigenvalues
+		const axes = [reach, -reach].map((r) => Math.sqrt(Math.max(0, (xx + yy) / 2 + r)) * scale);
+		g.beginPath();
+		g.ellipse(x * scale, y * scale, axes[0], axes[1], Math.atan2(2 * xy, xx - yy) / 2, 0, 7);
+		stroke(g, WHITE, 1, [1, 3], 0.3);
+	}
+	g.font = `600 10px ${ink.font}`;
+	g.textAlign = "left";
+	g.textBaseline = "alphabetic";
+	g.fillStyle = WHITE;
+	g.strokeStyle = "rgb(0 0 0 / .6)";
+	g.lineWidth = 3;
+	for (const { box, label } of estimates) {
+		const y = (box[1] + box[3]) * scale - 4;
+		g.strokeText(`${label}`, box[0] * scale + 3, y);
+		g.fillText(`${label}`, box[0] * scale + 3, y);
 	}
 }
 
@@ -68,13 +81,14 @@ export function drawOverlay(g, view, scene) {
 			corners(g, box, scale);
 			stroke(g, WHITE, 1.75, [], 0.5);
 		}
+		if (view.gates.length && roomy) drawGates(g, view, scene);
 	}
 	if (layers.boxes) drawTracks(g, visibleTracks(view), scene, roomy);
 	g.globalAlpha = 1;
 }
 
 /**
- * Tracks whose box is in the picture, far to near (a near person stands lower in it).
+ * Tracks whose box is in the picture, far to near.
  * @param {CameraStep} view
  * @returns {(TrackInView & {box: Box})[]}
  */
@@ -99,12 +113,7 @@ function drawSamples(g, samples, scale) {
 	g.globalAlpha = opacity;
 }
 
-/**
- * @param {Brush} g
- * @param {(TrackInView & {box: Box})[]} tracks
- * @param {Scene} scene
- * @param {boolean} roomy
- */
+/** @param {Brush} g @param {(TrackInView & {box: Box})[]} tracks @param {Scene} scene @param {boolean} roomy */
 function drawTracks(g, tracks, { scale, selection, hover, ink, width }, roomy) {
 	const huge = width > 800 ? 1.4 : 1;
 	for (const { id, box, seen } of tracks) {
@@ -147,26 +156,13 @@ function drawTracks(g, tracks, { scale, selection, hover, ink, width }, roomy) {
 	}
 }
 
-/**
- * The picture of a camera that has none: its right shape, a border and a quiet grid.
- * @param {Brush} g
- * @param {number} width
- * @param {number} height
- */
+/** A camera without pictures: a border and a quiet grid. @param {Brush} g @param {number} width @param {number} height */
 export function drawEmptyPicture(g, width, height) {
 	g.fillStyle = "#1c1c1c";
 	g.fillRect(0, 0, width, height);
 	g.beginPath();
-	for (let k = 1; k < 8; k += 1) {
-		const x = Math.round((width * k) / 8) + 0.5;
-		g.moveTo(x, 0);
-		g.lineTo(x, height);
-	}
-	for (let k = 1; k < 6; k += 1) {
-		const y = Math.round((height * k) / 6) + 0.5;
-		g.moveTo(0, y);
-		g.lineTo(width, y);
-	}
+	for (let k = 1; k < 8; k += 1) g.rect(Math.round((width * k) / 8) + 0.5, 0, 0, height);
+	for (let k = 1; k < 6; k += 1) g.rect(0, Math.round((height * k) / 6) + 0.5, width, 0);
 	stroke(g, "#262626", 1);
 	g.beginPath();
 	g.rect(0.5, 0.5, width - 1, height - 1);

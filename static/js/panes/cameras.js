@@ -3,6 +3,7 @@
 import { fill, h, icon, idTag, show, tipOf, write } from "../dom.js";
 import { prepare } from "../draw/canvas.js";
 import { drawEmptyPicture, drawOverlay, visibleTracks } from "../draw/overlay.js";
+import { viewWords } from "../events.js";
 import { mosaic } from "../mosaic.js";
 import { pictureInk } from "../palette.js";
 
@@ -152,6 +153,7 @@ export function mountCameras(root, { store, page, actions, playback }) {
 		if (shown.stale) words.push("computing");
 		else if (shown.result && !shown.result.computed) words.push(state.run?.state === "computing" ? "computing" : "not computed");
 		else if (view) {
+			if (view.events.length) words.push(`2D: ${viewWords(view.events)}`);
 			const away = view.tracks.filter((track) => !track.visible);
 			/** @type {Map<string, number[]>} */
 			const reasons = new Map();
@@ -213,12 +215,7 @@ export function mountCameras(root, { store, page, actions, playback }) {
 					h("dt", {}, h("i", {}, "p"), h("sub", {}, "D")),
 					h("dd", {}, show(Number(track.detection_probability.toFixed(3))), track.hidden_by !== null && h("small", {}, ` hidden by ${track.hidden_by}`)),
 				],
-				[
-					h("dt", {}, "fed by"),
-					track.seen
-						? h("dd", {}, `box ${(track.source ?? 0) + 1}`)
-						: h("dd", {}, "no box here"),
-				],
+				[h("dt", {}, "fed by"), h("dd", {}, track.seen ? `box ${(track.source ?? 0) + 1}` : "no box here")],
 				whole && [h("dt", {}, "at"), h("dd", {}, whole.position.map((v) => v.toFixed(2).replace("-", "−")).join("  "), h("small", {}, " m"))],
 			),
 		);
