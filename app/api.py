@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import io
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,6 +14,7 @@ from app import models, results
 from app.errors import ApiError, ErrorBody, sentence
 from app.jobs import Jobs
 from app.pictures import Pictures
+from app.timeline import BUCKETS, Timelines, Window
 from app.workbench import Workbench
 from tracker import export
 from tracker.pipeline import Cancelled
@@ -42,6 +44,28 @@ def _jobs(request: Request) -> Jobs:
     return jobs
 
 
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """The part of the steps that somebody looks at, and in how many values a curve."""
+
+    first: int
+    last: int | None
+    buckets: int
+
+    def window(self, frames: int) -> Window:
+        """As buckets of a sequence; bounds beyond it are its ends."""
+        return Window.of(frames, self.first, self.last, self.buckets)
+
+
+def _shown(
+    first: Annotated[int, Query(ge=0, description="First step.")] = 0,
+    last: Annotated[int | None, Query(ge=0, description="Last step, else the end.")] = None,
+    buckets: Annotated[int, Query(ge=1, le=1 << 14, description="Most values a curve.")] = BUCKETS,
+) -> Shown:
+    return Shown(first, last, buckets)
+
+
+Part = Annotated[Shown, Depends(_shown)]
 Bench = Annotated[Workbench, Depends(_workbench)]
 Work = Annotated[Jobs, Depends(_jobs)]
 
@@ -211,13 +235,13 @@ async def step(
 
 
 @router.get("/timeline")
-def timeline(request: Request, bench: Bench) -> models.Timeline:
-    """The shown run over time, as far as it is computed."""
+def timeline(request: Request, bench: Bench, part: Part) -> models.Timeline:
+    """The shown run over time, as far as it is computed, at the width that it is drawn at."""
     snapshot = bench.snapshot()
     if snapshot.sequence is None:
         raise nothing_open()
-    timelines: results.Timelines = request.app.state.timelines
-    return timelines.of(snapshot.sequence, snapshot.run)
+    timelines: Timelines = request.app.state.timelines
+    return timelines.of(snapshot.sequence, snapshot.run, part.window(snapshot.sequence.frames))
 
 
 @router.get(

@@ -1,10 +1,8 @@
-"""A snapshot, a step and a timeline as the messages of :mod:`app.models`."""
+"""A snapshot and a step as the messages of :mod:`app.models`."""
 
 from __future__ import annotations
 
-import threading
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 from numpy import ndarray
@@ -220,85 +218,6 @@ def _add_tracks(message: models.Step, sequence: Sequence, run: Run, step: int) -
                     centre=(float(centres[i, 0]), float(centres[i, 1])) if in_front[i] else None,
                 )
             )
-
-
-class Timelines:
-    """Makes timelines; remembers what it counted of the run it was asked for last."""
-
-    def __init__(self) -> None:
-        self._run: Run | None = None
-        self._cardinality: list[float] = []
-        self._sequence: Sequence | None = None
-        self._truth: list[int] | None = None
-        self._lock = threading.Lock()
-
-    def of(self, sequence: Sequence, run: Run | None) -> models.Timeline:
-        """The shown run over time, as far as it is computed."""
-        with self._lock:
-            return self._of(sequence, run)
-
-    def _of(self, sequence: Sequence, run: Run | None) -> models.Timeline:
-        if run is not self._run:
-            self._run, self._cardinality = run, []
-        if sequence is not self._sequence:
-            self._sequence, self._truth = sequence, _truth_counts(sequence)
-        done = run.done if run is not None else 0
-        cardinality = self._cardinality
-        if run is not None:
-            cardinality.extend(
-                round(result.posterior.cardinality, 4)
-                for result in run.fused[len(cardinality) : done]
-            )
-        count = [0] * done
-        lives: list[models.TrackLife] = []
-        if run is not None:
-            tracks = run.tracks
-            rows = slice(0, int(np.searchsorted(tracks.frames, done)))
-            count = np.bincount(tracks.frames[rows], minlength=done).tolist()
-            lives = _lives(tracks.frames[rows], tracks.ids[rows], np.any(tracks.seen[rows], axis=1))
-        return models.Timeline(
-            run=run.key if run is not None else "",
-            done=done,
-            frames=sequence.frames,
-            cardinality=list(cardinality),
-            count=count,
-            truth=self._truth,
-            tracks=lives,
-        )
-
-
-def _truth_counts(sequence: Sequence) -> list[int] | None:
-    truth = sequence.ground_truth
-    if truth is None:
-        return None
-    counts: list[int] = np.bincount(truth.frames, minlength=sequence.frames).tolist()
-    return counts[: sequence.frames]
-
-
-def _lives(frames: ndarray, ids: ndarray, seen: ndarray) -> list[models.TrackLife]:
-    """Runs of consecutive steps of each id in which it is seen, or not seen, by any camera."""
-    if not len(frames):
-        return []
-    order = np.lexsort((frames, ids))
-    frames, ids, seen = frames[order], ids[order], seen[order]
-    new_span = np.ones(len(frames), dtype=bool)
-    new_span[1:] = (np.diff(ids) != 0) | (np.diff(frames) != 1) | (seen[1:] != seen[:-1])
-    starts = np.flatnonzero(new_span)
-    ends = np.append(starts[1:], len(frames)) - 1
-    lives: dict[int, list[models.Span]] = {}
-    for target, first, last, is_seen in zip(
-        ids[starts].tolist(),
-        frames[starts].tolist(),
-        frames[ends].tolist(),
-        seen[starts].tolist(),
-        strict=True,
-    ):
-        word: Any = "seen" if is_seen else "coasting"
-        lives.setdefault(target, []).append((first, last, word))
-    return [
-        models.TrackLife(id=target, first=spans[0][0], last=spans[-1][1], spans=spans)
-        for target, spans in lives.items()
-    ]
 
 
 def _vector(values: ndarray) -> models.Vector:

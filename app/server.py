@@ -26,9 +26,9 @@ from app.gateway import Gateway
 from app.jobs import Jobs
 from app.paths import static_folder
 from app.pictures import Pictures
-from app.results import Timelines
 from app.security import CONTENT_POLICY, Guard, allowed_hosts, is_loopback
 from app.stream import Stream
+from app.timeline import Timelines
 from app.workbench import Workbench
 from tracker import __version__
 

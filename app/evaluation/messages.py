@@ -10,6 +10,7 @@ from numpy import ndarray
 from app.evaluation import models
 from app.evaluation.scores import Reference, Scored
 from app.models import Model
+from app.timeline import Window
 from tracker import parameters as table
 from tracker import pipeline
 from tracker.evaluation import Evaluation, compare
@@ -69,30 +70,41 @@ def _shared(row: Any, model: type[Model]) -> dict[str, Any]:
 
 
 def series_of(
-    scored: Scored, evaluation: Evaluation, of: Literal["shown", "pinned", "previous"]
+    scored: Scored,
+    evaluation: Evaluation,
+    of: Literal["shown", "pinned", "previous"],
+    window: Window,
 ) -> models.EvaluationSeries:
-    """Everything over time."""
+    """Everything over time, of each bucket of the window the worst step."""
     settings, series = evaluation.settings, evaluation.series
     names = set(type(series).__slots__) & set(models.EvaluationSeries.model_fields)
+    rows = {name: window.worst(getattr(series, name)) for name in ("ospa", "ospa2", "gospa")}
     pairs = evaluation.pairs
     return models.EvaluationSeries(
         run=scored.key,
         of=of,
         steps=scored.steps,
         partial=not scored.complete,
+        first=window.first,
+        stride=window.stride,
         unit=settings.unit,
         cost=settings.stated(("cutoff", "order")),
         gate=settings.stated(("distance", "gate")),
         errors=[
-            models.PersonError(person=person, **_trimmed(values))
+            models.PersonError(person=person, **_trimmed(values, window))
             for person, values in evaluation.errors.items()
         ],
         track_errors=[
-            models.TrackError(track=track, **_trimmed(_of_track(evaluation, track)))
+            models.TrackError(track=track, **_trimmed(_of_track(evaluation, track), window))
             for track in np.unique(pairs.tracks).tolist()
         ],
         switches=_switches(evaluation),
-        **{name: getattr(series, name).round(DECIMALS).tolist() for name in names},
+        **{
+            name: getattr(series, name)[rows.get(name.partition("_")[0], rows["ospa"])]
+            .round(DECIMALS)
+            .tolist()
+            for name in names
+        },
     )
 
 
@@ -104,12 +116,17 @@ def _of_track(evaluation: Evaluation, track: int) -> ndarray:
     return values
 
 
-def _trimmed(values: ndarray) -> dict[str, Any]:
-    """From the first to the last value that there is."""
-    there = np.flatnonzero(np.isfinite(values))
-    first, last = (int(there[0]), int(there[-1])) if len(there) else (0, -1)
-    shown = values[first : last + 1].round(DECIMALS).tolist()
-    return {"first": first, "values": [v if v == v else None for v in shown]}
+def _trimmed(values: ndarray, window: Window) -> dict[str, Any]:
+    """From the first to the last bucket that has a value."""
+    starts, shown = window.starts(len(values)), values[window.worst(values)]
+    there = np.flatnonzero(np.isfinite(shown))
+    if not len(there):
+        return {"first": window.first, "values": []}
+    kept = shown[there[0] : there[-1] + 1].round(DECIMALS).tolist()
+    return {
+        "first": int(starts[there[0]]),
+        "values": [value if value == value else None for value in kept],
+    }
 
 
 def _switches(evaluation: Evaluation) -> list[models.Switch]:

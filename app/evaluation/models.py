@@ -111,7 +111,7 @@ class PersonError(Model):
 
     person: int
     first: int
-    """The step of the first value."""
+    """The first step of the first value's bucket."""
     values: list[float | None]
     """Metres; null where there is no pair."""
 
@@ -135,12 +135,20 @@ class Switch(Model):
 
 
 class EvaluationSeries(Model):
-    """A run against the truth over time: one value a step."""
+    """A run against the truth over time: one value a bucket of steps.
+
+    Of a bucket with several steps the worst is told: that with the greatest OSPA, for
+    GOSPA and its parts that with the greatest GOSPA, for errors the greatest error.
+    """
 
     run: str
     of: Literal["shown", "pinned", "previous"]
     steps: int
     partial: bool
+    first: int
+    """The first step of the first bucket."""
+    stride: int
+    """Steps a bucket: 1 where each step has its own value."""
     unit: str
     """Of the distance: m, or none for boxes."""
     cost: str

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Depends, Query, Request, Response
 
 from app import results
-from app.api import ERRORS, Bench, file_name, nothing_open
+from app.api import ERRORS, Bench, Part, file_name, nothing_open
 from app.errors import ApiError
 from app.evaluation import messages, models
 from app.evaluation.scores import Scored
@@ -58,6 +58,7 @@ def evaluation(bench: Bench) -> models.EvaluationInfo:
 @router.get("/evaluation/series")
 def series(
     bench: Bench,
+    part: Part,
     of: Annotated[Literal["shown", "pinned", "previous"], Query(description="Whose.")] = "shown",
 ) -> models.EvaluationSeries:
     """OSPA, GOSPA and their parts, the errors and the identity switches over time."""
@@ -66,7 +67,8 @@ def series(
     scored = {"shown": scores.shown, "pinned": scores.pinned, "previous": scores.before}[of]
     if of != "shown" and scored is None:
         raise _nothing_to_compare()
-    return messages.series_of(*_evaluated(snapshot, scored), of)
+    run, evaluated = _evaluated(snapshot, scored)
+    return messages.series_of(run, evaluated, of, part.window(run.sequence.frames))
 
 
 @router.get("/evaluation/comparison")

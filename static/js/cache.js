@@ -6,26 +6,7 @@
  * What is wanted comes as a list, most urgent first. Requests that fell out of the list are
  * aborted; what arrives is kept under its own name, so a late answer can never pass for another.
  * @template V
- * @typedef {object} Cache
- * @property {(names: string[]) => void} want
- * @property {(name: string) => V | undefined} get
- * @property {(name: string, value: V) => void} put
- * @property {(name: string) => void} forget
- * @property {() => void} clear
- * @property {() => IterableIterator<string>} names
- */
-
-/**
- * @template V
- * @param {object} how
- * @param {(name: string, signal: AbortSignal) => Promise<V>} how.load
- * @param {(value: V) => number} how.sizeOf
- * @param {number} how.budget  in the unit of `sizeOf`
- * @param {number} [how.parallel]  requests at a time
- * @param {(name: string) => void} how.arrived
- * @param {(value: V) => void} [how.dispose]
- * @param {(name: string, error: unknown) => V | undefined} how.failed  a value stands for the failure and is
- *   kept; without one the name may be wanted again
+ * @param {CacheHow<V>} how
  * @returns {Cache<V>}
  */
 export function createCache({ load, sizeOf, budget, parallel = 4, arrived, dispose = () => {}, failed }) {

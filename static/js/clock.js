@@ -106,6 +106,15 @@ export function xOf(step, { first, last, width }) {
 }
 
 /**
+ * Where a step is among values of which each stands for some steps.
+ * @param {number} step
+ * @param {Buckets} buckets
+ */
+export function bucketOf(step, { first, stride }) {
+	return Math.floor((step - first) / stride);
+}
+
+/**
  * Step at a pointer position.
  * @param {number} x  CSS pixels from the left end of the axis
  * @param {View} view

@@ -81,16 +81,6 @@ export function ordered(tracks, order) {
 }
 
 /**
- * Share of its life in which a camera saw the track.
- * @param {TrackLane} track
- * @returns {number} 0 … 1
- */
-export function seenShare({ first, last, spans }) {
-	const seen = spans.reduce((sum, [from, to, kind]) => sum + (kind === "seen" ? to - from + 1 : 0), 0);
-	return seen / Math.max(1, last - first + 1);
-}
-
-/**
  * What a track is doing at a step.
  * @param {TrackLane} track
  * @param {number} step

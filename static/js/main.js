@@ -39,6 +39,7 @@ const store = createStore(
 		sequences: [],
 		basis: "",
 		timeline: null,
+		span: null,
 		step: 0,
 		shown: -1,
 		result: null,
@@ -118,7 +119,7 @@ function receiveState(told, streamed = false) {
 		const cameras = server.sequence?.cameras.length ?? 0;
 		const large = place.camera !== null && place.camera < cameras ? place.camera : cameras > 2 ? 0 : null;
 		const known = place.selection !== null && here ? place.selection : server.selection;
-		store.set({ basis: "", timeline: null, scores: null, result: null, shown: -1, step: 0, playing: 0, range: [null, null], loop: false, hover: null, large, selection: known });
+		store.set({ basis: "", timeline: null, span: null, scores: null, result: null, shown: -1, step: 0, playing: 0, range: [null, null], loop: false, hover: null, large, selection: known });
 		if (server.sequence) store.set({ step: Math.max(0, Math.min(server.sequence.frames - 1, step)) });
 		if (known !== server.selection) stream.send({ type: "select", id: known });
 		if (server.sequence && (!place.sequence || place.sequence === server.sequence.name)) {
@@ -143,9 +144,16 @@ function showRun(run) {
 	void fetchTimeline();
 }
 
+/** What is asked for of a long recording: what is shown and as much again at either side. */
+function part() {
+	const [first, last] = store.get().span ?? [0, 1e9];
+	const beside = last - first;
+	return `first=${Math.max(0, Math.floor(first - beside))}&last=${Math.ceil(last + beside)}`;
+}
+
 const fetchTimeline = fetcher(async () => {
 	if (!store.get().server?.sequence) return;
-	const timeline = await getJson("/api/timeline");
+	const timeline = await getJson(`/api/timeline?${part()}`);
 	// Lanes of another run than the one that is shown would mix the two; its own news is on the way.
 	if (timeline.run === store.get().basis) store.set({ timeline });
 });
@@ -154,8 +162,8 @@ const fetchScores = fetcher(async () => {
 	const sequence = store.get().server?.sequence;
 	if (!sequence?.has_truth) return;
 	const told = (/** @type {string} */ what) => getJson(`/api/evaluation${what}`);
-	const [evaluation, series, comparison] = await Promise.all([told(""), told("/series"), told("/comparison").catch(() => null)]);
-	const reference = comparison && (await told(`/series?of=${comparison.against}`).catch(() => null));
+	const [evaluation, series, comparison] = await Promise.all([told(""), told(`/series?${part()}`), told("/comparison").catch(() => null)]);
+	const reference = comparison && (await told(`/series?of=${comparison.against}&${part()}`).catch(() => null));
 	if (store.get().server?.sequence?.key === sequence.key) store.set({ scores: { evaluation, series, comparison, reference } });
 });
 
@@ -239,6 +247,10 @@ document.addEventListener("mousedown", (event) => {
 	if (event.target instanceof Element && event.target.closest("button, tr, .cam")) event.preventDefault();
 });
 
+store.on(["span"], () => {
+	void fetchTimeline();
+	void fetchScores();
+});
 store.on(["theme"], ({ theme }) => {
 	document.documentElement.dataset.theme = theme;
 	playback.repaint();

@@ -85,16 +85,21 @@
  * @property {number} cardinality
  *
  * @typedef {[number, number, "seen" | "coasting"]} Span  from and to are inclusive
- * @typedef {{id: number, first: number, last: number, spans: Span[]}} TrackLane
+ * @typedef {{id: number, first: number, last: number, seen: number, spans: Span[]}} TrackLane  seen: share of its life
+ * @typedef {{first: number, stride: number}} Buckets  each value stands for `stride` steps, the first from step `first` on
+ * @typedef {{low: number[], high: number[], mean: number[]}} Summary  of each bucket
  *
  * @typedef {object} Timeline
  * @property {string} run
  * @property {number} done
  * @property {number} frames
- * @property {number[]} cardinality
- * @property {number[]} count
- * @property {number[] | null} truth
+ * @property {number} first
+ * @property {number} stride
+ * @property {Summary} cardinality
+ * @property {Summary} count
+ * @property {Summary | null} truth
  * @property {TrackLane[]} tracks
+ * @property {number} left_out
  *
  * @typedef {object} Parameter
  * @property {string} key
@@ -134,6 +139,7 @@
  * @property {SequenceEntry[]} sequences
  * @property {string} basis  key of the run that the server shows: that in `run`, or while that has no step yet, one before
  * @property {Timeline | null} timeline  always of the run `basis`
+ * @property {[number, number] | null} span  steps that the timeline shows of a long recording; null: all of them
  * @property {number} step  what is asked for
  * @property {number} shown  what is painted
  * @property {StepResult | null} result  of the painted step
@@ -169,6 +175,8 @@
  *
  * @typedef {object} ScoreSeries
  * @property {string} run
+ * @property {number} first
+ * @property {number} stride
  * @property {string} unit
  * @property {string} cost  cut-off and order, in words
  * @property {string} gate
@@ -181,6 +189,18 @@
  * @property {number[]} gospa_false
  * @property {(Course & {track: number})[]} track_errors
  * @property {Switch[]} switches
+ *
+ * @typedef {object} Plots  what the strips draw of the scores
+ * @property {Scores | null} of
+ * @property {"ospa" | "gospa"} by
+ * @property {number[]} total
+ * @property {ScoreSeries | null} reference
+ * @property {number[]} place  share of the total that is distance, 0 … 1
+ * @property {number} top  value at the upper edge
+ * @property {Buckets} buckets
+ * @property {(Course & {track: number})[]} courses
+ * @property {(number | null)[]} mean  of all courses
+ * @property {number} most  error at the upper edge
  *
  * @typedef {{evaluation: Evaluation, series: ScoreSeries, comparison: Comparison | null, reference: ScoreSeries | null}} Scores
  *
@@ -261,3 +281,27 @@
  */
 
 /** @typedef {CanvasRenderingContext2D} Brush */
+
+/**
+ * @template V
+ * @typedef {object} Cache
+ * @property {(names: string[]) => void} want
+ * @property {(name: string) => V | undefined} get
+ * @property {(name: string, value: V) => void} put
+ * @property {(name: string) => void} forget
+ * @property {() => void} clear
+ * @property {() => IterableIterator<string>} names
+ */
+
+/**
+ * @template V
+ * @typedef {object} CacheHow
+ * @property {(name: string, signal: AbortSignal) => Promise<V>} load
+ * @property {(value: V) => number} sizeOf
+ * @property {number} budget  in the unit of `sizeOf`
+ * @property {number} [parallel]  requests at a time
+ * @property {(name: string) => void} arrived
+ * @property {(value: V) => void} [dispose]
+ * @property {(name: string, error: unknown) => V | undefined} failed  a value stands for the failure and is
+ *   kept; without one the name may be wanted again
+ */

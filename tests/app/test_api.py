@@ -153,10 +153,12 @@ def test_the_timeline_counts_what_the_engine_reports(client: TestClient, crossin
     timeline = client.get("/api/timeline").json()
     assert timeline["done"] == timeline["frames"] == FRAMES
     np.testing.assert_allclose(
-        timeline["cardinality"], [f.posterior.cardinality for f in run.fused], atol=1e-4
+        timeline["cardinality"]["mean"], [f.posterior.cardinality for f in run.fused], atol=1e-4
     )
-    assert timeline["count"] == np.bincount(run.tracks.frames, minlength=FRAMES).tolist()
-    assert timeline["truth"] == [2] * FRAMES
+    count = np.bincount(run.tracks.frames, minlength=FRAMES).tolist()
+    assert timeline["count"] == {"low": count, "high": count, "mean": count}
+    assert timeline["truth"]["low"] == timeline["truth"]["high"] == [2] * FRAMES
+    assert (timeline["first"], timeline["stride"], timeline["left_out"]) == (0, 1, 0)
     covered = set()
     for track in timeline["tracks"]:
         assert track["first"] == track["spans"][0][0]

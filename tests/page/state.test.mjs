@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { createCache } from "../../static/js/cache.js";
-import { eventsOf, longMisses, nextEvent, ordered, seenShare, stateAt, viewWords } from "../../static/js/events.js";
+import { eventsOf, longMisses, nextEvent, ordered, stateAt, viewWords } from "../../static/js/events.js";
 import { mosaic } from "../../static/js/mosaic.js";
 import { createStore } from "../../static/js/store.js";
 import { readPlace, writePlace } from "../../static/js/url.js";
@@ -115,10 +115,9 @@ test("events: births, deaths and long misses, in order", () => {
   assert.equal(eventsOf([TRACK], { fps: 25, done: 100 }).some((e) => e.kind === "death"), false);
 });
 
-test("what a track is at a step, and how much of it was seen", () => {
+test("what a track is at a step", () => {
   assert.deepEqual([5, 10, 40, 99, 100].map((step) => stateAt(TRACK, step)), ["not yet", "seen", "coasting", "coasting", "ended"]);
   assert.equal(stateAt({ id: 1, first: 0, last: 9, spans: [[0, 3, "seen"], [6, 9, "seen"]] }, 5), "lost");
-  assert.equal(seenShare(TRACK), 40 / 90);
   assert.deepEqual(longMisses(TRACK, 25), [[40, 79]]);
 });
 

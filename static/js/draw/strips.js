@@ -1,6 +1,6 @@
 // @ts-check
 /** Plots over the steps, under the lanes and on the same axis. */
-import { xOf } from "../clock.js";
+import { bucketOf, xOf } from "../clock.js";
 import { faded } from "../palette.js";
 import { stroke } from "./canvas.js";
 
@@ -8,31 +8,28 @@ import { stroke } from "./canvas.js";
  * A staircase: numbers of people hold for a whole step. Of many steps on one pixel the
  * lowest and the highest are drawn, so that a short change never disappears.
  * @param {Brush} g @param {Row} row @param {View} view
- * @param {number[]} values
+ * @param {Buckets} buckets
+ * @param {{low: number[], high: number[]}} values
  * @param {number} top  value at the upper edge
  * @param {{colour: string, width: number, dash?: number[]}} pen
  */
-export function drawStairs(g, row, view, values, top, { colour, width, dash }) {
-	const first = Math.max(0, Math.floor(view.first));
-	const last = Math.min(values.length - 1, Math.ceil(view.last));
-	if (last < first) return;
+export function drawStairs(g, row, view, buckets, values, top, { colour, width, dash }) {
+	const { first, stride } = buckets;
+	const from = Math.max(0, bucketOf(view.first, buckets));
+	const to = Math.min(values.low.length - 1, bucketOf(view.last, buckets) + 1);
+	if (to < from) return;
 	const level = (/** @type {number} */ value) =>
 		row.y + row.height - 4 - (Math.max(0, Math.min(value, top)) / top) * (row.height - 10);
-	const perPixel = (view.last - view.first) / Math.max(1, view.width);
-	const stride = Math.max(1, Math.floor(perPixel));
+	const many = Math.max(1, Math.floor((view.last - view.first) / stride / Math.max(1, view.width)));
 	g.beginPath();
-	g.moveTo(Math.max(0, xOf(first, view)), level(values[first]));
-	for (let step = first; step <= last; step += stride) {
-		let low = values[step];
-		let high = low;
-		for (let k = step + 1; k < Math.min(step + stride, last + 1); k += 1) {
-			low = Math.min(low, values[k]);
-			high = Math.max(high, values[k]);
-		}
-		const x = xOf(step, view);
+	g.moveTo(Math.max(0, xOf(first + from * stride, view)), level(values.low[from]));
+	for (let k = from; k <= to; k += many) {
+		const low = Math.min(...values.low.slice(k, k + many));
+		const high = Math.max(...values.high.slice(k, k + many));
+		const x = xOf(first + k * stride, view);
 		g.lineTo(x, level(low));
 		if (high !== low) g.lineTo(x, level(high));
-		g.lineTo(Math.min(view.width, xOf(Math.min(step + stride, last), view)), level(values[Math.min(step + stride - 1, last)]));
+		g.lineTo(Math.min(view.width, xOf(first + Math.min(k + many, to) * stride, view)), level(values.low[Math.min(k + many - 1, to)]));
 	}
 	stroke(g, colour, width, dash);
 }
@@ -56,15 +53,16 @@ function drawGround(g, row, view, ink) {
 /**
  * Number of people: truth broad and grey, the reported targets thin over it.
  * @param {Brush} g @param {Row} row @param {View} view
- * @param {{count: number[], truth: number[] | null}} data
+ * @param {Timeline} timeline
  * @param {Palette} ink
  */
-export function drawCardinality(g, row, view, { count, truth }, ink) {
+export function drawCardinality(g, row, view, timeline, ink) {
 	drawGround(g, row, view, ink);
+	const { count, truth } = timeline;
 	let top = 2;
-	for (const values of [count, truth ?? []]) for (const value of values) top = Math.max(top, value);
-	if (truth) drawStairs(g, row, view, truth, top * 1.1, { colour: ink.get("p-truth"), width: 3 });
-	drawStairs(g, row, view, count, top * 1.1, { colour: ink.get("p-est"), width: 1.25 });
+	for (const values of [count, truth]) for (const value of values?.high ?? []) top = Math.max(top, value);
+	if (truth) drawStairs(g, row, view, timeline, truth, top * 1.1, { colour: ink.get("p-truth"), width: 3 });
+	drawStairs(g, row, view, timeline, count, top * 1.1, { colour: ink.get("p-est"), width: 1.25 });
 }
 
 /**
@@ -83,51 +81,55 @@ export function scaleOf(values) {
  * A distance between the sets of people and estimates, stacked: how much of it is place, how
  * much is number. Of the steps on one pixel the worst is drawn; what leaves the axis is capped.
  * @param {Brush} g @param {Row} row @param {View} view
- * @param {{total: number[], place: number[], top: number, reference: number[] | null}} data  place: share, 0 … 1
+ * @param {Plots} plots
  * @param {Palette} ink
  */
-export function drawParts(g, row, view, { total, place, top, reference }, ink) {
+export function drawParts(g, row, view, { total, place, top, buckets, reference, by }, ink) {
 	drawGround(g, row, view, ink);
 	const base = row.y + row.height - 4;
 	const scale = (row.height - 10) / top;
 	const slope = (view.last - view.first) / view.width;
 	for (let x = 0; x < view.width; x += 1) {
-		let step = Math.floor(view.first + x * slope);
-		const next = Math.min(total.length, Math.max(step + 1, Math.floor(view.first + (x + 1) * slope)));
-		if (step >= total.length) break;
-		for (let k = step + 1; k < next; k += 1) if (total[k] > total[step]) step = k;
-		const height = Math.min(total[step], top) * scale;
-		const low = Math.min(height, total[step] * place[step] * scale);
+		let at = bucketOf(view.first + x * slope, buckets);
+		const next = Math.min(total.length, Math.max(at + 1, bucketOf(view.first + (x + 1) * slope, buckets)));
+		if (at >= total.length) break;
+		if (at < 0) continue;
+		for (let k = at + 1; k < next; k += 1) if (total[k] > total[at]) at = k;
+		const height = Math.min(total[at], top) * scale;
+		const low = Math.min(height, total[at] * place[at] * scale);
 		g.fillStyle = ink.get("p-loc");
 		g.fillRect(x, base - low, 1, low);
 		g.fillStyle = ink.get("p-card");
 		g.fillRect(x, base - height, 1, height - low);
 		g.fillStyle = ink.get("ink-1");
-		if (total[step] > top) g.fillRect(x, base - height - 2, 1, 1);
+		if (total[at] > top) g.fillRect(x, base - height - 2, 1, 1);
 	}
-	if (reference) drawStairs(g, row, view, reference, top, { colour: ink.get("ink-2"), width: 1, dash: [4, 2] });
+	const other = reference?.[by];
+	if (reference && other) drawStairs(g, row, view, reference, { low: other, high: other }, top, { colour: ink.get("ink-2"), width: 1, dash: [4, 2] });
 }
 
 /**
  * Position errors: one line a track, the selected one or else the mean of all in front.
  * @param {Brush} g @param {Row} row @param {View} view
- * @param {{courses: (Course & {track: number})[], mean: (number | null)[], selection: number | null, top: number}} data
+ * @param {Plots} plots
+ * @param {number | null} selection
  * @param {Palette} ink
  */
-export function drawErrors(g, row, view, { courses, mean, selection, top }, ink) {
+export function drawErrors(g, row, view, { courses, mean, buckets, most: top }, selection, ink) {
 	drawGround(g, row, view, ink);
 	const base = row.y + row.height - 4;
-	const stride = Math.max(1, Math.floor((view.last - view.first) / view.width));
+	const { stride } = buckets;
+	const many = Math.max(1, Math.floor((view.last - view.first) / stride / view.width));
 	const line = (/** @type {Course} */ { first, values }, /** @type {string} */ colour, /** @type {number} */ width) => {
 		let open = false;
 		g.beginPath();
-		const from = Math.max(0, Math.floor((view.first - first) / stride) * stride);
-		for (let k = from; k < values.length && first + k <= view.last + stride; k += stride) {
-			const known = values.slice(k, k + stride).filter((value) => value !== null);
+		const from = Math.max(0, Math.floor(bucketOf(view.first, { first, stride }) / many) * many);
+		for (let k = from; k < values.length && first + k * stride <= view.last + many * stride; k += many) {
+			const known = values.slice(k, k + many).filter((value) => value !== null);
 			if (known.length) {
 				const y = base - (Math.min(top, Math.max(...known)) / top) * (row.height - 10);
-				if (open) g.lineTo(xOf(first + k, view), y);
-				else g.moveTo(xOf(first + k, view), y);
+				if (open) g.lineTo(xOf(first + k * stride, view), y);
+				else g.moveTo(xOf(first + k * stride, view), y);
 			}
 			open = known.length > 0;
 		}
@@ -136,17 +138,18 @@ export function drawErrors(g, row, view, { courses, mean, selection, top }, ink)
 	const chosen = courses.find(({ track }) => track === selection);
 	for (const course of courses) if (course !== chosen) line(course, faded(ink.id(course.track), 0.35), 1);
 	if (chosen) line(chosen, ink.id(chosen.track), 1.75);
-	else line({ first: 0, values: mean }, ink.get("p-est"), 1.25);
+	else line({ first: buckets.first, values: mean }, ink.get("p-est"), 1.25);
 }
 
 /**
  * @param {Course[]} courses
- * @param {number} steps
+ * @param {number} count  of buckets
+ * @param {Buckets} buckets
  * @returns {(number | null)[]} mean over those that have a value
  */
-export function meanOf(courses, steps) {
-	return Array.from({ length: steps }, (_, step) => {
-		const values = courses.flatMap(({ first, values }) => values[step - first] ?? []);
+export function meanOf(courses, count, buckets) {
+	return Array.from({ length: count }, (_, k) => {
+		const values = courses.flatMap(({ first, values }) => values[k - bucketOf(first, buckets)] ?? []);
 		return values.length ? values.reduce((sum, value) => sum + value, 0) / values.length : null;
 	});
 }

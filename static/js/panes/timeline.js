@@ -1,11 +1,11 @@
 // @ts-check
 /** The timeline: one axis for range bar, ruler, lanes and strips, and one playhead over them. */
-import { panned, secondsOf, stepAt, xOf, zoomed } from "../clock.js";
+import { bucketOf, panned, secondsOf, stepAt, xOf, zoomed } from "../clock.js";
 import { fill, h, idTag, write } from "../dom.js";
 import { hatch, prepare } from "../draw/canvas.js";
 import { drawLanes, drawRange, drawRuler } from "../draw/lanes.js";
 import { drawCardinality, drawErrors, drawParts, meanOf, scaleOf } from "../draw/strips.js";
-import { ordered, scoresOf, seenShare } from "../events.js";
+import { ordered, scoresOf } from "../events.js";
 import { faded, palette } from "../palette.js";
 import { shownDone } from "../playback.js";
 import { mountTransport } from "./transport.js";
@@ -63,6 +63,15 @@ export function mountTimeline(root, context) {
 		placeHead();
 	}
 
+	/** Another part is shown: of a long recording its values are fetched. */
+	function look() {
+		const whole = view.last - view.first >= frames - 1;
+		const { timeline } = store.get();
+		if (timeline && (timeline.stride > 1 || store.get().span)) store.set({ span: whole ? null : [view.first, view.last] });
+		draw();
+		placeHead();
+	}
+
 	function draw() {
 		if (asked) return;
 		asked = true;
@@ -90,33 +99,34 @@ export function mountTimeline(root, context) {
 		if (scores !== plots.of || name !== plots.by) {
 			const series = scores?.series;
 			const total = series?.[name] ?? [];
-			const reference = scores?.reference?.[name] ?? null;
+			const reference = scores?.reference ?? null;
+			const buckets = series ?? { first: 0, stride: 1 };
 			// The parts are of powers in GOSPA and of roots in OSPA: drawn are their shares of the whole.
 			const place = series ? series[`${name}_localisation`].map((part, k) => part / Math.max(1e-12, part + (name === "ospa" ? series.ospa_cardinality[k] : series.gospa_missed[k] + series.gospa_false[k]))) : [];
 			const courses = series?.track_errors ?? [];
-			const top = scaleOf([...total, ...(reference ?? [])]);
-			plots = { of: scores, by: name, total, reference, place, courses, top, mean: meanOf(courses, total.length), most: scaleOf(courses.flatMap((course) => course.values)) };
+			const top = scaleOf([...total, ...(reference?.[name] ?? [])]);
+			plots = { of: scores, by: name, total, reference, place, courses, buckets, top, mean: meanOf(courses, total.length, buckets), most: scaleOf(courses.flatMap((course) => course.values)) };
 		}
 		return plots;
 	}
-	/** @type {{of: Scores | null, by: string, total: number[], reference: number[] | null, place: number[], top: number, courses: ScoreSeries["track_errors"], mean: (number | null)[], most: number}} */
-	let plots = { of: null, by: "", total: [], reference: null, place: [], top: 1, courses: [], mean: [], most: 1 };
+	/** @type {Plots} */
+	let plots = { of: null, by: "ospa", total: [], reference: null, place: [], top: 1, buckets: { first: 0, stride: 1 }, courses: [], mean: [], most: 1 };
 
 	/** The values at the playhead, beside their plots. */
 	function writeScores() {
 		const { shown, selection, measure: name } = store.get();
-		const { of, total, reference, top, courses, mean, most } = plotted();
-		const at = Math.max(0, shown);
+		const { of, total, reference, top, buckets, courses, mean, most } = plotted();
+		const at = bucketOf(Math.max(0, shown), buckets);
 		const unit = of?.series.unit ?? "";
 		const text = (/** @type {number | null | undefined} */ number) => number?.toFixed(2) ?? "–";
-		write(value, reference ? `A ${text(reference[at])} · B ${text(total[at])} ${unit}` : `${text(total[at])} ${unit}`);
+		write(value, reference ? `A ${text(reference[name][at])} · B ${text(total[at])} ${unit}` : `${text(total[at])} ${unit}`);
 		write(range0, `0–${top}`);
 		write(measure, name.toUpperCase());
 		measure.dataset.tip = `${of?.series.cost ?? "not scored yet"}; press for ${name === "ospa" ? "GOSPA" : "OSPA"}`;
 		countSign.dataset.tip = name === "ospa" ? "number of people" : "missed and false people";
 		referenceSign.hidden = !reference;
 		const course = courses.find(({ track }) => track === selection);
-		write(error, `${text(course ? course.values[at - course.first] : mean[at])} ${unit}`);
+		write(error, `${text(course ? course.values[at - bucketOf(course.first, buckets)] : mean[at])} ${unit}`);
 		write(whose, `${course ? `track ${course.track}` : "mean"} in front · 0–${most} ${unit}`);
 	}
 
@@ -142,11 +152,11 @@ export function mountTimeline(root, context) {
 		drawLanes(g, block, view, { tracks: shownTracks(), scroll: lanes.scrollTop, laneHeight, done: timeline?.done ?? 0, fps, selection, hover: hover?.id ?? null, switches: scoresOf(store.get())?.series.switches ?? [] }, ink);
 		drawRange(g, over, view, { loaded: playback.loadedSteps(), done, frames }, ink);
 		drawRuler(g, ruler, view, { range }, ink);
-		drawCardinality(g, strip, view, { count: timeline?.count ?? [], truth: timeline?.truth ?? null }, ink);
+		if (timeline) drawCardinality(g, strip, view, timeline, ink);
 		if (!parts.hidden) {
-			const { total, place, top, reference, courses, mean, most } = plotted();
-			drawParts(g, { ...strip, y: strip.y + strip.height }, view, { total, place, top, reference }, ink);
-			if (errors.offsetHeight) drawErrors(g, { ...strip, y: strip.y + 2 * strip.height }, view, { courses, mean, selection, top: most }, ink);
+			const plots = plotted();
+			drawParts(g, { ...strip, y: strip.y + strip.height }, view, plots, ink);
+			if (errors.offsetHeight) drawErrors(g, { ...strip, y: strip.y + 2 * strip.height }, view, plots, selection, ink);
 		}
 		if (done < frames) {
 			const x = Math.max(0, xOf(done, view));
@@ -156,7 +166,7 @@ export function mountTimeline(root, context) {
 
 	/** The playhead moves by transform alone; nothing is drawn again while it plays. */
 	function placeHead() {
-		const { shown, step, server, result, timeline, playing } = store.get();
+		const { shown, step, server, result, basis, playing } = store.get();
 		const at = Math.max(0, shown);
 		const x = xOf(at, view);
 		head.hidden = frames < 1 || x < -1 || x > view.width + 1;
@@ -174,9 +184,9 @@ export function mountTimeline(root, context) {
 			const count = result?.computed ? `, ${result.tracks.length} people` : "";
 			seekBar.setAttribute("aria-valuetext", `step ${at} of ${frames}, ${secondsOf(at, fps)} s${count}`);
 		}
-		const estimate = timeline?.count[at];
-		const truth = timeline?.truth?.[at];
-		fill(people, estimate === undefined ? "–" : estimate, truth !== undefined && h("span", { class: "sub" }, ` of ${truth}`));
+		const current = result?.run === basis && result.computed ? result : null;
+		const truth = server?.sequence?.has_truth ? current?.truth.length : undefined;
+		fill(people, current?.tracks.length ?? "–", truth !== undefined && h("span", { class: "sub" }, ` of ${truth}`));
 		if (!parts.hidden) writeScores();
 	}
 
@@ -212,7 +222,7 @@ export function mountTimeline(root, context) {
 				labels.set(track.id, label);
 			}
 			label.element.setAttribute("aria-pressed", String(track.id === selection));
-			write(label.share, `${Math.round(seenShare(track) * 100)} %`);
+			write(label.share, `${Math.round(track.seen * 100)} %`);
 			if (lanes.children[index] !== label.element) lanes.insertBefore(label.element, lanes.children[index] ?? null);
 		});
 		const { run, server, laneOrder } = store.get();
@@ -250,15 +260,13 @@ export function mountTimeline(root, context) {
 				const pixels = event.deltaX || event.deltaY;
 				view = panned(view, (pixels / view.width) * (view.last - view.first), frames);
 			} else view = zoomed(view, Math.exp(event.deltaY * 0.0015), event.clientX - box.left, frames);
-			draw();
-			placeHead();
+			look();
 		},
 		{ passive: false },
 	);
 	plot.addEventListener("dblclick", () => {
 		view = { ...view, first: 0, last: Math.max(1, frames - 1) };
-		draw();
-		placeHead();
+		look();
 	});
 	seekBar.addEventListener("input", () => playback.seek(seekBar.valueAsNumber));
 	lanes.addEventListener("scroll", draw);
@@ -285,7 +293,7 @@ export function mountTimeline(root, context) {
 		placeHead();
 	});
 	store.on(["range", "loop", "hover", "theme"], draw);
-	store.on(["shown", "step"], placeHead);
+	store.on(["shown", "step", "result"], placeHead);
 	let waiting = false;
 	store.on(["loaded"], () => {
 		// Pictures arrive many times a second; the bar needs a few of them only.

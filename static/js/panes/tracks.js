@@ -1,7 +1,7 @@
 // @ts-check
 /** The table of tracks: sorted by any column, walked by keyboard, alive at the shown step. */
 import { fill, h, icon, idTag, tipOf, write } from "../dom.js";
-import { eventsNow, nextEvent, scoresOf, seenShare, stateAt } from "../events.js";
+import { eventsNow, nextEvent, scoresOf, stateAt } from "../events.js";
 
 /** Rows beyond this are counted, not drawn. */
 const MOST_ROWS = 300;
@@ -14,7 +14,7 @@ const COLUMNS = [
 	{ name: "born", word: "Born", number: true, give: "", value: (t) => t.first },
 	{ name: "died", word: "Died", number: true, give: "", value: (t, { done }) => (t.last < done - 1 ? t.last : Infinity) },
 	{ name: "length", word: "Length", number: true, give: "", value: (t) => t.last - t.first },
-	{ name: "seen", word: "Seen", number: true, give: "", value: seenShare },
+	{ name: "seen", word: "Seen", number: true, give: "", value: (t) => t.seen },
 	{ name: "existence", word: "Weight", number: true, give: "", value: (t) => t.id },
 	{ name: "position", word: "x, y, z  m", number: true, give: "opt-1", value: (t) => t.id },
 	{ name: "error", word: "Error  m", number: true, give: "truth", value: (t, { scored }) => scored.get(t.id)?.mean_error ?? Infinity },
@@ -114,7 +114,7 @@ export function mountTracks(root, { store, page, actions, playback }) {
 			if (!entry) rows.set(track.id, (entry = makeRow(track)));
 			const ended = track.last < done - 1;
 			const score = scored.get(track.id);
-			const texts = [null, null, track.first, ended ? track.last : "–", duration((track.last - track.first + 1) / fps), `${Math.round(seenShare(track) * 100)} %`, null, null, score?.mean_error?.toFixed(3) ?? "–", score?.switches ?? "–"];
+			const texts = [null, null, track.first, ended ? track.last : "–", duration((track.last - track.first + 1) / fps), `${Math.round(track.seen * 100)} %`, null, null, score?.mean_error?.toFixed(3) ?? "–", score?.switches ?? "–"];
 			texts.forEach((text, k) => text !== null && entry && write(entry.cells[k], String(text)));
 			if (body.children[index] !== entry.row) body.insertBefore(entry.row, body.children[index] ?? null);
 		});
@@ -153,14 +153,14 @@ export function mountTracks(root, { store, page, actions, playback }) {
 			entry.row.classList.toggle("gone", !alive);
 			entry.row.setAttribute("aria-selected", String(track.id === selection));
 		}
-		const count = timeline?.count[step];
-		const hidden = (timeline?.tracks.length ?? 0) - rows.size;
-		const truth = timeline?.truth?.[step];
+		const count = current?.computed ? current.tracks.length : undefined;
+		const hidden = (timeline?.tracks.length ?? 0) - rows.size + (timeline?.left_out ?? 0);
+		const truth = server?.sequence?.has_truth ? current?.truth.length : undefined;
 		write(
 			summary,
 			count === undefined
 				? server?.sequence ? "not computed at this step" : ""
-				: `${count}${truth === undefined || truth === null ? "" : ` of ${truth}`} people at step ${step}${hidden > 0 ? ` · ${hidden} more tracks` : ""}`,
+				: `${count}${truth === undefined ? "" : ` of ${truth}`} people at step ${step}${hidden > 0 ? ` · ${hidden} more tracks` : ""}`,
 		);
 		const event = nextEvent(eventsNow(store.get()), step, 1);
 		fill(upcoming, event ? ["next: ", h("b", {}, `${event.kind} of ${event.id}, step ${event.step}`)] : "no later event");
