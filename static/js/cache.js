@@ -7,7 +7,7 @@
  * aborted; what arrives is kept under its own name, so a late answer can never pass for another.
  * @template V
  * @param {CacheHow<V>} how
- * @returns {Cache<V>}
+ * @returns {Kept<V>}
  */
 export function createCache({ load, sizeOf, budget, parallel = 4, arrived, dispose = () => {}, failed }) {
 	/** In the order of their last use, oldest first.  @type {Map<string, V>} */

@@ -284,7 +284,7 @@
 
 /**
  * @template V
- * @typedef {object} Cache
+ * @typedef {object} Kept  things that belong to a step
  * @property {(names: string[]) => void} want
  * @property {(name: string) => V | undefined} get
  * @property {(name: string, value: V) => void} put
