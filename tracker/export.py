@@ -173,16 +173,7 @@ def read_tracks_csv(path: Path | str) -> TrackFile:
     )
     frames = columns.whole("frame", 0, None, "the step")
     ids = columns.whole("id", 0, None, "the track")
-    order = np.lexsort([ids, frames])
-    same = (np.diff(frames[order]) == 0) & (np.diff(ids[order]) == 0)
-    if same.any():
-        first, second = order[np.argmax(same)], order[np.argmax(same) + 1]
-        raise columns.error(
-            int(columns.lines[second]),
-            "id",
-            f"track {ids[second]} is at step {frames[second]} already in line "
-            f"{columns.lines[first]}; expected one row a track a step",
-        )
+    order = columns.one_row_each(frames, ids, "track")
     return TrackFile(
         frames=frames[order],
         times=columns.values["time"][order],

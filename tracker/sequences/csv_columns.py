@@ -63,6 +63,28 @@ class Columns:
                 f"expected {expected}, found {float(self.values[name][row]):.12g}",
             )
 
+    def one_row_each(
+        self, frames: Int[ndarray, " N"], ids: Int[ndarray, " N"], what: str
+    ) -> Int[ndarray, " N"]:
+        """The order of the rows by step and id, after a check that no id is twice at a step.
+
+        Args:
+            frames: The step of each row.
+            ids: The id of each row, in the column ``id``.
+            what: What has an id, for the message: ``track`` or ``person``.
+        """
+        order = np.lexsort([ids, frames])
+        same = (np.diff(frames[order]) == 0) & (np.diff(ids[order]) == 0)
+        if same.any():
+            first, second = order[np.argmax(same)], order[np.argmax(same) + 1]
+            raise self.error(
+                int(self.lines[second]),
+                "id",
+                f"{what} {ids[second]} is at step {frames[second]} already in line "
+                f"{self.lines[first]}; expected one row a {what} a step",
+            )
+        return order
+
     def error(self, line: int, name: str, message: str) -> SequenceError:
         """An error about one cell."""
         return SequenceError(f'{self.where}, line {line}, column "{name}": {message}')

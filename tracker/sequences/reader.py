@@ -314,16 +314,7 @@ def _ground_truth(fields: Fields, reading: _Reading) -> GroundTruth | None:
     frames = columns.whole("frame", 0, reading.frames - 1, "the step")
     ids = columns.whole("id", 0, None, "the person")
     valid = columns.whole("valid", 0, 1, "1 certain, 0 not")
-    order = np.lexsort([ids, frames])
-    same = (np.diff(frames[order]) == 0) & (np.diff(ids[order]) == 0)
-    if same.any():
-        first, second = order[np.argmax(same)], order[np.argmax(same) + 1]
-        raise columns.error(
-            int(columns.lines[second]),
-            "id",
-            f"person {ids[second]} is at step {frames[second]} already in line "
-            f"{columns.lines[first]}; expected one row a person a step",
-        )
+    order = columns.one_row_each(frames, ids, "person")
     positions = columns.stacked("x", "y", "z")
     return GroundTruth(frames[order], ids[order], positions[order], valid[order] == 1)
 
