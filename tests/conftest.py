@@ -21,6 +21,22 @@ settings.register_profile(
 )
 settings.load_profile("repeatable")
 
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """``--long``: also what takes long; each such test has a short form that always runs."""
+    parser.addoption("--long", action="store_true", help="also run the tests marked long")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave the long tests out unless they were asked for, by ``--long`` or ``-m long``."""
+    if config.getoption("--long") or "long" in config.getoption("-m"):
+        return
+    long = [item for item in items if item.get_closest_marker("long")]
+    if long:
+        config.hook.pytest_deselected(items=long)
+        items[:] = [item for item in items if item not in long]
+
+
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 

@@ -25,6 +25,7 @@ def test_all_methods_get_the_same_boxes() -> None:
     assert compared["sequential_phd as published"].fusion.misses == "per_camera"
 
 
+@pytest.mark.long
 @pytest.mark.data
 def test_it_finds_what_it_claims(data_folder: Path) -> None:
     result = EXPERIMENTS["cmc"].run(Context(data=data_folder))

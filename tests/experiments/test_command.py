@@ -98,7 +98,6 @@ def test_wrong_usage(
     assert err.count("\n") == 1
 
 
-@pytest.mark.long
 def test_all_in_short_show_the_direction_of_each_claim(tmp_path: Path) -> None:
     data = ["--data", str(DATA)] if DATA.is_dir() else []
     done = subprocess.run(
