@@ -271,6 +271,8 @@ class CameraStep(Model):
     events: list[CameraEvent] = Field(default_factory=list)
     gates: list[Gate] = Field(default_factory=list)
     """Where the method expects its targets, in pixels."""
+    foreground: str | None = None
+    """``?run=`` of the foreground's address; null where the method has none."""
     tracks: list[CameraTrack]
     truth: list[CameraTruth]
     information: dict[str, float]

@@ -173,6 +173,8 @@ def _add_views(message: models.Step, run: Run, step: int, with_samples: bool) ->
             models.CameraEvent(kind=event.kind, labels=list(event.labels)) for event in view.events
         ]
         camera.gates = [(x, y, xx, xy, yy) for x, y, xx, xy, yy in view.gates.round(2).tolist()]
+        if view.foreground is not None:
+            camera.foreground = run.keys["single_view"]
         if with_samples:
             points = np.column_stack([view.samples[:, :2], view.sample_weights])
             camera.samples = [(x, y, w) for x, y, w in points.round(3).tolist()]

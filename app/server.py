@@ -18,7 +18,7 @@ from fastapi.staticfiles import StaticFiles
 from fastapi_offline import FastAPIOffline
 from starlette.types import Scope
 
-from app import api, errors, gateway, stream
+from app import api, errors, foreground, gateway, stream
 from app.errors import sentence
 from app.evaluation import routes as evaluation
 from app.evaluation.worker import Evaluator
@@ -75,6 +75,7 @@ def create_app(settings: Settings) -> FastAPI:
     )
     errors.install(app)
     app.include_router(api.router)
+    app.include_router(foreground.router)
     app.include_router(evaluation.router)
     app.include_router(stream.router)
     app.include_router(gateway.router)

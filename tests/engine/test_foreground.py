@@ -7,39 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
 from numpy import ndarray
 
+from tests.engine.rooms import SKIN, clip, empty_room, person_mask, photograph, with_person
 from tracker import foreground, image_kernels
-from tracker.foreground import BackgroundModel, tone_curve
-
-
-def empty_room(height: int = 96, width: int = 128) -> ndarray:
-    """Walls from dark to light with a few pieces of furniture."""
-    rng = np.random.default_rng(0)
-    ramp = np.linspace(40, 210, width)[None, :, None] * np.array([0.9, 1.0, 1.05])
-    room = np.broadcast_to(ramp, (height, width, 3)).copy()
-    for _ in range(12):
-        x, y = rng.integers(0, width - 30), rng.integers(0, height - 30)
-        room[y : y + 25, x : x + 20] = rng.uniform(20, 230, 3)
-    return cv2.GaussianBlur(room, (0, 0), 1.0)
-
-
-def photograph(room: ndarray, gain: float = 1.0, noise: float = 1.5, seed: int = 0) -> ndarray:
-    """The room as a camera with noise and its own exposure shows it."""
-    seen = room * gain + np.random.default_rng(seed).normal(0.0, noise, room.shape)
-    return np.clip(np.rint(seen), 0, 255).astype(np.uint8)
-
-
-def with_person(room: ndarray, x: int, y: int = 30) -> ndarray:
-    peopled = room.copy()
-    cv2.ellipse(peopled, (x, y), (9, 14), 0, 0, 360, (30.0, 60.0, 170.0), -1)
-    return peopled
-
-
-def clip(gains: ndarray) -> list[ndarray]:
-    """Somebody walks through the picture; no picture is empty."""
-    room = empty_room()
-    return [photograph(with_person(room, 10 + 4 * k), gain, seed=k) for k, gain in enumerate(gains)]
+from tracker.foreground import BackgroundModel, LearntForeground, tone_curve
 
 
 def learnt(gains: ndarray) -> BackgroundModel:
@@ -59,8 +32,8 @@ def test_a_person_is_foreground_at_any_exposure_and_the_room_is_not(gain: float)
     model = learnt(1.0 + 0.15 * np.sin(np.arange(25)))
     picture = photograph(with_person(empty_room(), 70), gain, seed=99)
     mask = model.foreground(picture, 24.0).astype(bool)
-    person = with_person(np.zeros_like(empty_room()), 70).any(axis=2)
-    differs = np.abs(empty_room() - np.array([30.0, 60.0, 170.0])).max(axis=2) > 40.0
+    person = person_mask(70)
+    differs = np.abs(empty_room() - np.array(SKIN)).max(axis=2) > 40.0
     assert mask[person & differs].mean() > 0.85
     assert mask[~cv2.dilate(person.astype(np.uint8), np.ones((5, 5))).astype(bool)].mean() < 0.01
 
@@ -136,3 +109,38 @@ def test_the_mask_agrees_with_numpy() -> None:
     disagreeing = mask != (differs & ~shadow)
     assert disagreeing.mean() < 0.005  # float32 roots of NumPy at the threshold itself
     assert shadow[differs].any()
+
+
+def test_the_learnt_model_has_the_face_of_all_models() -> None:
+    model = learnt(np.ones(9))
+    picture = photograph(with_person(empty_room(), 70), seed=99)
+    face = LearntForeground(model, 24.0)
+    state, found = face.step(face.start(), picture)
+    assert state is None
+    np.testing.assert_array_equal(found.mask, model.foreground(picture, 24.0))
+    np.testing.assert_array_equal(found.thresholds, 24.0)
+
+
+@given(
+    arrays.arrays(
+        np.uint8, st.tuples(st.integers(1, 40), st.integers(1, 40)), elements=st.integers(0, 1)
+    )
+)
+def test_a_packed_mask_comes_back(mask: ndarray) -> None:
+    packed = foreground.pack(mask)
+    assert packed.dtype == np.uint8
+    assert packed.ndim == 1
+    np.testing.assert_array_equal(foreground.unpack(packed), mask)
+
+
+def test_a_mask_of_people_is_packed_into_little() -> None:
+    mask = np.zeros((288, 360), dtype=np.uint8)
+    for x in (60, 150, 260):
+        cv2.ellipse(mask, (x, 150), (25, 90), 0, 0, 360, 1, -1)
+    assert foreground.pack(mask).nbytes < 1500
+
+
+@pytest.mark.parametrize("size", [0, 5, 8, 60])
+def test_what_is_no_packed_mask_is_refused(size: int) -> None:
+    with pytest.raises(ValueError, match=f"expected a packed mask, got {size} bytes"):
+        foreground.unpack(np.full(size, 7, dtype=np.uint8))

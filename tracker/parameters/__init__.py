@@ -20,6 +20,7 @@ from tracker.parameters.changing import (
 from tracker.parameters.colour_phd import ColourPhdParams
 from tracker.parameters.definition import Params, Stage
 from tracker.parameters.detections import DetectionBoxParams, DetectionPhdParams
+from tracker.parameters.foreground import ForegroundParams
 from tracker.parameters.fusion import FusionParams
 from tracker.parameters.run import FusionName, RunParameters, SingleViewName
 from tracker.parameters.table import GROUPS, METHODS, PARAMETERS, PRESETS, Parameter
@@ -32,6 +33,7 @@ __all__ = [
     "ColourPhdParams",
     "DetectionBoxParams",
     "DetectionPhdParams",
+    "ForegroundParams",
     "FusionName",
     "FusionParams",
     "Parameter",

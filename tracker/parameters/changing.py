@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from tracker.parameters.definition import Stage
-from tracker.parameters.run import RunParameters
+from tracker.parameters.run import FOREGROUND_METHODS, RunParameters
 from tracker.parameters.table import METHODS, PARAMETERS, Parameter
 
 
@@ -102,13 +102,15 @@ def changed(parameters: RunParameters, reference: RunParameters | None = None) -
 def stage_values(parameters: RunParameters, stage: Stage) -> dict[str, Any]:
     """What the result of one stage depends on by itself: its method and its parameters."""
     single_view = "detection_boxes" if parameters.single_view == "none" else parameters.single_view
-    group = {"single_view": single_view, "fusion": "fusion", "tracks": "fusion"}[stage]
+    groups: set[str] = {single_view} if stage == "single_view" else {"fusion"}
+    if stage == "single_view" and parameters.single_view in FOREGROUND_METHODS:
+        groups.add("foreground")
     values: dict[str, Any] = {}
     if stage == "single_view":
         values["single_view"] = parameters.single_view
     if stage == "fusion":
         values["fusion_method"] = parameters.fusion_method
     for key, parameter in PARAMETERS.items():
-        if parameter.group == group and parameter.stage == stage:
+        if parameter.group in groups and parameter.stage == stage:
             values[key] = value(parameters, key)
     return values

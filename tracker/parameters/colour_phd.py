@@ -47,11 +47,6 @@ class ColourPhdParams(Params):
     ] = 0.35
     """A peak with a smaller share of foreground in its box is not taken."""
 
-    foreground_threshold: Annotated[
-        float, Field(ge=2.0, le=128.0), ui("θ", unit="16 √level", step=1.0)
-    ] = 24.0
-    """A pixel that differs more than this from the background is foreground."""
-
     foreground_weight: Annotated[
         float, Field(ge=0.0, le=10.0), ui("a", step=0.1, published=0.0)
     ] = 3.0

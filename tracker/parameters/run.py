@@ -7,10 +7,15 @@ from typing import Literal
 from tracker.parameters.colour_phd import ColourPhdParams
 from tracker.parameters.definition import Params
 from tracker.parameters.detections import DetectionBoxParams, DetectionPhdParams
+from tracker.parameters.foreground import ForegroundParams
 from tracker.parameters.fusion import FusionParams
 
 SingleViewName = Literal["colour_phd", "detection_phd", "none"]
 FusionName = Literal["sequential_phd", "multi_bernoulli"]
+
+
+FOREGROUND_METHODS: frozenset[SingleViewName] = frozenset({"colour_phd"})
+"""The single-view methods that ask what in a picture is foreground."""
 
 
 class RunParameters(Params):
@@ -25,4 +30,5 @@ class RunParameters(Params):
     colour_phd: ColourPhdParams = ColourPhdParams()
     detection_boxes: DetectionBoxParams = DetectionBoxParams()
     detection_phd: DetectionPhdParams = DetectionPhdParams()
+    foreground: ForegroundParams = ForegroundParams()
     fusion: FusionParams = FusionParams()

@@ -26,7 +26,9 @@ def create(
         ValueError: If there is no such method, or the sequence lacks what it needs.
     """
     if name == "colour_phd":
-        return ColourPhd(sequence, camera_index, parameters.colour_phd, reader)
+        return ColourPhd(
+            sequence, camera_index, parameters.colour_phd, parameters.foreground, reader
+        )
     if name == "detection_phd":
         return DetectionPhd(sequence, camera_index, parameters.detection_phd)
     if name == "none":

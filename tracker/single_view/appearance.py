@@ -6,21 +6,20 @@ Boxes are ``centre_x, centre_y, half_width, half_height`` in pixels.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
 from numpy import ndarray
 
-from tracker import colour, foreground
+from tracker import colour
 from tracker.colour import ColourSpaceName, KernelName
-from tracker.foreground import BackgroundModel
+from tracker.foreground import ForegroundModel, box_shares, integral, learn
+from tracker.parameters import ForegroundParams
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.templates import read_templates
-
-BACKGROUND_PICTURES = 32
-"""Pictures spread over the clip that the background is learnt from."""
 
 SIZE_JITTER = 0.1
 """Relative spread around the size that the target has at a place of the room: people differ."""
@@ -54,9 +53,10 @@ class Scene:
 
 
 class Appearance:
-    """The templates' colours, the learnt background and the sizes that a target can have.
+    """The templates' colours, the foreground model and the sizes that a target can have.
 
-    Made once per camera and run; nothing of it changes from step to step.
+    Made once per camera and run. What changes from step to step is the foreground
+    model's state, which the method carries.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class Appearance:
         *,
         colour_space: ColourSpaceName,
         histogram_kernel: KernelName,
-        with_foreground: bool,
+        foreground: ForegroundParams | None,
     ) -> None:
         """Read the templates and learn the background.
 
@@ -77,7 +77,7 @@ class Appearance:
             reader: Of the pictures.
             colour_space: The histograms' bins.
             histogram_kernel: How the pixels of a box count.
-            with_foreground: Whether the background is learnt.
+            foreground: Numbers of the foreground model; None where none is needed.
 
         Raises:
             ValueError: If there are no pictures or templates, or a template cannot be read.
@@ -91,20 +91,26 @@ class Appearance:
         self.model = read_templates(sequence, colour_space, histogram_kernel, reader)
         self.sizes = BoxSizes.of(view.camera, sequence.room, sequence.target_half_extents)
         self._image_size = view.camera.image_size
-        self._background: BackgroundModel | None = None
-        if with_foreground:
-            count = min(BACKGROUND_PICTURES, sequence.frames)
-            steps = np.linspace(0, sequence.frames - 1, count).astype(int)
-            pictures = (reader.picture(camera_index, int(step)) for step in steps)
-            self._background = BackgroundModel.learn(p for p in pictures if p is not None)
+        self._foreground: ForegroundModel | None = None
+        if foreground is not None:
+            self._foreground = learn(sequence, camera_index, reader, foreground)
 
-    def look(self, picture: UInt8[ndarray, "h w 3"], foreground_threshold: float) -> Scene:
-        """Prepare a picture."""
+    def start(self) -> Any:
+        """The state of the foreground model before the first picture."""
+        return None if self._foreground is None else self._foreground.start()
+
+    def look(self, state: Any, picture: UInt8[ndarray, "h w 3"]) -> tuple[Any, Scene]:
+        """Prepare a picture.
+
+        Args:
+            state: Of the foreground model, from :meth:`start` or the picture before.
+            picture: BGR.
+        """
         bins = colour.bin_map(picture, self.model.space)
-        if self._background is None:
-            return Scene(bins, None, None)
-        mask = self._background.foreground(picture, foreground_threshold)
-        return Scene(bins, mask, foreground.integral(mask))
+        if self._foreground is None:
+            return state, Scene(bins, None, None)
+        state, found = self._foreground.step(state, picture)
+        return state, Scene(bins, found.mask, integral(found.mask))
 
     def distances(self, scene: Scene, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N G"]:
         """Bhattacharyya distance D of each box to each person's nearest template."""
@@ -134,7 +140,7 @@ class Appearance:
             return np.zeros(len(boxes)), np.ones(len(boxes))
         middles, half_sizes = boxes[:, [0, 1, 0, 1]], boxes[:, [2, 3, 2, 3]]
         inside, above, left, right = (
-            foreground.box_shares(scene.sums, middles + part * half_sizes) for part in _PARTS
+            box_shares(scene.sums, middles + part * half_sizes) for part in _PARTS
         )
         around = above + (left + right) / 2.0
         return inside_weight * np.log(inside + 0.02) - around_weight * around, inside

@@ -9,6 +9,7 @@ filters", IEEE TAES 48(2), 2012.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -16,8 +17,9 @@ from numpy import ndarray
 from scipy.stats import chi2
 
 from tracker import gaussian_mixture, mean_shift, models, phd
+from tracker.foreground import pack
 from tracker.gaussian_mixture import GaussianMixture
-from tracker.parameters import ColourPhdParams
+from tracker.parameters import ColourPhdParams, ForegroundParams
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.appearance import Appearance, Scene
@@ -42,6 +44,8 @@ class ColourPhdState:
     unexplained: Float[ndarray, "B 4"]
     """Peaks that no component explained: where somebody may have appeared."""
     next_label: int
+    foreground: Any
+    """Of the foreground model."""
 
 
 class ColourPhd:
@@ -67,6 +71,7 @@ class ColourPhd:
         sequence: Sequence,
         camera_index: int,
         parameters: ColourPhdParams,
+        foreground: ForegroundParams,
         reader: FrameReader,
     ) -> None:
         """Read the templates and learn the background.
@@ -81,7 +86,7 @@ class ColourPhd:
             reader,
             colour_space=parameters.colour_space,
             histogram_kernel=parameters.histogram_kernel,
-            with_foreground=self._needs_foreground,
+            foreground=foreground if self._needs_foreground else None,
         )
         self._step_time = sequence.step_time
         camera = sequence.cameras[camera_index]
@@ -115,7 +120,9 @@ class ColourPhd:
 
     def start(self) -> ColourPhdState:
         """Nobody is in the picture."""
-        return ColourPhdState(GaussianMixture.empty(4), np.zeros((0, 4)), next_label=1)
+        return ColourPhdState(
+            GaussianMixture.empty(4), np.zeros((0, 4)), 1, self._appearance.start()
+        )
 
     def step(
         self,
@@ -131,9 +138,10 @@ class ColourPhd:
         next_label = state.next_label + births.size
         if picture is None:
             mixture = self._reduce(predicted)
-            return ColourPhdState(mixture, np.zeros((0, 4)), next_label), self._result(mixture)
+            after = ColourPhdState(mixture, np.zeros((0, 4)), next_label, state.foreground)
+            return after, self._result(mixture)
 
-        scene = self._appearance.look(picture, p.foreground_threshold)
+        background, scene = self._appearance.look(state.foreground, picture)
         samples = self._sample(predicted, scene, rng)
         scores, _, _ = self._score(scene, samples)
         candidates = self._climb(samples, scores)
@@ -156,6 +164,7 @@ class ColourPhd:
             mixture,
             peaks=peaks,
             peak_scores=np.exp(-0.5 * (distances / p.likelihood_sigma) ** 2),
+            mask=scene.mask,
             samples=samples,
             sample_weights=np.exp(scores.max(axis=1) - scores.max()) if len(scores) else None,
             information={
@@ -165,7 +174,7 @@ class ColourPhd:
                 "cardinality": mixture.cardinality,
             },
         )
-        return ColourPhdState(mixture, unexplained, next_label), result
+        return ColourPhdState(mixture, unexplained, next_label, background), result
 
     def _births(self, unexplained: Float[ndarray, "B 4"]) -> GaussianMixture:
         p = self._parameters
@@ -284,6 +293,7 @@ class ColourPhd:
         *,
         peaks: Float[ndarray, "M 4"] | None = None,
         peak_scores: Float[ndarray, " M"] | None = None,
+        mask: UInt8[ndarray, "h w"] | None = None,
         samples: Float[ndarray, "S 4"] | None = None,
         sample_weights: Float[ndarray, " S"] | None = None,
         information: dict[str, float] | None = None,
@@ -316,4 +326,5 @@ class ColourPhd:
                 else sample_weights.astype(np.float32)
             ),
             information=information or {},
+            foreground=None if mask is None else pack(mask),
         )

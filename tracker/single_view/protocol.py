@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
 EventKind = Literal["new", "vanished", "returned", "occluded", "merged", "split"]
@@ -55,6 +55,9 @@ class ViewResult:
     gates: Float[ndarray, "G 5"] = field(default_factory=lambda: np.zeros((0, 5)))
     """Ellipses around where the method expects its targets: centre x and y in pixels, and
     xx, xy, yy of the matrix C with (z − c)ᵀ C⁻¹ (z − c) = 1 on the border, pixels squared."""
+    foreground: UInt8[ndarray, " bytes"] | None = None
+    """What of the picture the method took for foreground, as ``tracker.foreground.pack`` makes
+    it; None where it asked for none or there was no picture."""
 
     @staticmethod
     def of_boxes(

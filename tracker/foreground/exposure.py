@@ -1,4 +1,4 @@
-"""What in a picture is not the background: a model learnt from the clip itself.
+"""A background learnt once from the clip, brought to each picture's exposure; shadows left out.
 
 The background is the median of pictures spread over the clip, so no empty picture
 is needed; whoever stands in one place for more than half of the clip becomes part
@@ -14,11 +14,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import UInt8
 from numpy import ndarray
 from scipy.optimize import isotonic_regression
 
 from tracker import image_kernels
+from tracker.foreground.segmentation import Segmentation
 
 LEVELS = 16
 """Levels of the source at which a tone curve is measured."""
@@ -56,14 +57,14 @@ class BackgroundModel:
         if not stack:
             return None
         # the first median is blurred by the exposures, but good enough to align them by
-        reference = _median(stack)
+        reference = median(stack)
         aligned = [cv2.LUT(picture, _inverse(tone_curve(reference, picture))) for picture in stack]
-        reference = _median(aligned)
+        reference = median(aligned)
         roots = cv2.LUT(reference, _ROOTS)
         deviations = [
             cv2.absdiff(cv2.LUT(picture, _ROOTS), roots).max(axis=2) for picture in aligned
         ]
-        return BackgroundModel(reference, _median(deviations))
+        return BackgroundModel(reference, median(deviations))
 
     def at_exposure_of(self, picture: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w 3"]:
         """The background as it would look in a picture taken with this exposure."""
@@ -145,23 +146,31 @@ def _inverse(curve: UInt8[ndarray, "1 256 3"]) -> UInt8[ndarray, "1 256 3"]:
     return inverse
 
 
-def integral(mask: UInt8[ndarray, "h w"]) -> Int[ndarray, "h1 w1"]:
-    """Sums above and to the left of each corner, for :func:`box_shares`."""
-    sums: ndarray = cv2.integral(mask)
-    return sums
-
-
-def box_shares(sums: Int[ndarray, "h1 w1"], edges: Float[ndarray, "N 4"]) -> Float[ndarray, " N"]:
-    """The share of foreground in rectangles given by left, top, right, bottom.
-
-    Of a rectangle partly outside the picture only what is inside counts; wholly
-    outside the share is 0.
-    """
-    shares: ndarray = image_kernels.box_means(sums, np.ascontiguousarray(edges, dtype=float))
-    return shares
-
-
-def _median(pictures: list[ndarray]) -> UInt8[ndarray, "h w *c"]:
+def median(pictures: list[ndarray]) -> UInt8[ndarray, "h w *c"]:
+    """Each value's median over pictures of one size; of an even number the upper one."""
     middle = len(pictures) // 2
     result: ndarray = np.partition(np.stack(pictures), middle, axis=0)[middle]
     return result
+
+
+class LearntForeground:
+    """A :class:`BackgroundModel` that stays as it was learnt, and one threshold."""
+
+    def __init__(self, background: BackgroundModel, threshold: float) -> None:
+        """Take the background.
+
+        Args:
+            background: As learnt.
+            threshold: As :meth:`BackgroundModel.foreground` takes it.
+        """
+        self._background = background
+        self._threshold = threshold
+
+    def start(self) -> None:
+        """Nothing changes from picture to picture."""
+        return None
+
+    def step(self, state: None, picture: UInt8[ndarray, "h w 3"]) -> tuple[None, Segmentation]:
+        """The foreground of a picture."""
+        mask = self._background.foreground(picture, self._threshold)
+        return None, Segmentation(mask, np.full(3, self._threshold))

@@ -1,0 +1,192 @@
+"""Foreground by thresholds that each picture sets itself, over a background that follows the light.
+
+[CMQ07] Chang, Ma, Qiao, "Human oriented multi-target tracking algorithm in video
+sequence", Control and Decision 22(4), 2007.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Float, Int, UInt8, UInt16
+from numpy import ndarray
+
+from tracker.foreground import kernels
+from tracker.foreground.exposure import (
+    DARKEST_SHADOW,
+    SHADOW_TINT,
+    BackgroundModel,
+    median,
+    tone_curve,
+)
+from tracker.foreground.segmentation import Segmentation
+from tracker.parameters.foreground import ForegroundParams
+
+ITERATIONS = 20
+"""Of the c-means at most; most come to rest after five to eight."""
+
+CLOSING = np.ones((3, 3), dtype=np.uint8)
+AROUND_FOREGROUND = np.ones((5, 5), dtype=np.uint8)
+"""What is this near to the foreground does not change the background."""
+
+BLINDING = 0.6
+"""A picture of which more than this share differs shows another scene or another light."""
+
+BLANK = 4.0
+"""A picture whose grey levels deviate by less than this shows nothing."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AdaptiveState:
+    """The background of one camera, and how long each pixel has shown it."""
+
+    background: UInt16[ndarray, "h w 3"]
+    """256 times the level, BGR: a tenth of a grey level counts."""
+    still: UInt8[ndarray, "h w"]
+    """For how many pictures each pixel has been away from the foreground, 255 at most."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Iterations:
+    """What the c-means went through, and where it stopped."""
+
+    thresholds: Float[ndarray, "K 3"]
+    """Of each iteration, grey levels in B, G, R."""
+    counts: Int[ndarray, " K"]
+    """n(k): foreground pixels of each."""
+    chosen: int
+    """k*."""
+
+
+def choose_iteration(counts: Int[ndarray, " K"]) -> int:
+    """k* = argmin (n(k) - n(k - 1)) over the k with n(k) > n(k - 1), [CMQ07].
+
+    Where the foreground grows least it has reached its border: before, parts of people
+    are missing, after, noise comes in. Where it never grows, the iteration's end.
+    """
+    growth = np.diff(counts)
+    growing = np.flatnonzero(growth > 0)
+    return int(growing[growth[growing].argmin()]) + 1 if len(growing) else len(counts) - 1
+
+
+def cluster(difference: UInt8[ndarray, "h w 3"], parameters: ForegroundParams) -> Iterations:
+    """The modified c-means of [CMQ07] on the difference of a picture and its background.
+
+    The distances to the classes' centres m_b and m_f are taken in units of the classes'
+    deviations, whose ratio r is given: |d - m_b| / r against |d - m_f|. Differences
+    beyond the foreground's centre are foreground, and below the background's background.
+
+    Args:
+        difference: |I - M|.
+        parameters: Start centres, ratio r, least threshold, least number of pixels.
+    """
+    thresholds, counts = kernels.two_classes(
+        difference,
+        parameters.background_centre,
+        parameters.foreground_centre,
+        parameters.deviation_ratio,
+        parameters.least_threshold,
+        parameters.minimum_area,
+        ITERATIONS,
+    )
+    return Iterations(thresholds, counts, choose_iteration(counts))
+
+
+class AdaptiveForeground:
+    """The segmentation of [CMQ07] in one camera.
+
+    The difference D = |I - M| of each channel falls into two classes by a c-means
+    iteration (:func:`cluster`); a pixel is background only where all three channels
+    are. Small pieces are dropped and gaps closed (3×3). The background follows,
+    M ← M + α (I - M), where a pixel lies away from the foreground (5×5), differs by
+    less than Th and has been background for w pictures.
+
+    Beyond the paper, and switched off by the preset ``published``: the background is
+    brought to each picture's exposure first, and a shadow's difference is no difference.
+    """
+
+    def __init__(
+        self, pictures: Iterable[UInt8[ndarray, "h w 3"]], parameters: ForegroundParams
+    ) -> None:
+        """Learn the first background: the median of pictures spread over the clip.
+
+        Args:
+            pictures: BGR, of one size, at least one.
+            parameters: The numbers.
+
+        Raises:
+            ValueError: If there is no picture.
+        """
+        stack = list(pictures)
+        if not stack:
+            raise ValueError("a background needs at least one picture, got none")
+        first = median(stack)
+        if parameters.follow_exposure:
+            learnt = BackgroundModel.learn(stack)
+            assert learnt is not None
+            first = learnt.picture
+        self._first = first
+        self._parameters = parameters
+
+    def start(self) -> AdaptiveState:
+        """The median, which counts as seen for long enough."""
+        still = np.full(self._first.shape[:2], 255, dtype=np.uint8)
+        return AdaptiveState(self._first.astype(np.uint16) * 256, still)
+
+    def step(
+        self, state: AdaptiveState, picture: UInt8[ndarray, "h w 3"]
+    ) -> tuple[AdaptiveState, Segmentation]:
+        """Segment one picture and let the background follow it.
+
+        A picture that shows nothing, or nothing of the scene, has no foreground and
+        leaves the background as it is.
+        """
+        p = self._parameters
+        shown = cv2.convertScaleAbs(state.background, alpha=1.0 / 256.0)
+        if p.follow_exposure:
+            shown = cv2.LUT(shown, tone_curve(shown, picture))
+        difference = cv2.absdiff(picture, shown)
+        if p.drop_shadows:
+            kernels.clear_shadows(
+                difference, picture, shown, DARKEST_SHADOW, SHADOW_TINT, p.least_threshold
+            )
+        found = cluster(difference, p)
+        thresholds = found.thresholds[found.chosen]
+        share = found.counts[found.chosen] / (picture.shape[0] * picture.shape[1])
+        if share > BLINDING or cv2.meanStdDev(picture)[1].max() < BLANK:
+            nothing = np.zeros(picture.shape[:2], dtype=np.uint8)
+            return state, Segmentation(nothing, thresholds)
+        mask = clean(kernels.above(difference, thresholds), p.minimum_area)
+        background, still = kernels.update_background(
+            state.background,
+            state.still,
+            picture,
+            shown,
+            cv2.dilate(mask, AROUND_FOREGROUND),
+            p.update_limit,
+            p.update_frames,
+            p.update_rate,
+        )
+        return AdaptiveState(background, still), Segmentation(mask, thresholds)
+
+
+def clean(mask: UInt8[ndarray, "h w"], minimum_area: int) -> UInt8[ndarray, "h w"]:
+    """Drop pieces of fewer pixels, then close gaps and cracks (3×3)."""
+    left, top, width, height = cv2.boundingRect(mask)
+    cleaned = np.zeros_like(mask)
+    if width == 0:
+        return cleaned
+    # most of a picture is empty; the closing needs a pixel more on every side
+    rows, columns = (
+        slice(max(0, top - 1), top + height + 1),
+        slice(max(0, left - 1), left + width + 1),
+    )
+    part = mask[rows, columns]
+    _, labels, statistics, _ = cv2.connectedComponentsWithStats(part, connectivity=8)
+    kept = (statistics[:, cv2.CC_STAT_AREA] >= minimum_area).astype(np.uint8)
+    kept[0] = 0
+    cleaned[rows, columns] = cv2.morphologyEx(kept[labels], cv2.MORPH_CLOSE, CLOSING)
+    return cleaned
