@@ -7,10 +7,15 @@ import json
 import sys
 from pathlib import Path
 
-from tests.benchmarks import kernels, pipeline, server
+from tests.benchmarks import jpda, kernels, pipeline, server
 from tests.benchmarks.measure import Measurement, machine
 
-SUITES = {"kernels": kernels.run, "pipeline": pipeline.run, "server": server.run}
+SUITES = {
+    "kernels": kernels.run,
+    "jpda": jpda.run,
+    "pipeline": pipeline.run,
+    "server": server.run,
+}
 
 
 def main() -> int:
