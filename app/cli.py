@@ -118,7 +118,9 @@ def _serve(command: Serve) -> int:
             threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
 
     app = server.create_app(
-        server.Settings(host=command.host, sequence=command.sequence, data=command.data)
+        server.Settings(
+            host=command.host, sequence=command.sequence, data=command.data, keep_on_disk=True
+        )
     )
     try:
         server.serve(app, listener, ready)
@@ -172,25 +174,34 @@ def _track(command: Track) -> None:
 
     from tracker import export, pipeline
     from tracker.sequences import library
+    from tracker.stage_cache import StageCache
 
     with Bar("rendering", "frame") as rendering:
         sequence = library.open_sequence(command.sequence, progress=rendering.at)
     parameters = table.with_values(pipeline.default_parameters(sequence), changes)
     begin = time.perf_counter()
+    stages: set[table.Stage] = set()
+
+    def told(_: pipeline.Run, progress: pipeline.Progress) -> None:
+        stages.add(progress.stage)
+        tracking.at(progress.done, progress.total)
+
     with Bar("tracking", "step") as tracking:
         tracking.at(0, sequence.frames)
         run = pipeline.compute(
             sequence,
             parameters,
             seed=command.seed,
-            on_progress=lambda _, progress: tracking.at(progress.done, progress.total),
+            cache=StageCache.on_disk() if command.cache else None,
+            on_progress=told,
         )
     seconds = time.perf_counter() - begin
     export.save_tracks_csv(output, sequence, run.tracks, parameters, command.seed)
     targets = len(set(run.tracks.ids.tolist()))
+    kept = "" if "single_view" in stages else "; stage 1 was kept from an earlier run"
     say(
         f"{sequence.frames} steps, {targets} tracks, {sequence.frames / seconds:.0f} steps/s "
-        f"({sequence.frames / seconds / sequence.fps:.1f} × real time), written to {output}"
+        f"({sequence.frames / seconds / sequence.fps:.1f} × real time{kept}), written to {output}"
     )
 
 

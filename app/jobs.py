@@ -23,6 +23,7 @@ from tracker import pipeline
 from tracker.pipeline import Cancelled, Progress, Run
 from tracker.sequences import library
 from tracker.sequences.frames import FrameReader
+from tracker.stage_cache import StageCache
 
 logger = logging.getLogger("app")
 
@@ -34,9 +35,6 @@ OPENING_TELLS_SECONDS = 0.1
 
 CLOSING_SECONDS = 1.0
 """How long what is under way may take to notice that it is to end."""
-
-KEPT_RUNS = 3
-"""Earlier runs, each with another stage 1, whose columns may be taken up again."""
 
 SWITCH_SECONDS = 0.001
 """A thread that computes gives the interpreter back this soon; Python's own 5 ms add up
@@ -63,14 +61,29 @@ def locate(name: str, data: Path | None) -> str:
 class Jobs:
     """Opens sequences and computes runs in threads of its own; reports to the workbench."""
 
-    def __init__(self, workbench: Workbench, *, data: Path | None = None, seed: int = 0) -> None:
+    def __init__(
+        self,
+        workbench: Workbench,
+        *,
+        data: Path | None = None,
+        seed: int = 0,
+        cache: StageCache | None = None,
+    ) -> None:
+        """Begin to follow the workbench.
+
+        Args:
+            workbench: Whom to serve.
+            data: Its folders are sequences by name.
+            seed: Of all runs.
+            cache: Where columns of runs are kept; in memory only, if none is given.
+        """
         self._workbench = workbench
         self._data = data
         self._seed = seed
         self._condition = threading.Condition()
         self._wanted: _Wanted | None = None
         self._under_way: _Wanted | None = None
-        self._kept: list[Run] = []
+        self._cache = cache or StageCache()
         self._opening: threading.Event | None = None
         self._openings: list[threading.Thread] = []
         self._closed = False
@@ -221,11 +234,8 @@ class Jobs:
         snapshot, workbench = wanted.snapshot, self._workbench
         sequence = snapshot.sequence
         assert sequence is not None
-        newest: Run | None = None
 
         def on_progress(run: Run, progress: Progress) -> None:
-            nonlocal newest
-            newest = run
             if not wanted.cancelled.is_set():
                 workbench.run_progresses(run, progress)
 
@@ -235,7 +245,8 @@ class Jobs:
                 snapshot.parameters,
                 seed=self._seed,
                 reader=snapshot.reader,
-                previous=self._donor(snapshot),
+                cache=self._cache,
+                wanted=lambda: workbench.snapshot().playhead,
                 on_progress=on_progress,
                 cancelled=wanted.cancelled.is_set,
             )
@@ -248,35 +259,8 @@ class Jobs:
             words = sentence(error)
             workbench.run_ends(wanted.key, "failed", words)
             workbench.notify("error", f"The run failed: {words}", "The last good run is shown.")
-            newest = None  # its state may be what failed
         else:
             workbench.run_ends(wanted.key, "done")
-        if newest is not None:
-            self._keep(newest)
-
-    def _donor(self, snapshot: Snapshot) -> Run | None:
-        """The earlier run that saves the most of a new one."""
-        assert snapshot.sequence is not None
-        keys = pipeline.stage_keys(snapshot.sequence, snapshot.parameters, self._seed)
-
-        def saved(run: Run) -> tuple[int, int]:
-            return (
-                len(run.fused) if run.keys["fusion"] == keys["fusion"] else 0,
-                len(run.views) if run.keys["single_view"] == keys["single_view"] else 0,
-            )
-
-        return max(self._kept, key=saved, default=None)
-
-    def _keep(self, run: Run) -> None:
-        """Remember the longest run of each stage 1; forget those of other sequences."""
-        others = [r for r in self._kept if r.sequence is run.sequence]
-        same = [r for r in others if r.keys["single_view"] == run.keys["single_view"]]
-        longer = [r for r in same if len(r.views) > len(run.views)]
-        self._kept = [
-            run,
-            *longer[:1],
-            *(r for r in others if r not in same),
-        ][:KEPT_RUNS]
 
     def close(self) -> None:
         """Stop everything; what is under way ends after its step."""
@@ -296,6 +280,16 @@ class Jobs:
         reader = self._workbench.snapshot().reader
         if reader is not None:
             reader.close()
+
+
+def in_background(work: Callable[[], object]) -> None:
+    """Do something that nobody waits for, and that may be cut short by the program's end."""
+
+    def nicely() -> None:
+        be_nice()
+        work()
+
+    threading.Thread(target=nicely, name="stage-files", daemon=True).start()
 
 
 def be_nice() -> None:

@@ -23,7 +23,7 @@ from app.errors import sentence
 from app.evaluation import routes as evaluation
 from app.evaluation.worker import Evaluator
 from app.gateway import Gateway
-from app.jobs import Jobs
+from app.jobs import Jobs, in_background
 from app.paths import static_folder
 from app.pictures import Pictures
 from app.security import CONTENT_POLICY, Guard, allowed_hosts, is_loopback
@@ -31,6 +31,7 @@ from app.stream import Stream
 from app.timeline import Timelines
 from app.workbench import Workbench
 from tracker import __version__
+from tracker.stage_cache import StageCache
 
 if TYPE_CHECKING:
     import viser
@@ -55,6 +56,8 @@ class Settings:
     """Its folders are sequences that can be chosen."""
     seed: int = 0
     with_viser: bool = True
+    keep_on_disk: bool = False
+    """Whether what the cameras found is kept for the next start."""
 
 
 def create_app(settings: Settings) -> FastAPI:
@@ -104,7 +107,8 @@ class _PageFiles(StaticFiles):
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     settings: Settings = app.state.settings
     workbench = app.state.workbench = Workbench()
-    jobs = app.state.jobs = Jobs(workbench, data=settings.data, seed=settings.seed)
+    cache = StageCache.on_disk(in_background) if settings.keep_on_disk else StageCache()
+    jobs = app.state.jobs = Jobs(workbench, data=settings.data, seed=settings.seed, cache=cache)
     pictures = app.state.pictures = Pictures(workbench)
     app.state.timelines = Timelines()
     evaluator = app.state.evaluator = Evaluator(workbench)

@@ -71,6 +71,25 @@ def test_methods_and_presets(run: Runs, crossing: Path, tmp_path: Path) -> None:
     assert out.read_text(encoding="utf-8") == engine_csv(crossing, tmp_path / "own.csv", changes)
 
 
+def test_stage_1_is_kept_for_the_next_run_unless_told_otherwise(
+    run: Runs, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(tmp_path / "cache"))
+    out = tmp_path / "tracks.csv"
+    line = ("track", data / "numbers", "-o", out, "--colour-phd.samples", "60")
+    status, _, stderr = run(*line, "--no-cache")
+    assert status == 0
+    assert not (tmp_path / "cache").exists()
+    first = out.read_text(encoding="utf-8")
+    assert "was kept" not in run(*line)[2]
+    assert len(list((tmp_path / "cache").rglob("*.npz"))) == 1
+    out.unlink()
+    status, _, stderr = run(*line)
+    assert (status, "stage 1 was kept from an earlier run" in stderr) == (0, True)
+    assert out.read_text(encoding="utf-8") == first
+    assert "was kept" not in run(*line, "--no-cache")[2]
+
+
 def test_every_parameter_has_its_flag() -> None:
     for key, parameter in PARAMETERS.items():
         flag = "--" + key.replace("_", "-")

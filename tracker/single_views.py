@@ -1,0 +1,105 @@
+"""Stage 1 of all cameras side by side: each in a thread of its own, handed over in order."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from tracker import single_view
+from tracker.run import Cancelled, Run
+from tracker.sequences.frames import FrameReader
+from tracker.single_view.protocol import SingleViewMethod, ViewResult
+
+BLOCK = 5
+"""Steps that a camera does at a time: few enough to stream, enough to pay."""
+
+Cancel = Callable[[], bool]
+
+
+class SingleViews:
+    """Stage 1 from where a run's column ends, step by step: results and states, one a camera."""
+
+    def __init__(self, run: Run, reader: FrameReader, cancelled: Cancel) -> None:
+        self._run = run
+        self._reader = reader
+        self._cancelled = cancelled
+        self._stopped = False
+        self._pools = [
+            ThreadPoolExecutor(1, f"single-view-{view.camera.name}") for view in run.sequence.views
+        ]
+
+    def __enter__(self) -> Iterator[tuple[tuple[ViewResult, ...], tuple[Any, ...]]]:
+        return self._iterate()
+
+    def __exit__(self, *_: object) -> None:
+        self._stopped = True  # a block under way ends after its step
+        for pool in self._pools:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+    def _iterate(self) -> Iterator[tuple[tuple[ViewResult, ...], tuple[Any, ...]]]:
+        preparing = [pool.submit(self._prepare, c) for c, pool in enumerate(self._pools)]
+        workers = [future.result() for future in preparing]
+        blocks: deque[list[Future[list[tuple[ViewResult, Any]]]]] = deque()
+
+        def order_block() -> None:
+            pairs = zip(self._pools, workers, strict=True)
+            blocks.append([pool.submit(worker.block) for pool, worker in pairs])
+
+        order_block()
+        left = self._run.sequence.frames - len(self._run.views)
+        while left > 0:
+            order_block()  # is computed while the one before is fused
+            parts = [future.result() for future in blocks.popleft()]
+            if self._cancelled():
+                raise Cancelled
+            for step in zip(*parts, strict=True):
+                yield tuple(result for result, _ in step), tuple(state for _, state in step)
+            left -= len(parts[0])
+
+    def _prepare(self, camera: int) -> _CameraWorker:
+        run = self._run
+        method = single_view.create(
+            run.parameters.single_view, run.sequence, camera, run.parameters, self._reader
+        )
+        run.costly = run.costly or method.needs_pictures
+        state = run.view_states[camera] if run.view_states is not None else method.start()
+        return _CameraWorker(
+            method, state, camera, run, self._reader, lambda: self._stopped or self._cancelled()
+        )
+
+
+class _CameraWorker:
+    """Stage 1 of one camera, from where the run's column ends."""
+
+    def __init__(
+        self,
+        method: SingleViewMethod,
+        state: Any,
+        camera: int,
+        run: Run,
+        reader: FrameReader,
+        stopped: Cancel,
+    ) -> None:
+        self._method = method
+        self._state = state
+        self._camera = camera
+        self._frame = len(run.views)
+        self._frames = run.sequence.frames
+        self._seed = run.seed
+        self._stopped = stopped
+        self._pictures = reader.iterate(camera, self._frame) if method.needs_pictures else None
+
+    def block(self) -> list[tuple[ViewResult, Any]]:
+        """The next few steps: result and state of each; none at the end."""
+        done: list[tuple[ViewResult, Any]] = []
+        while len(done) < BLOCK and self._frame < self._frames and not self._stopped():
+            picture = next(self._pictures, None) if self._pictures is not None else None
+            rng = np.random.default_rng((self._seed, self._camera, self._frame))
+            self._state, result = self._method.step(self._state, self._frame, picture, rng)
+            done.append((result, self._state))
+            self._frame += 1
+        return done
