@@ -16,24 +16,18 @@ from jaxtyping import Float, UInt8
 from numpy import ndarray
 from scipy.stats import chi2
 
-from tracker import gaussian_mixture, mean_shift, models, phd
+from tracker import gaussian_mixture, models, phd
 from tracker.foreground import pack
 from tracker.gaussian_mixture import GaussianMixture
 from tracker.parameters import ColourPhdParams, ForegroundParams
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.appearance import Appearance, Scene
 from tracker.single_view.box_sizes import entrance_boxes
+from tracker.single_view.colour_peaks import PeakFinder, Peaks
 from tracker.single_view.protocol import ViewResult
 
 GATE = float(chi2.ppf(0.9999, df=4))
 """Squared Mahalanobis distance: a person's own peak lies inside with this probability."""
-
-MERGE_DISTANCE = 0.8
-"""Peaks closer than this, in half sizes, are one."""
-
-SAME_PERSON_DISTANCE = 1.5
-"""Peaks of the same person's colours closer than this, in half sizes, are one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,14 +74,7 @@ class ColourPhd:
             ValueError: If there are no pictures or templates, or a template cannot be read.
         """
         self._parameters = parameters
-        self._appearance = Appearance(
-            sequence,
-            camera_index,
-            reader,
-            colour_space=parameters.colour_space,
-            histogram_kernel=parameters.histogram_kernel,
-            foreground=foreground if self._needs_foreground else None,
-        )
+        self._finder = PeakFinder(sequence, camera_index, parameters, foreground, reader)
         self._step_time = sequence.step_time
         camera = sequence.cameras[camera_index]
         births = GaussianMixture.empty(4)
@@ -100,29 +87,14 @@ class ColourPhd:
         )
         width, height = camera.image_size
         # uniform over the picture and the range of half sizes, of which a pixel each at least
-        possible = self._appearance.sizes
+        possible = self._finder.sizes
         sizes = np.maximum(possible.largest - possible.smallest, 1.0)
         volume = width * height * float(np.prod(sizes))
         self._clutter = parameters.clutter_rate / volume
 
-    @property
-    def _needs_foreground(self) -> bool:
-        p = self._parameters
-        return (
-            max(
-                p.acceptance_foreground,
-                p.foreground_weight,
-                p.surroundings_weight,
-                p.foreground_samples,
-            )
-            > 0.0
-        )
-
     def start(self) -> ColourPhdState:
         """Nobody is in the picture."""
-        return ColourPhdState(
-            GaussianMixture.empty(4), np.zeros((0, 4)), 1, self._appearance.start()
-        )
+        return ColourPhdState(GaussianMixture.empty(4), np.zeros((0, 4)), 1, self._finder.start())
 
     def step(
         self,
@@ -141,16 +113,11 @@ class ColourPhd:
             after = ColourPhdState(mixture, np.zeros((0, 4)), next_label, state.foreground)
             return after, self._result(mixture)
 
-        background, scene = self._appearance.look(state.foreground, picture)
-        samples = self._sample(predicted, scene, rng)
-        scores, _, _ = self._score(scene, samples)
-        candidates = self._climb(samples, scores)
-        peaks, distances = self._accept(scene, candidates)
-
-        noise = self._sigmas(peaks)[:, :, None] ** 2 * np.eye(4)
+        background, peaks = self._finder.find(state.foreground, picture, predicted, rng)
+        noise = self._finder.sigmas(peaks.boxes)[:, :, None] ** 2 * np.eye(4)
         updated = phd.update(
             predicted,
-            peaks,
+            peaks.boxes,
             expected=predicted.means,
             jacobians=np.broadcast_to(np.eye(4), (predicted.size, 4, 4)),
             noise=noise,
@@ -159,22 +126,9 @@ class ColourPhd:
             gate=GATE,
         )
         mixture = self._reduce(updated.posterior)
-        unexplained = peaks[updated.measurement_weights < 0.5]
-        result = self._result(
-            mixture,
-            peaks=peaks,
-            peak_scores=np.exp(-0.5 * (distances / p.likelihood_sigma) ** 2),
-            mask=scene.mask,
-            samples=samples,
-            sample_weights=np.exp(scores.max(axis=1) - scores.max()) if len(scores) else None,
-            information={
-                "peaks before acceptance": float(len(candidates)),
-                "least distance": float(distances.min()) if len(distances) else 1.0,
-                "foreground share": scene.foreground_share,
-                "cardinality": mixture.cardinality,
-            },
-        )
-        return ColourPhdState(mixture, unexplained, next_label, background), result
+        unexplained = peaks.boxes[updated.measurement_weights < 0.5]
+        after = ColourPhdState(mixture, unexplained, next_label, background)
+        return after, self._result(mixture, peaks)
 
     def _births(self, unexplained: Float[ndarray, "B 4"]) -> GaussianMixture:
         p = self._parameters
@@ -183,7 +137,7 @@ class ColourPhd:
         around = GaussianMixture(
             weights=np.full(len(unexplained), min(1.0, p.birth_rate * self._step_time)),
             means=unexplained,
-            covariances=self._sigmas(unexplained)[:, :, None] ** 2 * np.eye(4),
+            covariances=self._finder.sigmas(unexplained)[:, :, None] ** 2 * np.eye(4),
             labels=np.zeros(len(unexplained), dtype=np.int64),
         )
         return gaussian_mixture.concatenate([around, self._entrances])
@@ -196,87 +150,6 @@ class ColourPhd:
         noise = sigmas[:, :, None] ** 2 * np.eye(4) * self._step_time
         return gaussian_mixture.predict(mixture, np.eye(4), noise, p.survival_probability)
 
-    def _sample(
-        self, predicted: GaussianMixture, scene: Scene, rng: np.random.Generator
-    ) -> Float[ndarray, "S 4"]:
-        """Boxes from the predicted intensity and from the foreground."""
-        p = self._parameters
-        everywhere = round(p.samples * p.foreground_samples)
-        if predicted.size == 0 and p.foreground_samples > 0.0:
-            everywhere = p.samples
-        parts = [self._appearance.draw_on_foreground(everywhere, scene, rng)]
-        count = p.samples - everywhere
-        if predicted.size and count:
-            chosen = rng.choice(
-                predicted.size, count, p=predicted.weights / predicted.weights.sum()
-            )
-            factors = np.linalg.cholesky(predicted.covariances)
-            offsets = np.einsum("nab,nb->na", factors[chosen], rng.standard_normal((count, 4)))
-            parts.append(predicted.means[chosen] + offsets)
-        return self._appearance.within(np.concatenate(parts))
-
-    def _score(
-        self, scene: Scene, boxes: Float[ndarray, "N 4"]
-    ) -> tuple[Float[ndarray, "N G"], Float[ndarray, "N G"], Float[ndarray, " N"]]:
-        """Log-likelihood and distance D of each box for each person, and share of foreground."""
-        p = self._parameters
-        distances = self._appearance.distances(scene, boxes)
-        if not p.peaks_per_person:
-            distances = distances.min(axis=1, keepdims=True)
-        scores = -0.5 * (distances / p.likelihood_sigma) ** 2
-        factors, inside = self._appearance.shape_scores(
-            scene,
-            boxes,
-            inside_weight=p.foreground_weight,
-            around_weight=p.surroundings_weight,
-        )
-        return scores + factors[:, None], distances, inside
-
-    def _climb(
-        self, samples: Float[ndarray, "S 4"], scores: Float[ndarray, "S G"]
-    ) -> Float[ndarray, "M 4"]:
-        """The peaks of the weighted samples, by each person's colours for themselves."""
-        p = self._parameters
-        found = [np.zeros((0, 4))]
-        for person in range(scores.shape[1] if len(samples) else 0):
-            weights = np.exp(scores[:, person] - scores[:, person].max())
-            starts = mean_shift.starts(
-                samples, weights, p.mean_shift_starts, spread=p.spread_starts
-            )
-            peaks, _ = mean_shift.modes(
-                samples,
-                weights,
-                samples[starts],
-                bandwidth=p.bandwidth,
-                merge_distance=MERGE_DISTANCE,
-            )
-            found.append(peaks)
-        return np.concatenate(found)
-
-    def _accept(
-        self, scene: Scene, candidates: Float[ndarray, "M 4"]
-    ) -> tuple[Float[ndarray, "K 4"], Float[ndarray, " K"]]:
-        """The peaks that look enough like a person, and their distances; one at each place."""
-        p = self._parameters
-        scores, distances, inside = self._score(scene, candidates)
-        best, nearest, person = scores.max(axis=1), distances.min(axis=1), scores.argmax(axis=1)
-        good = best >= -0.5 * (p.acceptance_distance / p.likelihood_sigma) ** 2
-        if scene.mask is not None:
-            good &= inside >= p.acceptance_foreground
-        kept: list[int] = []
-        for i in np.argsort(-best, kind="stable"):
-            apart = (candidates[kept, :2] - candidates[i, :2]) / candidates[kept, 2:]
-            least = np.where(person[kept] == person[i], SAME_PERSON_DISTANCE, MERGE_DISTANCE)
-            if good[i] and np.all((apart**2).sum(axis=1) >= least**2):
-                kept.append(int(i))
-        return candidates[kept], nearest[kept]
-
-    def _sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
-        """Standard deviations of peaks: proportional to the box."""
-        p = self._parameters
-        half_sizes = np.maximum(boxes[:, 2:], 0.5)
-        return np.concatenate([p.centre_sigma * half_sizes, p.size_sigma * half_sizes], axis=1)
-
     def _reduce(self, mixture: GaussianMixture) -> GaussianMixture:
         p = self._parameters
         reduced, _ = gaussian_mixture.reduce(
@@ -287,44 +160,33 @@ class ColourPhd:
         )
         return reduced
 
-    def _result(
-        self,
-        mixture: GaussianMixture,
-        *,
-        peaks: Float[ndarray, "M 4"] | None = None,
-        peak_scores: Float[ndarray, " M"] | None = None,
-        mask: UInt8[ndarray, "h w"] | None = None,
-        samples: Float[ndarray, "S 4"] | None = None,
-        sample_weights: Float[ndarray, " S"] | None = None,
-        information: dict[str, float] | None = None,
-    ) -> ViewResult:
+    def _result(self, mixture: GaussianMixture, peaks: Peaks | None = None) -> ViewResult:
         p = self._parameters
-        peaks = np.zeros((0, 4)) if peaks is None else peaks
-        peak_scores = np.zeros(0) if peak_scores is None else peak_scores
+        found = np.zeros((0, 4)) if peaks is None else peaks.boxes
+        scores = np.zeros(0) if peaks is None else peaks.scores
         chosen = phd.extract(mixture, p.extraction_threshold)
         estimates, weights = mixture.means[chosen], mixture.weights[chosen]
         labels = mixture.labels[chosen]
         if p.output == "estimates":
             boxes, box_weights, box_labels = estimates, weights, labels
         else:
-            boxes, box_weights = peaks, peak_scores
-            box_labels = np.full(len(peaks), -1, dtype=np.int64)
+            boxes, box_weights = found, scores
+            box_labels = np.full(len(found), -1, dtype=np.int64)
+        samples = np.zeros((0, 4)) if peaks is None else peaks.samples
+        sample_weights = np.zeros(0) if peaks is None else peaks.sample_weights
+        information = {} if peaks is None else peaks.information
         return ViewResult(
             boxes=boxes,
             weights=box_weights,
             labels=box_labels,
-            sigmas=self._sigmas(boxes),
+            sigmas=self._finder.sigmas(boxes),
             estimates=estimates,
             estimate_weights=weights,
             estimate_labels=labels,
-            measurements=peaks,
-            measurement_scores=peak_scores,
-            samples=np.zeros((0, 4), np.float32) if samples is None else samples.astype(np.float32),
-            sample_weights=(
-                np.zeros(0, np.float32)
-                if sample_weights is None
-                else sample_weights.astype(np.float32)
-            ),
-            information=information or {},
-            foreground=None if mask is None else pack(mask),
+            measurements=found,
+            measurement_scores=scores,
+            samples=samples.astype(np.float32),
+            sample_weights=sample_weights.astype(np.float32),
+            information={**information, "cardinality": mixture.cardinality},
+            foreground=None if peaks is None or peaks.mask is None else pack(peaks.mask),
         )
