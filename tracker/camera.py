@@ -140,14 +140,15 @@ class Camera:
         The lens model is inverted by Newton's method, to a thousandth of a pixel
         inside the picture.
         """
-        drawn = np.linalg.solve(
-            self.intrinsics[:2, :2], (np.asarray(pixels, float) - self.intrinsics[:2, 2]).T
-        ).T
-        if not self.is_pinhole:
-            drawn = lens.undistort(np.ascontiguousarray(drawn), self.numbers[3], _LENS_ITERATIONS)
-        u, v = drawn.T
-        directions = np.stack([u, v, np.ones_like(u)], axis=1) @ self.rotation
-        return np.asarray(directions / np.linalg.norm(directions, axis=1, keepdims=True))
+        rotation, _, intrinsics, distortion = self.numbers
+        rays: ndarray = lens.directions(
+            np.ascontiguousarray(pixels, dtype=float),
+            rotation,
+            intrinsics,
+            distortion,
+            0 if self.is_pinhole else _LENS_ITERATIONS,
+        )
+        return rays
 
     def contains(self, pixels: Float[ndarray, "N 2"]) -> Bool[ndarray, " N"]:
         """Whether each pixel lies inside the picture; NaN does not."""

@@ -64,8 +64,8 @@ class GaussianMixture:
         """The expected number of targets: the sum of the weights."""
         return float(self.weights.sum())
 
-    def take(self, indices: ndarray) -> GaussianMixture:
-        """The components at ``indices`` (integers or a mask), in that order."""
+    def take(self, indices: ndarray | slice) -> GaussianMixture:
+        """The components at ``indices`` (integers, a mask or a slice), in that order."""
         return GaussianMixture(
             self.weights[indices],
             self.means[indices],
@@ -140,17 +140,18 @@ def merge(
 
     Raises:
         ValueError: If ``threshold`` is negative.
-        numpy.linalg.LinAlgError: If a covariance is singular.
+        numpy.linalg.LinAlgError: If a covariance is not positive definite.
     """
     if threshold < 0.0:
         raise ValueError(f"threshold must be >= 0 (squared Mahalanobis distance), got {threshold}")
     if mixture.size == 0:
         return mixture, np.zeros(0, dtype=np.int64)
-    precisions = np.linalg.inv(mixture.covariances)
     order = np.argsort(-mixture.weights, kind="stable")
     if owners is None:
         owners = np.full(mixture.size, -1, dtype=np.int64)
-    group, leaders = kernels.merge_groups(mixture.means, precisions, order, owners, threshold)
+    group, leaders = kernels.merge_groups(
+        mixture.means, mixture.covariances, order, owners, threshold
+    )
     weights, means, covariances = kernels.merge_moments(
         mixture.weights, mixture.means, mixture.covariances, group, len(leaders)
     )

@@ -22,24 +22,83 @@ def _kernel(function: _F) -> _F:
 
 
 @_kernel
+def factorise(matrix: ndarray, lower: ndarray) -> float:
+    """Cholesky factor of a symmetric positive definite matrix, and its log determinant.
+
+    Raises:
+        numpy.linalg.LinAlgError: If the matrix is not positive definite.
+    """
+    log_determinant = 0.0
+    for p in range(len(matrix)):
+        for q in range(p + 1):
+            total = matrix[p, q]
+            for r in range(q):
+                total -= lower[p, r] * lower[q, r]
+            if p == q:
+                if not total > 0.0:
+                    raise np.linalg.LinAlgError("a covariance is not positive definite")
+                lower[p, p] = math.sqrt(total)
+                log_determinant += math.log(total)
+            else:
+                lower[p, q] = total / lower[q, q]
+    return log_determinant
+
+
+@_kernel
+def solve(lower: ndarray, right: ndarray, solution: ndarray) -> None:
+    """The vector x with L Lᵀ x = b, for a Cholesky factor L."""
+    size = len(lower)
+    for p in range(size):
+        total = right[p]
+        for r in range(p):
+            total -= lower[p, r] * solution[r]
+        solution[p] = total / lower[p, p]
+    for p in range(size - 1, -1, -1):
+        total = solution[p]
+        for r in range(p + 1, size):
+            total -= lower[r, p] * solution[r]
+        solution[p] = total / lower[p, p]
+
+
+@_kernel
+def squared_length(residual: ndarray, lower: ndarray) -> float:
+    """Squared Mahalanobis length of a vector, by the Cholesky factor of its covariance."""
+    total, solved = 0.0, np.empty(len(residual))
+    for p in range(len(residual)):
+        value = residual[p]
+        for r in range(p):
+            value -= lower[p, r] * solved[r]
+        solved[p] = value / lower[p, p]
+        total += solved[p] * solved[p]
+    return total
+
+
+@_kernel
 def merge_groups(
-    means: ndarray, precisions: ndarray, order: ndarray, owners: ndarray, threshold: float
+    means: ndarray, covariances: ndarray, order: ndarray, owners: ndarray, threshold: float
 ) -> tuple[ndarray, ndarray]:
     """Group components around the heaviest ones left.
 
     Args:
         means: (J, d).
-        precisions: (J, d, d), the inverse covariances.
+        covariances: (J, d, d).
         order: (J,) indices, heaviest first.
         owners: (J,); a component with an owner (0 or more) joins its owner's only.
         threshold: Squared Mahalanobis distance.
 
     Returns:
         The group of each component (J,) and the leader of each group (K,).
+
+    Raises:
+        numpy.linalg.LinAlgError: If a covariance is not positive definite.
     """
     size, dimension = means.shape
     group = np.full(size, -1, dtype=np.int64)
     leaders = np.empty(size, dtype=np.int64)
+    lower = np.zeros((size, dimension, dimension))
+    for i in range(size):
+        factorise(covariances[i], lower[i])
+    offset = np.empty(dimension)
     count = 0
     for rank in range(size):
         leader = order[rank]
@@ -50,14 +109,14 @@ def merge_groups(
             i = order[later]
             if group[i] >= 0 or (owners[i] >= 0 and owners[i] != owners[leader]):
                 continue
-            distance = 0.0
+            near = True
             for a in range(dimension):
-                difference_a = means[i, a] - means[leader, a]
-                for b in range(dimension):
-                    distance += (
-                        difference_a * precisions[i, a, b] * (means[i, b] - means[leader, b])
-                    )
-            if distance <= threshold:
+                offset[a] = means[i, a] - means[leader, a]
+                # no axis alone may be beyond the threshold
+                if offset[a] * offset[a] > threshold * covariances[i, a, a]:
+                    near = False
+                    break
+            if near and squared_length(offset, lower[i]) <= threshold:
                 group[i] = count
         leaders[count] = leader
         count += 1
@@ -133,10 +192,12 @@ def kalman_pairs(
     shared = noises.shape[0] == 1
     spread = spreads.shape[0] > 0
     ph = np.empty((size, dimension, order))
+    own = np.empty((size, order, order))
     lower = np.empty((size, order, order))
     constants = np.empty(size)
     gains = np.empty((size, dimension, order))
     updated = np.empty((size, dimension, dimension))
+    has_factor = np.zeros(size, dtype=np.bool_)
     has_gain = np.zeros(size, dtype=np.bool_)
 
     component = np.empty(size * count, dtype=np.int64)
@@ -148,6 +209,7 @@ def kalman_pairs(
     factor = np.empty((dimension, dimension))
     half = np.empty((dimension, dimension))
     noise = np.empty((order, order))
+    offset = np.empty(order)
     solved = np.empty(order)
     pairs = 0
     for z in range(count):
@@ -164,13 +226,27 @@ def kalman_pairs(
                         for b in range(dimension):
                             total += covariances[j, a, b] * jacobians[j, p, b]
                         ph[j, a, p] = total
-            if z == 0 or not shared:
-                # S = H P Hᵀ + R and its Cholesky factor
+                # H P Hᵀ, the state's share of the innovation's covariance
                 for p in range(order):
                     for q in range(p + 1):
-                        total = noise[p, q]
+                        total = 0.0
                         for a in range(dimension):
                             total += jacobians[j, p, a] * ph[j, a, q]
+                        own[j, p, q] = total
+            near = True
+            for p in range(order):
+                offset[p] = measurements[z, p] - expected[j, p]
+                # no number of a measurement alone may be beyond the gate
+                if offset[p] * offset[p] > gate * (noise[p, p] + own[j, p, p]):
+                    near = False
+            if not near:
+                continue
+            if not shared or not has_factor[j]:
+                has_factor[j] = True
+                # the Cholesky factor of S = H P Hᵀ + R
+                for p in range(order):
+                    for q in range(p + 1):
+                        total = noise[p, q] + own[j, p, q]
                         for r in range(q):
                             total -= lower[j, p, r] * lower[j, q, r]
                         if p == q:
@@ -185,7 +261,7 @@ def kalman_pairs(
                 constants[j] = constant
             distance = 0.0
             for p in range(order):
-                total = measurements[z, p] - expected[j, p]
+                total = offset[p]
                 for r in range(p):
                     total -= lower[j, p, r] * solved[r]
                 solved[p] = total / lower[j, p, p]
@@ -235,7 +311,7 @@ def kalman_pairs(
             for a in range(dimension):
                 total = means[j, a]
                 for p in range(order):
-                    total += gains[j, a, p] * (measurements[z, p] - expected[j, p])
+                    total += gains[j, a, p] * offset[p]
                 new_means[pairs, a] = total
                 for b in range(dimension):
                     new_covariances[pairs, a, b] = updated[j, a, b]
@@ -286,6 +362,52 @@ def phd_weights(
         weights[pair] /= totals[z]
         sums[z] += weights[pair]
     return weights, odds, sums
+
+
+@_kernel
+def sum_pairs(
+    labels: ndarray, cameras: ndarray, of_pairs: ndarray, boxes: ndarray, weights: ndarray
+) -> tuple[ndarray, ndarray, ndarray, ndarray]:
+    """Sum the pairs of one camera, component and box; pairs of absent labels are left out.
+
+    Args:
+        labels: (J,) of the components; of several with one label the first stands for it.
+        cameras: (A,) of the pairs, as the further ones.
+        of_pairs: (A,) labels.
+        boxes: (A,).
+        weights: (A,).
+
+    Returns:
+        (K,) camera, component, box and sum of each pair, in the order of these three.
+    """
+    count = len(of_pairs)
+    width = 1
+    for pair in range(count):
+        width = max(width, boxes[pair] + 1)
+    keys = np.empty(count, dtype=np.int64)
+    kept = 0
+    which = np.empty(count, dtype=np.int64)
+    for pair in range(count):
+        for component in range(len(labels)):
+            if labels[component] == of_pairs[pair]:
+                # camera, component and box as the digits of one number
+                keys[kept] = (cameras[pair] * len(labels) + component) * width + boxes[pair]
+                which[kept] = pair
+                kept += 1
+                break
+    order = np.argsort(keys[:kept], kind="mergesort")
+    found = np.empty(kept, dtype=np.int64)
+    sums = np.zeros(kept)
+    distinct = 0
+    for place in order:
+        if distinct == 0 or keys[place] != found[distinct - 1]:
+            found[distinct] = keys[place]
+            distinct += 1
+        sums[distinct - 1] += weights[which[place]]
+    found = found[:distinct]
+    rest = found // width
+    size = max(len(labels), 1)
+    return rest // size, rest % size, found % width, sums[:distinct].copy()
 
 
 @_kernel

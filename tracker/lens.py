@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy import ndarray
 
@@ -112,3 +114,40 @@ def undistort(distorted: ndarray, distortion: ndarray, iterations: int) -> ndarr
         straight[n, 0] = u
         straight[n, 1] = v
     return straight
+
+
+@_kernel
+def directions(
+    pixels: ndarray,
+    rotation: ndarray,
+    intrinsics: ndarray,
+    distortion: ndarray,
+    iterations: int,
+) -> ndarray:
+    """Unit directions of the rays that a lens draws at some pixels: the way back.
+
+    Args:
+        pixels: (N, 2).
+        rotation: (3, 3), world to camera axes.
+        intrinsics: (3, 3), pixels.
+        distortion: (5,), k1 k2 p1 p2 k3.
+        iterations: Of :func:`undistort`; 0 for a pinhole.
+
+    Returns:
+        (N, 3), world axes.
+    """
+    count = len(pixels)
+    drawn = np.empty((count, 2))
+    determinant = intrinsics[0, 0] * intrinsics[1, 1] - intrinsics[0, 1] * intrinsics[1, 0]
+    for n in range(count):
+        across, down = pixels[n, 0] - intrinsics[0, 2], pixels[n, 1] - intrinsics[1, 2]
+        drawn[n, 0] = (intrinsics[1, 1] * across - intrinsics[0, 1] * down) / determinant
+        drawn[n, 1] = (intrinsics[0, 0] * down - intrinsics[1, 0] * across) / determinant
+    straight = undistort(drawn, distortion, iterations)
+    rays = np.empty((count, 3))
+    for n in range(count):
+        u, v = straight[n]
+        length = math.sqrt(u * u + v * v + 1.0)
+        for a in range(3):
+            rays[n, a] = (u * rotation[0, a] + v * rotation[1, a] + rotation[2, a]) / length
+    return rays

@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker import kernels
-from tracker.gaussian_mixture import GaussianMixture, concatenate
+from tracker import update_kernels
+from tracker.gaussian_mixture import GaussianMixture
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ def update(
     expected: Float[ndarray, "J m"],
     jacobians: Float[ndarray, "J m d"],
     noise: Float[ndarray, "N m m"],
-    spread: Float[ndarray, "J m m"] | None = None,
+    spread: Float[ndarray, "K m m"] | None = None,
     detection_probability: float | Float[ndarray, " J"],
     clutter_intensity: float | Float[ndarray, " M"],
     gate: float = np.inf,
@@ -62,7 +62,8 @@ def update(
         expected: h(m_j) for each component; for a linear model H m_j.
         jacobians: H for each component.
         noise: R, one for all measurements (N = 1) or one each (N = M).
-        spread: What each component adds to the noise, where h bends; nothing, if none.
+        spread: What each component adds to the noise, where h bends (K = J); nothing, if none
+            (or K = 0).
         detection_probability: p_D, one for all or one a component. Where it is
             0 the component is left as it is.
         clutter_intensity: κ(z) per unit of the measurement space.
@@ -72,43 +73,26 @@ def update(
         numpy.linalg.LinAlgError: If H P Hᵀ + R is not positive definite.
     """
     size, count = predicted.size, len(measurements)
-    p_d = np.broadcast_to(np.asarray(detection_probability, dtype=float), (size,))
-    missed = GaussianMixture(
-        predicted.weights * (1.0 - p_d), predicted.means, predicted.covariances, predicted.labels
-    )
-    if count == 0 or size == 0:
-        return PhdUpdate(
-            missed,
-            np.arange(size),
-            np.full(size, -1, dtype=np.int64),
-            np.zeros(0),
-            np.zeros(count),
-        )
-    detectable = np.flatnonzero(p_d * predicted.weights > 0.0)
-    parent, measured, log_likelihood, means, covariances = kernels.kalman_pairs(
-        predicted.means[detectable],
-        predicted.covariances[detectable],
-        np.asarray(expected, dtype=float)[detectable],
-        np.asarray(jacobians, dtype=float)[detectable],
+    weights, means, covariances, parents, sources, log_odds, sums = update_kernels.phd_update(
+        predicted.weights,
+        predicted.means,
+        predicted.covariances,
+        np.ascontiguousarray(expected, dtype=float),
+        np.ascontiguousarray(jacobians, dtype=float),
         np.ascontiguousarray(measurements, dtype=float),
         np.ascontiguousarray(noise, dtype=float),
-        np.zeros((0, *noise.shape[1:])) if spread is None else spread[detectable],
+        np.zeros((0, *noise.shape[1:])) if spread is None else spread,
+        _filled(detection_probability, size),
+        _filled(clutter_intensity, count),
         gate,
     )
-    parent = detectable[parent]
-    kappa = np.broadcast_to(np.asarray(clutter_intensity, dtype=float), (count,))
-    with np.errstate(divide="ignore"):
-        log_kappa = np.log(kappa)
-    log_terms = np.log(p_d[parent] * predicted.weights[parent]) + log_likelihood
-    weights, log_odds, sums = kernels.phd_weights(log_terms, measured, log_kappa)
-    detected = GaussianMixture(weights, means, covariances, predicted.labels[parent])
-    return PhdUpdate(
-        posterior=concatenate([missed, detected]),
-        parents=np.concatenate([np.arange(size), parent]),
-        measurements=np.concatenate([np.full(size, -1, dtype=np.int64), measured]),
-        log_odds=log_odds,
-        measurement_weights=sums,
-    )
+    posterior = GaussianMixture(weights, means, covariances, predicted.labels[parents])
+    return PhdUpdate(posterior, parents, sources, log_odds, sums)
+
+
+def _filled(value: float | Float[ndarray, " N"], count: int) -> Float[ndarray, " N"]:
+    """One number for all as one each."""
+    return value if isinstance(value, np.ndarray) else np.full(count, float(value))
 
 
 def extract(mixture: GaussianMixture, threshold: float) -> Int[ndarray, " K"]:

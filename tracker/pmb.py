@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker import association, kernels
+from tracker import association, update_kernels
 from tracker.association import Marginals
 from tracker.gaussian_mixture import GaussianMixture
 
@@ -60,39 +60,22 @@ def update(
         unexplained_intensity: ρ_j = κ(z_j) + e_j, clutter and newborns at each measurement.
         gate: Squared Mahalanobis distance beyond which a pair is left out.
     """
-    size, count = tracks.size, len(measurements)
-    p_d, existence = detection_probability, tracks.weights
-    survived = existence * (1.0 - p_d)
-    missed = 1.0 - existence + survived
-    pairs = np.zeros((size, count))
-    if count == 0 or size == 0:
-        marginal = Marginals(pairs, np.ones(size), np.ones(count))
-        weights = survived / np.maximum(missed, 1e-300)
-        return PmbUpdate(
-            GaussianMixture(weights, tracks.means, tracks.covariances, tracks.labels), marginal
-        )
-    track, measured, log_likelihood, means, covariances = kernels.kalman_pairs(
+    existences, means, covariances, rows, unexplained = update_kernels.bernoulli_update(
+        tracks.weights,
         tracks.means,
         tracks.covariances,
-        np.ascontiguousarray(expected),
-        np.ascontiguousarray(jacobians),
-        np.ascontiguousarray(measurements),
-        np.ascontiguousarray(noise),
+        np.ascontiguousarray(expected, dtype=float),
+        np.ascontiguousarray(jacobians, dtype=float),
+        np.ascontiguousarray(measurements, dtype=float),
+        np.ascontiguousarray(noise, dtype=float),
         np.zeros((0, *noise.shape[1:])) if spread is None else spread,
+        detection_probability,
+        unexplained_intensity,
         gate,
-    )
-    pairs[track, measured] = existence[track] * p_d[track] * np.exp(log_likelihood)
-    marginal = association.marginals(missed, pairs, unexplained_intensity)
-    kept = marginal.missed * survived / np.maximum(missed, 1e-300)
-    # the missed hypothesis first, so that no group is ever empty
-    new_existence, new_means, new_covariances = kernels.merge_moments(
-        np.concatenate([np.maximum(kept, 1e-12), marginal.detected[track, measured]]),
-        np.concatenate([tracks.means, means]),
-        np.concatenate([tracks.covariances, covariances]),
-        np.concatenate([np.arange(size), track]),
-        size,
+        association.TOLERANCE,
+        association.ITERATIONS,
     )
     return PmbUpdate(
-        GaussianMixture(np.minimum(new_existence, 1.0), new_means, new_covariances, tracks.labels),
-        marginal,
+        GaussianMixture(existences, means, covariances, tracks.labels),
+        Marginals(rows[:, 1:], rows[:, 0], unexplained),
     )

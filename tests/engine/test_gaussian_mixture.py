@@ -57,9 +57,10 @@ def test_leaders_are_the_heaviest_of_their_groups(
     mixture: GaussianMixture, threshold: float
 ) -> None:
     order = np.argsort(-mixture.weights, kind="stable")
-    precisions = np.linalg.inv(mixture.covariances)
     nobody = np.full(mixture.size, -1)
-    group, leaders = kernels.merge_groups(mixture.means, precisions, order, nobody, threshold)
+    group, leaders = kernels.merge_groups(
+        mixture.means, mixture.covariances, order, nobody, threshold
+    )
     _, reference_leaders, members = reference_merge(mixture, threshold)
     assert_array_equal(leaders, reference_leaders)
     for number, (leader, reference_members) in enumerate(zip(leaders, members, strict=True)):

@@ -112,10 +112,10 @@ def test_the_published_scheme_stays_behind(data_folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("method", "least"), [("multi_bernoulli", 250.0), ("sequential_phd", 150.0)]
+    ("method", "least"), [("multi_bernoulli", 500.0), ("sequential_phd", 300.0)]
 )
 def test_the_fusion_is_fast_enough(data_folder: Path, method: str, least: float) -> None:
-    # half of what an idle core does, so that a busy machine does not fail
+    # less than half of what an idle core does; the time of this process on its core counts
     sequence = read_sequence(data_folder / "cmc2")
     chosen = parameters(method)
     views = pipeline.compute(sequence, chosen).views

@@ -15,6 +15,12 @@ from numpy import ndarray
 
 from tracker import kernels
 
+TOLERANCE = 1e-6
+"""Largest change of a message, relative to the intensity it meets, at which all are settled."""
+
+ITERATIONS = 200
+"""At most so many, should they not settle."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Marginals:
@@ -33,8 +39,8 @@ def marginals(
     detected: Float[ndarray, "n M"],
     unexplained: Float[ndarray, " M"],
     *,
-    tolerance: float = 1e-6,
-    iterations: int = 200,
+    tolerance: float = TOLERANCE,
+    iterations: int = ITERATIONS,
 ) -> Marginals:
     """Marginals of the one-to-one association, by loopy belief propagation ([WL14]_).
 

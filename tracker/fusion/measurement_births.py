@@ -9,11 +9,13 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 from scipy.special import expit
 
-from tracker.camera import Camera
+from tracker import birth_kernels
+from tracker.camera import NEAREST_DEPTH, Camera
 from tracker.fusion.target_model import TargetModel
 from tracker.sequences.sequence import Room
 
 _REFINEMENTS = 3
+_MOST_SEEDS = 1000  # of a crowd of boxes that nobody explains, where the rays meet best
 _START_SIGMA = 1.0  # metres: how loosely the meeting point of two rays binds the refinement
 _UNEXPLAINED = 0.5  # a box that somebody made with more than this probability starts nobody
 
@@ -104,6 +106,20 @@ class MeasurementBirths:
         self._gate = gate
         self._margin = margin
         self._largest_gap = largest_gap
+        self._centres = np.array([camera.centre for camera in cameras])
+        rotations, translations, intrinsics, distortions = (
+            np.array([camera.numbers[part] for camera in cameras]) for part in range(4)
+        )
+        self._numbers = (
+            np.array([camera.image_size for camera in cameras]),
+            rotations,
+            translations,
+            intrinsics,
+            distortions,
+            NEAREST_DEPTH,
+            np.array([camera.largest_radius for camera in cameras]),
+        )
+        """All cameras in the form that the compiled fit knows."""
 
     def propose(self, evidence: list[CameraEvidence]) -> Newborns | None:
         """Newcomers that share no box, the surest first; None for nobody."""
@@ -126,97 +142,59 @@ class MeasurementBirths:
         free = [one.centres[one.unexplained > _UNEXPLAINED] for one in evidence]
         if sum(len(centres) > 0 for centres in free) < 2:
             return np.zeros((0, 3))
-        rays = [
-            camera.back_project(centres)
-            for camera, centres in zip(self._cameras, free, strict=True)
-        ]
-        points = [np.zeros((0, 3))]
-        for a in range(len(rays)):
-            for b in range(a + 1, len(rays)):
-                if not len(rays[a]) or not len(rays[b]):
-                    continue
-                u, v = rays[a][:, None, :], rays[b][None, :, :]
-                base = self._cameras[b].centre - self._cameras[a].centre
-                uv = (u * v).sum(-1)
-                denominator = np.maximum(1.0 - uv**2, 1e-6)
-                along_a = ((u @ base) - uv * (v @ base)) / denominator
-                along_b = (uv * (u @ base) - (v @ base)) / denominator
-                on_a = self._cameras[a].centre + along_a[..., None] * u
-                on_b = self._cameras[b].centre + along_b[..., None] * v
-                gap = np.linalg.norm(on_a - on_b, axis=-1)
-                middle = (on_a + on_b) / 2.0
-                good = (gap < self._largest_gap) & (along_a > 0.1) & (along_b > 0.1)
-                points.append(middle[good])
-        all_points = np.concatenate(points)
-        return np.asarray(all_points[self._room.contains(all_points, self._margin)])
+        rays = np.concatenate(
+            [
+                camera.back_project(centres)
+                for camera, centres in zip(self._cameras, free, strict=True)
+            ]
+        )
+        points, gaps = birth_kernels.meeting_points(
+            rays, _starts([len(centres) for centres in free]), self._centres, self._largest_gap
+        )
+        inside = self._room.contains(points, self._margin)
+        points, gaps = points[inside], gaps[inside]
+        if len(points) > _MOST_SEEDS:
+            points = points[np.argsort(gaps, kind="stable")[:_MOST_SEEDS]]
+        return np.asarray(points)
 
     def _fit(self, seeds: Float[ndarray, "N 3"], evidence: list[CameraEvidence]) -> Newborns:
         """The places that fit best to the nearest box in every camera, and their odds.
 
         A seed that ends outside the room or with fewer than two boxes is left out.
         """
-        positions, covariances = seeds, np.tile(np.eye(3) * _START_SIGMA**2, (len(seeds), 1, 1))
-        for _ in range(_REFINEMENTS):
-            information = np.tile(np.eye(3) / _START_SIGMA**2, (len(seeds), 1, 1))
-            pull = seeds / _START_SIGMA**2
-            sources = np.full((len(evidence), len(seeds)), -1, dtype=np.int64)
-            for c, camera in enumerate(self._cameras):
-                if not len(evidence[c].values):
-                    continue
-                expected = self._model.expected(camera, positions)
-                slopes = expected.jacobians
-                residuals = evidence[c].values[None] - expected.values[:, None]
-                own = self._nearest(residuals, slopes, covariances, evidence[c])
-                sources[c] = own = np.where(expected.valid, own, -1)
-                weights = slopes.transpose(0, 2, 1) @ np.linalg.inv(evidence[c].noises[own])
-                weights[own < 0] = 0.0
-                residual = residuals[np.arange(len(seeds)), own]
-                information += weights @ slopes
-                pull = pull + _apply(weights, residual + _apply(slopes, positions))
-            covariances = np.asarray(np.linalg.inv(information), dtype=np.float64)
-            positions = _apply(covariances, pull)
-        found = Newborns(positions, covariances, np.zeros(len(seeds)), sources)
+        positions, covariances, sources, fits = birth_kernels.fit_places(
+            seeds,
+            _START_SIGMA,
+            _REFINEMENTS,
+            np.concatenate([one.values for one in evidence]),
+            np.concatenate([one.noises for one in evidence]),
+            np.concatenate([one.unexplained for one in evidence]) > _UNEXPLAINED,
+            _starts([len(one.values) for one in evidence]),
+            self._gate,
+            self._model.half_height,
+            self._model.half_width,
+            *self._numbers,
+        )
         inside = self._room.contains(positions, self._margin)
-        found = found.take(np.flatnonzero(inside & ((sources >= 0).sum(axis=0) >= 2)))
-        existences = expit(self._log_odds(found, evidence))
+        kept = np.flatnonzero(inside & ((sources >= 0).sum(axis=0) >= 2))
+        found = Newborns(positions[kept], covariances[kept], np.zeros(len(kept)), sources[:, kept])
+        existences = expit(self._log_odds(found, fits[:, kept], evidence))
         return Newborns(found.positions, found.covariances, existences, found.sources)
 
-    def _nearest(
-        self,
-        residuals: Float[ndarray, "N M m"],
-        slopes: Float[ndarray, "N m 3"],
-        covariances: Float[ndarray, "N 3 3"],
-        evidence: CameraEvidence,
-    ) -> Int[ndarray, " N"]:
-        """The unexplained box that lies nearest, -1 where none is inside the gate."""
-        own_spread = slopes @ covariances @ slopes.transpose(0, 2, 1)
-        spread = evidence.noises[None] + own_spread[:, None]
-        solved = np.linalg.solve(spread, residuals[..., None])[..., 0]
-        distances = (residuals * solved).sum(axis=2)
-        distances[:, evidence.unexplained <= _UNEXPLAINED] = np.inf
-        best = distances.argmin(axis=1)
-        close = distances[np.arange(len(best)), best] <= self._gate
-        return np.asarray(np.where(close, best, -1))
-
-    def _log_odds(self, found: Newborns, evidence: list[CameraEvidence]) -> Float[ndarray, " N"]:
-        """log Λ of each newcomer."""
+    def _log_odds(
+        self, found: Newborns, fits: Float[ndarray, "C N"], evidence: list[CameraEvidence]
+    ) -> Float[ndarray, " N"]:
+        """log Λ of each newcomer, of whose boxes ``fits`` are the log likelihoods."""
         log_odds = self._log_density + 1.5 * np.log(2.0 * np.pi)
         log_odds = log_odds + 0.5 * np.linalg.slogdet(found.covariances)[1]
         for c, camera in enumerate(self._cameras):
             hit = found.sources[c] >= 0
             missed = ~hit & camera.sees(found.positions)
             log_odds[missed] += self._log_miss
-            if not hit.any():
-                continue
-            own, expected = found.sources[c][hit], self._model.expected(camera, found.positions)
-            residual = evidence[c].values[own] - expected.values[hit]
-            noise = evidence[c].noises[own]
-            distance = (residual * np.linalg.solve(noise, residual[..., None])[..., 0]).sum(axis=1)
-            log_odds[hit] += self._log_hit - np.log(evidence[c].clutter_intensity)
-            log_odds[hit] -= 0.5 * (distance + np.linalg.slogdet(2.0 * np.pi * noise)[1])
+            log_odds[hit] += self._log_hit - np.log(evidence[c].clutter_intensity) + fits[c][hit]
         return np.asarray(log_odds)
 
 
-def _apply(matrices: Float[ndarray, "N a b"], vectors: Float[ndarray, "N b"]) -> ndarray:
-    """Each matrix times its vector."""
-    return np.asarray((matrices @ vectors[..., None])[..., 0])
+def _starts(counts: list[int]) -> Int[ndarray, " C1"]:
+    """Where each camera's boxes begin when all stand in one row, and the end."""
+    return np.cumsum([0, *counts])

@@ -63,29 +63,48 @@ def recall(
     Returns:
         The labels of this step's components, and the memory after it.
     """
-    seconds, labels = model.parameters.memory, mixture.labels
-    if seconds == 0.0:
+    labels = mixture.labels
+    if model.parameters.memory == 0.0:
         return labels, memory
-    sure = np.flatnonzero(mixture.weights > CONFIRMED)
-    names, first = np.unique(labels[sure], return_index=True)
-    bearers = sure[first]
-    count = memory.known.size
-    missing = Memory(
-        memory.known,
-        gaussian_mixture.concatenate([memory.lost, memory.known]),
-        np.concatenate([memory.ages, np.zeros(count)]) + model.step_time,
-        np.concatenate([memory.newer, np.full(count, first_label)]),
-    )
-    missing = missing.take(~np.isin(missing.lost.labels, names))
-    lost = model.motion.predict(missing.lost, 1.0)
-    waiting = model.room.contains(lost.means[:, :3]) & (missing.ages <= seconds + 1e-9)
-    missing = Memory(memory.known, lost, missing.ages, missing.newer).take(waiting)
+    bearers = _first_of_each(labels, np.flatnonzero(mixture.weights > CONFIRMED))
+    missing = _missing(memory, labels[bearers], model, first_label)
     if missing.lost.size and len(bearers):
         labels, back = _returned(missing, mixture.take(bearers), labels)
         missing = missing.take(~back)
-    known = mixture.take(bearers)
-    known = GaussianMixture(known.weights, known.means, known.covariances, labels[bearers])
+    known = GaussianMixture(
+        mixture.weights[bearers],
+        mixture.means[bearers],
+        mixture.covariances[bearers],
+        labels[bearers],
+    )
     return labels, Memory(known, missing.lost, missing.ages, missing.newer)
+
+
+def _first_of_each(labels: Int[ndarray, " J"], among: Int[ndarray, " K"]) -> Int[ndarray, " L"]:
+    """The first of some components of each label."""
+    _, first = np.unique(labels[among], return_index=True)
+    return among[first]
+
+
+def _missing(
+    memory: Memory, present: Int[ndarray, " L"], model: FusionModel, first_label: int
+) -> Memory:
+    """Who of the lost and of the known is not present, where he may be now: the new lost."""
+    away = ~np.isin(memory.known.labels, present)
+    count = int(away.sum())
+    if not count and not memory.lost.size:
+        return memory
+    missing = Memory(
+        memory.known,
+        gaussian_mixture.concatenate([memory.lost, memory.known.take(away)]),
+        np.concatenate([memory.ages, np.zeros(count)]) + model.step_time,
+        np.concatenate([memory.newer, np.full(count, first_label)]),
+    )
+    missing = missing.take(~np.isin(missing.lost.labels, present))
+    lost = model.motion.predict(missing.lost, 1.0)
+    waiting = model.room.contains(lost.means[:, :3])
+    waiting &= missing.ages <= model.parameters.memory + 1e-9
+    return Memory(memory.known, lost, missing.ages, missing.newer).take(waiting)
 
 
 def _returned(

@@ -151,14 +151,11 @@ class MultiBernoulli:
 
         Returns:
             e_j / (κ + e_j) for each box: the share of the unexplained that is a
-            newcomer; and where that newcomer would be, one Gaussian a box.
+            newcomer; and where that newcomer would be, one Gaussian a box (nowhere, all 0,
+            where none can be).
         """
         intensity, model = work.undetected, self._model
-        count, dimension = len(values), intensity.dimension
-        nameless = np.zeros(count, dtype=np.int64)
-        means, covariances = np.zeros((count, dimension)), np.tile(np.eye(dimension), (count, 1, 1))
-        if intensity.size == 0:
-            return np.zeros(count), GaussianMixture(np.zeros(count), means, covariances, nameless)
+        count = len(values)
         expected = model.expected(index, intensity)
         updated = phd.update(
             intensity,
@@ -166,22 +163,24 @@ class MultiBernoulli:
             expected=expected.values,
             jacobians=expected.jacobians,
             noise=noises,
-            spread=expected.spreads if len(expected.spreads) else None,
+            spread=expected.spreads,
             detection_probability=model.chances(index, expected, intensity),
             clutter_intensity=model.clutter[index],
             gate=model.gate,
         )
+        posterior = updated.posterior
+        work.undetected = posterior.take(slice(intensity.size))
         pairs = slice(intensity.size, None)
-        work.undetected = updated.posterior.take(np.arange(intensity.size))
-        # a faint copy of nobody keeps every group filled
-        weights, means, covariances = kernels.merge_moments(
-            np.concatenate([np.full(count, 1e-12), updated.posterior.weights[pairs]]),
-            np.concatenate([means, updated.posterior.means[pairs]]),
-            np.concatenate([covariances, updated.posterior.covariances[pairs]]),
-            np.concatenate([np.arange(count), updated.measurements[pairs]]),
-            count,
+        newborns = GaussianMixture(
+            *kernels.merge_moments(
+                posterior.weights[pairs],
+                posterior.means[pairs],
+                posterior.covariances[pairs],
+                updated.measurements[pairs],
+                count,
+            ),
+            labels=np.zeros(count, dtype=np.int64),
         )
-        newborns = GaussianMixture(weights, means, covariances, nameless)
         return np.minimum(updated.measurement_weights, 1.0 - 1e-9), newborns
 
     def _begin_tracks(

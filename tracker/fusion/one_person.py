@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker import association
+from tracker import association, update_kernels
 from tracker.fusion.model import CONFIRMED
 from tracker.gaussian_mixture import GaussianMixture
 from tracker.phd import PhdUpdate
@@ -53,32 +53,24 @@ def share_boxes(
         The update with these weights and labels.
     """
     size, boxes = predicted.size, len(updated.measurement_weights)
-    labels, label = np.unique(predicted.labels, return_inverse=True)
-    held = np.bincount(label, predicted.weights)
-    scale = 1.0 / np.maximum(held, 1.0)  # merging may have left a little more than one person
-    there = np.bincount(label, predicted.weights * detection_probability) * scale
-    missed = np.maximum(1.0 - there, 1e-9)
-    person = (labels < births.start) | (labels >= births.stop)
-    owner, box = label[updated.parents[size:]], updated.measurements[size:]
-    odds = np.exp(np.minimum(updated.log_odds, _LARGEST_ODDS)) * scale[owner]
-    table = np.bincount(owner * boxes + box, odds, len(labels) * boxes).reshape(len(labels), boxes)
-    nobody = 1.0 + table[~person].sum(axis=0)  # clutter or a newcomer, in units of κ
-    marginals = association.marginals(missed[person], table[person], nobody)
-    factors = np.ones(len(labels))
-    factors[person] = marginals.missed / missed[person]
-    # the share of a box's pair in what its label, or the newcomers, got of the box
-    parts = np.zeros((len(labels), boxes))
-    parts[person] = marginals.detected / np.maximum(table[person], 1e-300)
-    parts[~person] = marginals.unexplained / nobody
-    weights = np.concatenate(
-        [
-            updated.posterior.weights[:size] * (factors * scale)[label],
-            odds * parts[owner, box],
-        ]
+    owner, box = updated.parents[size:], updated.measurements[size:]
+    factors, shares, known = update_kernels.share_boxes(
+        predicted.weights,
+        predicted.labels,
+        detection_probability,
+        births.start,
+        births.stop,
+        owner,
+        box,
+        updated.log_odds,
+        boxes,
+        _LARGEST_ODDS,
+        association.TOLERANCE,
+        association.ITERATIONS,
     )
-    names = np.where(person[owner], labels[owner], next_label + box)
+    names = np.where(known, predicted.labels[owner], next_label + box)
     posterior = GaussianMixture(
-        weights,
+        np.concatenate([updated.posterior.weights[:size] * factors, shares]),
         updated.posterior.means,
         updated.posterior.covariances,
         np.concatenate([predicted.labels, names]),
@@ -88,12 +80,12 @@ def share_boxes(
         updated.parents,
         updated.measurements,
         updated.log_odds,
-        np.bincount(box, weights[size:], boxes),
+        np.bincount(box, shares, boxes),
     )
 
 
 def owners(mixture: GaussianMixture) -> Int[ndarray, " J"]:
     """Who may be merged with whom: a sure person's components with nobody else's, -1 for others."""
-    _, label = np.unique(mixture.labels, return_inverse=True)
+    _, label = update_kernels.group_labels(mixture.labels)
     sure = np.bincount(label, mixture.weights) > CONFIRMED
     return np.asarray(np.where(sure[label], mixture.labels, -1))

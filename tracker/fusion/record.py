@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
+from tracker import kernels
 from tracker.fusion.protocol import Associations, FusionResult
 from tracker.gaussian_mixture import GaussianMixture
 
@@ -92,19 +93,13 @@ class Ledger:
         """
         if not self._cameras or not len(labels):
             return Associations.none()
-        alive, first = np.unique(labels, return_index=True)
-        of_pair = np.concatenate(self._labels)
-        place = np.minimum(np.searchsorted(alive, of_pair), len(alive) - 1)
-        kept = np.flatnonzero(alive[place] == of_pair)
-        cameras = np.concatenate(self._cameras)[kept]
-        components, boxes = first[place[kept]], np.concatenate(self._boxes)[kept]
-        # camera, component and box as the digits of one number
-        bases = (len(labels), int(boxes.max(initial=0)) + 1)
-        keys = (cameras * bases[0] + components) * bases[1] + boxes
-        pairs, which = np.unique(keys, return_inverse=True)
-        sums = np.bincount(which, np.concatenate(self._probabilities)[kept], len(pairs))
-        rest, boxes = np.divmod(pairs, bases[1])
-        cameras, components = np.divmod(rest, bases[0])
+        cameras, components, boxes, sums = kernels.sum_pairs(
+            labels,
+            np.concatenate(self._cameras),
+            np.concatenate(self._labels),
+            np.concatenate(self._boxes),
+            np.concatenate(self._probabilities),
+        )
         return Associations(
             cameras.astype(np.int32),
             components.astype(np.int32),

@@ -81,8 +81,8 @@ class TargetModel:
         self.kind: MeasurementKind = kind
         self.size = SIZES[kind]
         self._unscented = update == "unscented"
-        self._half_height = float(half_extents[2])
-        self._half_width = float(np.mean(half_extents[:2]))
+        self.half_height = float(half_extents[2])
+        self.half_width = float(np.mean(half_extents[:2]))
         self._transform = _FROM_BOX[kind]
         # R = T diag(σ²) Tᵀ is linear in σ²
         products = np.einsum("pa,qa->apq", self._transform, self._transform)
@@ -113,8 +113,8 @@ class TargetModel:
     ) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
         found: tuple[ndarray, ndarray, ndarray, ndarray, ndarray] = box_kernels.expected_boxes(
             np.ascontiguousarray(states, dtype=float),
-            self._half_height,
-            self._half_width,
+            self.half_height,
+            self.half_width,
             self.size,
             camera.image_size,
             *camera.numbers,

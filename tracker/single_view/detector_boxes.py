@@ -45,31 +45,29 @@ class DetectorBoxes:
                 f'camera "{view.camera.name}" of {sequence.name} has no detections; name a CSV '
                 "file as its `detections` in sequence.toml, or choose single_view colour_phd"
             )
-        self._detections = view.detections
-        self._camera = view.camera
-        self._room = sequence.room
-        self._half_height = float(sequence.target_half_extents[2])
-        self._parameters = parameters
+        p, all_boxes = parameters, view.detections
+        above = all_boxes.scores >= p.score_threshold
+        self._frames, scores = all_boxes.frames[above], all_boxes.scores[above]
+        half_sizes = all_boxes.boxes[above, 2:] / 2.0
+        boxes = np.concatenate([all_boxes.boxes[above, :2] + half_sizes, half_sizes], axis=1)
+        sigmas = trust(boxes, p)
+        nearest, farthest = standing_between(
+            view.camera,
+            boxes,
+            float(sequence.target_half_extents[2]),
+            _DEPTH_SIGMAS * sigmas[:, 3] / boxes[:, 3],
+        )
+        plausible = meets(sequence.room, nearest, farthest, p.room_tolerance)
+        self._found = Detected(boxes, scores, sigmas, plausible)
+        """Of all steps: the judgement of a box asks for no other."""
 
     def at(self, frame: int) -> Detected:
         """The boxes of one step."""
-        p, rows = self._parameters, self._detections.at(frame)
-        rows_above = np.flatnonzero(self._detections.scores[rows] >= p.score_threshold)
-        corners = self._detections.boxes[rows][rows_above]
-        half_sizes = corners[:, 2:] / 2.0
-        boxes = np.concatenate([corners[:, :2] + half_sizes, half_sizes], axis=1)
-        sigmas = trust(boxes, p)
+        first, last = np.searchsorted(self._frames, [frame, frame + 1])
+        rows, found = slice(int(first), int(last)), self._found
         return Detected(
-            boxes, self._detections.scores[rows][rows_above], sigmas, self._plausible(boxes, sigmas)
+            found.boxes[rows], found.scores[rows], found.sigmas[rows], found.plausible[rows]
         )
-
-    def _plausible(
-        self, boxes: Float[ndarray, "N 4"], sigmas: Float[ndarray, "N 4"]
-    ) -> Bool[ndarray, " N"]:
-        nearest, farthest = standing_between(
-            self._camera, boxes, self._half_height, _DEPTH_SIGMAS * sigmas[:, 3] / boxes[:, 3]
-        )
-        return meets(self._room, nearest, farthest, self._parameters.room_tolerance)
 
 
 def trust(boxes: Float[ndarray, "N 4"], parameters: DetectionBoxParams) -> Float[ndarray, "N 4"]:
