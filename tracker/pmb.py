@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker import association, update_kernels
+from tracker import association, marginal_kernels
 from tracker.association import Marginals
 from tracker.gaussian_mixture import GaussianMixture
 
@@ -60,7 +60,7 @@ def update(
         unexplained_intensity: ρ_j = κ(z_j) + e_j, clutter and newborns at each measurement.
         gate: Squared Mahalanobis distance beyond which a pair is left out.
     """
-    existences, means, covariances, rows, unexplained = update_kernels.bernoulli_update(
+    existences, means, covariances, rows, unexplained = marginal_kernels.bernoulli_update(
         tracks.weights,
         tracks.means,
         tracks.covariances,

@@ -1,8 +1,4 @@
-"""Whole updates of targets by the boxes of one camera, compiled: no interpreter in between.
-
-Each is a composition of the kernels of :mod:`tracker.kernels`; the tests hold them
-against the formulas, pair by pair.
-"""
+"""The Kalman update of every component by every measurement, and the PHD update, compiled."""
 
 from __future__ import annotations
 
@@ -11,13 +7,215 @@ import math
 import numpy as np
 from numpy import ndarray
 
-from tracker.kernels import (
-    _kernel,
-    belief_propagation,
-    kalman_pairs,
-    merge_moments,
-    phd_weights,
-)
+from tracker.kernels import _kernel
+
+
+@_kernel
+def kalman_pairs(
+    means: ndarray,
+    covariances: ndarray,
+    expected: ndarray,
+    jacobians: ndarray,
+    measurements: ndarray,
+    noises: ndarray,
+    spreads: ndarray,
+    gate: float,
+) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
+    """The Kalman update of every component by every measurement inside its gate.
+
+    Args:
+        means: (J, d).
+        covariances: (J, d, d).
+        expected: (J, m), the measurement each component predicts.
+        jacobians: (J, m, d), its derivative H.
+        measurements: (M, m).
+        noises: (1, m, m) for all, or (M, m, m).
+        spreads: (J, m, m), what a component adds to the noise, or (0, m, m) for nothing.
+        gate: Squared Mahalanobis distance of the innovation; infinity for none.
+
+    Returns:
+        For each of the P pairs, measurement by measurement: component (P,),
+        measurement (P,), log N(z; h, S) (P,), mean (P, d), covariance (P, d, d)
+        in Joseph form, which stays symmetric and positive.
+
+    Raises:
+        numpy.linalg.LinAlgError: If the covariance of an innovation is not positive definite.
+    """
+    size, dimension = means.shape
+    count, order = measurements.shape
+    shared = noises.shape[0] == 1
+    spread = spreads.shape[0] > 0
+    ph = np.empty((size, dimension, order))
+    own = np.empty((size, order, order))
+    lower = np.empty((size, order, order))
+    constants = np.empty(size)
+    gains = np.empty((size, dimension, order))
+    updated = np.empty((size, dimension, dimension))
+    has_factor = np.zeros(size, dtype=np.bool_)
+    has_gain = np.zeros(size, dtype=np.bool_)
+
+    component = np.empty(size * count, dtype=np.int64)
+    measured = np.empty(size * count, dtype=np.int64)
+    likelihood = np.empty(size * count)
+    new_means = np.empty((size * count, dimension))
+    new_covariances = np.empty((size * count, dimension, dimension))
+
+    factor = np.empty((dimension, dimension))
+    half = np.empty((dimension, dimension))
+    noise = np.empty((order, order))
+    offset = np.empty(order)
+    solved = np.empty(order)
+    pairs = 0
+    for z in range(count):
+        for j in range(size):
+            for p in range(order):
+                for q in range(order):
+                    noise[p, q] = noises[0 if shared else z, p, q]
+                    if spread:
+                        noise[p, q] += spreads[j, p, q]
+            if z == 0:
+                for a in range(dimension):
+                    for p in range(order):
+                        total = 0.0
+                        for b in range(dimension):
+                            total += covariances[j, a, b] * jacobians[j, p, b]
+                        ph[j, a, p] = total
+                # H P Hᵀ, the state's share of the innovation's covariance
+                for p in range(order):
+                    for q in range(p + 1):
+                        total = 0.0
+                        for a in range(dimension):
+                            total += jacobians[j, p, a] * ph[j, a, q]
+                        own[j, p, q] = total
+            near = True
+            for p in range(order):
+                offset[p] = measurements[z, p] - expected[j, p]
+                # no number of a measurement alone may be beyond the gate
+                if offset[p] * offset[p] > gate * (noise[p, p] + own[j, p, p]):
+                    near = False
+            if not near:
+                continue
+            if not shared or not has_factor[j]:
+                has_factor[j] = True
+                # the Cholesky factor of S = H P Hᵀ + R
+                for p in range(order):
+                    for q in range(p + 1):
+                        total = noise[p, q] + own[j, p, q]
+                        for r in range(q):
+                            total -= lower[j, p, r] * lower[j, q, r]
+                        if p == q:
+                            if not total > 0.0:
+                                raise np.linalg.LinAlgError("H P H' + R is not positive definite")
+                            lower[j, p, p] = math.sqrt(total)
+                        else:
+                            lower[j, p, q] = total / lower[j, q, q]
+                constant = -0.5 * order * math.log(2.0 * math.pi)
+                for p in range(order):
+                    constant -= math.log(lower[j, p, p])
+                constants[j] = constant
+            distance = 0.0
+            for p in range(order):
+                total = offset[p]
+                for r in range(p):
+                    total -= lower[j, p, r] * solved[r]
+                solved[p] = total / lower[j, p, p]
+                distance += solved[p] * solved[p]
+            if not distance <= gate or distance == math.inf:
+                continue
+            if not (shared and has_gain[j]):
+                has_gain[j] = True
+                # K = P Hᵀ S⁻¹, row by row through the factor
+                for a in range(dimension):
+                    for p in range(order):
+                        total = ph[j, a, p]
+                        for r in range(p):
+                            total -= lower[j, p, r] * solved[r]
+                        solved[p] = total / lower[j, p, p]
+                    for p in range(order - 1, -1, -1):
+                        total = solved[p]
+                        for r in range(p + 1, order):
+                            total -= lower[j, r, p] * gains[j, a, r]
+                        gains[j, a, p] = total / lower[j, p, p]
+                # P = (I - K H) P (I - K H)ᵀ + K R Kᵀ
+                for a in range(dimension):
+                    for b in range(dimension):
+                        total = 1.0 if a == b else 0.0
+                        for p in range(order):
+                            total -= gains[j, a, p] * jacobians[j, p, b]
+                        factor[a, b] = total
+                for a in range(dimension):
+                    for b in range(dimension):
+                        total = 0.0
+                        for c in range(dimension):
+                            total += factor[a, c] * covariances[j, c, b]
+                        half[a, b] = total
+                for a in range(dimension):
+                    for b in range(a + 1):
+                        total = 0.0
+                        for c in range(dimension):
+                            total += half[a, c] * factor[b, c]
+                        for p in range(order):
+                            for q in range(order):
+                                total += gains[j, a, p] * noise[p, q] * gains[j, b, q]
+                        updated[j, a, b] = total
+                        updated[j, b, a] = total
+            component[pairs] = j
+            measured[pairs] = z
+            likelihood[pairs] = constants[j] - 0.5 * distance
+            for a in range(dimension):
+                total = means[j, a]
+                for p in range(order):
+                    total += gains[j, a, p] * offset[p]
+                new_means[pairs, a] = total
+                for b in range(dimension):
+                    new_covariances[pairs, a, b] = updated[j, a, b]
+            pairs += 1
+    return (
+        component[:pairs],
+        measured[:pairs],
+        likelihood[:pairs],
+        new_means[:pairs],
+        new_covariances[:pairs],
+    )
+
+
+@_kernel
+def phd_weights(
+    log_terms: ndarray, measured: ndarray, log_clutter: ndarray
+) -> tuple[ndarray, ndarray, ndarray]:
+    """Weights of a PHD update, in logarithms: a far measurement still goes to its nearest.
+
+    Args:
+        log_terms: (P,), log(p_D w q(z)) of each pair.
+        measured: (P,), its measurement.
+        log_clutter: (M,), log κ(z); minus infinity without clutter.
+
+    Returns:
+        (P,) weights; (P,) log odds against clutter; (M,) sums of the weights.
+    """
+    count = len(log_clutter)
+    largest = np.empty(count)
+    for z in range(count):
+        largest[z] = max(log_clutter[z], -1e300)
+    for pair in range(len(log_terms)):
+        z = measured[pair]
+        largest[z] = max(largest[z], log_terms[pair])
+    totals = np.empty(count)
+    for z in range(count):
+        totals[z] = math.exp(log_clutter[z] - largest[z])
+    weights = np.empty(len(log_terms))
+    odds = np.empty(len(log_terms))
+    for pair in range(len(log_terms)):
+        z = measured[pair]
+        weights[pair] = math.exp(log_terms[pair] - largest[z])
+        totals[z] += weights[pair]
+        odds[pair] = log_terms[pair] - log_clutter[z]
+    sums = np.zeros(count)
+    for pair in range(len(log_terms)):
+        z = measured[pair]
+        weights[pair] /= totals[z]
+        sums[z] += weights[pair]
+    return weights, odds, sums
 
 
 @_kernel
@@ -40,7 +238,7 @@ def phd_update(
         weights: (J,).
         means: (J, d).
         covariances: (J, d, d).
-        expected: (J, m), as the further ones, of :func:`tracker.kernels.kalman_pairs`.
+        expected: (J, m), as the further ones, of :func:`kalman_pairs`.
         detection_probabilities: (J,).
         clutter: (M,), κ(z).
         gate: Squared Mahalanobis distance.
@@ -86,158 +284,3 @@ def phd_update(
     all_means[size:], all_covariances[size:] = new_means, new_covariances
     parents[size:], sources[size:] = parent, measured
     return all_weights, all_means, all_covariances, parents, sources, log_odds, sums
-
-
-@_kernel
-def bernoulli_update(
-    existences: ndarray,
-    means: ndarray,
-    covariances: ndarray,
-    expected: ndarray,
-    jacobians: ndarray,
-    measurements: ndarray,
-    noises: ndarray,
-    spreads: ndarray,
-    detection_probabilities: ndarray,
-    unexplained: ndarray,
-    gate: float,
-    tolerance: float,
-    iterations: int,
-) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
-    """The update of Bernoulli tracks by one measurement set, of which each gets its share.
-
-    Args:
-        existences: (n,).
-        means: (n, d), as the further ones, of :func:`tracker.kernels.kalman_pairs`.
-        detection_probabilities: (n,).
-        unexplained: (M,), intensity of clutter and newcomers at each measurement, > 0.
-        gate: Squared Mahalanobis distance.
-        tolerance: As ``iterations``, of :func:`tracker.kernels.belief_propagation`.
-
-    Returns:
-        (n,) existences, (n, d) means, (n, d, d) covariances; (n, 1 + M) probabilities of
-        a miss and of each measurement; (M,) the probability that no track made it.
-    """
-    size, dimension = means.shape
-    count = len(measurements)
-    track, measured, log_likelihood, pair_means, pair_covariances = kalman_pairs(
-        means, covariances, expected, jacobians, measurements, noises, spreads, gate
-    )
-    pairs = len(track)
-    missed = np.empty(size)
-    survived = np.empty(size)
-    for i in range(size):
-        survived[i] = existences[i] * (1.0 - detection_probabilities[i])
-        missed[i] = 1.0 - existences[i] + survived[i]
-    detected = np.zeros((size, count))
-    for pair in range(pairs):
-        i = track[pair]
-        detected[i, measured[pair]] = (
-            existences[i] * detection_probabilities[i] * math.exp(log_likelihood[pair])
-        )
-    rows, columns = belief_propagation(missed, detected, unexplained, tolerance, iterations)
-
-    weights = np.empty(size + pairs)
-    parts = np.empty((size + pairs, dimension))
-    spread = np.empty((size + pairs, dimension, dimension))
-    group = np.empty(size + pairs, dtype=np.int64)
-    for i in range(size):
-        # a faint share of the missed hypothesis stays, so that no track is without any
-        weights[i] = max(rows[i, 0] * survived[i] / max(missed[i], 1e-300), 1e-12)
-        group[i] = i
-    parts[:size], spread[:size] = means, covariances
-    for pair in range(pairs):
-        weights[size + pair] = rows[track[pair], 1 + measured[pair]]
-        group[size + pair] = track[pair]
-    parts[size:], spread[size:] = pair_means, pair_covariances
-    new_existences, new_means, new_covariances = merge_moments(weights, parts, spread, group, size)
-    for i in range(size):
-        new_existences[i] = min(new_existences[i], 1.0)
-    return new_existences, new_means, new_covariances, rows, columns
-
-
-@_kernel
-def group_labels(labels: ndarray) -> tuple[ndarray, ndarray]:
-    """The distinct labels, ascending, and for each of (J,) labels its place among them."""
-    order = np.argsort(labels, kind="mergesort")
-    distinct = np.empty(len(labels), dtype=np.int64)
-    place = np.empty(len(labels), dtype=np.int64)
-    count = 0
-    for j in order:
-        if count == 0 or labels[j] != distinct[count - 1]:
-            distinct[count] = labels[j]
-            count += 1
-        place[j] = count - 1
-    return distinct[:count].copy(), place
-
-
-@_kernel
-def share_boxes(
-    weights: ndarray,
-    labels: ndarray,
-    detection_probabilities: ndarray,
-    first_birth: int,
-    last_birth: int,
-    parents: ndarray,
-    measured: ndarray,
-    log_odds: ndarray,
-    boxes: int,
-    largest_odds: float,
-    tolerance: float,
-    iterations: int,
-) -> tuple[ndarray, ndarray, ndarray]:
-    """New weights of a PHD update whose labels stand for one person each.
-
-    Args:
-        weights: (J,) before this camera.
-        labels: (J,).
-        detection_probabilities: (J,).
-        first_birth: Labels from here up to ``last_birth``, exclusive, stay Poisson.
-        parents: (P,), the component of each pair.
-        measured: (P,), its box.
-        log_odds: (P,), log(p_D w q(z) / κ) of each.
-        boxes: M.
-        largest_odds: Logarithm of what counts as certain.
-        tolerance: As ``iterations``, of :func:`tracker.kernels.belief_propagation`.
-
-    Returns:
-        (J,) factors on the weights of the missed; (P,) weights of the pairs; (P,) whether a
-        pair is a person's, not a birth's.
-    """
-    distinct, place = group_labels(labels)
-    count = len(distinct)
-    person = (distinct < first_birth) | (distinct >= last_birth)
-    held, there = np.zeros(count), np.zeros(count)
-    for j in range(len(labels)):
-        held[place[j]] += weights[j]
-        there[place[j]] += weights[j] * detection_probabilities[j]
-    # merging may have left a little more than one person
-    scale = 1.0 / np.maximum(held, 1.0)
-    missed = np.maximum(1.0 - there * scale, 1e-9)
-    pairs = len(parents)
-    odds, owner = np.empty(pairs), np.empty(pairs, dtype=np.int64)
-    table = np.zeros((count, boxes))
-    nobody = np.ones(boxes)  # clutter or a newcomer, in units of κ
-    for pair in range(pairs):
-        owner[pair] = place[parents[pair]]
-        odds[pair] = math.exp(min(log_odds[pair], largest_odds)) * scale[owner[pair]]
-        if person[owner[pair]]:
-            table[owner[pair], measured[pair]] += odds[pair]
-        else:
-            nobody[measured[pair]] += odds[pair]
-    people = np.flatnonzero(person)
-    rows, columns = belief_propagation(missed[people], table[people], nobody, tolerance, iterations)
-    row = np.full(count, -1, dtype=np.int64)
-    factors = scale.copy()
-    for i in range(len(people)):
-        row[people[i]] = i
-        factors[people[i]] *= rows[i, 0] / missed[people[i]]
-    shares = np.empty(pairs)
-    for pair in range(pairs):
-        who, z = owner[pair], measured[pair]
-        # the share of this pair in what its label, or the newcomers, got of the box
-        if person[who]:
-            shares[pair] = odds[pair] * rows[row[who], 1 + z] / max(table[who, z], 1e-300)
-        else:
-            shares[pair] = odds[pair] * columns[z] / nobody[z]
-    return factors[place], shares, person[owner]

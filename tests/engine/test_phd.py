@@ -21,7 +21,7 @@ from tests.engine.mixtures import (
     reference_update,
 )
 from tests.engine.synthetic import CAMERAS, walk
-from tracker import gaussian_mixture, kernels, phd
+from tracker import gaussian_mixture, phd, update_kernels
 from tracker.gaussian_mixture import GaussianMixture
 
 seeds = st.integers(0, 2**32 - 1)
@@ -313,7 +313,7 @@ def test_one_sure_target_before_a_camera_is_the_extended_kalman_filter() -> None
 
 def test_a_noise_that_is_no_covariance_is_refused() -> None:
     with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
-        kernels.kalman_pairs(
+        update_kernels.kalman_pairs(
             np.zeros((1, 2)),
             np.zeros((1, 2, 2)),
             np.zeros((1, 2)),

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from tests.engine.standing import CAMERAS, HALF_EXTENTS
 from tests.engine.synthetic import look_at
-from tracker import kernels
+from tracker import update_kernels
 from tracker.camera import Camera
 from tracker.fusion.target_model import SIZES, MeasurementKind, TargetModel, UpdateKind
 from tracker.single_view.protocol import ViewResult
@@ -102,7 +102,7 @@ def update(
     """One Gaussian updated by one box."""
     model = TargetModel(HALF_EXTENTS, "box", kind)
     expected = model.expected(NEAR, mean[None], covariance[None])
-    found = kernels.kalman_pairs(
+    found = update_kernels.kalman_pairs(
         mean[None],
         covariance[None],
         expected.values,

@@ -10,7 +10,7 @@ from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.engine.standing import CAMERAS, HALF_EXTENTS, watch
-from tracker import association, birth_kernels, kernels, update_kernels
+from tracker import association, birth_kernels, kernels, marginal_kernels
 from tracker.camera import NEAREST_DEPTH
 from tracker.fusion.target_model import MeasurementKind, TargetModel
 
@@ -74,7 +74,7 @@ def test_shared_boxes(seed: int, size: int, boxes: int) -> None:
     parents = np.array([j for j, _ in pairs], dtype=np.int64)
     measured = np.array([z for _, z in pairs], dtype=np.int64)
     log_odds = rng.normal(0.0, 3.0, len(pairs))
-    factors, shares, known = update_kernels.share_boxes(
+    factors, shares, known = marginal_kernels.share_boxes(
         weights, labels, p_d, births.start, births.stop, parents, measured, log_odds, boxes,
         600.0, association.TOLERANCE, association.ITERATIONS,
     )  # fmt: skip
@@ -86,7 +86,7 @@ def test_shared_boxes(seed: int, size: int, boxes: int) -> None:
 
 @given(st.lists(st.integers(-3, 6), max_size=12))
 def test_labels_are_grouped_as_by_numpy(labels: list[int]) -> None:
-    distinct, place = update_kernels.group_labels(np.array(labels, dtype=np.int64))
+    distinct, place = kernels.group_labels(np.array(labels, dtype=np.int64))
     expected = np.unique(np.array(labels, dtype=np.int64), return_inverse=True)
     assert_array_equal(distinct, expected[0])
     assert_array_equal(place, expected[1])

@@ -20,7 +20,7 @@ data association", patent CN101783020A, 2010.
 
 from __future__ import annotations
 
-from tracker.association.belief_propagation import Marginals, marginals
+from tracker.association.belief_propagation import ITERATIONS, TOLERANCE, Marginals, marginals
 from tracker.association.events import (
     JointEvents,
     log_weights,
@@ -32,7 +32,9 @@ from tracker.association.exact import MOST_ITEMS, exact_marginals
 from tracker.association.validation import clusters, validation_matrix
 
 __all__ = [
+    "ITERATIONS",
     "MOST_ITEMS",
+    "TOLERANCE",
     "JointEvents",
     "Marginals",
     "clusters",

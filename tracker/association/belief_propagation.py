@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker import kernels
+from tracker import marginal_kernels
 
 TOLERANCE = 1e-6
 """Largest change of a message, relative to the intensity it meets, at which all are settled."""
@@ -56,7 +56,7 @@ def marginals(
         tolerance: Largest change of a message at which the iteration stops.
         iterations: At most this many.
     """
-    row, column = kernels.belief_propagation(
+    row, column = marginal_kernels.belief_propagation(
         np.ascontiguousarray(missed, dtype=float),
         np.ascontiguousarray(detected, dtype=float),
         np.ascontiguousarray(unexplained, dtype=float),

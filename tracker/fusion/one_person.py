@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker import association, update_kernels
+from tracker import association, kernels, marginal_kernels
 from tracker.fusion.model import CONFIRMED
 from tracker.gaussian_mixture import GaussianMixture
 from tracker.phd import PhdUpdate
@@ -54,7 +54,7 @@ def share_boxes(
     """
     size, boxes = predicted.size, len(updated.measurement_weights)
     owner, box = updated.parents[size:], updated.measurements[size:]
-    factors, shares, known = update_kernels.share_boxes(
+    factors, shares, known = marginal_kernels.share_boxes(
         predicted.weights,
         predicted.labels,
         detection_probability,
@@ -86,6 +86,6 @@ def share_boxes(
 
 def owners(mixture: GaussianMixture) -> Int[ndarray, " J"]:
     """Who may be merged with whom: a sure person's components with nobody else's, -1 for others."""
-    _, label = update_kernels.group_labels(mixture.labels)
+    _, label = kernels.group_labels(mixture.labels)
     sure = np.bincount(label, mixture.weights) > CONFIRMED
     return np.asarray(np.where(sure[label], mixture.labels, -1))

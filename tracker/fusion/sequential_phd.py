@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker import gaussian_mixture, models, phd, update_kernels
+from tracker import gaussian_mixture, kernels, models, phd
 from tracker.fusion import memory, one_person
 from tracker.fusion.measurement_births import CameraEvidence
 from tracker.fusion.memory import Memory
@@ -172,7 +172,7 @@ class SequentialPhd:
 
     def _without_doubles(self, mixture: GaussianMixture, record: Record) -> Int[ndarray, " K"]:
         """Indices of the components of those labels that do not only repeat another."""
-        labels, label = update_kernels.group_labels(mixture.labels)
+        labels, label = kernels.group_labels(mixture.labels)
         held = np.bincount(label, mixture.weights, len(labels))
         # the heaviest component of a label has the last word on where its person is
         order = np.argsort(mixture.weights, kind="stable")

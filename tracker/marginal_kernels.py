@@ -1,0 +1,212 @@
+"""Who made which measurement, compiled: belief propagation, and the updates that rest on it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy import ndarray
+
+from tracker.kernels import _kernel, group_labels, merge_moments
+from tracker.update_kernels import kalman_pairs
+
+
+@_kernel
+def belief_propagation(
+    missed: ndarray, detected: ndarray, unexplained: ndarray, tolerance: float, iterations: int
+) -> tuple[ndarray, ndarray]:
+    """Messages between targets and measurements until they settle.
+
+    Args:
+        missed: (n,) weight of each target's miss.
+        detected: (n, M) weight of each pair, 0 outside the gate.
+        unexplained: (M,) weight of each measurement being nobody's.
+        tolerance: Largest change of a message at which to stop.
+        iterations: At most this many.
+
+    Returns:
+        (n, 1 + M) probabilities of a miss and of each measurement for every target, and
+        (M,) the probability that no target made the measurement.
+    """
+    targets, count = detected.shape
+    to_target = np.empty((targets, count))
+    to_measurement = np.zeros((targets, count))
+    for j in range(count):
+        for i in range(targets):
+            to_target[i, j] = 1.0 / unexplained[j]
+    for _ in range(iterations):
+        for i in range(targets):
+            total = missed[i]
+            for j in range(count):
+                total += detected[i, j] * to_target[i, j]
+            for j in range(count):
+                if detected[i, j] > 0.0:
+                    rest = max(total - detected[i, j] * to_target[i, j], 1e-300)
+                    to_measurement[i, j] = detected[i, j] / rest
+        change = 0.0
+        for j in range(count):
+            total = unexplained[j]
+            for i in range(targets):
+                total += to_measurement[i, j]
+            for i in range(targets):
+                new = 1.0 / max(total - to_measurement[i, j], 1e-300)
+                change = max(change, abs(new - to_target[i, j]) * unexplained[j])
+                to_target[i, j] = new
+        if change < tolerance:
+            break
+    rows = np.empty((targets, 1 + count))
+    columns = np.empty(count)
+    for i in range(targets):
+        total = missed[i]
+        rows[i, 0] = missed[i]
+        for j in range(count):
+            rows[i, 1 + j] = detected[i, j] * to_target[i, j]
+            total += rows[i, 1 + j]
+        for j in range(1 + count):
+            rows[i, j] /= max(total, 1e-300)
+    for j in range(count):
+        total = unexplained[j]
+        for i in range(targets):
+            total += to_measurement[i, j]
+        columns[j] = unexplained[j] / total
+    return rows, columns
+
+
+@_kernel
+def bernoulli_update(
+    existences: ndarray,
+    means: ndarray,
+    covariances: ndarray,
+    expected: ndarray,
+    jacobians: ndarray,
+    measurements: ndarray,
+    noises: ndarray,
+    spreads: ndarray,
+    detection_probabilities: ndarray,
+    unexplained: ndarray,
+    gate: float,
+    tolerance: float,
+    iterations: int,
+) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
+    """The update of Bernoulli tracks by one measurement set, of which each gets its share.
+
+    Args:
+        existences: (n,).
+        means: (n, d), as the further ones, of :func:`tracker.update_kernels.kalman_pairs`.
+        detection_probabilities: (n,).
+        unexplained: (M,), intensity of clutter and newcomers at each measurement, > 0.
+        gate: Squared Mahalanobis distance.
+        tolerance: As ``iterations``, of :func:`belief_propagation`.
+
+    Returns:
+        (n,) existences, (n, d) means, (n, d, d) covariances; (n, 1 + M) probabilities of
+        a miss and of each measurement; (M,) the probability that no track made it.
+    """
+    size, dimension = means.shape
+    count = len(measurements)
+    track, measured, log_likelihood, pair_means, pair_covariances = kalman_pairs(
+        means, covariances, expected, jacobians, measurements, noises, spreads, gate
+    )
+    pairs = len(track)
+    missed = np.empty(size)
+    survived = np.empty(size)
+    for i in range(size):
+        survived[i] = existences[i] * (1.0 - detection_probabilities[i])
+        missed[i] = 1.0 - existences[i] + survived[i]
+    detected = np.zeros((size, count))
+    for pair in range(pairs):
+        i = track[pair]
+        detected[i, measured[pair]] = (
+            existences[i] * detection_probabilities[i] * math.exp(log_likelihood[pair])
+        )
+    rows, columns = belief_propagation(missed, detected, unexplained, tolerance, iterations)
+
+    weights = np.empty(size + pairs)
+    parts = np.empty((size + pairs, dimension))
+    spread = np.empty((size + pairs, dimension, dimension))
+    group = np.empty(size + pairs, dtype=np.int64)
+    for i in range(size):
+        # a faint share of the missed hypothesis stays, so that no track is without any
+        weights[i] = max(rows[i, 0] * survived[i] / max(missed[i], 1e-300), 1e-12)
+        group[i] = i
+    parts[:size], spread[:size] = means, covariances
+    for pair in range(pairs):
+        weights[size + pair] = rows[track[pair], 1 + measured[pair]]
+        group[size + pair] = track[pair]
+    parts[size:], spread[size:] = pair_means, pair_covariances
+    new_existences, new_means, new_covariances = merge_moments(weights, parts, spread, group, size)
+    for i in range(size):
+        new_existences[i] = min(new_existences[i], 1.0)
+    return new_existences, new_means, new_covariances, rows, columns
+
+
+@_kernel
+def share_boxes(
+    weights: ndarray,
+    labels: ndarray,
+    detection_probabilities: ndarray,
+    first_birth: int,
+    last_birth: int,
+    parents: ndarray,
+    measured: ndarray,
+    log_odds: ndarray,
+    boxes: int,
+    largest_odds: float,
+    tolerance: float,
+    iterations: int,
+) -> tuple[ndarray, ndarray, ndarray]:
+    """New weights of a PHD update whose labels stand for one person each.
+
+    Args:
+        weights: (J,) before this camera.
+        labels: (J,).
+        detection_probabilities: (J,).
+        first_birth: Labels from here up to ``last_birth``, exclusive, stay Poisson.
+        parents: (P,), the component of each pair.
+        measured: (P,), its box.
+        log_odds: (P,), log(p_D w q(z) / κ) of each.
+        boxes: M.
+        largest_odds: Logarithm of what counts as certain.
+        tolerance: As ``iterations``, of :func:`belief_propagation`.
+
+    Returns:
+        (J,) factors on the weights of the missed; (P,) weights of the pairs; (P,) whether a
+        pair is a person's, not a birth's.
+    """
+    distinct, place = group_labels(labels)
+    count = len(distinct)
+    person = (distinct < first_birth) | (distinct >= last_birth)
+    held, there = np.zeros(count), np.zeros(count)
+    for j in range(len(labels)):
+        held[place[j]] += weights[j]
+        there[place[j]] += weights[j] * detection_probabilities[j]
+    # merging may have left a little more than one person
+    scale = 1.0 / np.maximum(held, 1.0)
+    missed = np.maximum(1.0 - there * scale, 1e-9)
+    pairs = len(parents)
+    odds, owner = np.empty(pairs), np.empty(pairs, dtype=np.int64)
+    table = np.zeros((count, boxes))
+    nobody = np.ones(boxes)  # clutter or a newcomer, in units of κ
+    for pair in range(pairs):
+        owner[pair] = place[parents[pair]]
+        odds[pair] = math.exp(min(log_odds[pair], largest_odds)) * scale[owner[pair]]
+        if person[owner[pair]]:
+            table[owner[pair], measured[pair]] += odds[pair]
+        else:
+            nobody[measured[pair]] += odds[pair]
+    people = np.flatnonzero(person)
+    rows, columns = belief_propagation(missed[people], table[people], nobody, tolerance, iterations)
+    row = np.full(count, -1, dtype=np.int64)
+    factors = scale.copy()
+    for i in range(len(people)):
+        row[people[i]] = i
+        factors[people[i]] *= rows[i, 0] / missed[people[i]]
+    shares = np.empty(pairs)
+    for pair in range(pairs):
+        who, z = owner[pair], measured[pair]
+        # the share of this pair in what its label, or the newcomers, got of the box
+        if person[who]:
+            shares[pair] = odds[pair] * rows[row[who], 1 + z] / max(table[who, z], 1e-300)
+        else:
+            shares[pair] = odds[pair] * columns[z] / nobody[z]
+    return factors[place], shares, person[owner]
