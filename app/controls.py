@@ -11,11 +11,12 @@ from __future__ import annotations
 import threading
 from collections.abc import Set
 from functools import partial
-from typing import Any, Literal, get_args
+from typing import Any
 
 import viser
 
 from app import scene_style
+from app.scene_keys import hotkeys
 from app.scene_sliders import Scale, hint_text, label_text, number_text
 from app.scene_worker import LatestWorker
 from app.workbench import Change, Snapshot, Workbench
@@ -28,35 +29,6 @@ PANEL_WIDTH = 276
 
 STAGES: dict[Stage, str] = {"single_view": "Single view", "fusion": "Fusion", "tracks": "Tracks"}
 METHOD_STAGE: dict[str, Stage] = {"single_view": "single_view", "fusion_method": "fusion"}
-
-Key = Literal[
-    "space", "home", "end", "pageup", "pagedown", "escape",
-    "B", "G", "I", "J", "K", "L", "N", "O", "T",
-    "0", "1", "2", "3", "4", "5", "6", "7", "8", "9",
-]  # fmt: skip
-
-COMMANDS: tuple[tuple[str, str, Key, Literal["shift"] | None], ...] = (
-    ("play", "Play or pause", "space", None),
-    ("first", "First step", "home", None),
-    ("last", "Last step", "end", None),
-    ("ten-back", "Ten steps back", "pageup", None),
-    ("ten-forward", "Ten steps on", "pagedown", None),
-    ("play-back", "Play backwards", "J", None),
-    ("stop", "Stop", "K", None),
-    ("play-forward", "Play", "L", None),
-    ("mark-in", "Play from here", "I", None),
-    ("mark-out", "Play to here", "O", None),
-    ("next-event", "Next event", "N", None),
-    ("previous-event", "Previous event", "N", "shift"),
-    ("truth", "Truth on or off", "G", None),
-    ("trails", "Trails on or off", "T", None),
-    ("boxes", "Boxes on or off", "B", None),
-    ("clear", "Clear the selection", "escape", None),
-    ("free-view", "Free view", "0", None),
-    *((f"camera-{key}", f"Camera {key}", key, None) for key in get_args(Key)[-9:]),
-)
-"""Keys that reach the page also from inside the 3D view: name, words, key, modifier. Arrows and
-W A S D Q E are missing on purpose: they move viser's own viewpoint."""
 
 Input = (
     viser.GuiInputHandle[float]
@@ -102,9 +74,11 @@ class Controls:
             "Reset all", hint="Every value and method to its default."
         )
         self._reset_all.on_click(lambda _: self._reset(None))
-        for name, words, key, modifier in COMMANDS:
-            command = server.gui.add_command(words, hotkey=key, modifier=modifier)
-            command.on_trigger(partial(self._relay, name))
+        for hotkey in hotkeys():
+            command = server.gui.add_command(
+                hotkey.title, hotkey=hotkey.key, modifier=hotkey.modifier
+            )
+            command.on_trigger(partial(self._relay, hotkey.name))
         self._refresh(workbench.snapshot())
         self._unsubscribe = workbench.subscribe(self._note)
         self._worker.ask("refresh")

@@ -19,6 +19,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 ENVIRONMENT = ROOT / ".venv"
+NEEDS = {"page": "Node.js", "page types": "TypeScript 5.5 or newer (tsc)"}
 BIN = ENVIRONMENT / ("Scripts" if os.name == "nt" else "bin")
 PYTHON = BIN / ("python.exe" if os.name == "nt" else "python")
 
@@ -38,9 +39,19 @@ def set_up() -> None:
     stamp.write_text(wanted, encoding="utf-8")
 
 
+def type_checker() -> str | None:
+    """TypeScript's compiler, which reads the types in the page's comments, where it is at hand."""
+    tsc = shutil.which("tsc")
+    if tsc is None:
+        return None
+    told = subprocess.run([tsc, "--version"], capture_output=True, text=True).stdout
+    version = [int(part) for part in told.split()[-1].split(".")[:2]]
+    return tsc if version >= [5, 5] else None
+
+
 def commands(pytest_arguments: list[str]) -> dict[str, list[list[str]]]:
     """What is run, by name, in order."""
-    node = shutil.which("node")
+    node, tsc = shutil.which("node"), type_checker()
     page_tests = sorted(str(path) for path in (ROOT / "tests" / "page").glob("*.test.mjs"))
     return {
         "style": [
@@ -49,7 +60,8 @@ def commands(pytest_arguments: list[str]) -> dict[str, list[list[str]]]:
         ],
         "types": [[str(BIN / "mypy")]],
         "imports": [[str(BIN / "lint-imports")]],
-        "page": [[node, "--test", *page_tests]] if node and page_tests else [],
+        "page": [[node, "--test", *page_tests]] if node else [],
+        "page types": [[tsc, "--project", str(ROOT / "static" / "jsconfig.json")]] if tsc else [],
         "tests": [[str(PYTHON), "-m", "pytest", *pytest_arguments]],
         "benchmarks": [[str(PYTHON), "-m", "tests.benchmarks", "--short"]],
     }
@@ -68,7 +80,7 @@ def main() -> int:
         if arguments.only and name not in arguments.only:
             continue
         if not lines:
-            print(f"── {name}: skipped, Node.js is not installed", flush=True)
+            print(f"── {name}: skipped, {NEEDS[name]} is not installed", flush=True)
             continue
         begin = time.monotonic()
         print(f"── {name}", flush=True)

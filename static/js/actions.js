@@ -3,6 +3,10 @@
 import { ApiError, request, sendJson } from "./api.js";
 import { SPEEDS, clampStep } from "./clock.js";
 import { eventsNow, nextEvent, ordered } from "./events.js";
+import { commandLine } from "./url.js";
+
+/** Changes of one drag that follow each other within this time are undone together. */
+const SAME_DRAG = 1500;
 
 /**
  * Save what an address gives, once it is known that it gives it.
@@ -20,114 +24,52 @@ async function download(path, fallback) {
 }
 
 /**
- * @param {object} parts
- * @param {Store<PageState>} parts.store
- * @param {(step: number) => void} parts.seek
- * @param {(message: object) => boolean} parts.send
- * @param {() => void} parts.help
- * @param {(state: ServerState) => void} parts.receive
+ * @param {object} how
+ * @param {Store<PageState>} how.store
+ * @param {(step: number) => void} how.seek
+ * @param {(message: object) => boolean} how.send
+ * @param {(state: ServerState) => void} how.receive
+ * @returns {Actions}
  */
-export function createActions({ store, seek, send, help, receive }) {
+export function createActions({ store, seek, send, receive }) {
 	let noteId = 0;
-	/** Values before each change, newest last.  @type {Record<string, any>[]} */
-	const history = [];
-
-	/** @param {"info" | "warn" | "error"} level @param {string} title @param {string} text */
-	function note(level, title, text) {
-		const id = (noteId += 1);
-		// The same thing said twice is one note.
-		const others = store.get().notes.filter((other) => other.title !== title);
-		store.set({ notes: [...others.slice(-3), { id, level, title, text }] });
-		if (level === "info") setTimeout(() => store.set({ notes: store.get().notes.filter((other) => other.id !== id) }), 6000);
-	}
+	/** Values to go back to and on to, newest last.  @type {Record<string, any>[][]} */
+	const [past, future] = [[], []];
+	let rememberedAt = -Infinity;
+	let undoing = 0;
+	const frames = () => store.get().server?.sequence?.frames ?? 0;
 
 	/** @param {unknown} error */
 	function tell(error) {
-		if (error instanceof ApiError) note("error", error.message, error.hint ?? "");
-		else throw error;
+		if (!(error instanceof ApiError)) throw error;
+		actions.note("error", error.message, error.hint ?? "");
 	}
-
-	/** @param {"POST" | "PATCH" | "DELETE"} method @param {string} path @param {object} [body] */
-	async function ask(method, path, body) {
-		try {
-			const answer = await sendJson(method, path, body);
-			if (answer && typeof answer === "object" && "version" in answer) receive(answer);
-			return true;
-		} catch (error) {
-			tell(error);
-			return false;
-		}
-	}
-
-	const frames = () => store.get().server?.sequence?.frames ?? 0;
-	const changeTo = (/** @type {Record<string, any>} */ changes) => ask("PATCH", "/api/parameters", { changes });
-
-	/** @param {number | null} id */
-	function select(id) {
-		if (store.get().selection === id) return;
-		store.set({ selection: id });
-		send({ type: "select", id });
-	}
-
-	const page = {
-		note,
-		select,
-		open: (/** @type {string} */ name) => ask("POST", "/api/sequence", { name }),
-		change: changeTo,
-		reset: (/** @type {string[]} */ ...keys) => ask("POST", "/api/parameters/reset", keys.length ? { keys } : {}),
-		preset: (/** @type {string} */ name) => ask("POST", "/api/parameters/preset", { name }),
-		cancel: () => ask("POST", "/api/run/cancel"),
-		pin: (/** @type {boolean} */ on) => ask(on ? "POST" : "DELETE", "/api/run/pin"),
-		runAgain: () => ask("POST", "/api/run"),
-		chooseView(/** @type {number} */ camera) {
-			store.set({ view3d: camera });
-			void ask("POST", "/api/view", { camera: camera < 0 ? null : camera });
-		},
-		toggleLayer3d(/** @type {string} */ layer) {
-			const layers3d = { ...store.get().layers3d, [layer]: !store.get().layers3d[layer] };
-			store.set({ layers3d });
-			void ask("PATCH", "/api/layers", { changes: { [layer]: layers3d[layer] } });
-		},
-		toggleLayer2d(/** @type {string} */ layer) {
-			const { layers2d } = store.get();
-			store.set({ layers2d: { ...layers2d, [layer]: !layers2d[layer] } });
-		},
-		async copy(/** @type {string} */ text) {
-			try {
-				await navigator.clipboard.writeText(text);
-				return true;
-			} catch {
-				return false;
-			}
-		},
-		/**
-		 * Keep what the parameters were, whoever changed them; many changes of one drag are one.
-		 * @param {Record<string, any>} before
-		 * @param {Record<string, any>} after
-		 */
-		remember(before, after) {
-			const old = Object.fromEntries(Object.keys(after).filter((key) => before[key] !== after[key]).map((key) => [key, before[key]]));
-			if (Object.keys(old).length === 0) return;
-			const now = performance.now();
-			const last = history[history.length - 1];
-			const same = last && now - rememberedAt < 1500 && Object.keys(old).every((key) => key in last);
-			rememberedAt = now;
-			if (same) return;
-			history.push(old);
-			if (history.length > 100) history.shift();
-		},
-		forget: () => history.splice(0),
-	};
-	let rememberedAt = -Infinity;
-	let undoing = false;
 
 	/** @type {Actions} */
 	const actions = {
+		note(level, title, text) {
+			const id = (noteId += 1);
+			// The same thing said twice is one note.
+			const others = store.get().notes.filter((other) => other.title !== title);
+			store.set({ notes: [...others.slice(-3), { id, level, title, text }] });
+			if (level === "info") setTimeout(() => store.set({ notes: store.get().notes.filter((other) => other.id !== id) }), 6000);
+		},
+		async ask(method, path, body) {
+			try {
+				const answer = await sendJson(method, `/api/${path}`, body);
+				if (answer && typeof answer === "object" && "version" in answer) receive(answer);
+				return answer;
+			} catch (error) {
+				tell(error);
+				return null;
+			}
+		},
+
+		// play
 		togglePlay() {
 			const { playing, shown, range } = store.get();
 			if (!frames()) return;
-			const last = range[1] ?? frames() - 1;
-			if (!playing && shown >= last) seek(range[0] ?? 0);
+			if (!playing && shown >= (range[1] ?? frames() - 1)) seek(range[0] ?? 0);
 			store.set({ playing: playing ? 0 : 1 });
 		},
 		shuttle(direction) {
@@ -141,18 +83,10 @@ export function createActions({ store, seek, send, help, receive }) {
 			store.set({ playing: 0 });
 			seek(store.get().step + steps);
 		},
-		seekBy(seconds) {
-			store.set({ playing: 0 });
-			seek(store.get().step + Math.round(seconds * (store.get().server?.sequence?.fps ?? 25)));
-		},
-		toEnd(end) {
-			store.set({ playing: 0 });
-			seek(end === "first" ? 0 : frames() - 1);
-		},
+		secondsBy: (seconds) => actions.stepBy(Math.round(seconds * (store.get().server?.sequence?.fps ?? 25))),
 		changeSpeed(direction) {
-			const { speed } = store.get();
-			const index = SPEEDS.indexOf(speed);
-			store.set({ speed: SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, index + direction))] });
+			const index = SPEEDS.indexOf(store.get().speed) + direction;
+			store.set({ speed: SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, index))] });
 		},
 		toggleLoop: () => store.set({ loop: !store.get().loop }),
 		markRange(end) {
@@ -169,52 +103,109 @@ export function createActions({ store, seek, send, help, receive }) {
 			if (!event) return;
 			store.set({ playing: 0 });
 			seek(event.step);
-			select(event.id);
+			actions.select(event.id);
+		},
+
+		// tracks
+		select(id) {
+			if (store.get().selection === id) return;
+			store.set({ selection: id });
+			send({ type: "select", id });
 		},
 		nextTrack(direction) {
-			const { timeline, laneOrder } = store.get();
+			const { timeline, laneOrder, selection } = store.get();
 			const ids = ordered(timeline?.tracks ?? [], laneOrder).map((track) => track.id);
-			if (!ids.length) return;
-			const index = ids.indexOf(store.get().selection ?? -1);
-			select(ids[index < 0 ? (direction > 0 ? 0 : ids.length - 1) : (index + direction + ids.length) % ids.length]);
+			const index = ids.indexOf(selection ?? -1);
+			if (ids.length) actions.select(ids[index < 0 ? (direction > 0 ? 0 : ids.length - 1) : (index + direction + ids.length) % ids.length]);
 		},
+		clear() {
+			if (store.get().layout.max) actions.maximise(store.get().layout.max ?? null);
+			else actions.select(null);
+		},
+		exportTracks: () => void download("/api/export/tracks.csv", "tracks.csv").catch(tell),
+
+		// cameras and 3D
 		chooseCamera(index) {
 			const count = store.get().server?.sequence?.cameras.length ?? 0;
 			if (index < count) store.set({ large: store.get().large === index ? null : index });
 		},
+		lookThrough(camera) {
+			store.set({ view3d: camera });
+			void actions.ask("POST", "view", { camera: camera < 0 ? null : camera });
+		},
 		freeView() {
 			store.set({ large: null });
-			page.chooseView(-1);
+			actions.lookThrough(-1);
 		},
 		toggleLayer(layer) {
 			const { layers2d, layers3d } = store.get();
-			if (layer === "truth") {
-				// One key, one meaning: where both were different, both are on afterwards.
-				const on = !(layers2d.truth && layers3d.truth);
-				if (layers2d.truth !== on) page.toggleLayer2d("truth");
-				if (layers3d.truth !== on) page.toggleLayer3d("truth");
-			} else if (layer === "trails") page.toggleLayer3d("trails");
-			else if (layer in layers2d) page.toggleLayer2d(layer);
+			// One key, one meaning: where both were different, both are on afterwards.
+			const on = ![layers2d, layers3d].every((layers) => layers[layer] ?? true);
+			if (layer in layers2d && layers2d[layer] !== on) actions.toggleLayer2d(layer);
+			if (layer in layers3d && layers3d[layer] !== on && layer !== "boxes") actions.toggleLayer3d(layer);
 		},
-		clear: () => select(null),
-		exportTracks() {
-			void download("/api/export/tracks.csv", "tracks.csv").catch(tell);
+		toggleLayer2d(layer) {
+			const { layers2d } = store.get();
+			store.set({ layers2d: { ...layers2d, [layer]: !layers2d[layer] } });
 		},
-		toggleTheme: () => store.set({ theme: store.get().theme === "dark" ? "light" : "dark" }),
-		help,
-		undo() {
-			const old = history.pop();
+		toggleLayer3d(layer) {
+			const layers3d = { ...store.get().layers3d, [layer]: !store.get().layers3d[layer] };
+			store.set({ layers3d });
+			void actions.ask("PATCH", "layers", { changes: { [layer]: layers3d[layer] } });
+		},
+
+		// runs and parameters
+		open: (name) => actions.ask("POST", "sequence", { name }),
+		change: (changes) => actions.ask("PATCH", "parameters", { changes }),
+		reset: (...keys) => void actions.ask("POST", "parameters/reset", keys.length ? { keys } : {}),
+		preset: (name) => void actions.ask("POST", "parameters/preset", { name }),
+		cancel: () => void actions.ask("POST", "run/cancel"),
+		runAgain: () => void actions.ask("POST", "run"),
+		pin: (on) => void actions.ask(on ? "POST" : "DELETE", "run/pin"),
+		remember(before, after) {
+			const old = Object.fromEntries(Object.keys(after).filter((key) => before[key] !== after[key]).map((key) => [key, before[key]]));
+			if (Object.keys(old).length === 0) return;
+			const now = performance.now();
+			const last = past[past.length - 1];
+			const same = last && now - rememberedAt < SAME_DRAG && Object.keys(old).every((key) => key in last);
+			rememberedAt = undoing ? -Infinity : now;
+			if (undoing < 0) future.push(old);
+			else if (undoing > 0 || !same) past.push(old);
+			if (!undoing) future.length = 0;
+			if (past.length > 100) past.shift();
+		},
+		forget: () => void (past.length = future.length = 0),
+		async undo(direction) {
+			const old = (direction < 0 ? past : future).pop();
 			if (!old || undoing) return;
-			undoing = true;
-			const length = history.length;
-			void changeTo(old).then(() => {
-				// The undo itself came back as a change; it is not one to undo.
-				setTimeout(() => {
-					history.length = Math.min(history.length, length);
-					undoing = false;
-				}, 300);
-			});
+			undoing = direction;
+			await actions.change(old);
+			undoing = 0;
 		},
+		async copyRun(what) {
+			const { server } = store.get();
+			if (!server?.sequence) return;
+			const { parameters, changed, sequence } = server;
+			const json = () => JSON.stringify(Object.fromEntries(changed.map((key) => [key, parameters[key]])), null, 2);
+			const text = what === "json" ? json() : commandLine(sequence.name, parameters, changed);
+			try {
+				await navigator.clipboard.writeText(text);
+				actions.note("info", "Copied", text.length < 400 ? text : "");
+			} catch {
+				actions.note("warn", "The browser does not let the page use the clipboard", text);
+			}
+		},
+
+		// page
+		toggleTheme: () => store.set({ theme: store.get().theme === "dark" ? "light" : "dark" }),
+		maximise(pane) {
+			const { layout } = store.get();
+			store.set({ layout: pane === null ? {} : { ...layout, max: layout.max === pane ? undefined : pane } });
+		},
+		// what the dialogs and the timeline put in place of these when they are there
+		help() {},
+		palette() {},
+		zoom() {},
 	};
-	return { actions, page };
+	return actions;
 }

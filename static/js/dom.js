@@ -1,8 +1,5 @@
 // @ts-check
-/** Building elements. */
-import { COMMANDS, keyLabel } from "./commands.js";
-
-/** @typedef {Node | string | number | null | undefined | false} Child */
+/** Building and filling elements. */
 
 /**
  * An element with attributes and children. `on…` is a listener, `class` and the rest are
@@ -44,85 +41,66 @@ export function write(node, text) {
 }
 
 /**
- * @param {string} name  of a symbol in the page, `i-…` for icons, `l-…` for legends
- * @param {string} [kind]  further classes
- * @param {string} [box]
+ * The elements that the page's markup names with `data-ref`, by that name.
+ * @param {ParentNode} root
+ * @returns {Record<string, any>}
  */
-export function icon(name, kind = "", box = "") {
-	const ns = "http://www.w3.org/2000/svg";
-	const svg = document.createElementNS(ns, "svg");
-	svg.setAttribute("class", name.startsWith("l-") ? "" : `i ${kind}`);
-	svg.setAttribute("aria-hidden", "true");
-	if (box) svg.setAttribute("viewBox", box);
-	const use = document.createElementNS(ns, "use");
-	use.setAttribute("href", `#${name}`);
-	svg.append(use);
-	return svg;
+export function parts(root) {
+	const named = /** @type {NodeListOf<HTMLElement>} */ (root.querySelectorAll("[data-ref]"));
+	return Object.fromEntries([...named].map((element) => [element.dataset.ref, element]));
 }
 
 /**
- * The coloured number of a track. Colour follows the id and never the rank.
- * @param {number} id
+ * @param {HTMLSelectElement} select
+ * @param {[string | number, string][]} choices  values and words
+ * @param {string | number} chosen
  */
+export function choices(select, choices, chosen) {
+	fill(select, choices.map(([value, word]) => h("option", { value }, word)));
+	select.value = String(chosen);
+}
+
+/** @param {string} name  of a symbol in the page  @param {string} [kind]  further classes */
+export function icon(name, kind = "") {
+	const ns = "http://www.w3.org/2000/svg";
+	const svg = document.createElementNS(ns, "svg");
+	svg.setAttribute("class", `i ${kind}`);
+	svg.append(document.createElementNS(ns, "use"));
+	svg.firstElementChild?.setAttribute("href", `#${name}`);
+	return svg;
+}
+
+/** @param {number} id  @returns {number} 1 … 24; colour follows the id and never the rank */
+export function colourIndex(id) {
+	return ((((id - 1) % 24) + 24) % 24) + 1;
+}
+
+/** @param {number} id */
 export function idTag(id) {
 	const n = colourIndex(id);
 	return h("span", { class: "id", "--c": `var(--id-${n})`, "--on-id": `var(--on-${n})` }, id);
 }
 
-/**
- * @param {number} id
- * @returns {number} 1 … 24
- */
-export function colourIndex(id) {
-	return ((((id - 1) % 24) + 24) % 24) + 1;
-}
-
-/**
- * Attributes of a control that does what a command does: its tooltip and its key.
- * @param {string} name
- * @param {string} [tip]  where the title says too much
- */
-export function tipOf(name, tip) {
-	const command = COMMANDS.find((c) => c.name === name);
-	return { "data-tip": tip ?? command?.title ?? "", "data-key": command ? keyLabel(command.keys[0]) : "" };
-}
-
-/**
- * A symbol such as `p_S` or `J_max` with its index lowered.
- * @param {string} symbol
- */
+/** A symbol such as `p_S` with its index lowered.  @param {string} symbol */
 export function symbolNodes(symbol) {
 	const [base, index] = symbol.split("_");
 	return [h("i", {}, base), ...(index ? [h("sub", {}, index)] : [])];
 }
 
-/**
- * @param {unknown} value
- * @returns {string} a number as short as it stays readable
- */
+/** @param {unknown} value  @returns {string} as short as it stays readable */
 export function show(value) {
 	if (typeof value === "boolean") return value ? "on" : "off";
-	if (typeof value !== "number") return value === null || value === undefined ? "–" : String(value);
+	if (typeof value !== "number") return value === null || value === undefined ? "–" : String(value).replaceAll("_", " ");
 	if (Number.isInteger(value)) return String(value);
 	return Math.abs(value) < 1e-3 ? value.toExponential().replace("e-", "e−") : String(Number(value.toPrecision(5)));
 }
 
 /**
- * A chooser: a native select with the look of the page.
- * @param {object} how
- * @param {string} how.label
- * @param {boolean} [how.box]
- * @param {string} [how.word]  printed before the value
- * @param {(value: string) => void} how.choose
+ * A number with a fixed count of digits and a true minus.
+ * @param {number | null | undefined} value  @param {number} digits  @param {boolean} [signed]
  */
-export function chooser({ label, box = false, word = "", choose }) {
-	const select = h("select", {
-		"aria-label": label,
-		onchange: () => {
-			choose(select.value);
-			select.blur();
-		},
-	});
-	const root = h("label", { class: box ? "chooser box" : "chooser" }, word && h("span", { class: "k opt-2" }, word), select, icon("i-down", "s"));
-	return { root, select };
+export function fixed(value, digits, signed = false) {
+	if (value === null || value === undefined) return "–";
+	const text = Math.abs(value).toFixed(digits);
+	return (Number(text) === 0 ? "" : value < 0 ? "−" : signed ? "+" : "") + text;
 }

@@ -2,10 +2,11 @@
 /** Wires the page: one store, one socket, one playback, and the panes that look at them. */
 import { createActions } from "./actions.js";
 import { fetcher, getJson, openStream } from "./api.js";
-import { commandFor, commandOf, keyOf } from "./commands.js";
+import { commandFor, commandOf, keyLabel, keyOf, perform, register } from "./commands.js";
 import { mountCameras } from "./panes/cameras.js";
-import { mountHelp } from "./panes/help.js";
+import { mountLayout } from "./panes/layout.js";
 import { mountNotes } from "./panes/notes.js";
+import { mountSheets } from "./panes/sheets.js";
 import { mountSide } from "./panes/side.js";
 import { mountTimeline } from "./panes/timeline.js";
 import { mountTop } from "./panes/top.js";
@@ -15,7 +16,7 @@ import { createStore } from "./store.js";
 import { readPlace, writePlace } from "./url.js";
 
 /** What is remembered in this browser: how the page looks, never what it shows. */
-const KEPT = /** @type {const} */ (["theme", "tab", "layers2d", "laneOrder", "measure", "singleKeys"]);
+const KEPT = /** @type {const} */ (["theme", "tab", "layers2d", "laneOrder", "measure", "singleKeys", "layout"]);
 
 /** @returns {Partial<PageState>} */
 function remembered() {
@@ -26,6 +27,7 @@ function remembered() {
 	}
 }
 
+register(await getJson("/static/commands.json"));
 const start = readPlace(location.search);
 /** @type {Store<PageState>} */
 const store = createStore(
@@ -57,6 +59,7 @@ const store = createStore(
 		scores: null,
 		measure: "ospa",
 		laneOrder: "longest",
+		layout: {},
 		singleKeys: true,
 		notes: [],
 		...remembered(),
@@ -67,29 +70,60 @@ const store = createStore(
 
 const origin = Math.random().toString(36).slice(2);
 const playback = createPlayback(store, (step) => stream.send({ type: "seek", step, origin }));
-/** @type {() => void} */
-let toggleHelp = () => {};
-const { actions, page } = createActions({
-	store,
-	seek: playback.seek,
-	send: (message) => stream.send(message),
-	help: () => toggleHelp(),
-	receive: (state) => receiveState(state),
-});
+const actions = createActions({ store, seek: playback.seek, send: (message) => stream.send(message), receive: (state) => receiveState(state) });
 
 const element = (/** @type {string} */ selector) => /** @type {HTMLElement} */ (document.querySelector(selector));
-const context = { store, playback, actions, page, retry: () => stream.retry() };
+/** @type {Context} */
+const context = { store, playback, actions, retry: () => stream.retry(), press };
 mountTop(element(".top"), context);
 mountNotes(element(".notes"), context);
 mountView3d(element(".view"), context);
 mountCameras(element(".cams"), context);
 mountSide(element(".side"), context);
 mountTimeline(element(".time"), context);
-toggleHelp = mountHelp(context);
+mountSheets(context);
+mountLayout(context);
+
+for (const control of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-command], [data-command-key]"))) {
+	const { command: name, commandKey } = control.dataset;
+	const command = commandOf(name ?? commandKey ?? "");
+	control.dataset.key = command.keys.slice(0, 1).map(keyLabel).join();
+	if (!name) continue;
+	control.dataset.tip ??= command.title;
+	if (!control.textContent?.trim()) control.setAttribute("aria-label", command.title);
+	control.addEventListener("click", () => perform(command, actions));
+}
+for (const chip of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-layer2d], [data-layer3d]"))) {
+	const { layer2d, layer3d } = chip.dataset;
+	chip.addEventListener("click", () => (layer2d ? actions.toggleLayer2d(layer2d) : actions.toggleLayer3d(layer3d ?? "")));
+}
 
 /** The place of the address is gone to once, when its sequence is open. */
 let place = start.place;
-if (start.unknown.length) page.note("warn", `The address has unknown parts: ${start.unknown.join(", ")}`, "The rest of it is followed.");
+if (start.unknown.length) actions.note("warn", `The address has unknown parts: ${start.unknown.join(", ")}`, "The rest of it is followed.");
+
+/** Go to a place as far as the open sequence is the place's.  @param {ServerState} server */
+function arrive(server) {
+	const { sequence } = server;
+	if (!sequence || (place.sequence && place.sequence !== sequence.name)) return;
+	const { step, camera, selection, values } = place;
+	place = { sequence: null, step: null, selection: null, camera: null, values: null };
+	const cameras = sequence.cameras.length;
+	store.set({
+		step: Math.max(0, Math.min(sequence.frames - 1, step ?? server.playhead)),
+		large: camera !== null && camera < cameras ? camera : cameras > 2 ? 0 : null,
+	});
+	if (selection !== null) actions.select(selection);
+	if (values) void restore(server, values);
+}
+
+/** Have these values, and the defaults for all others.  @param {ServerState} server @param {Record<string, any>} values */
+async function restore(server, values) {
+	const others = server.changed.filter((key) => !(key in values));
+	if (others.length) await actions.ask("POST", "parameters/reset", { keys: others });
+	const differing = Object.entries(values).filter(([key, value]) => String(server.parameters[key]) !== String(value));
+	if (differing.length) await actions.change(Object.fromEntries(differing));
+}
 
 /**
  * @param {ServerState} told
@@ -105,33 +139,23 @@ function receiveState(told, streamed = false) {
 	if (before?.sequence && !server.sequence) {
 		// The server was started anew: when the same sequence is open again, go where we were.
 		const { shown, selection, large } = store.get();
-		place = { sequence: before.sequence.name, step: Math.max(0, shown), selection, camera: large };
+		place = { sequence: before.sequence.name, step: Math.max(0, shown), selection, camera: large, values: valuesOf(before) };
 	}
-	const first = before === null;
-	if (first && place.sequence && server.sequence?.name !== place.sequence && server.opening?.name !== place.sequence) {
-		void page.open(place.sequence);
+	if (before === null && place.sequence && server.sequence?.name !== place.sequence && server.opening?.name !== place.sequence) {
+		void actions.open(place.sequence);
 	}
 	if (changed) {
 		playback.clear();
-		page.forget();
-		const here = place.step !== null && (!place.sequence || place.sequence === server.sequence?.name);
-		const step = here ? Number(place.step) : server.playhead;
-		const cameras = server.sequence?.cameras.length ?? 0;
-		const large = place.camera !== null && place.camera < cameras ? place.camera : cameras > 2 ? 0 : null;
-		const known = place.selection !== null && here ? place.selection : server.selection;
-		store.set({ basis: "", timeline: null, span: null, scores: null, result: null, shown: -1, step: 0, playing: 0, range: [null, null], loop: false, hover: null, large, selection: known });
-		if (server.sequence) store.set({ step: Math.max(0, Math.min(server.sequence.frames - 1, step)) });
-		if (known !== server.selection) stream.send({ type: "select", id: known });
-		if (server.sequence && (!place.sequence || place.sequence === server.sequence.name)) {
-			place = { sequence: null, step: null, selection: null, camera: null };
-		}
+		actions.forget();
+		store.set({ basis: "", timeline: null, span: null, scores: null, result: null, shown: -1, step: 0, playing: 0, range: [null, null], loop: false, hover: null, selection: server.selection });
 	} else if (before) {
-		page.remember(before.parameters, server.parameters);
+		actions.remember(before.parameters, server.parameters);
 		if (before.selection !== server.selection) store.set({ selection: server.selection });
 	}
 	store.set({ server, run: server.run, ...(server.layers ? { layers3d: { ...store.get().layers3d, ...server.layers } } : {}) });
+	if (changed) arrive(server);
 	if (changed || before?.pinned?.key !== server.pinned?.key) void fetchScores();
-	if (first || before?.opening?.name !== server.opening?.name) void fetchSequences();
+	if (before === null || before.opening?.name !== server.opening?.name) void fetchSequences();
 }
 
 /**
@@ -194,14 +218,12 @@ function receive(message) {
 			void fetchScores();
 			break;
 		case "notice":
-			page.note(message.level, message.message, message.hint ?? "");
+			actions.note(message.level, message.message, message.hint ?? "");
 			break;
 		case "command":
-			try {
-				commandOf(message.name).run(actions);
-			} catch (error) {
-				console.warn(error);
-			}
+			// Keys inside our own frame come here by themselves; this is for a 3D view in a window of its own.
+			if (document.hasFocus() && document.activeElement === element("iframe")) break;
+			perform(commandOf(message.name), actions);
 			break;
 	}
 }
@@ -221,24 +243,26 @@ const stream = openStream("/api/stream", {
 	message: receive,
 });
 
-/** @param {EventTarget | null} target */
-function isTyping(target) {
-	if (!(target instanceof HTMLElement)) return false;
-	if (target instanceof HTMLInputElement) return target.type !== "range" && target.type !== "checkbox";
-	return target.isContentEditable || target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement;
-}
-
-document.addEventListener("keydown", (event) => {
+/**
+ * Run the command of a key, unless somebody types.
+ * @param {KeyboardEvent} event
+ * @returns {boolean} whether there was one
+ */
+function press(event) {
 	const key = keyOf(event);
-	const inDialog = document.querySelector("dialog[open]") !== null;
-	if (isTyping(event.target) || (inDialog && key !== "?")) return;
-	// Space and Enter on a focused control press that control.
-	if (key === "Space" && event.target instanceof Element && event.target.closest("button, a, summary, [role=button]")) return;
+	const target = /** @type {Element} */ (event.target);
+	const open = document.querySelector("dialog[open]");
+	if (open && !(open.matches(".help") ? key === "?" : key === "Ctrl+k")) return false;
+	if (!key.startsWith("Ctrl+k") && target.matches?.("input:not([type=range], [type=checkbox]), textarea, select, [contenteditable=true]")) return false;
+	// Space on a focused control presses that control.
+	if (key === "Space" && target.closest?.("button, a, summary, input, [role=button]")) return false;
 	const command = commandFor(key, store.get().singleKeys);
-	if (!command) return;
+	if (!command) return false;
 	event.preventDefault();
-	command.run(actions);
-});
+	perform(command, actions);
+	return true;
+}
+document.addEventListener("keydown", press);
 
 // A click leaves the focus where it was, so that Space goes on meaning play; only the 3D view,
 // which keeps all keys to itself while it has the focus, gives it back.
@@ -264,6 +288,11 @@ store.on([...KEPT], (state) => {
 	}
 });
 
+/** What differs from the defaults.  @param {ServerState} server */
+const valuesOf = ({ changed, parameters }) => Object.fromEntries(changed.map((key) => [key, parameters[key]]));
+
+/** The address without the step: what the back button goes back over. */
+let standing = "";
 /** @type {ReturnType<typeof setTimeout> | undefined} */
 let writing;
 store.on(["shown", "selection", "large", "server"], () => {
@@ -272,8 +301,23 @@ store.on(["shown", "selection", "large", "server"], () => {
 		writing = undefined;
 		const { server, shown, selection, large } = store.get();
 		if (!server?.sequence || shown < 0 || server.opening) return;
-		const search = writePlace({ sequence: server.sequence.name, step: shown, selection, camera: large });
-		if (search !== location.search) history.replaceState(null, "", search || location.pathname);
+		const here = { sequence: server.sequence.name, step: shown, selection, camera: large, values: valuesOf(server) };
+		const search = writePlace(here);
+		const next = writePlace({ ...here, step: null });
+		if (search !== location.search) history[standing && next !== standing ? "pushState" : "replaceState"](here, "", search || location.pathname);
+		standing = next;
 		document.title = `${server.sequence.name} · multiview-phd`;
 	}, 400);
+});
+addEventListener("popstate", ({ state }) => {
+	const { server } = store.get();
+	if (!state || !server) return;
+	place = state;
+	standing = writePlace({ ...state, step: null });
+	store.set({ playing: 0 });
+	if (server.sequence?.name !== state.sequence) void actions.open(state.sequence);
+	else {
+		if (state.selection === null) actions.select(null);
+		arrive(server);
+	}
 });

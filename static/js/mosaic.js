@@ -19,22 +19,23 @@ export function mosaic(aspects, large, { width, most, gap }) {
 		: oneLarge(aspects, large, inner, tall, gap);
 }
 
-/** @param {number[]} aspects @param {number} inner @param {number} tall @param {number} gap */
+/**
+ * In the number of columns that makes the pictures largest.
+ * @param {number[]} aspects @param {number} inner @param {number} tall @param {number} gap
+ */
 function alike(aspects, inner, tall, gap) {
-	const columns = Math.ceil(Math.sqrt(aspects.length));
-	const rows = Math.ceil(aspects.length / columns);
-	const cellHeight = Math.min((tall - gap * (rows - 1)) / rows, (inner - gap * (columns - 1)) / columns / Math.max(...aspects));
-	const cellWidth = (inner - gap * (columns - 1)) / columns;
-	const cells = aspects.map((aspect, index) => {
-		const frame = {
-			x: gap + (index % columns) * (cellWidth + gap),
-			y: gap + Math.floor(index / columns) * (cellHeight + gap),
-			width: cellWidth,
-			height: cellHeight,
-		};
-		return fit(aspect, frame);
+	const widest = Math.max(...aspects);
+	const grids = aspects.map((_, index) => {
+		const columns = index + 1;
+		const rows = Math.ceil(aspects.length / columns);
+		const width = (inner - gap * (columns - 1)) / columns;
+		return { columns, rows, width, height: Math.min((tall - gap * (rows - 1)) / rows, width / widest) };
 	});
-	return { cells, height: Math.round(rows * cellHeight + (rows - 1) * gap + 2 * gap) };
+	const { columns, rows, width, height } = grids.reduce((best, grid) => (grid.height > best.height + 0.5 ? grid : best));
+	const cells = aspects.map((aspect, index) =>
+		fit(aspect, { x: gap + (index % columns) * (width + gap), y: gap + Math.floor(index / columns) * (height + gap), width, height }),
+	);
+	return { cells, height: Math.round(rows * (height + gap) + gap) };
 }
 
 /** @param {number[]} aspects @param {number} large @param {number} inner @param {number} tall @param {number} gap */
@@ -49,19 +50,11 @@ function oneLarge(aspects, large, inner, tall, gap) {
 	const cellHeight = (height - gap * (rows - 1)) / rows;
 	const bigWidth = aspects[large] * height;
 	const cellWidth = (inner - bigWidth - columns * gap) / columns;
-	let place = 0;
 	const cells = aspects.map((aspect, index) => {
 		if (index === large) return fit(aspect, { x: gap, y: gap, width: bigWidth, height });
-		const column = Math.floor(place / rows);
-		const row = place % rows;
-		place += 1;
-		const frame = {
-			x: gap + bigWidth + gap + column * (cellWidth + gap),
-			y: gap + row * (cellHeight + gap),
-			width: cellWidth,
-			height: cellHeight,
-		};
-		return fit(aspect, frame);
+		const place = index - Number(index > large);
+		const x = gap + bigWidth + gap + Math.floor(place / rows) * (cellWidth + gap);
+		return fit(aspect, { x, y: gap + (place % rows) * (cellHeight + gap), width: cellWidth, height: cellHeight });
 	});
 	return { cells, height: Math.round(height + 2 * gap) };
 }

@@ -5,6 +5,7 @@
  * Steps are 0-based; boxes are `[left, top, width, height]` in pixels; positions are metres.
  *
  * @typedef {[number, number, number, number]} Box
+ * @typedef {Node | string | number | null | undefined | false} Child  of an element
  * @typedef {{code: string, message: string, field: string | null, hint: string | null}} ApiFailure
  *
  * @typedef {object} CameraInfo
@@ -115,7 +116,7 @@
  * @typedef {object} Schema
  * @property {{name: string, help: string}[]} groups
  * @property {Parameter[]} parameters
- * @property {{single_view: string[], fusion_method: string[]}} methods
+ * @property {Record<string, string[]>} methods
  * @property {Record<string, Record<string, any>>} presets
  *
  * @typedef {object} SequenceEntry
@@ -127,7 +128,7 @@
  * @property {boolean} ready
  * @property {string | null} [error]
  *
- * @typedef {{id: number, level: "info" | "warn" | "error", title: string, text: string, again?: () => void}} Note
+ * @typedef {{id: number, level: "info" | "warn" | "error", title: string, text: string}} Note
  *
  * @typedef {object} PageState
  * @property {"connecting" | "open" | "lost"} link
@@ -158,6 +159,7 @@
  * @property {Scores | null} scores  of the run that was set against the truth last
  * @property {"ospa" | "gospa"} measure  what the timeline plots
  * @property {"longest" | "born"} laneOrder
+ * @property {{right?: number, cams?: number, lanes?: number, max?: PaneName}} layout  shares of the window, and the pane that is alone
  * @property {string} theme
  * @property {boolean} singleKeys
  * @property {Note[]} notes
@@ -204,32 +206,53 @@
  *
  * @typedef {{evaluation: Evaluation, series: ScoreSeries, comparison: Comparison | null, reference: ScoreSeries | null}} Scores
  *
+ * @typedef {"view" | "cams" | "side" | "time"} PaneName
+ *
  * @typedef {object} Command
  * @property {string} name
  * @property {string} title
- * @property {"Play" | "Cameras and 3D" | "Tracks" | "Page"} group
+ * @property {"Play" | "Cameras and 3D" | "Tracks" | "Parameters" | "Page"} group
  * @property {string[]} keys
- * @property {(actions: Actions) => void} run
+ * @property {string} action  a name of `Actions`
+ * @property {any} [value]  its argument
  *
- * @typedef {object} Actions  what commands need of the page
+ * @typedef {object} Actions  what a person can do
+ * @property {(level: "info" | "warn" | "error", title: string, text: string) => void} note
+ * @property {(method: "POST" | "PATCH" | "DELETE", path: string, body?: object) => Promise<any>} ask  null after a failure, which is told
  * @property {() => void} togglePlay
  * @property {(direction: -1 | 0 | 1) => void} shuttle
  * @property {(steps: number) => void} stepBy
- * @property {(seconds: number) => void} seekBy
- * @property {(end: "first" | "last") => void} toEnd
+ * @property {(seconds: number) => void} secondsBy
  * @property {(direction: -1 | 1) => void} changeSpeed
  * @property {() => void} toggleLoop
  * @property {(end: 0 | 1) => void} markRange
  * @property {(direction: -1 | 1) => void} toEvent
+ * @property {(id: number | null) => void} select
  * @property {(direction: -1 | 1) => void} nextTrack
- * @property {(index: number) => void} chooseCamera
- * @property {() => void} freeView
- * @property {(layer: string) => void} toggleLayer
  * @property {() => void} clear
  * @property {() => void} exportTracks
+ * @property {(index: number) => void} chooseCamera  as the large picture
+ * @property {(camera: number) => void} lookThrough  in 3D; -1 is the free view
+ * @property {() => void} freeView
+ * @property {(layer: string) => void} toggleLayer  in the pictures and in 3D
+ * @property {(layer: string) => void} toggleLayer2d
+ * @property {(layer: string) => void} toggleLayer3d
+ * @property {(name: string) => Promise<any>} open
+ * @property {(changes: Record<string, any>) => Promise<any>} change
+ * @property {(...keys: string[]) => void} reset
+ * @property {(name: string) => void} preset
+ * @property {() => void} cancel
+ * @property {() => void} runAgain
+ * @property {(on: boolean) => void} pin
+ * @property {(before: Record<string, any>, after: Record<string, any>) => void} remember  what the parameters were, whoever changed them
+ * @property {() => void} forget  what can be undone
+ * @property {(direction: -1 | 1) => void} undo  or redo
+ * @property {(what: "command" | "json") => void} copyRun
  * @property {() => void} toggleTheme
+ * @property {(pane: PaneName | null) => void} maximise  null: all panes as they were at first
  * @property {() => void} help
- * @property {() => void} undo
+ * @property {() => void} palette
+ * @property {(factor: number) => void} zoom  of the timeline; above 1 shows more steps
  *
  * @typedef {object} Frame  what is painted at once
  * @property {number} step
@@ -241,14 +264,15 @@
  * @property {Store<PageState>} store
  * @property {ReturnType<typeof import("./playback.js").createPlayback>} playback
  * @property {Actions} actions
- * @property {ReturnType<typeof import("./actions.js").createActions>["page"]} page
  * @property {() => void} retry  connect now
+ * @property {(event: KeyboardEvent) => boolean} press  run the command of a key; whether there was one
+ * @typedef {(root: HTMLElement, context: Context) => void} Pane  fills its part of the page and keeps it current
  *
  * @typedef {{y: number, height: number}} Row  of the timeline, CSS pixels
  * @typedef {{first: number, last: number, width: number}} View  the steps an axis of `width` CSS pixels shows
  * @typedef {{step: number, id: number, kind: "birth" | "death" | "long miss" | "switch"}} LaneEvent
  * @typedef {{x: number, y: number, width: number, height: number}} Cell  of the mosaic of pictures
- * @typedef {{sequence: string | null, step: number | null, selection: number | null, camera: number | null}} Place
+ * @typedef {{sequence: string | null, step: number | null, selection: number | null, camera: number | null, values: Record<string, any> | null}} Place  values: what differs from the defaults
  * @typedef {{bitmap: ImageBitmap | null, missing: string | null}} Picture
  * @typedef {{key: string, number: number, at: string, sequence: string, state: string, done: number, total: number, speed: string, changes: number, parameters: Record<string, any>}} PastRun
  *
@@ -267,9 +291,6 @@
  * @property {number | null} hover
  * @property {number} opacity
  * @property {Palette} ink
- *
- * @typedef {{row: HTMLTableRowElement, cells: HTMLElement[]}} TrackRow
- * @typedef {{name: string, word: string, number: boolean, give: string, value: (track: TrackLane, at: {step: number, done: number, scored: Map<number, ScoredTrack>}) => number | string}} TrackColumn
  */
 
 /**
@@ -278,6 +299,25 @@
  * @property {() => Readonly<T>} get
  * @property {(patch: Partial<T>) => void} set
  * @property {(keys: (keyof T)[], listener: (state: Readonly<T>) => void) => () => void} on
+ */
+
+/**
+ * @template R
+ * @typedef {object} Column  of a table
+ * @property {string} word
+ * @property {string} [kind]  classes
+ * @property {(row: R) => string | number | Child | Child[]} cell
+ * @property {(row: R) => number} [by]  makes it sortable
+ * @property {boolean} [live]  changes with the shown step
+ */
+
+/**
+ * @template R
+ * @typedef {object} Grid  a table
+ * @property {HTMLElement} element
+ * @property {(rows: R[]) => void} show
+ * @property {() => void} live  fill the columns that change with the step
+ * @property {(act: (row: R, element: HTMLTableRowElement) => void) => void} each
  */
 
 /** @typedef {CanvasRenderingContext2D} Brush */

@@ -1,7 +1,7 @@
 // @ts-check
-/**
- * The address holds what a colleague needs to see the same: sequence, step, selection, camera.
- */
+/** A place as text: the address that shows a colleague the same, the command that computes it. */
+
+const KNOWN = ["seq", "step", "sel", "cam"];
 
 /**
  * @param {string} search  with or without the question mark
@@ -13,16 +13,17 @@ export function readPlace(search) {
 		const text = query.get(key);
 		return text !== null && /^\d{1,9}$/.test(text) ? Number(text) : null;
 	};
-	const known = ["seq", "step", "sel", "cam"];
 	const camera = whole("cam");
+	const values = [...query].filter(([key]) => key.startsWith("p."));
 	return {
 		place: {
 			sequence: query.get("seq") || null,
 			step: whole("step"),
 			selection: whole("sel"),
 			camera: camera === null || camera < 1 ? null : camera - 1,
+			values: values.length ? Object.fromEntries(values.map(([key, text]) => [key.slice(2), text])) : null,
 		},
-		unknown: [...query.keys()].filter((key) => !known.includes(key)),
+		unknown: [...query.keys()].filter((key) => !KNOWN.includes(key) && !key.startsWith("p.")),
 	};
 }
 
@@ -30,12 +31,27 @@ export function readPlace(search) {
  * @param {Place} place  the camera is an index; the address counts from 1, as the page does
  * @returns {string} beginning with a question mark, or empty
  */
-export function writePlace({ sequence, step, selection, camera }) {
+export function writePlace({ sequence, step, selection, camera, values }) {
 	const query = new URLSearchParams();
 	if (sequence) query.set("seq", sequence);
 	if (step !== null) query.set("step", String(step));
 	if (selection !== null) query.set("sel", String(selection));
 	if (camera !== null) query.set("cam", String(camera + 1));
+	for (const [key, value] of Object.entries(values ?? {})) query.set(`p.${key}`, String(value));
 	const text = query.toString();
 	return text ? `?${text}` : "";
+}
+
+/**
+ * The command line that makes the same run.
+ * @param {string} sequence
+ * @param {Record<string, any>} parameters
+ * @param {string[]} changed
+ */
+export function commandLine(sequence, parameters, changed) {
+	const quote = (/** @type {any} */ value) => (/^[\w./+-]+$/.test(value) ? value : `'${String(value).replaceAll("'", "'\\''")}'`);
+	const methods = [["single-view", parameters.single_view], ["fusion", parameters.fusion_method]];
+	const flags = methods.filter(([, name]) => name !== undefined).map(([flag, name]) => `--${flag} ${quote(name)}`);
+	const sets = changed.filter((key) => key.includes(".")).map((key) => `--set ${key}=${quote(parameters[key])}`);
+	return ["multiview-phd track", quote(sequence), "-o tracks.csv", ...flags, ...sets].join(" ");
 }

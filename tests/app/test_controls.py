@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import re
+import json
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,8 +12,10 @@ import viser
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app import controls, gateway
-from app.controls import Controls
+from app import gateway
+from app.controls import ORIGIN, Controls
+from app.paths import static_folder
+from app.scene_keys import hotkeys
 from app.scene_sliders import Scale, hint_text, label_text, number_text
 from app.workbench import Workbench
 from tests.app import scene_case
@@ -22,7 +23,6 @@ from tracker import parameters as table
 from tracker.parameters import PARAMETERS
 
 SECONDS = 20.0
-COMMANDS_JS = Path(__file__).resolve().parents[2] / "static" / "js" / "commands.js"
 NUMBERS = [p for p in PARAMETERS.values() if p.kind in ("float", "int")]
 
 
@@ -154,7 +154,7 @@ def test_an_edit_reaches_the_workbench(panel: Controls, workbench: Workbench) ->
     assert value(workbench, "fusion.survival_probability") == 0.9
     assert value(workbench, "fusion.pruning_threshold") == 1e-3
     assert value(workbench, "fusion.max_components") == 80
-    assert workbench.snapshot().parameters_origin == controls.ORIGIN
+    assert workbench.snapshot().parameters_origin == ORIGIN
 
 
 def test_many_edits_end_in_the_last(panel: Controls, workbench: Workbench) -> None:
@@ -247,14 +247,15 @@ def test_a_preset_moves_the_sliders(panel: Controls, workbench: Workbench) -> No
         assert at == wanted or panel._scales[key].stands_at(at, wanted)
 
 
-def test_keys_and_names_are_those_of_the_page(workbench: Workbench) -> None:
-    text = COMMANDS_JS.read_text(encoding="utf-8")
-    listed = re.findall(r'\["([\w-]+)", "[^"]+", \[([^\]]*\]?"?)\], \(a\)', text)
-    page = {name: re.findall(r'"([^"]+)"', keys) for name, keys in listed}
-    page |= {f"camera-{digit}": [str(digit)] for digit in range(1, 10)}
-    for name, _, key, modifier in controls.COMMANDS:
-        shift = "shift+" if modifier else ""
-        assert f"{shift}{key.lower()}" in [k.lower() for k in page[name]], name
-    keys = [(key, modifier) for _, _, key, modifier in controls.COMMANDS]
+def test_keys_of_the_3d_view_are_those_of_the_page() -> None:
+    groups = json.loads((static_folder() / "commands.json").read_text(encoding="utf-8"))
+    page = {command["name"]: command["keys"] for rows in groups.values() for command in rows}
+    found = list(hotkeys())
+    for hotkey in found:
+        modifier = {None: "", "shift": "shift+", "cmd/ctrl": "ctrl+"}[hotkey.modifier]
+        assert f"{modifier}{hotkey.key.lower()}" in [key.lower() for key in page[hotkey.name]]
+    keys = [(hotkey.key, hotkey.modifier) for hotkey in found]
     assert len(set(keys)) == len(keys)
-    assert not {"W", "A", "S", "D", "Q", "E"} & {key for key, _ in keys}
+    assert not {"W", "A", "S", "D", "Q", "E", "arrowleft"} & {k for k, m in keys if m is None}
+    names = {hotkey.name for hotkey in found}
+    assert {"play", "first", "next-event", "previous-event", "camera-9", "palette"} <= names

@@ -1,7 +1,11 @@
 // One registry of commands: no two share a key, each has words, keys are named alike everywhere.
 import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { clashes, COMMANDS, commandFor, commandOf, keyLabel, keyOf } from "../../static/js/commands.js";
+import { clashes, COMMANDS, commandFor, commandOf, keyLabel, keyOf, perform, register, search } from "../../static/js/commands.js";
+
+const read = (name) => readFileSync(new URL(`../../static/${name}`, import.meta.url), "utf8");
+register(JSON.parse(read("commands.json")));
 
 const event = (key, modifiers = {}) => ({ key, ctrlKey: false, metaKey: false, altKey: false, shiftKey: false, ...modifiers });
 
@@ -11,15 +15,30 @@ test("no key belongs to two commands and no name to two", () => {
   assert.deepEqual(clashes([COMMANDS[0], COMMANDS[0]]), ["Space"]);
 });
 
-test("every command has a title, a key, and runs one action", () => {
+test("every command has a title and runs one action that there is", () => {
+  const actions = read("js/actions.js");
   for (const command of COMMANDS) {
     assert.ok(command.title.length > 2, command.name);
-    assert.ok(command.keys.length > 0, command.name);
+    assert.match(actions, new RegExp(`^\\t\\t(async )?${command.action}[(:]`, "m"), command.name);
     const called = [];
-    const actions = new Proxy({}, { get: (_, name) => () => called.push(name) });
-    command.run(actions);
-    assert.equal(called.length, 1, command.name);
+    perform(command, { [command.action]: (value) => called.push(value) });
+    assert.deepEqual(called, [command.value], command.name);
   }
+});
+
+test("every button of the page names a command that there is", () => {
+  const html = read("index.html");
+  const named = new Set([...html.matchAll(/data-command(?:-key)?="([^"]+)"/g)].map((match) => match[1]));
+  for (const name of named) assert.ok(commandOf(name));
+  assert.ok(named.has("play") && named.has("help"));
+});
+
+test("the palette finds commands by their words, those that begin with them first", () => {
+  assert.equal(search("undo")[0].name, "undo");
+  assert.equal(search("step  ONE").length, 2);
+  assert.equal(search("tim large")[0].name, "maximise-time");
+  assert.deepEqual(search("no such thing"), []);
+  assert.equal(search("").length, COMMANDS.length);
 });
 
 test("a key event finds its command", () => {
@@ -39,6 +58,7 @@ test("a key event finds its command", () => {
 
 test("single-key shortcuts can be switched off, arrows and help stay", () => {
   assert.equal(commandFor("g", false), undefined);
+  assert.equal(commandFor("Shift+v", false), undefined);
   assert.equal(commandFor("ArrowLeft", false)?.name, "step-back");
   assert.equal(commandFor("Ctrl+z", false)?.name, "undo");
   assert.equal(commandFor("?", false)?.name, "help");

@@ -34,9 +34,19 @@ test("nothing comes from another host", () => {
   }
 });
 
-test("the page stays light: at most 150 KiB of JavaScript", () => {
+test("the page stays light: at most 150 kB of JavaScript", () => {
   const bytes = loaded.reduce((sum, name) => sum + statSync(join(ROOT, name)).size, 0);
-  assert.ok(bytes <= 150 * 1024, `${bytes} bytes`);
+  assert.ok(bytes <= 150_000, `${bytes} bytes`);
+});
+
+test("every part that a module asks for is in the page", () => {
+  const html = readFileSync(join(ROOT, "index.html"), "utf8");
+  for (const name of loaded) {
+    const text = readFileSync(join(ROOT, name), "utf8");
+    for (const [, list] of text.matchAll(/const \{([^}]+)\} = parts\(/g)) {
+      for (const part of list.split(",")) assert.ok(html.includes(`data-ref="${part.split(":")[0].trim()}"`), `${name} asks for ${part}`);
+    }
+  }
 });
 
 test("every symbol that is used is in the page", () => {
@@ -44,8 +54,7 @@ test("every symbol that is used is in the page", () => {
   const known = new Set([...html.matchAll(/symbol id="([^"]+)"/g)].map((match) => match[1]));
   for (const name of loaded) {
     const text = readFileSync(join(ROOT, name), "utf8");
-    for (const [, symbol] of text.matchAll(/"((?:i|l)-[a-z]+)"/g)) {
-      if (!symbol.endsWith("-")) assert.ok(known.has(symbol), `${name} uses ${symbol}`);
-    }
+    for (const [, symbol] of text.matchAll(/"#?((?:i|l)-[a-z]+)"/g)) assert.ok(known.has(symbol), `${name} uses ${symbol}`);
   }
+  for (const [, symbol] of html.matchAll(/href="#([^"]+)"/g)) assert.ok(known.has(symbol), symbol);
 });

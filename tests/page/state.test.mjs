@@ -5,7 +5,7 @@ import { createCache } from "../../static/js/cache.js";
 import { eventsOf, longMisses, nextEvent, ordered, stateAt, viewWords } from "../../static/js/events.js";
 import { mosaic } from "../../static/js/mosaic.js";
 import { createStore } from "../../static/js/store.js";
-import { readPlace, writePlace } from "../../static/js/url.js";
+import { commandLine, readPlace, writePlace } from "../../static/js/url.js";
 
 const turn = () => new Promise((resolve) => setImmediate(resolve));
 
@@ -38,12 +38,22 @@ test("a listener may change the store; that is told in the next turn", async () 
 });
 
 test("the address round-trips and names what it does not know", () => {
-  const place = { sequence: "room 44/ü&x", step: 264, selection: 7, camera: 1 };
+  const place = { sequence: "room 44/ü&x", step: 264, selection: 7, camera: 1, values: { "fusion.detection_probability": "0.6", fusion_method: "sequential_phd" } };
   assert.deepEqual(readPlace(writePlace(place)), { place, unknown: [] });
-  const none = { sequence: null, step: null, selection: null, camera: null };
+  const none = { sequence: null, step: null, selection: null, camera: null, values: null };
   assert.equal(writePlace(none), "");
+  assert.equal(writePlace({ ...none, values: {} }), "");
   assert.deepEqual(readPlace(""), { place: none, unknown: [] });
   assert.deepEqual(readPlace("?step=-4&sel=x&cam=0&zoom=3"), { place: none, unknown: ["zoom"] });
+});
+
+test("a run as a command line: methods and what differs, quoted for a shell", () => {
+  const parameters = { single_view: "none", fusion_method: "multi_bernoulli", "fusion.birth": "both", "fusion.x": 0.5 };
+  assert.equal(
+    commandLine("my room's", parameters, ["fusion_method", "fusion.x"]),
+    "multiview-phd track 'my room'\\''s' -o tracks.csv --single-view none --fusion multi_bernoulli --set fusion.x=0.5",
+  );
+  assert.equal(commandLine("room44-3p", {}, []), "multiview-phd track room44-3p -o tracks.csv");
 });
 
 /** A cache whose requests are answered by hand. */

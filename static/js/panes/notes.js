@@ -2,26 +2,17 @@
 /** Notes under the top bar: what happened, what still works, what to do next. */
 import { fill, h, icon } from "../dom.js";
 
-/** @param {HTMLElement} root @param {Context} context */
-export function mountNotes(root, { store, page, retry }) {
-	/** @type {string} */
+/** @type {Pane} */
+export function mountNotes(root, { store, actions, retry }) {
 	let dismissed = "";
 	/** @type {ReturnType<typeof setInterval> | undefined} */
 	let ticking;
 
 	/** @param {string} kind @param {string} title @param {string} text @param {(Node | null | false)[]} buttons */
 	const note = (kind, title, text, buttons) =>
-		h(
-			"div",
-			{ class: "note", role: kind === "bad" ? "alert" : null },
-			h("span", { class: `dot ${kind}` }),
-			h("h2", {}, title),
-			h("span", { class: "group" }, buttons),
-			text && h("p", {}, text),
-		);
-
-	const close = (/** @type {() => void} */ act) =>
-		h("button", { class: "btn icon end", "aria-label": "Dismiss", "data-tip": "Dismiss", onclick: act }, icon("i-close"));
+		h("div", { class: "note", role: kind === "bad" ? "alert" : null }, h("span", { class: `dot ${kind}` }), h("h2", {}, title), h("span", { class: "group" }, buttons), text && h("p", {}, text));
+	const button = (/** @type {string} */ word, /** @type {() => void} */ onclick) => h("button", { class: "btn box", onclick }, word);
+	const close = (/** @type {() => void} */ onclick) => h("button", { class: "btn icon end", "aria-label": "Dismiss", "data-tip": "Dismiss", onclick }, icon("i-close"));
 
 	function render() {
 		const { link, lostAt, retryAt, run, basis, notes, server } = store.get();
@@ -31,19 +22,14 @@ export function mountNotes(root, { store, page, retry }) {
 			const seconds = Math.max(0, Math.ceil((retryAt - Date.now()) / 1000));
 			const since = new Date(lostAt).toLocaleTimeString([], { hour12: false });
 			const wait = seconds > 0 ? `Next try in ${seconds} s.` : "Trying now.";
-			all.push(
-				note("bad", `No connection since ${since}`, `What was loaded can still be looked at; parameters are locked until the server is back. ${wait}`, [
-					h("button", { class: "btn box", onclick: retry }, "Try now"),
-				]),
-			);
+			all.push(note("bad", `No connection since ${since}`, `What was loaded can still be looked at; parameters are locked until the server is back. ${wait}`, [button("Try now", retry)]));
 		}
 		if (run?.state === "failed" && dismissed !== run.key) {
-			const words = [run.error ?? "The terminal says more."];
-			words.push(basis && basis !== run.key ? "The run before is still shown." : "Change a parameter, or choose another method.");
+			const next = basis && basis !== run.key ? "The run before is still shown." : "Change a parameter, or choose another method.";
 			all.push(
-				note("bad", `The run stopped at step ${run.done}`, words.join(" "), [
-					server?.changed.length ? h("button", { class: "btn box", onclick: () => page.reset() }, "Reset all parameters") : null,
-					h("button", { class: "btn box", onclick: page.runAgain }, "Try again"),
+				note("bad", `The run stopped at step ${run.done}`, `${run.error ?? "The terminal says more."} ${next}`, [
+					server?.changed.length ? button("Reset all parameters", () => actions.reset()) : null,
+					button("Try again", actions.runAgain),
 					close(() => {
 						dismissed = run.key;
 						render();
@@ -51,21 +37,13 @@ export function mountNotes(root, { store, page, retry }) {
 				]),
 			);
 		}
-		for (const { id, level, title, text, again } of notes) {
-			all.push(
-				note(level === "error" ? "bad" : level === "warn" ? "warn" : "busy", title, text, [
-					again ? h("button", { class: "btn box", onclick: again }, "Try again") : null,
-					close(() => store.set({ notes: store.get().notes.filter((other) => other.id !== id) })),
-				]),
-			);
+		for (const { id, level, title, text } of notes) {
+			const kind = { error: "bad", warn: "warn", info: "busy" }[level];
+			all.push(note(kind, title, text, [close(() => store.set({ notes: store.get().notes.filter((other) => other.id !== id) }))]));
 		}
 		fill(root, all);
 		clearInterval(ticking);
-		if (link === "lost") ticking = setInterval(countdown, 1000);
-	}
-
-	function countdown() {
-		if (store.get().link === "lost" && !root.contains(document.activeElement)) render();
+		if (link === "lost") ticking = setInterval(() => root.contains(document.activeElement) || render(), 1000);
 	}
 
 	store.on(["link", "retryAt", "run", "basis", "notes"], render);

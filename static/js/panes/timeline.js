@@ -1,7 +1,7 @@
 // @ts-check
 /** The timeline: one axis for range bar, ruler, lanes and strips, and one playhead over them. */
 import { bucketOf, panned, secondsOf, stepAt, xOf, zoomed } from "../clock.js";
-import { fill, h, idTag, write } from "../dom.js";
+import { fill, h, idTag, parts, write } from "../dom.js";
 import { hatch, prepare } from "../draw/canvas.js";
 import { drawLanes, drawRange, drawRuler } from "../draw/lanes.js";
 import { drawCardinality, drawErrors, drawParts, meanOf, scaleOf } from "../draw/strips.js";
@@ -10,41 +10,13 @@ import { faded, palette } from "../palette.js";
 import { shownDone } from "../playback.js";
 import { mountTransport } from "./transport.js";
 
-/** @param {HTMLElement} root @param {Context} context */
+/** @type {Pane} */
 export function mountTimeline(root, context) {
-	const { store, page, playback } = context;
-	const lanes = h("div", { class: "lanes", tabindex: -1, "aria-label": "Tracks" });
-	const people = h("span", { class: "r" });
-	const order = h("button", { class: "start", "data-tip": "Order of the lanes: longest first, or as they were born" });
+	const { store, actions, playback } = context;
+	const { lanes, order, people, truthSign, parts: strip2, measure, value, countSign, referenceSign, axis, errors, error, whose, plot, fixed, empty, seek: seekBar, wanted, head, label: readout } = parts(root);
+	mountTransport(root, context);
 	order.addEventListener("click", () => store.set({ laneOrder: store.get().laneOrder === "longest" ? "born" : "longest" }));
-	const sign = (/** @type {string} */ word, /** @type {string} */ kind = word) => h("span", { class: `lg ${kind}` }, word);
-	const truthSign = sign("truth");
-	const value = h("span", { class: "r" });
-	const range0 = h("span", { class: "lg" });
-	const referenceSign = sign("A");
-	const countSign = sign("count");
-	const measure = h("button", { class: "n start up", onclick: () => store.set({ measure: store.get().measure === "ospa" ? "gospa" : "ospa" }) });
-	const parts = h("div", { class: "gr strip" }, measure, value, h("span", { class: "brk" }), sign("location"), countSign, referenceSign, range0);
-	const error = h("span", { class: "r" });
-	const whose = h("span", { class: "lg" });
-	const errors = h("div", { class: "gr strip tall" }, h("span", { class: "n" }, "Position error"), error, h("span", { class: "brk" }), whose);
-	const gutter = h(
-		"div",
-		{ class: "gut" },
-		h("div", { class: "gr over" }),
-		h("div", { class: "gr ruler" }, order, h("span", { class: "r" }, "seen")),
-		lanes,
-		h("div", { class: "gr strip" }, h("span", { class: "n" }, "People"), people, h("span", { class: "brk" }), truthSign, sign("estimate")),
-		parts,
-		errors,
-	);
-	const fixed = h("canvas", { "aria-hidden": "true" });
-	const seekBar = h("input", { class: "seek", type: "range", min: 0, max: 0, step: 1, value: 0, "aria-label": "Step" });
-	const head = h("div", { class: "ph" }, h("b", {}, "0"));
-	const wanted = h("div", { class: "ph wanted", hidden: true });
-	const empty = h("div", { class: "empty" });
-	const plot = h("div", { class: "plot" }, fixed, empty, seekBar, wanted, head);
-	root.append(mountTransport(context), gutter, plot);
+	measure.addEventListener("click", () => store.set({ measure: store.get().measure === "ospa" ? "gospa" : "ospa" }));
 
 	/** @type {View} */
 	let view = { first: 0, last: 1, width: 1 };
@@ -120,7 +92,7 @@ export function mountTimeline(root, context) {
 		const unit = of?.series.unit ?? "";
 		const text = (/** @type {number | null | undefined} */ number) => number?.toFixed(2) ?? "–";
 		write(value, reference ? `A ${text(reference[name][at])} · B ${text(total[at])} ${unit}` : `${text(total[at])} ${unit}`);
-		write(range0, `0–${top}`);
+		write(axis, `0–${top}`);
 		write(measure, name.toUpperCase());
 		measure.dataset.tip = `${of?.series.cost ?? "not scored yet"}; press for ${name === "ospa" ? "GOSPA" : "OSPA"}`;
 		countSign.dataset.tip = name === "ospa" ? "number of people" : "missed and false people";
@@ -138,7 +110,7 @@ export function mountTimeline(root, context) {
 		const over = { y: 0, height: token("h-over") };
 		const ruler = { y: over.height, height: token("h-ruler") };
 		const laneHeight = token("h-lane");
-		const block = { y: ruler.y + ruler.height, height: laneHeight * token("n-lanes") };
+		const block = { y: ruler.y + ruler.height, height: lanes.offsetHeight };
 		const strip = { y: block.y + block.height, height: token("h-strip") };
 		if (frames < 1) return;
 		if (loop && (range[0] !== null || range[1] !== null)) {
@@ -153,7 +125,7 @@ export function mountTimeline(root, context) {
 		drawRange(g, over, view, { loaded: playback.loadedSteps(), done, frames }, ink);
 		drawRuler(g, ruler, view, { range }, ink);
 		if (timeline) drawCardinality(g, strip, view, timeline, ink);
-		if (!parts.hidden) {
+		if (!strip2.hidden) {
 			const plots = plotted();
 			drawParts(g, { ...strip, y: strip.y + strip.height }, view, plots, ink);
 			if (errors.offsetHeight) drawErrors(g, { ...strip, y: strip.y + 2 * strip.height }, view, plots, selection, ink);
@@ -171,9 +143,8 @@ export function mountTimeline(root, context) {
 		const x = xOf(at, view);
 		head.hidden = frames < 1 || x < -1 || x > view.width + 1;
 		head.style.transform = `translateX(${Math.round(x)}px)`;
-		const label = /** @type {HTMLElement} */ (head.firstElementChild);
-		write(label, String(at));
-		label.style.marginLeft = `${Math.max(0, 17 - x)}px`;
+		write(readout, String(at));
+		readout.style.marginLeft = `${Math.max(0, 17 - x)}px`;
 		wanted.hidden = step === shown || Math.abs(xOf(step, view) - x) < 2;
 		wanted.style.transform = `translateX(${Math.round(xOf(step, view))}px)`;
 		if (seekBar.valueAsNumber !== step) seekBar.value = String(step);
@@ -187,7 +158,7 @@ export function mountTimeline(root, context) {
 		const current = result?.run === basis && result.computed ? result : null;
 		const truth = server?.sequence?.has_truth ? current?.truth.length : undefined;
 		fill(people, current?.tracks.length ?? "–", truth !== undefined && h("span", { class: "sub" }, ` of ${truth}`));
-		if (!parts.hidden) writeScores();
+		if (!strip2.hidden) writeScores();
 	}
 
 	/** @type {Map<number, {element: HTMLElement, share: HTMLElement}>} */
@@ -211,7 +182,7 @@ export function mountTimeline(root, context) {
 					{
 						class: "gr lane",
 						"aria-label": `Track ${track.id}`,
-						onclick: () => page.select(track.id),
+						onclick: () => actions.select(track.id),
 						onpointerenter: () => store.set({ hover: { id: track.id, camera: -1 } }),
 						onpointerleave: () => store.set({ hover: null }),
 					},
@@ -232,7 +203,7 @@ export function mountTimeline(root, context) {
 		empty.style.top = `${above() + 8}px`;
 	}
 
-	plot.addEventListener("pointerdown", (event) => {
+	plot.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
 		if (event.button !== 0 || frames < 1) return;
 		event.preventDefault();
 		plot.setPointerCapture(event.pointerId);
@@ -241,17 +212,17 @@ export function mountTimeline(root, context) {
 		const inLanes = event.clientY - box.top > above() && event.clientY - box.top < above() + lanes.clientHeight;
 		const track = shownTracks()[lane];
 		const at = stepAt(event.clientX - box.left, view);
-		if (inLanes && track && at >= track.first && at <= track.last) page.select(track.id);
+		if (inLanes && track && at >= track.first && at <= track.last) actions.select(track.id);
 		store.set({ playing: 0 });
 		playback.seek(at);
 	});
-	plot.addEventListener("pointermove", (event) => {
+	plot.addEventListener("pointermove", (/** @type {PointerEvent} */ event) => {
 		if (!plot.hasPointerCapture(event.pointerId)) return;
 		playback.seek(stepAt(event.clientX - plot.getBoundingClientRect().left, view));
 	});
 	plot.addEventListener(
 		"wheel",
-		(event) => {
+		(/** @type {WheelEvent} */ event) => {
 			event.preventDefault();
 			const box = plot.getBoundingClientRect();
 			const overLanes = event.clientY - box.top > above() && lanes.scrollHeight > lanes.clientHeight;
@@ -264,16 +235,19 @@ export function mountTimeline(root, context) {
 		},
 		{ passive: false },
 	);
-	plot.addEventListener("dblclick", () => {
-		view = { ...view, first: 0, last: Math.max(1, frames - 1) };
+	/** @param {number} factor */
+	actions.zoom = (factor) => {
+		const x = Math.max(0, Math.min(view.width, xOf(Math.max(0, store.get().shown), view)));
+		view = zoomed(view, factor, x, frames);
 		look();
-	});
+	};
+	plot.addEventListener("dblclick", () => actions.zoom(1e9));
 	seekBar.addEventListener("input", () => playback.seek(seekBar.valueAsNumber));
 	lanes.addEventListener("scroll", draw);
 
 	store.on(["server"], ({ server }) => {
 		const now = server?.sequence?.frames ?? 0;
-		truthSign.hidden = parts.hidden = errors.hidden = !server?.sequence?.has_truth;
+		truthSign.hidden = strip2.hidden = errors.hidden = !server?.sequence?.has_truth;
 		if (now === frames) return;
 		frames = now;
 		view = { ...view, first: 0, last: Math.max(1, frames - 1) };
