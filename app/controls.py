@@ -19,7 +19,8 @@ from app import scene_style
 from app.scene_keys import hotkeys
 from app.scene_sliders import Scale, hint_text, label_text, number_text
 from app.scene_worker import LatestWorker
-from app.workbench import Change, Snapshot, Workbench
+from app.snapshot import Change, Snapshot
+from app.workbench import Workbench
 from tracker import parameters as table
 from tracker.parameters import Parameter, ParameterError, RunParameters, Stage
 

@@ -12,7 +12,7 @@ from numpy import ndarray
 
 from app.api import ERRORS, FOR_EVER, Bench
 from app.errors import ApiError
-from app.workbench import Snapshot
+from app.snapshot import Snapshot
 from tracker.foreground import unpack
 
 TINT = (214, 100, 244)

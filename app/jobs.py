@@ -18,7 +18,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.errors import sentence
-from app.workbench import Change, Opening, Snapshot, Workbench
+from app.snapshot import Change, Opening, Snapshot
+from app.workbench import Workbench
 from tracker import pipeline
 from tracker.pipeline import Cancelled, Progress, Run
 from tracker.sequences import library

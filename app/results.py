@@ -8,7 +8,7 @@ import numpy as np
 from numpy import ndarray
 
 from app import models
-from app.workbench import Snapshot
+from app.snapshot import Snapshot
 from tracker import parameters as table
 from tracker.pipeline import Run
 from tracker.sequences.sequence import Sequence

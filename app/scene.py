@@ -19,7 +19,8 @@ from app.scene_people import PeopleNodes
 from app.scene_room import GRID_CELL, FrustumNodes, RoomNodes, pose_through
 from app.scene_views import Views
 from app.scene_worker import LatestWorker
-from app.workbench import Change, Event, Snapshot, ViewRequest, Workbench
+from app.snapshot import Change, Event, Snapshot, ViewRequest
+from app.workbench import Workbench
 from tracker.pipeline import Run
 
 

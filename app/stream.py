@@ -16,7 +16,8 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import TypeAdapter, ValidationError
 
 from app import models, results
-from app.workbench import Change, Command, Event, Notice, Snapshot, ViewRequest, Workbench
+from app.snapshot import Change, Command, Event, Notice, Snapshot, ViewRequest
+from app.workbench import Workbench
 
 SECONDS_BETWEEN = {"progress": 0.1, "timeline": 0.25}
 """How often at most a page is told how far the run is, and that the timeline has grown."""

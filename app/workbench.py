@@ -1,128 +1,40 @@
 """The one store: sequence, parameters, playhead, selection, layers and the current run.
 
 Whoever changes something calls a method here; whoever shows something subscribes
-and reads a :class:`Snapshot`. Two kinds of news: a *change* says that a part of
+and reads a :class:`~app.snapshot.Snapshot`. Two kinds of news: a *change* says that a part of
 the state is another now (read it again), an *event* is a passing request that
 leaves no trace in the state.
 """
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Literal
 
 from app.evaluation.scores import Scored, Scores
+from app.snapshot import (
+    CLAMPED_ORIGIN,
+    LAYERS,
+    Change,
+    Command,
+    Event,
+    Level,
+    Notice,
+    Opening,
+    RunState,
+    Snapshot,
+    ViewRequest,
+    clamp,
+)
 from tracker import parameters as table
 from tracker.parameters import ParameterError, RunParameters
 from tracker.pipeline import Progress, Run
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
-
-Change = Literal[
-    "sequence", "opening", "parameters", "playhead", "selection", "layers",
-    "run", "progress", "evaluation", "pinned",
-]  # fmt: skip
-"""What is another now: ``run`` is a run's beginning and its end, ``progress`` its new steps."""
-
-RunPhase = Literal["idle", "computing", "done", "failed", "cancelled"]
-
-Level = Literal["info", "warn", "error"]
-
-LAYERS = ("boxes", "ellipsoids", "trails", "truth", "volume")
-"""The layers of the 3D view that can be switched."""
-
-CLAMPED_ORIGIN = "viser"
-"""Whose numbers are moved into their range rather than refused: viser clamps nothing itself."""
-
-
-@dataclass(frozen=True, slots=True)
-class RunState:
-    """How far the run is that the parameters ask for."""
-
-    key: str = ""
-    """Of the run that is asked for; what is shown is of this run where its key is the same."""
-    state: RunPhase = "idle"
-    done: int = 0
-    total: int = 0
-    steps_per_second: float = 0.0
-    seconds_left: float | None = None
-    message: str = ""
-    error: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Opening:
-    """A sequence that is being rendered or read."""
-
-    name: str
-    message: str
-    done: int = 0
-    total: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class ViewRequest:
-    """Somebody wants to look through a camera in 3D; None is the free view."""
-
-    camera: int | None
-
-
-@dataclass(frozen=True, slots=True)
-class Command:
-    """A transport key was pressed inside the 3D view."""
-
-    name: str
-
-
-@dataclass(frozen=True, slots=True)
-class Notice:
-    """A sentence for the person in front of the page."""
-
-    level: Level
-    message: str
-    hint: str | None = None
-
-
-Event = ViewRequest | Command | Notice
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Snapshot:
-    """The whole state at one moment; a value that can be read from any thread."""
-
-    version: int = 0
-    """Grows with every change."""
-    sequence: Sequence | None = None
-    sequence_key: str = ""
-    """Another for every content, so that pictures may be kept for ever."""
-    reader: FrameReader | None = None
-    opening: Opening | None = None
-    parameters: RunParameters = field(default_factory=RunParameters)
-    defaults: RunParameters = field(default_factory=RunParameters)
-    """The values that a reset returns to: of methods, those that fit the sequence."""
-    parameters_origin: str = ""
-    """Who changed the parameters last, so that nobody is told their own news."""
-    playhead: int = 0
-    playhead_origin: str = ""
-    selection: int | None = None
-    run: Run | None = None
-    """What is shown; steps below its ``done`` are there."""
-    run_state: RunState = RunState()
-    scores: Scores = field(default_factory=Scores)
-    """Runs against the truth, where there is one."""
-    layers: Mapping[str, bool] = field(
-        default_factory=lambda: MappingProxyType(dict.fromkeys(LAYERS, True))
-    )
-
-    @property
-    def step_is_computed(self) -> bool:
-        """Whether the shown run has the playhead's step."""
-        return self.run is not None and self.playhead < self.run.done
 
 
 class Workbench:
@@ -385,21 +297,3 @@ class Workbench:
             listeners = list(self._listeners)
         for callback in listeners:
             callback(event)
-
-
-def clamp(key: str, value: Any) -> Any:
-    """A number moved into the range of its parameter; what is no number is left to the check."""
-    parameter = table.PARAMETERS.get(key)
-    if parameter is None or parameter.kind not in ("float", "int"):
-        return value
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        return value
-    if not math.isfinite(number):
-        return value
-    if parameter.minimum is not None:
-        number = max(number, parameter.minimum)
-    if parameter.maximum is not None:
-        number = min(number, parameter.maximum)
-    return round(number) if parameter.kind == "int" else number

@@ -13,7 +13,7 @@ from app.evaluation import messages, models
 from app.evaluation.scores import Scored
 from app.evaluation.worker import Evaluator
 from app.models import State
-from app.workbench import Snapshot
+from app.snapshot import Snapshot
 from tracker.evaluation import Evaluation
 from tracker.evaluation.report import report_html
 

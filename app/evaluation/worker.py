@@ -11,7 +11,8 @@ from dataclasses import replace
 from app.errors import sentence
 from app.evaluation.scores import Scored
 from app.jobs import CLOSING_SECONDS, be_nice
-from app.workbench import Change, Snapshot, Workbench
+from app.snapshot import Change, Snapshot
+from app.workbench import Workbench
 from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
 
 logger = logging.getLogger("app")

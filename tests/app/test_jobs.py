@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from app.jobs import Jobs
-from app.workbench import Event, Notice, Snapshot, Workbench
+from app.snapshot import Event, Notice, Snapshot
+from app.workbench import Workbench
 from tests.app.conftest import wait_until
 from tests.app.folders import write_crossing
 from tracker import pipeline

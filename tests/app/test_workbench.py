@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from app.workbench import LAYERS, Change, Command, Event, Notice, ViewRequest, Workbench, clamp
+from app.snapshot import LAYERS, Change, Command, Event, Notice, ViewRequest, clamp
+from app.workbench import Workbench
 from tracker import pipeline
 from tracker.parameters import PARAMETERS, PRESETS, ParameterError, value
 from tracker.pipeline import Progress, Run

@@ -1,0 +1,111 @@
+"""What the page and the server tell each other, as types: the OpenAPI page is made from them.
+
+Pixels, metres and steps throughout; a step is 0-based. ``null`` stands for what
+is not there.
+"""
+
+from __future__ import annotations
+
+from app.models.base import (
+    Box,
+    Model,
+    Vector,
+)
+from app.models.requests import (
+    LayerChanges,
+    OpenRequest,
+    ParameterChanges,
+    PresetRequest,
+    ResetRequest,
+    SeekChange,
+    SelectChange,
+    StreamPing,
+    StreamSeek,
+    StreamSelect,
+    ViewChange,
+)
+from app.models.state import (
+    CameraInfo,
+    EntranceInfo,
+    GroupInfo,
+    MethodsInfo,
+    OpeningInfo,
+    ParameterInfo,
+    PinnedInfo,
+    RoomInfo,
+    RunInfo,
+    Schema,
+    SequenceEntryInfo,
+    SequenceInfo,
+    SequenceList,
+    State,
+    TargetInfo,
+    ViserInfo,
+)
+from app.models.step import (
+    CameraEvent,
+    CameraStep,
+    CameraTrack,
+    CameraTruth,
+    Estimate,
+    Gate,
+    Measurement,
+    Step,
+    Track,
+    Truth,
+)
+from app.models.timeline import (
+    Counts,
+    Numbers,
+    Span,
+    Timeline,
+    TrackLife,
+)
+
+__all__ = [
+    "Box",
+    "CameraEvent",
+    "CameraInfo",
+    "CameraStep",
+    "CameraTrack",
+    "CameraTruth",
+    "Counts",
+    "EntranceInfo",
+    "Estimate",
+    "Gate",
+    "GroupInfo",
+    "LayerChanges",
+    "Measurement",
+    "MethodsInfo",
+    "Model",
+    "Numbers",
+    "OpenRequest",
+    "OpeningInfo",
+    "ParameterChanges",
+    "ParameterInfo",
+    "PinnedInfo",
+    "PresetRequest",
+    "ResetRequest",
+    "RoomInfo",
+    "RunInfo",
+    "Schema",
+    "SeekChange",
+    "SelectChange",
+    "SequenceEntryInfo",
+    "SequenceInfo",
+    "SequenceList",
+    "Span",
+    "State",
+    "Step",
+    "StreamPing",
+    "StreamSeek",
+    "StreamSelect",
+    "TargetInfo",
+    "Timeline",
+    "Track",
+    "TrackLife",
+    "Truth",
+    "Vector",
+    "ViewChange",
+    "ViserInfo",
+]

@@ -1,0 +1,18 @@
+"""What messages are made of: pixels, metres and steps; ``null`` stands for what is not there."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict
+
+
+class Model(BaseModel):
+    """A message; attribute docstrings become the descriptions of the OpenAPI page."""
+
+    model_config = ConfigDict(use_attribute_docstrings=True, extra="forbid")
+
+
+Box = tuple[float, float, float, float]
+"""left, top, width, height in pixels."""
+
+Vector = tuple[float, float, float]
+"""x, y, z in metres, world frame."""

@@ -1,0 +1,80 @@
+"""What a page asks for."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from app.models.base import Model
+
+
+class OpenRequest(Model):
+    """Open another sequence."""
+
+    name: str = Field(min_length=1, max_length=4096)
+    """A built-in name, a name of the list, or a folder."""
+
+
+class ParameterChanges(Model):
+    """Values by key; all are taken or none."""
+
+    changes: dict[str, Any]
+    origin: str = ""
+
+
+class ResetRequest(Model):
+    """Back to the defaults."""
+
+    keys: list[str] | None = None
+    """All, the methods included, where none are named."""
+
+
+class PresetRequest(Model):
+    """A preset by name."""
+
+    name: str
+
+
+class LayerChanges(Model):
+    """Layers of the 3D view, by name."""
+
+    changes: dict[str, bool]
+
+
+class ViewChange(Model):
+    """Look through a camera in 3D."""
+
+    camera: int | None
+    """Its index; null for the free view."""
+
+
+class SelectChange(Model):
+    """Select a track."""
+
+    id: int | None
+
+
+class SeekChange(Model):
+    """Move the playhead."""
+
+    step: int
+    origin: str = ""
+
+
+class StreamSeek(SeekChange):
+    """From the page over the socket."""
+
+    type: Literal["seek"]
+
+
+class StreamSelect(SelectChange):
+    """From the page over the socket."""
+
+    type: Literal["select"]
+
+
+class StreamPing(Model):
+    """From the page over the socket: is anybody there?"""
+
+    type: Literal["ping"]

@@ -1,0 +1,186 @@
+"""Everything that all pages share, but for the results themselves; and what can be chosen."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from app.models.base import Model, Vector
+from app.snapshot import RunPhase
+
+
+class EntranceInfo(Model):
+    """Where people appear: mean and standard deviation."""
+
+    position: Vector
+    sigma: Vector
+
+
+class RoomInfo(Model):
+    """The volume that people are tracked in."""
+
+    min: Vector
+    max: Vector
+    entrances: list[EntranceInfo]
+
+
+class TargetInfo(Model):
+    """The upright box around a person."""
+
+    half_extents: Vector
+
+
+class CameraInfo(Model):
+    """One camera of the sequence."""
+
+    name: str
+    width: int
+    height: int
+    has_pictures: bool
+    has_detections: bool
+
+
+class SequenceInfo(Model):
+    """The sequence that is open."""
+
+    key: str
+    """Part of the pictures' addresses; another for every content."""
+    name: str
+    description: str
+    fps: float
+    frames: int
+    has_pictures: bool
+    has_detections: bool
+    has_truth: bool
+    room: RoomInfo
+    target: TargetInfo
+    cameras: list[CameraInfo]
+    templates: int
+    """How many colour templates it has."""
+
+
+class OpeningInfo(Model):
+    """A sequence on its way."""
+
+    name: str
+    message: str
+    done: int
+    total: int
+    """0 while it is not known."""
+
+
+class MethodsInfo(Model):
+    """The chosen methods."""
+
+    single_view: str
+    fusion_method: str
+
+
+class RunInfo(Model):
+    """The run that the parameters ask for."""
+
+    key: str
+    """A step or timeline with this key is of these parameters; with another, of earlier ones."""
+    state: RunPhase
+    done: int
+    total: int
+    steps_per_second: float
+    seconds_left: float | None
+    message: str
+    """The stage that takes the time."""
+    error: str | None
+
+
+class PinnedInfo(Model):
+    """The pinned run: the A of comparisons."""
+
+    key: str
+    parameters: dict[str, Any]
+    """Methods and values."""
+    changed: list[str]
+    """Keys whose value is not the default."""
+    differs: list[str]
+    """Keys whose value is not the one that the parameters have now."""
+
+
+class ViserInfo(Model):
+    """Where the 3D view is."""
+
+    path: str = "/viser/"
+
+
+class State(Model):
+    """Everything that all pages share, but for the results themselves."""
+
+    version: int
+    """Grows with every change; of two states the larger is the newer."""
+    sequence: SequenceInfo | None
+    opening: OpeningInfo | None
+    parameters: dict[str, Any]
+    changed: list[str]
+    """Keys whose value is not the default."""
+    methods: MethodsInfo
+    playhead: int
+    selection: int | None
+    layers: dict[str, bool]
+    """Of the 3D view."""
+    run: RunInfo
+    pinned: PinnedInfo | None
+    viser: ViserInfo
+
+
+class ParameterInfo(Model):
+    """One parameter: what a slider needs."""
+
+    key: str
+    group: str
+    name: str
+    label: str
+    help: str
+    symbol: str
+    unit: str
+    stage: str
+    """The first stage that a change re-runs."""
+    kind: Literal["float", "int", "bool", "choice"]
+    default: Any
+    minimum: float | None
+    maximum: float | None
+    step: float | None
+    log: bool
+    choices: list[str]
+    advanced: bool
+
+
+class GroupInfo(Model):
+    """A group of parameters."""
+
+    name: str
+    help: str
+
+
+class Schema(Model):
+    """Every parameter, method and preset."""
+
+    groups: list[GroupInfo]
+    parameters: list[ParameterInfo]
+    methods: dict[str, list[str]]
+    presets: dict[str, dict[str, Any]]
+
+
+class SequenceEntryInfo(Model):
+    """A sequence that can be opened."""
+
+    name: str
+    description: str
+    kind: Literal["rendered", "folder"]
+    cameras: int | None
+    frames: int | None
+    ready: bool
+    """Whether it opens without rendering."""
+    error: str | None = None
+    """Why it cannot be opened."""
+
+
+class SequenceList(Model):
+    """What can be opened."""
+
+    sequences: list[SequenceEntryInfo]

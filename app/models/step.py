@@ -1,0 +1,119 @@
+"""One step of a run: what each camera found, the targets, the truth."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from app.models.base import Box, Model, Vector
+
+
+class Measurement(Model):
+    """A peak or detection that the camera's filter was given."""
+
+    box: Box
+    score: float
+
+
+class Estimate(Model):
+    """A camera's own 2D estimate."""
+
+    box: Box
+    weight: float
+    label: int
+    """-1 where the method has no labels."""
+
+
+class CameraEvent(Model):
+    """Something that happened to people in a camera's picture, as its method tells it."""
+
+    kind: Literal["new", "vanished", "returned", "occluded", "merged", "split"]
+    labels: list[int]
+    """Labels of the camera's own 2D estimates."""
+
+
+Gate = tuple[float, float, float, float, float]
+"""An ellipse: centre x and y, and xx, xy, yy of the matrix C with (z − c)ᵀ C⁻¹ (z − c) = 1."""
+
+
+class CameraTrack(Model):
+    """One 3D target as one camera should see it, and what that camera said of it."""
+
+    id: int
+    box: Box | None
+    """Reprojected; null where a part is behind the camera."""
+    seen: bool
+    """Whether one of the camera's boxes fed it at this step."""
+    detection_probability: float
+    source: int
+    """Index of the box that fed it among what the camera gave the fusion, -1 for none."""
+    hidden_by: int | None
+    """Id of the target in front of it."""
+    visible: bool
+    reason: Literal["out of view", "behind camera"] | None
+    """Why it is not visible."""
+    centre: tuple[float, float] | None
+
+
+class CameraTruth(Model):
+    """Where a person really is in this picture."""
+
+    id: int
+    box: Box
+    valid: bool
+    """False where the position is not certain."""
+
+
+class CameraStep(Model):
+    """One camera at one step."""
+
+    name: str
+    measurements: list[Measurement]
+    estimates: list[Estimate]
+    samples: list[tuple[float, float, float]] | None = None
+    """x, y and relative weight; only where asked for."""
+    events: list[CameraEvent] = Field(default_factory=list)
+    gates: list[Gate] = Field(default_factory=list)
+    """Where the method expects its targets, in pixels."""
+    foreground: str | None = None
+    """``?run=`` of the foreground's address; null where the method has none."""
+    tracks: list[CameraTrack]
+    truth: list[CameraTruth]
+    information: dict[str, float]
+    """Numbers of the method worth showing, by name."""
+
+
+class Track(Model):
+    """One 3D target at one step."""
+
+    id: int
+    position: Vector
+    sigma: Vector
+    existence: float
+    """Weight or probability of existence."""
+    seen: list[bool]
+    """By camera."""
+
+
+class Truth(Model):
+    """Where a person really is."""
+
+    id: int
+    position: Vector
+    valid: bool
+
+
+class Step(Model):
+    """One step of the shown run; the truth is there whether it is computed or not."""
+
+    run: str
+    """Key of the run that it is of; empty where none is shown."""
+    step: int
+    computed: bool
+    cameras: list[CameraStep]
+    tracks: list[Track]
+    truth: list[Truth]
+    components: int
+    cardinality: float
+    """Expected number of people: the sum of the weights."""

@@ -1,0 +1,60 @@
+"""A run over time."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from app.models.base import Model
+
+Span = tuple[int, int, Literal["seen", "coasting"]]
+"""First step, last step, and whether any camera saw the target."""
+
+
+class TrackLife(Model):
+    """A track's life."""
+
+    id: int
+    first: int
+    last: int
+    """Of its whole life."""
+    seen: float
+    """Share of its whole life in which a camera saw it."""
+    spans: list[Span]
+    """Within the steps asked for; ones shorter than ``stride`` are joined with their neighbours."""
+
+
+class Counts(Model):
+    """Whole numbers over time: of each bucket the lowest, the highest and the mean."""
+
+    low: list[int]
+    high: list[int]
+    mean: list[float]
+
+
+class Numbers(Model):
+    """Numbers over time: of each bucket the lowest, the highest and the mean."""
+
+    low: list[float]
+    high: list[float]
+    mean: list[float]
+
+
+class Timeline(Model):
+    """The shown run over time, as far as it is computed, summed up in buckets of steps."""
+
+    run: str
+    done: int
+    frames: int
+    first: int
+    """The first step of the first bucket."""
+    stride: int
+    """Steps a bucket: 1 where each step has its own value."""
+    cardinality: Numbers
+    count: Counts
+    """Targets reported."""
+    truth: Counts | None
+    """People really there, over all steps asked for."""
+    tracks: list[TrackLife]
+    """Those that live in the steps asked for, by id."""
+    left_out: int
+    """How many more live there: the shorter ones, where they are very many."""
