@@ -22,6 +22,7 @@ from tracker.parameters.definition import Params, Stage
 from tracker.parameters.detections import DetectionBoxParams, DetectionPhdParams
 from tracker.parameters.foreground import ForegroundParams
 from tracker.parameters.fusion import FusionParams
+from tracker.parameters.pseudo_particle import PseudoParticleParams
 from tracker.parameters.run import FusionName, RunParameters, SingleViewName
 from tracker.parameters.table import GROUPS, METHODS, PARAMETERS, PRESETS, Parameter
 
@@ -39,6 +40,7 @@ __all__ = [
     "Parameter",
     "ParameterError",
     "Params",
+    "PseudoParticleParams",
     "RunParameters",
     "SingleViewName",
     "Stage",

@@ -9,8 +9,9 @@ from tracker.parameters.definition import Params
 from tracker.parameters.detections import DetectionBoxParams, DetectionPhdParams
 from tracker.parameters.foreground import ForegroundParams
 from tracker.parameters.fusion import FusionParams
+from tracker.parameters.pseudo_particle import PseudoParticleParams
 
-SingleViewName = Literal["colour_phd", "detection_phd", "none"]
+SingleViewName = Literal["colour_phd", "pseudo_particle", "detection_phd", "none"]
 FusionName = Literal["sequential_phd", "multi_bernoulli"]
 
 
@@ -28,6 +29,7 @@ class RunParameters(Params):
     """Method of stage 2: how the cameras' boxes become 3D positions."""
 
     colour_phd: ColourPhdParams = ColourPhdParams()
+    pseudo_particle: PseudoParticleParams = PseudoParticleParams()
     detection_boxes: DetectionBoxParams = DetectionBoxParams()
     detection_phd: DetectionPhdParams = DetectionPhdParams()
     foreground: ForegroundParams = ForegroundParams()

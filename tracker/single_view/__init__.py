@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from tracker.parameters import RunParameters
+from tracker.parameters import METHODS, RunParameters
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour_phd import ColourPhd
 from tracker.single_view.detection_phd import DetectionPhd
 from tracker.single_view.none import DetectionBoxes
 from tracker.single_view.protocol import SingleViewMethod, ViewResult
+from tracker.single_view.pseudo_particle import PseudoParticle
 
 __all__ = ["SingleViewMethod", "ViewResult", "create"]
 
@@ -31,6 +32,9 @@ def create(
         )
     if name == "detection_phd":
         return DetectionPhd(sequence, camera_index, parameters.detection_phd)
+    if name == "pseudo_particle":
+        return PseudoParticle(sequence, camera_index, parameters.pseudo_particle, reader)
     if name == "none":
         return DetectionBoxes(sequence, camera_index, parameters.detection_boxes)
-    raise ValueError(f"single_view: expected colour_phd, detection_phd or none, got {name!r}")
+    expected = ", ".join(METHODS["single_view"])
+    raise ValueError(f"single_view: expected one of {expected}, got {name!r}")

@@ -1,0 +1,130 @@
+"""Numbers of the particle filters on colour.
+
+[SG08] Sun, Guo, "Multiple object tracking with a pseudo particle filter", 2008.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from tracker.parameters.definition import Params, ui
+
+
+class PseudoParticleParams(Params):
+    """Single-view pseudo particle filter, and the classical one beside it ([SG08])."""
+
+    filter: Annotated[Literal["pseudo", "classical"], ui("p(x|z)")] = "pseudo"
+    """Clusters of particles as targets, or one posterior whose mean is the only one."""
+
+    samples: Annotated[int, Field(ge=20, le=5000), ui("S", unit="1/(camera·step)", log=True)] = 400
+    """Particles, of all targets together."""
+
+    colour_space: Annotated[Literal["hue_saturation", "rgb"], ui("u", published="rgb")] = (
+        "hue_saturation"
+    )
+    """Bins of the histograms: 16 hues × 16 saturations and 16 greys, or RGB 8×8×8."""
+
+    histogram_kernel: Annotated[Literal["epanechnikov", "flat"], ui("k(r)", published="flat")] = (
+        "epanechnikov"
+    )
+    """How a box's pixels count: less towards the edge of the ellipse in it, or all the same."""
+
+    sharpness: Annotated[float, Field(ge=1.0, le=200.0), ui("λ", step=1.0, log=True)] = 40.0
+    """How fast a particle's weight exp(-λ d) falls with the distance d to a target's colours."""
+
+    foreground_threshold: Annotated[
+        float, Field(ge=2.0, le=128.0), ui("θ", unit="16 √level", step=1.0)
+    ] = 24.0
+    """A pixel that differs more than this from the background is foreground."""
+
+    foreground_weight: Annotated[
+        float, Field(ge=0.0, le=10.0), ui("a", step=0.1, published=0.0)
+    ] = 3.0
+    """The weight is multiplied by the share of foreground in the box to this power."""
+
+    surroundings_weight: Annotated[
+        float, Field(ge=0.0, le=10.0), ui("b", step=0.1, published=0.0)
+    ] = 3.0
+    """The weight falls by exp(-b · share of foreground above and beside the box)."""
+
+    birth: Annotated[Literal["foreground", "picture"], ui("γ(x)", published="picture")] = (
+        "foreground"
+    )
+    """Where particles look for new targets: on the foreground, or anywhere in the picture."""
+
+    newcomer_share: Annotated[float, Field(ge=0.0, le=1.0), ui("s", step=0.05)] = 0.4
+    """Share of the particles that look for new targets; all do while there is no target."""
+
+    resampling: Annotated[Literal["each", "together"], ui("w_i", published="together")] = "each"
+    """Whether each target's particles, and the newcomers', keep their number, or all compete."""
+
+    motion_sigma: Annotated[
+        float, Field(ge=0.1, le=50.0), ui("σ_w", unit="half sizes/√s", step=0.1, log=True)
+    ] = 3.0
+    """How far a person strays in the picture in one second."""
+
+    growth_sigma: Annotated[
+        float, Field(ge=0.01, le=5.0), ui("σ_H", unit="half sizes/√s", step=0.01, log=True)
+    ] = 0.4
+    """How much a person's box grows or shrinks in one second."""
+
+    velocity_share: Annotated[float, Field(ge=0.0, le=1.0), ui("v", step=0.05, published=0.0)] = 0.8
+    """How much of its mean displacement a target repeats: 0 is a random walk."""
+
+    bandwidth: Annotated[
+        float, Field(ge=0.2, le=3.0), ui("h", unit="half sizes", step=0.05, log=True)
+    ] = 1.0
+    """Radius of the mean shift's kernel; it follows the size of the target."""
+
+    smallest_cluster: Annotated[float, Field(ge=0.0, le=0.5), ui("c_min", step=0.005)] = 0.01
+    """A cluster with a smaller share of the particles is dropped."""
+
+    redistribution: Annotated[
+        float, Field(ge=0.0, le=3.0), ui("σ_r", unit="half sizes", step=0.05)
+    ] = 0.7
+    """Spread of the particles that are drawn anew around each target; 0 keeps the resampled."""
+
+    acceptance_distance: Annotated[float, Field(ge=0.05, le=1.0), ui("d_0", step=0.01)] = 0.5
+    """Column of the background: a mode less likely than one at this distance is nobody."""
+
+    acceptance_foreground: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("f_min", step=0.01, published=0.0)
+    ] = 0.35
+    """A mode with a smaller share of foreground in its box is nobody."""
+
+    position_sigma: Annotated[
+        float, Field(ge=0.1, le=10.0), ui("σ_a", unit="half sizes", step=0.1, log=True)
+    ] = 1.0
+    """How far from where a target is expected its mode lies, when they are assigned."""
+
+    separation: Annotated[
+        float, Field(ge=0.0, le=5.0), ui("r_n", unit="half sizes", step=0.1, published=0.0)
+    ] = 1.5
+    """A mode nearer than this to a target's mode is no newcomer."""
+
+    targets_per_person: Annotated[int, Field(ge=1, le=10), ui("n_g", step=1, published=1)] = 2
+    """How many targets may look like one person's templates at a time."""
+
+    confirmation: Annotated[int, Field(ge=1, le=50), ui("n_c", unit="steps", step=1)] = 3
+    """Steps in which a new target must be found before it counts."""
+
+    patience: Annotated[float, Field(ge=0.0, le=10.0), ui("t_p", unit="s", step=0.05)] = 0.4
+    """How long a target that is not found is still waited for."""
+
+    memory: Annotated[float, Field(ge=0.0, le=100.0), ui("t_m", unit="s", step=0.5)] = 10.0
+    """How long after it vanished a target of the same colours returns under its id."""
+
+    centre_sigma: Annotated[
+        float, Field(ge=0.02, le=3.0), ui("σ_x", unit="half sizes", step=0.01, log=True)
+    ] = 0.5
+    """Standard deviation of a mode's centre, as the fusion is told."""
+
+    size_sigma: Annotated[
+        float, Field(ge=0.02, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
+    ] = 0.5
+    """Standard deviation of a mode's half sizes: colour alone hardly tells them."""
+
+    output: Annotated[Literal["modes", "targets"], ui("Y", published="targets")] = "modes"
+    """What goes to the fusion: every mode that is not background, or the confirmed targets."""
