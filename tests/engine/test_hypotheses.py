@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from numpy import ndarray
 
 from tracker.single_view import hypotheses
-from tracker.single_view.hypotheses import Register, Targets, best_hypothesis, somebody
+from tracker.single_view.hypotheses import best_hypothesis, somebody
 from tracker.single_view.protocol import ViewEvent
+from tracker.single_view.register import Register, Targets, follow
 
 LIKELY, UNLIKELY = 0.2, 0.9
 
@@ -148,7 +149,7 @@ class Story:
         for row, (_, person) in enumerate(modes):
             distances[row, person] = LIKELY
         logs = matrix(boxes, distances, expected, vacant)
-        self.register, events = hypotheses.follow(
+        self.register, events = follow(
             self.register,
             expected,
             boxes,

@@ -30,7 +30,7 @@ STEPS = 50
 VARIANTS: dict[str, dict[str, object]] = {
     "default": {},
     "published": {
-        key.split(".")[1]: value
+        key.removeprefix("pseudo_particle."): value
         for key, value in PRESETS["published"].items()
         if key.startswith("pseudo_particle.")
     },

@@ -34,11 +34,6 @@ class PseudoParticleParams(Params):
     sharpness: Annotated[float, Field(ge=1.0, le=200.0), ui("λ", step=1.0, log=True)] = 40.0
     """How fast a particle's weight exp(-λ d) falls with the distance d to a target's colours."""
 
-    foreground_threshold: Annotated[
-        float, Field(ge=2.0, le=128.0), ui("θ", unit="16 √level", step=1.0)
-    ] = 24.0
-    """A pixel that differs more than this from the background is foreground."""
-
     foreground_weight: Annotated[
         float, Field(ge=0.0, le=10.0), ui("a", step=0.1, published=0.0)
     ] = 3.0

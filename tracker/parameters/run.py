@@ -15,7 +15,7 @@ SingleViewName = Literal["colour_phd", "pseudo_particle", "detection_phd", "none
 FusionName = Literal["sequential_phd", "multi_bernoulli"]
 
 
-FOREGROUND_METHODS: frozenset[SingleViewName] = frozenset({"colour_phd"})
+FOREGROUND_METHODS: frozenset[SingleViewName] = frozenset({"colour_phd", "pseudo_particle"})
 """The single-view methods that ask what in a picture is foreground."""
 
 

@@ -33,7 +33,9 @@ def create(
     if name == "detection_phd":
         return DetectionPhd(sequence, camera_index, parameters.detection_phd)
     if name == "pseudo_particle":
-        return PseudoParticle(sequence, camera_index, parameters.pseudo_particle, reader)
+        return PseudoParticle(
+            sequence, camera_index, parameters.pseudo_particle, parameters.foreground, reader
+        )
     if name == "none":
         return DetectionBoxes(sequence, camera_index, parameters.detection_boxes)
     expected = ", ".join(METHODS["single_view"])

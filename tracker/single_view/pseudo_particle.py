@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Float32, Int, UInt8
@@ -13,13 +14,16 @@ from numpy import ndarray
 from scipy.special import expit
 
 from tracker import particles as particle_set
-from tracker.parameters import PseudoParticleParams
+from tracker.foreground import pack
+from tracker.parameters import ForegroundParams, PseudoParticleParams
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view import hypotheses
-from tracker.single_view.appearance import Appearance, Scene
-from tracker.single_view.hypotheses import GATE, UNCONFIRMED, Register, Targets
+from tracker.single_view.appearance import Scene
+from tracker.single_view.colour_particles import ColourParticles
+from tracker.single_view.hypotheses import GATE
 from tracker.single_view.protocol import ViewEvent, ViewResult
+from tracker.single_view.register import UNCONFIRMED, Register, Targets, follow
 
 MERGE_DISTANCE = 1.0
 """Modes closer than this, in half sizes, are one."""
@@ -36,6 +40,8 @@ class PseudoParticleState:
     """Around the targets, or the classical filter's posterior; all of the same weight."""
     register: Register
     """Targets of the pseudo particle filter; the classical one has none."""
+    foreground: Any
+    """Of the foreground model."""
 
 
 class PseudoParticle:
@@ -64,6 +70,7 @@ class PseudoParticle:
         sequence: Sequence,
         camera_index: int,
         parameters: PseudoParticleParams,
+        foreground: ForegroundParams,
         reader: FrameReader,
     ) -> None:
         """Read the templates and learn the background.
@@ -71,22 +78,13 @@ class PseudoParticle:
         Raises:
             ValueError: If there are no pictures or templates, or a template cannot be read.
         """
-        p = self._parameters = parameters
-        self._appearance = Appearance(
-            sequence,
-            camera_index,
-            reader,
-            colour_space=p.colour_space,
-            histogram_kernel=p.histogram_kernel,
-            with_foreground=p.birth == "foreground"
-            or max(p.foreground_weight, p.surroundings_weight, p.acceptance_foreground) > 0.0,
-        )
+        self._parameters = parameters
+        self._model = ColourParticles(sequence, camera_index, parameters, foreground, reader)
         self._step_time = sequence.step_time
-        self._persons = len(self._appearance.model.names)
 
     def start(self) -> PseudoParticleState:
         """Nobody is in the picture."""
-        return PseudoParticleState(np.zeros((0, 4)), Register.empty())
+        return PseudoParticleState(np.zeros((0, 4)), Register.empty(), self._model.start())
 
     def step(
         self,
@@ -96,13 +94,18 @@ class PseudoParticle:
         rng: np.random.Generator,
     ) -> tuple[PseudoParticleState, ViewResult]:
         """One step; without a picture the particles only move."""
-        moved = self._move(state.particles, rng)
+        moved = self._model.move(state.particles, rng)
         if picture is None:
             return replace(state, particles=moved), self._unseen(state)
-        scene = self._appearance.look(picture, self._parameters.foreground_threshold)
+        foreground, scene = self._model.look(state.foreground, picture)
         if self._parameters.filter == "classical":
-            return self._classical(moved, scene, rng)
-        return self._pseudo(state.register, moved, scene, rng)
+            particles, result = self._classical(moved, scene, rng)
+            after = PseudoParticleState(particles, state.register, foreground)
+        else:
+            particles, register, result = self._pseudo(state.register, moved, scene, rng)
+            after = PseudoParticleState(particles, register, foreground)
+        mask = None if scene.mask is None else pack(scene.mask)
+        return after, replace(result, foreground=mask)
 
     def _pseudo(
         self,
@@ -110,11 +113,12 @@ class PseudoParticle:
         moved: Float[ndarray, "S 4"],
         scene: Scene,
         rng: np.random.Generator,
-    ) -> tuple[PseudoParticleState, ViewResult]:
+    ) -> tuple[Float[ndarray, "S 4"], Register, ViewResult]:
+        """Clusters, the hypothesis matrix, drawing anew: particles, targets and result."""
         p = self._parameters
-        samples = np.concatenate([moved, self._newcomers(p.samples - len(moved), scene, rng)])
+        samples = np.concatenate([moved, self._model.newcomers(p.samples - len(moved), scene, rng)])
         expected = register.targets.moved(p.velocity_share)
-        scores = self._scores(scene, samples)
+        scores = self._model.scores(scene, samples)
         weights = (
             particle_set.normalised(scores)
             if p.resampling == "together"
@@ -125,12 +129,12 @@ class PseudoParticle:
             samples, counts, bandwidth=p.bandwidth, merge_distance=MERGE_DISTANCE
         )
         modes = found.modes[found.shares >= p.smallest_cluster]
-        distances = self._appearance.distances(scene, modes)
-        evidence, inside = self._evidence(scene, modes)
+        distances = self._model.distances(scene, modes)
+        evidence, inside = self._model.evidence(scene, modes)
         good = inside >= p.acceptance_foreground
         modes, distances, evidence = modes[good], distances[good], evidence[good]
 
-        vacant = hypotheses.vacancies(expected, self._persons, p.targets_per_person)
+        vacant = hypotheses.vacancies(expected, self._model.persons, p.targets_per_person)
         matrix = hypotheses.hypothesis_matrix(
             modes,
             distances,
@@ -151,7 +155,7 @@ class PseudoParticle:
             background,
             p.separation,
         )
-        after, events = hypotheses.follow(
+        after, events = follow(
             register,
             expected,
             modes,
@@ -181,25 +185,25 @@ class PseudoParticle:
                 "foreground share": scene.foreground_share,
             },
         )
-        return PseudoParticleState(particles, after), result
+        return particles, after, result
 
     def _classical(
         self, moved: Float[ndarray, "S 4"], scene: Scene, rng: np.random.Generator
-    ) -> tuple[PseudoParticleState, ViewResult]:
+    ) -> tuple[Float[ndarray, "S 4"], ViewResult]:
         """Sampling, importance weights, resampling: one posterior, and its mean."""
         p = self._parameters
-        samples = moved if len(moved) else self._newcomers(p.samples, scene, rng)
-        weights = particle_set.normalised(self._scores(scene, samples))
+        samples = moved if len(moved) else self._model.newcomers(p.samples, scene, rng)
+        weights = particle_set.normalised(self._model.scores(scene, samples))
         counts = particle_set.resample(weights, p.samples if len(samples) else 0, rng)
         mean = (weights @ samples)[None] if len(samples) else np.zeros((0, 4))
-        scores = self._scores(scene, mean)
+        scores = self._model.scores(scene, mean)
         existence = expit(scores + p.sharpness * p.acceptance_distance)
         labels = np.full(len(mean), CLASSICAL_LABEL)
         result = ViewResult(
             boxes=mean,
             weights=existence,
             labels=labels,
-            sigmas=self._sigmas(mean),
+            sigmas=self._model.sigmas(mean),
             estimates=mean,
             estimate_weights=existence,
             estimate_labels=labels,
@@ -209,45 +213,7 @@ class PseudoParticle:
             sample_weights=_relative(weights),
             information={"effective particles": particle_set.effective_number(weights)},
         )
-        particles = np.repeat(samples, counts, axis=0)
-        return PseudoParticleState(particles, Register.empty()), result
-
-    def _move(
-        self, particles: Float[ndarray, "S 4"], rng: np.random.Generator
-    ) -> Float[ndarray, "S 4"]:
-        """Random walk in half sizes; a box grows or shrinks as a whole."""
-        p, root = self._parameters, np.sqrt(self._step_time)
-        noise = rng.standard_normal((len(particles), 3))
-        moved = particles.copy()
-        moved[:, :2] += p.motion_sigma * root * particles[:, 2:] * noise[:, :2]
-        moved[:, 2:] *= np.exp(p.growth_sigma * root * noise[:, 2:])
-        return self._appearance.within(moved)
-
-    def _newcomers(
-        self, count: int, scene: Scene, rng: np.random.Generator
-    ) -> Float[ndarray, "N 4"]:
-        """Particles where somebody may have appeared."""
-        if self._parameters.birth == "foreground":
-            drawn = self._appearance.draw_on_foreground(count, scene, rng)
-        else:
-            drawn = self._appearance.draw_anywhere(count, rng)
-        return self._appearance.within(drawn)
-
-    def _evidence(
-        self, scene: Scene, boxes: Float[ndarray, "N 4"]
-    ) -> tuple[Float[ndarray, " N"], Float[ndarray, " N"]]:
-        """What the foreground says of each box, and its share inside."""
-        p = self._parameters
-        return self._appearance.shape_scores(
-            scene, boxes, inside_weight=p.foreground_weight, around_weight=p.surroundings_weight
-        )
-
-    def _scores(self, scene: Scene, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, " N"]:
-        """The logarithm of each box's weight."""
-        distances = self._appearance.distances(scene, boxes)
-        colours = particle_set.log_likelihoods(distances, self._parameters.sharpness)
-        evidence, _ = self._evidence(scene, boxes)
-        return np.asarray(colours + evidence)
+        return np.repeat(samples, counts, axis=0), result
 
     def _nearest(self, boxes: Float[ndarray, "S 4"], targets: Targets) -> Int[ndarray, " S"]:
         """Of each box the target within whose gate it lies, the nearest; T outside all gates."""
@@ -284,12 +250,6 @@ class PseudoParticle:
     def _steps(self, seconds: float) -> int:
         return round(seconds / self._step_time)
 
-    def _sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
-        """Standard deviations of modes: proportional to the box."""
-        p = self._parameters
-        half_sizes = np.maximum(boxes[:, 2:], 0.5)
-        return np.concatenate([p.centre_sigma * half_sizes, p.size_sigma * half_sizes], axis=1)
-
     def _result(
         self,
         targets: Targets,
@@ -312,7 +272,7 @@ class PseudoParticle:
             boxes=boxes,
             weights=weights,
             labels=box_labels,
-            sigmas=self._sigmas(boxes),
+            sigmas=self._model.sigmas(boxes),
             estimates=confirmed.boxes,
             estimate_weights=confirmed.existences,
             estimate_labels=confirmed.labels,
