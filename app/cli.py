@@ -92,6 +92,10 @@ def _sentence(error: Exception) -> str:
 
 
 def _serve(command: Serve) -> int:
+    if not 0 <= command.port <= 65535:
+        raise ParameterError(
+            "--port", f"expected 0 (any that is free) to 65535, got {command.port}"
+        )
     check_data(command.data)
     from app import server
     from app.jobs import locate
@@ -166,6 +170,7 @@ def _leave(status: int) -> None:
 def _track(command: Track) -> None:
     changes = command.changes()
     table.with_values(table.RunParameters(), changes)  # wrong usage shows before any work
+    _check_seed(command.seed)
     output = command.output
     if output.is_dir():
         raise CommandError(f"--output {output}: expected a file to write, found a folder")
@@ -231,7 +236,8 @@ def _render(command: Render) -> None:
 
     if command.name not in rendering.ROOMS:
         known = ", ".join(rendering.ROOMS)
-        raise CommandError(f"NAME: expected one of {known}, got {command.name!r}")
+        raise ParameterError("NAME", f"expected one of {known}, got {command.name!r}")
+    _check_seed(command.seed)
     if command.cameras not in (2, 3):
         raise ParameterError("--cameras", f"expected 2 or 3, got {command.cameras}")
     if command.folder.exists():
@@ -245,6 +251,11 @@ def _render(command: Render) -> None:
             progress=bar.at,
         )
     say(f"{command.name} with {command.cameras} cameras, written to {command.folder}")
+
+
+def _check_seed(seed: int) -> None:
+    if seed < 0:
+        raise ParameterError("--seed", f"expected a whole number from 0, got {seed}")
 
 
 def _parameters() -> None:

@@ -92,6 +92,14 @@ def install(app: FastAPI) -> None:
     @app.exception_handler(RequestValidationError)
     async def _request(_: Request, error: RequestValidationError) -> JSONResponse:
         first = error.errors()[0]
+        if first["type"] == "json_invalid":
+            why, byte = first["ctx"]["error"], first["loc"][1]
+            detail = ErrorDetail(
+                code="bad_request",
+                message=f"The body is not JSON: {why}, at byte {byte}.",
+                hint='Send an object such as {"changes": {"fusion.clutter_rate": 1.5}}.',
+            )
+            return JSONResponse(body(detail), 422)
         place = [str(part) for part in first["loc"]]
         field = ".".join(place[1:]) or place[0]
         detail = ErrorDetail(

@@ -32,7 +32,7 @@ class Serve:
     """Start the workbench and serve its page on this machine."""
 
     sequence: Annotated[
-        Positional[str], arg(metavar="SEQUENCE", help="A built-in room's name or a folder.")
+        Positional[str], arg(metavar="[SEQUENCE]", help="A built-in room's name or a folder.")
     ] = DEFAULT_SEQUENCE
     host: str = "127.0.0.1"
     """Address to listen on. Anything but this machine's own lets others change what you see."""

@@ -72,15 +72,16 @@ def series(
 
 
 @router.get("/evaluation/comparison")
-def comparison(bench: Bench, evaluator: Scorer) -> models.Comparison:
+def comparison(bench: Bench, evaluator: Scorer) -> models.Comparison | None:
     """The run scored last, B, against the pinned or else the previous finished one, A.
 
-    While B is under way, A counts as far as B has come.
+    While B is under way, A counts as far as B has come. Null where there is no A: none is
+    pinned, and none was finished before.
     """
     snapshot = bench.snapshot()
     b = _evaluated(snapshot, snapshot.scores.shown)
     if snapshot.scores.reference is None:
-        raise _nothing_to_compare()
+        return None
     against, scored = snapshot.scores.reference
     if against == "pinned":
         _evaluated(snapshot, scored)

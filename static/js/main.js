@@ -186,7 +186,7 @@ const fetchScores = fetcher(async () => {
 	const sequence = store.get().server?.sequence;
 	if (!sequence?.has_truth) return;
 	const told = (/** @type {string} */ what) => getJson(`/api/evaluation${what}`);
-	const [evaluation, series, comparison] = await Promise.all([told(""), told(`/series?${part()}`), told("/comparison").catch(() => null)]);
+	const [evaluation, series, comparison] = await Promise.all([told(""), told(`/series?${part()}`), told("/comparison")]);
 	const reference = comparison && (await told(`/series?of=${comparison.against}&${part()}`).catch(() => null));
 	if (store.get().server?.sequence?.key === sequence.key) store.set({ scores: { evaluation, series, comparison, reference } });
 });

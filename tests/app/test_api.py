@@ -390,3 +390,10 @@ def test_the_page_of_the_routes_loads_nothing_from_another_host(client: TestClie
     for path in ("/docs-files/swagger-ui-bundle.js", "/docs-files/swagger-ui.css"):
         assert path in page
         assert client.get(path).status_code == 200
+
+
+def test_a_body_that_is_no_json_is_said_to_be_none(empty: TestClient) -> None:
+    answer = empty.patch(
+        "/api/parameters", content="{changes", headers={"content-type": "application/json"}
+    )
+    assert_error(answer, 422, "bad_request", "not JSON", "at byte 1")

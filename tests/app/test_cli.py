@@ -121,6 +121,7 @@ def test_help_names_every_flag_with_range_and_default(run: Runs) -> None:
         (["--preset", "magic"], "--preset: expected one of robust, published, got 'magic'"),
         (["--fusion", "magic"], "expected one of sequential_phd"),
         (["--single-view", "magic"], "expected one of colour_phd"),
+        (["--seed", "-1"], "--seed: expected a whole number from 0, got -1"),
     ],
 )
 def test_a_wrong_value_is_wrong_usage(
@@ -262,7 +263,7 @@ def test_parameters(run: Runs) -> None:
 
 def test_render_refuses_what_it_cannot_do(run: Runs, tmp_path: Path) -> None:
     status, _, stderr = run("render", "room99", tmp_path / "new")
-    assert status == 1
+    assert status == 2
     assert "expected one of room24-2p, room35-2p, room44-3p, got 'room99'" in stderr
     status, _, stderr = run("render", "room24-2p", tmp_path)
     assert status == 1
@@ -333,3 +334,10 @@ def test_whoever_has_read_enough_is_no_failure() -> None:
     )
     assert done.stderr == ""
     assert done.stdout.startswith("key")
+
+
+@pytest.mark.parametrize("port", ["-1", "65536", "99999999"])
+def test_a_port_that_cannot_be_is_wrong_usage(run: Runs, port: str) -> None:
+    status, stdout, stderr = run("serve", "--port", port)
+    assert (status, stdout) == (2, "")
+    assert f"--port: expected 0 (any that is free) to 65535, got {port}" in stderr

@@ -105,6 +105,15 @@ def test_calibration_by_projection_is_the_same_camera(folder: Path) -> None:
     np.testing.assert_allclose(split.rotation, camera.rotation, atol=1e-12)
 
 
+def test_a_projection_of_the_wrong_shape_is_told_once(folder: Path) -> None:
+    text = (folder / "sequence.toml").read_text(encoding="utf-8")
+    text = re.sub(r"K = .*\nR = .*\nt = .*", "projection = [[1, 0], [0, 1]]", text, count=1)
+    (folder / "sequence.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(SequenceError, match=r"projection: expected") as told:
+        read_sequence(folder)
+    assert str(told.value).count("projection") == 1
+
+
 @pytest.mark.parametrize(
     "coefficients", [[], [-0.3, 0.1, 0.001, 0.002], [-0.3, 0.1, 0.0, 0.0, 0.2]]
 )

@@ -31,8 +31,9 @@ def read_camera(name: str, image_size: tuple[int, int], fields: Fields) -> Camer
             raise fields.error(
                 "projection", f"stands in place of {listed(both)}; remove one or the other"
             )
+        projection = fields.matrix("projection", 3, 4)
         try:
-            return Camera.from_projection(name, image_size, fields.matrix("projection", 3, 4))
+            return Camera.from_projection(name, image_size, projection)
         except ValueError as error:
             raise fields.error("projection", str(error)) from None
     missing = [key for key in ("K", "R", "t") if key not in fields]
