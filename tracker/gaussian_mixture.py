@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker import kernels
+from tracker import kernels, mixture_kernels
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,12 +100,14 @@ def predict(
         noise: Q, in squared state units per step, one for all or one a component.
         survival_probability: p_S, one for all or one a component.
     """
-    covariances = transition @ mixture.covariances @ transition.T + noise
+    means, covariances = mixture_kernels.predict(
+        mixture.means,
+        mixture.covariances,
+        np.ascontiguousarray(transition, dtype=float),
+        np.ascontiguousarray(noise, dtype=float).reshape(-1, *transition.shape),
+    )
     return GaussianMixture(
-        mixture.weights * survival_probability,
-        mixture.means @ transition.T,
-        (covariances + covariances.transpose(0, 2, 1)) / 2.0,  # rounding leaves it askew
-        mixture.labels,
+        mixture.weights * survival_probability, means, covariances, mixture.labels
     )
 
 
@@ -149,7 +151,7 @@ def merge(
     order = np.argsort(-mixture.weights, kind="stable")
     if owners is None:
         owners = np.full(mixture.size, -1, dtype=np.int64)
-    group, leaders = kernels.merge_groups(
+    group, leaders = mixture_kernels.merge_groups(
         mixture.means, mixture.covariances, order, owners, threshold
     )
     weights, means, covariances = kernels.merge_moments(

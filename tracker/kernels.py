@@ -74,56 +74,6 @@ def squared_length(residual: ndarray, lower: ndarray) -> float:
 
 
 @_kernel
-def merge_groups(
-    means: ndarray, covariances: ndarray, order: ndarray, owners: ndarray, threshold: float
-) -> tuple[ndarray, ndarray]:
-    """Group components around the heaviest ones left.
-
-    Args:
-        means: (J, d).
-        covariances: (J, d, d).
-        order: (J,) indices, heaviest first.
-        owners: (J,); a component with an owner (0 or more) joins its owner's only.
-        threshold: Squared Mahalanobis distance.
-
-    Returns:
-        The group of each component (J,) and the leader of each group (K,).
-
-    Raises:
-        numpy.linalg.LinAlgError: If a covariance is not positive definite.
-    """
-    size, dimension = means.shape
-    group = np.full(size, -1, dtype=np.int64)
-    leaders = np.empty(size, dtype=np.int64)
-    lower = np.zeros((size, dimension, dimension))
-    for i in range(size):
-        factorise(covariances[i], lower[i])
-    offset = np.empty(dimension)
-    count = 0
-    for rank in range(size):
-        leader = order[rank]
-        if group[leader] >= 0:
-            continue
-        group[leader] = count
-        for later in range(rank + 1, size):
-            i = order[later]
-            if group[i] >= 0 or (owners[i] >= 0 and owners[i] != owners[leader]):
-                continue
-            near = True
-            for a in range(dimension):
-                offset[a] = means[i, a] - means[leader, a]
-                # no axis alone may be beyond the threshold
-                if offset[a] * offset[a] > threshold * covariances[i, a, a]:
-                    near = False
-                    break
-            if near and squared_length(offset, lower[i]) <= threshold:
-                group[i] = count
-        leaders[count] = leader
-        count += 1
-    return group, leaders[:count].copy()
-
-
-@_kernel
 def merge_moments(
     weights: ndarray, means: ndarray, covariances: ndarray, group: ndarray, count: int
 ) -> tuple[ndarray, ndarray, ndarray]:

@@ -2,6 +2,8 @@
 
 [VM06] B.-N. Vo, W.-K. Ma, "The Gaussian mixture probability hypothesis density
 filter", IEEE Transactions on Signal Processing 54(11), 2006.
+[RCV10] B. Ristic, D. Clark, B.-N. Vo, "Improved SMC implementation of the PHD filter",
+FUSION 2010: estimates gathered by measurement.
 [ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
 density filtering", 2021.
 """
@@ -14,8 +16,12 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker import update_kernels
-from tracker.gaussian_mixture import GaussianMixture
+from tracker import extraction_kernels, kernels, update_kernels
+from tracker.gaussian_mixture import GaussianMixture, concatenate
+
+SPARE = 0.25
+"""How much more than one target, or than its weight, a component may stand for: weights are
+uncertain, but less than half a target cannot be reported."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,3 +105,55 @@ def extract(mixture: GaussianMixture, threshold: float) -> Int[ndarray, " K"]:
     """Indices of the components heavier than ``threshold``, heaviest first ([ZW21] §2.4)."""
     above = np.flatnonzero(mixture.weights > threshold)
     return above[np.argsort(-mixture.weights[above], kind="stable")]
+
+
+def extract_measured(
+    predicted: GaussianMixture, updated: PhdUpdate, threshold: float = 0.5
+) -> GaussianMixture:
+    """One target for each measurement that most likely had one, after [RCV10].
+
+    Where targets are many, the weight of one is spread over several components and none
+    of them is heavy. So components are gathered by the measurement z that made them:
+
+        W_z = Σ_j w_j(z),   m_z = Σ_j w_j(z) m_j(z) / W_z
+
+    is reported where W_z is above the threshold, beside heavy components that no
+    measurement updated. Beyond [RCV10], a predicted component pays for what it explains:
+    it stands for w'_j targets, or for one where that is less, and a little more
+    (:data:`SPARE`). The surest measurement is served first, so a false alarm beside a
+    target, which the PHD filter gives a weight near 1 as well, is not reported too.
+
+    Args:
+        predicted: v', as it was updated.
+        updated: By one measurement set, not reduced yet.
+        threshold: Expected number of targets.
+
+    Returns:
+        The reported targets: first those of measurements, the surest first.
+    """
+    size = predicted.size
+    measured = updated.measurements[size:]
+    spent, group, count = extraction_kernels.pay_for_measurements(
+        np.maximum(predicted.weights, 1.0) + SPARE,
+        updated.posterior.weights[size:],
+        updated.parents[size:],
+        measured,
+        updated.log_odds,
+        updated.measurement_weights,
+        threshold,
+    )
+    pairs = np.flatnonzero(group >= 0)
+    weights, means, covariances = kernels.merge_moments(
+        spent[pairs],
+        updated.posterior.means[size + pairs],
+        updated.posterior.covariances[size + pairs],
+        group[pairs],
+        count,
+    )
+    labels = np.zeros(count, dtype=np.int64)
+    order = pairs[np.argsort(spent[pairs], kind="stable")]
+    labels[group[order]] = updated.posterior.labels[size + order]  # the heaviest stays
+    missed = np.flatnonzero(updated.posterior.weights[:size] > threshold)
+    return concatenate(
+        [GaussianMixture(weights, means, covariances, labels), updated.posterior.take(missed)]
+    )

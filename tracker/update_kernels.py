@@ -1,4 +1,4 @@
-"""The Kalman update of every component by every measurement, and the PHD update, compiled."""
+"""The Kalman update of all components by all measurements in their gates, and the PHD update."""
 
 from __future__ import annotations
 
@@ -8,6 +8,136 @@ import numpy as np
 from numpy import ndarray
 
 from tracker.kernels import _kernel
+
+
+@_kernel
+def _widest_axis(values: ndarray, reach: ndarray) -> int:
+    """The axis along which values (N, d) lie furthest apart, measured by the mean reach (J, d)."""
+    best = 0
+    most = -1.0
+    for a in range(values.shape[1]):
+        low = math.inf
+        high = -math.inf
+        total = 0.0
+        for i in range(values.shape[0]):
+            low = min(low, values[i, a])
+            high = max(high, values[i, a])
+        for i in range(reach.shape[0]):
+            total += reach[i, a]
+        width = (high - low) / max(total, 1e-300)
+        if width > most:
+            most = width
+            best = a
+    return best
+
+
+@_kernel
+def _factor(own: ndarray, j: int, noises: ndarray, n: int, lower: ndarray, place: int) -> float:
+    """Cholesky factor of S = own + R into ``lower[place]``; log of 1 / √det(2π S)."""
+    order = own.shape[1]
+    constant: float = -0.5 * order * math.log(2.0 * math.pi)
+    for p in range(order):
+        for q in range(p + 1):
+            total = own[j, p, q] + noises[n, p, q]
+            for r in range(q):
+                total -= lower[place, p, r] * lower[place, q, r]
+            if p == q:
+                if not total > 0.0:
+                    raise np.linalg.LinAlgError("H P H' + R is not positive definite")
+                lower[place, p, p] = math.sqrt(total)
+                constant -= math.log(lower[place, p, p])
+            else:
+                lower[place, p, q] = total / lower[place, q, q]
+    return constant
+
+
+@_kernel
+def _gated_pairs(
+    expected: ndarray,
+    measurements: ndarray,
+    noises: ndarray,
+    own: ndarray,
+    gate: float,
+    lower: ndarray,
+    constants: ndarray,
+) -> tuple[ndarray, ndarray, ndarray]:
+    """Component, measurement and log-likelihood of each pair inside its gate.
+
+    What lies within the gate of S lies within √(gate S_pp) along every axis p: only such
+    measurements are looked at, found by bisection along one axis. The result is that of
+    looking at all.
+    """
+    size, order = expected.shape
+    count = len(measurements)
+    if size == 0 or count == 0:
+        nothing = np.empty(0, dtype=np.int64)
+        return nothing, nothing, np.empty(0)
+    shared = noises.shape[0] == 1
+    reach = np.empty((size, order))
+    for p in range(order):
+        noise = noises[:, p, p].max()
+        for j in range(size):
+            if not own[j, p, p] + noise > 0.0:
+                raise np.linalg.LinAlgError("H P H' + R is not positive definite")
+            # a little more than the bound, so that rounding excludes nothing
+            reach[j, p] = math.sqrt(gate * (own[j, p, p] + noise)) * (1.0 + 1e-9)
+    axis = _widest_axis(measurements, reach)
+    by_axis = np.argsort(measurements[:, axis])
+    coordinates = measurements[:, axis][by_axis]
+
+    capacity = 4 * (size + count)
+    component = np.empty(capacity, dtype=np.int64)
+    measured = np.empty(capacity, dtype=np.int64)
+    likelihood = np.empty(capacity)
+    solved = np.empty(order)
+    pairs = 0
+    for j in range(size):
+        if shared:
+            constants[j] = _factor(own, j, noises, 0, lower, j)
+        first = np.searchsorted(coordinates, expected[j, axis] - reach[j, axis])
+        last = expected[j, axis] + reach[j, axis]
+        for k in range(first, count):
+            if coordinates[k] > last:
+                break
+            z = by_axis[k]
+            near = True
+            for p in range(order):
+                if abs(measurements[z, p] - expected[j, p]) > reach[j, p]:
+                    near = False
+            if not near:
+                continue
+            place = j if shared else 0
+            constant = constants[j] if shared else _factor(own, j, noises, z, lower, 0)
+            distance = 0.0
+            for p in range(order):
+                total = measurements[z, p] - expected[j, p]
+                for r in range(p):
+                    total -= lower[place, p, r] * solved[r]
+                solved[p] = total / lower[place, p, p]
+                distance += solved[p] * solved[p]
+            if not distance <= gate or distance == math.inf:
+                continue
+            if pairs == capacity:
+                component = np.concatenate((component, np.empty_like(component)))
+                measured = np.concatenate((measured, np.empty_like(measured)))
+                likelihood = np.concatenate((likelihood, np.empty_like(likelihood)))
+                capacity *= 2
+            component[pairs] = j
+            measured[pairs] = z
+            likelihood[pairs] = constant - 0.5 * distance
+            pairs += 1
+
+    # measurement by measurement
+    place_of = np.zeros(count + 1, dtype=np.int64)
+    for pair in range(pairs):
+        place_of[measured[pair] + 1] += 1
+    for z in range(count):
+        place_of[z + 1] += place_of[z]
+    order_of = np.empty(pairs, dtype=np.int64)
+    for pair in range(pairs):
+        order_of[place_of[measured[pair]]] = pair
+        place_of[measured[pair]] += 1
+    return component[order_of], measured[order_of], likelihood[order_of]
 
 
 @_kernel
@@ -42,141 +172,95 @@ def kalman_pairs(
         numpy.linalg.LinAlgError: If the covariance of an innovation is not positive definite.
     """
     size, dimension = means.shape
-    count, order = measurements.shape
+    order = measurements.shape[1]
     shared = noises.shape[0] == 1
     spread = spreads.shape[0] > 0
     ph = np.empty((size, dimension, order))
     own = np.empty((size, order, order))
-    lower = np.empty((size, order, order))
+    for j in range(size):
+        for a in range(dimension):
+            for p in range(order):
+                total = 0.0
+                for b in range(dimension):
+                    total += covariances[j, a, b] * jacobians[j, p, b]
+                ph[j, a, p] = total
+        for p in range(order):
+            for q in range(order):
+                total = spreads[j, p, q] if spread else 0.0
+                for a in range(dimension):
+                    total += jacobians[j, p, a] * ph[j, a, q]
+                own[j, p, q] = total
+    lower = np.empty((size if shared else 1, order, order))
     constants = np.empty(size)
-    gains = np.empty((size, dimension, order))
-    updated = np.empty((size, dimension, dimension))
-    has_factor = np.zeros(size, dtype=np.bool_)
+    component, measured, likelihood = _gated_pairs(
+        expected, measurements, noises, own, gate, lower, constants
+    )
+
+    pairs = len(component)
+    new_means = np.empty((pairs, dimension))
+    new_covariances = np.empty((pairs, dimension, dimension))
+    gains = np.empty((size if shared else 1, dimension, order))
+    updated = np.empty((size if shared else 1, dimension, dimension))
     has_gain = np.zeros(size, dtype=np.bool_)
-
-    component = np.empty(size * count, dtype=np.int64)
-    measured = np.empty(size * count, dtype=np.int64)
-    likelihood = np.empty(size * count)
-    new_means = np.empty((size * count, dimension))
-    new_covariances = np.empty((size * count, dimension, dimension))
-
     factor = np.empty((dimension, dimension))
     half = np.empty((dimension, dimension))
     noise = np.empty((order, order))
-    offset = np.empty(order)
     solved = np.empty(order)
-    pairs = 0
-    for z in range(count):
-        for j in range(size):
+    for pair in range(pairs):
+        j = component[pair]
+        z = measured[pair]
+        place = j if shared else 0
+        if not (shared and has_gain[j]):
+            has_gain[j] = True
+            n = 0 if shared else z
+            if not shared:
+                _factor(own, j, noises, n, lower, 0)
             for p in range(order):
                 for q in range(order):
-                    noise[p, q] = noises[0 if shared else z, p, q]
-                    if spread:
-                        noise[p, q] += spreads[j, p, q]
-            if z == 0:
-                for a in range(dimension):
-                    for p in range(order):
-                        total = 0.0
-                        for b in range(dimension):
-                            total += covariances[j, a, b] * jacobians[j, p, b]
-                        ph[j, a, p] = total
-                # H P Hᵀ, the state's share of the innovation's covariance
-                for p in range(order):
-                    for q in range(p + 1):
-                        total = 0.0
-                        for a in range(dimension):
-                            total += jacobians[j, p, a] * ph[j, a, q]
-                        own[j, p, q] = total
-            near = True
-            for p in range(order):
-                offset[p] = measurements[z, p] - expected[j, p]
-                # no number of a measurement alone may be beyond the gate
-                if offset[p] * offset[p] > gate * (noise[p, p] + own[j, p, p]):
-                    near = False
-            if not near:
-                continue
-            if not shared or not has_factor[j]:
-                has_factor[j] = True
-                # the Cholesky factor of S = H P Hᵀ + R
-                for p in range(order):
-                    for q in range(p + 1):
-                        total = noise[p, q] + own[j, p, q]
-                        for r in range(q):
-                            total -= lower[j, p, r] * lower[j, q, r]
-                        if p == q:
-                            if not total > 0.0:
-                                raise np.linalg.LinAlgError("H P H' + R is not positive definite")
-                            lower[j, p, p] = math.sqrt(total)
-                        else:
-                            lower[j, p, q] = total / lower[j, q, q]
-                constant = -0.5 * order * math.log(2.0 * math.pi)
-                for p in range(order):
-                    constant -= math.log(lower[j, p, p])
-                constants[j] = constant
-            distance = 0.0
-            for p in range(order):
-                total = offset[p]
-                for r in range(p):
-                    total -= lower[j, p, r] * solved[r]
-                solved[p] = total / lower[j, p, p]
-                distance += solved[p] * solved[p]
-            if not distance <= gate or distance == math.inf:
-                continue
-            if not (shared and has_gain[j]):
-                has_gain[j] = True
-                # K = P Hᵀ S⁻¹, row by row through the factor
-                for a in range(dimension):
-                    for p in range(order):
-                        total = ph[j, a, p]
-                        for r in range(p):
-                            total -= lower[j, p, r] * solved[r]
-                        solved[p] = total / lower[j, p, p]
-                    for p in range(order - 1, -1, -1):
-                        total = solved[p]
-                        for r in range(p + 1, order):
-                            total -= lower[j, r, p] * gains[j, a, r]
-                        gains[j, a, p] = total / lower[j, p, p]
-                # P = (I - K H) P (I - K H)ᵀ + K R Kᵀ
-                for a in range(dimension):
-                    for b in range(dimension):
-                        total = 1.0 if a == b else 0.0
-                        for p in range(order):
-                            total -= gains[j, a, p] * jacobians[j, p, b]
-                        factor[a, b] = total
-                for a in range(dimension):
-                    for b in range(dimension):
-                        total = 0.0
-                        for c in range(dimension):
-                            total += factor[a, c] * covariances[j, c, b]
-                        half[a, b] = total
-                for a in range(dimension):
-                    for b in range(a + 1):
-                        total = 0.0
-                        for c in range(dimension):
-                            total += half[a, c] * factor[b, c]
-                        for p in range(order):
-                            for q in range(order):
-                                total += gains[j, a, p] * noise[p, q] * gains[j, b, q]
-                        updated[j, a, b] = total
-                        updated[j, b, a] = total
-            component[pairs] = j
-            measured[pairs] = z
-            likelihood[pairs] = constants[j] - 0.5 * distance
+                    noise[p, q] = noises[n, p, q] + (spreads[j, p, q] if spread else 0.0)
+            # K = P Hᵀ S⁻¹, row by row through the factor
             for a in range(dimension):
-                total = means[j, a]
                 for p in range(order):
-                    total += gains[j, a, p] * offset[p]
-                new_means[pairs, a] = total
+                    total = ph[j, a, p]
+                    for r in range(p):
+                        total -= lower[place, p, r] * solved[r]
+                    solved[p] = total / lower[place, p, p]
+                for p in range(order - 1, -1, -1):
+                    total = solved[p]
+                    for r in range(p + 1, order):
+                        total -= lower[place, r, p] * gains[place, a, r]
+                    gains[place, a, p] = total / lower[place, p, p]
+            # P = (I - K H) P (I - K H)ᵀ + K R Kᵀ
+            for a in range(dimension):
                 for b in range(dimension):
-                    new_covariances[pairs, a, b] = updated[j, a, b]
-            pairs += 1
-    return (
-        component[:pairs],
-        measured[:pairs],
-        likelihood[:pairs],
-        new_means[:pairs],
-        new_covariances[:pairs],
-    )
+                    total = 1.0 if a == b else 0.0
+                    for p in range(order):
+                        total -= gains[place, a, p] * jacobians[j, p, b]
+                    factor[a, b] = total
+            for a in range(dimension):
+                for b in range(dimension):
+                    total = 0.0
+                    for c in range(dimension):
+                        total += factor[a, c] * covariances[j, c, b]
+                    half[a, b] = total
+            for a in range(dimension):
+                for b in range(a + 1):
+                    total = 0.0
+                    for c in range(dimension):
+                        total += half[a, c] * factor[b, c]
+                    for p in range(order):
+                        for q in range(order):
+                            total += gains[place, a, p] * noise[p, q] * gains[place, b, q]
+                    updated[place, a, b] = total
+                    updated[place, b, a] = total
+        for a in range(dimension):
+            total = means[j, a]
+            for p in range(order):
+                total += gains[place, a, p] * (measurements[z, p] - expected[j, p])
+            new_means[pair, a] = total
+            for b in range(dimension):
+                new_covariances[pair, a, b] = updated[place, a, b]
+    return component, measured, likelihood, new_means, new_covariances
 
 
 @_kernel
