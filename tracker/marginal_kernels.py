@@ -29,47 +29,54 @@ def belief_propagation(
         (M,) the probability that no target made the measurement.
     """
     targets, count = detected.shape
-    to_target = np.empty((targets, count))
-    to_measurement = np.zeros((targets, count))
-    for j in range(count):
-        for i in range(targets):
-            to_target[i, j] = 1.0 / unexplained[j]
+    # only pairs inside a gate exchange messages: row by row, whose measurement and weight
+    rows = np.zeros((targets, 1 + count))
+    starts = np.zeros(targets + 1, dtype=np.int64)
+    for i in range(targets):
+        starts[i + 1] = starts[i]
+        for j in range(count):
+            if detected[i, j] > 0.0:
+                starts[i + 1] += 1
+    measured = np.empty(starts[targets], dtype=np.int64)
+    weights = np.empty(starts[targets])
+    to_target = np.empty(starts[targets])
+    to_measurement = np.empty(starts[targets])
+    pair = 0
+    for i in range(targets):
+        for j in range(count):
+            if detected[i, j] > 0.0:
+                measured[pair] = j
+                weights[pair] = detected[i, j]
+                to_target[pair] = 1.0 / unexplained[j]
+                pair += 1
+    totals = unexplained.copy()
     for _ in range(iterations):
+        totals[:] = unexplained
         for i in range(targets):
             total = missed[i]
-            for j in range(count):
-                total += detected[i, j] * to_target[i, j]
-            for j in range(count):
-                if detected[i, j] > 0.0:
-                    rest = max(total - detected[i, j] * to_target[i, j], 1e-300)
-                    to_measurement[i, j] = detected[i, j] / rest
+            for pair in range(starts[i], starts[i + 1]):
+                total += weights[pair] * to_target[pair]
+            for pair in range(starts[i], starts[i + 1]):
+                rest = max(total - weights[pair] * to_target[pair], 1e-300)
+                to_measurement[pair] = weights[pair] / rest
+                totals[measured[pair]] += to_measurement[pair]
         change = 0.0
-        for j in range(count):
-            total = unexplained[j]
-            for i in range(targets):
-                total += to_measurement[i, j]
-            for i in range(targets):
-                new = 1.0 / max(total - to_measurement[i, j], 1e-300)
-                change = max(change, abs(new - to_target[i, j]) * unexplained[j])
-                to_target[i, j] = new
+        for pair in range(len(measured)):
+            j = measured[pair]
+            new = 1.0 / max(totals[j] - to_measurement[pair], 1e-300)
+            change = max(change, abs(new - to_target[pair]) * unexplained[j])
+            to_target[pair] = new
         if change < tolerance:
             break
-    rows = np.empty((targets, 1 + count))
-    columns = np.empty(count)
     for i in range(targets):
         total = missed[i]
-        rows[i, 0] = missed[i]
-        for j in range(count):
-            rows[i, 1 + j] = detected[i, j] * to_target[i, j]
-            total += rows[i, 1 + j]
-        for j in range(1 + count):
-            rows[i, j] /= max(total, 1e-300)
-    for j in range(count):
-        total = unexplained[j]
-        for i in range(targets):
-            total += to_measurement[i, j]
-        columns[j] = unexplained[j] / total
-    return rows, columns
+        for pair in range(starts[i], starts[i + 1]):
+            total += weights[pair] * to_target[pair]
+        total = max(total, 1e-300)
+        rows[i, 0] = missed[i] / total
+        for pair in range(starts[i], starts[i + 1]):
+            rows[i, 1 + measured[pair]] = weights[pair] * to_target[pair] / total
+    return rows, unexplained / totals
 
 
 @_kernel
