@@ -7,11 +7,12 @@ import json
 import sys
 from pathlib import Path
 
-from tests.benchmarks import jpda, kernels, pipeline, server
+from tests.benchmarks import jpda, kernels, pipeline, server, targets
 from tests.benchmarks.measure import Measurement, machine
 
 SUITES = {
     "kernels": kernels.run,
+    "targets": targets.run,
     "jpda": jpda.run,
     "pipeline": pipeline.run,
     "server": server.run,

@@ -80,47 +80,73 @@ def update(
     return posterior, np.concatenate([np.full(predicted.size, -1), measured])
 
 
+def absorbing(mixture: GaussianMixture, threshold: float) -> tuple[ndarray, ndarray]:
+    """Every pair of a component and another that would absorb it, were it the leader.
+
+    Looked for in the nine cells around a component, of a grid over the two axes on which
+    the mixture is spread widest.
+    """
+    means, size, many = mixture.means, mixture.size, mixture.dimension > 1
+    reach = np.sqrt(threshold * mixture.covariances.diagonal(axis1=1, axis2=2))
+    axes = np.argsort(-np.ptp(means, axis=0) / (reach.mean(axis=0) + 1e-300))[:2]
+    side = reach[:, axes].max(axis=0) + 1e-9
+    cells = np.floor((means[:, axes] - means[:, axes].min(axis=0)) / side).astype(np.int64)
+    rows = cells[:, 0]
+    columns = cells[:, 1] if many else np.zeros(size, dtype=np.int64)
+    width = columns.max() + 3
+    order = np.argsort(rows * width + columns, kind="stable")
+    keys = (rows * width + columns)[order]
+    parts = []
+    for row in (-1, 0, 1):
+        middle = (rows + row) * width + columns
+        first = np.searchsorted(keys, middle - 1)
+        count = np.searchsorted(keys, middle + 1, side="right") - first
+        one = np.repeat(np.arange(size), count)
+        offset = np.arange(len(one)) - np.repeat(np.cumsum(count) - count, count)
+        other = order[first[one] + offset]
+        for axis in axes:
+            near = np.abs(means[other, axis] - means[one, axis]) <= reach[one, axis]
+            one, other = one[near], other[near]
+        parts.append((one, other))
+    one, other = (np.concatenate(part) for part in zip(*parts, strict=True))
+    offset = means[other] - means[one]
+    precisions = np.linalg.inv(mixture.covariances)
+    inside = np.einsum("na,nab,nb->n", offset, precisions[one], offset) <= threshold
+    return one[inside], other[inside]
+
+
 def groups(mixture: GaussianMixture, threshold: float) -> tuple[ndarray, ndarray]:
     """Who is absorbed by which leader, heaviest first, and the leaders."""
-    axis = int(np.argmax(np.ptp(mixture.means, axis=0)))
-    order = np.argsort(mixture.means[:, axis], kind="stable")
-    means, precisions = mixture.means[order], np.linalg.inv(mixture.covariances[order])
-    reach = np.sqrt(threshold * mixture.covariances[:, axis, axis].max())
-    first = np.searchsorted(means[:, axis], means[:, axis] - reach).tolist()
-    last = np.searchsorted(means[:, axis], means[:, axis] + reach, side="right").tolist()
-    widest = np.sqrt(threshold * mixture.covariances.diagonal(axis1=1, axis2=2).max(axis=0))
-    group = np.full(mixture.size, -1)
+    absorbed, leader = absorbing(mixture, threshold)
+    order = np.argsort(leader, kind="stable")
+    theirs = absorbed[order].tolist()
+    starts = np.searchsorted(leader[order], np.arange(mixture.size + 1)).tolist()
+    group = [-1] * mixture.size
     leaders = []
-    by_weight = np.argsort(-mixture.weights[order], kind="stable")
-    # equal weights: the earlier of the mixture leads
-    by_weight = by_weight[np.lexsort((order[by_weight], -mixture.weights[order][by_weight]))]
-    for leader in by_weight.tolist():
-        if group[leader] >= 0:
+    for one in np.argsort(-mixture.weights, kind="stable").tolist():
+        if group[one] >= 0:
             continue
-        part = slice(first[leader], last[leader])
-        offset = means[part] - means[leader]
-        near = np.flatnonzero((group[part] < 0) & (np.abs(offset) <= widest).all(axis=1))
-        offset = offset[near]
-        near += part.start
-        distance = np.einsum("na,nab,nb->n", offset, precisions[near], offset)
-        group[near[distance <= threshold]] = len(leaders)
-        leaders.append(leader)
-    found = np.empty(mixture.size, dtype=np.int64)
-    found[order] = group
-    return found, order[leaders]
+        group[one] = number = len(leaders)
+        leaders.append(one)
+        for other in theirs[starts[one] : starts[one + 1]]:
+            if group[other] < 0:
+                group[other] = number
+    return np.array(group), np.array(leaders)
 
 
 def merge(mixture: GaussianMixture, threshold: float) -> tuple[GaussianMixture, ndarray]:
     """Table II of [VM06], keeping the first two moments; and the leader of each group."""
+    if mixture.size == 0:
+        return mixture, np.zeros(0, dtype=np.int64)
     group, leaders = groups(mixture, threshold)
-    weights = np.bincount(group, mixture.weights)
-    share = mixture.weights / weights[group]
-    means = np.zeros((len(leaders), mixture.dimension))
-    np.add.at(means, group, share[:, None] * mixture.means)
-    offset = mixture.means - means[group]
-    spread = mixture.covariances + offset[:, :, None] * offset[:, None, :]
-    covariances = np.zeros((len(leaders), mixture.dimension, mixture.dimension))
-    np.add.at(covariances, group, share[:, None, None] * spread)
+    order = np.argsort(group, kind="stable")
+    starts = np.searchsorted(group[order], np.arange(len(leaders)))
+    weights = np.add.reduceat(mixture.weights[order], starts)
+    share = (mixture.weights / weights[group])[order, None]
+    means = np.add.reduceat(share * mixture.means[order], starts)
+    offset = mixture.means[order] - means[group[order]]
+    spread = mixture.covariances[order] + offset[:, :, None] * offset[:, None, :]
+    covariances = np.add.reduceat(share[:, :, None] * spread, starts)
     return GaussianMixture(weights, means, covariances, mixture.labels[leaders]), leaders
 
 
