@@ -5,7 +5,7 @@ One module a claim; its ``EXPERIMENT`` is entered here under its name.
 
 from __future__ import annotations
 
-from tracker.experiments import cameras, cmc, fig1, fig2, fig3, sequences
+from tracker.experiments import cameras, cmc, fig1, fig2, fig3, ppf, sequences
 from tracker.experiments.experiment import (
     Context,
     Experiment,
@@ -24,6 +24,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         cameras.EXPERIMENT,
         sequences.EXPERIMENT,
         cmc.EXPERIMENT,
+        ppf.EXPERIMENT,
     )
 }
 """By name, in the order in which ``--all`` runs them."""

@@ -1,6 +1,8 @@
 """Numbers of the particle filters on colour.
 
-[SG08] Sun, Guo, "Multiple object tracking with a pseudo particle filter", 2008.
+[SG08] Sun, Guo, "Multiple object tracking with a pseudo particle filter", 2008. A field's
+``published`` value makes the scheme of that paper; λ and d_0, for flat RGB histograms, are
+chosen on rendered clips.
 """
 
 from __future__ import annotations
@@ -31,7 +33,9 @@ class PseudoParticleParams(Params):
     )
     """How a box's pixels count: less towards the edge of the ellipse in it, or all the same."""
 
-    sharpness: Annotated[float, Field(ge=1.0, le=200.0), ui("λ", step=1.0, log=True)] = 40.0
+    sharpness: Annotated[
+        float, Field(ge=1.0, le=200.0), ui("λ", step=1.0, log=True, published=20.0)
+    ] = 40.0
     """How fast a particle's weight exp(-λ d) falls with the distance d to a target's colours."""
 
     foreground_weight: Annotated[
@@ -81,7 +85,9 @@ class PseudoParticleParams(Params):
     ] = 0.7
     """Spread of the particles that are drawn anew around each target; 0 keeps the resampled."""
 
-    acceptance_distance: Annotated[float, Field(ge=0.05, le=1.0), ui("d_0", step=0.01)] = 0.5
+    acceptance_distance: Annotated[
+        float, Field(ge=0.05, le=1.0), ui("d_0", step=0.01, published=0.6)
+    ] = 0.5
     """Column of the background: a mode less likely than one at this distance is nobody."""
 
     acceptance_foreground: Annotated[
@@ -105,7 +111,7 @@ class PseudoParticleParams(Params):
     confirmation: Annotated[int, Field(ge=1, le=50), ui("n_c", unit="steps", step=1)] = 3
     """Steps in which a new target must be found before it counts."""
 
-    patience: Annotated[float, Field(ge=0.0, le=10.0), ui("t_p", unit="s", step=0.05)] = 0.4
+    patience: Annotated[float, Field(ge=0.0, le=10.0), ui("t_p", unit="s", step=0.05)] = 0.8
     """How long a target that is not found is still waited for."""
 
     memory: Annotated[float, Field(ge=0.0, le=100.0), ui("t_m", unit="s", step=0.5)] = 10.0

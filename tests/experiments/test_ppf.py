@@ -1,0 +1,136 @@
+"""The experiment on targets that look alike: its clips, its figures and its direction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from tracker.experiments import EXPERIMENTS, Context, clips, ppf
+from tracker.experiments.clips import Clip
+from tracker.experiments.pool import Desk
+from tracker.experiments.ppf import CLASSICAL, PSEUDO, ROBUST, Scene
+from tracker.experiments.ppf_clips import CLIPS, SHADE
+
+NOBODY = Desk(advance=lambda steps: None, cancelled=lambda: False)
+BOX = [50.0, 60.0, 10.0, 14.0]
+
+
+def shortened(clip: Clip, steps: int) -> Clip:
+    actors = tuple(
+        replace(actor, path=actor.path[:steps], half_sizes=actor.half_sizes[:steps])
+        for actor in clip.actors
+    )
+    return replace(clip, actors=actors, light=clip.light[:steps])
+
+
+def test_the_clips_show_what_they_are_named_after() -> None:
+    cup, balls, faces = (make() for make in CLIPS.values())
+    assert [clip.name for clip in (cup, balls, faces)] == list(CLIPS)
+    assert [len(clip.actors) for clip in (cup, balls, faces)] == [1, 2, 3]
+    for clip in (balls, faces):  # nothing but the place tells them apart
+        assert len({(a.colours, a.seed, a.speckle) for a in clip.actors}) == 1
+    apart = np.linalg.norm(balls.actors[0].path - balls.actors[1].path, axis=1) / 13.0
+    assert apart.min() < 2.5
+    visible = np.array([faces.visible(step) for step in range(80, 110)])
+    assert visible.min() < 0.2
+    assert faces.light.min() == SHADE < faces.light.max() == 1.0
+    for clip in (cup, balls, faces):
+        boxes = np.array([clip.boxes(step) for step in range(clip.steps)])
+        assert np.all(boxes[:, :, :2] >= boxes[:, :, 2:])
+        assert np.all(boxes[:, :, :2] + boxes[:, :, 2:] <= np.array(clip.size))
+
+
+def test_a_target_is_found_by_an_estimate_of_its_own_within_its_radius() -> None:
+    truth = np.array([BOX, [100.0, 60.0, 10.0, 14.0], [150.0, 60.0, 10.0, 14.0], [np.nan] * 4])
+    counts = np.array([True, True, False, False])
+    # one estimate between the first two is nobody's; one on the third is somebody's
+    between = np.array([[75.0, 60.0, 10.0, 14.0], [150.0, 60.0, 10.0, 14.0]])
+    found, astray = ppf._compare(truth, counts, between)
+    assert_array_equal(found, [0.0, 0.0, np.nan, np.nan])
+    assert astray == 0.5
+    # two on one target find only one
+    twice = np.array([BOX, [52.0, 60.0, 10.0, 14.0]])
+    found, astray = ppf._compare(truth, counts, twice)
+    assert_array_equal(found, [1.0, 0.0, np.nan, np.nan])
+    assert astray == 0.0
+    found, astray = ppf._compare(truth, counts, np.zeros((0, 4)))
+    assert_array_equal(found, [0.0, 0.0, np.nan, np.nan])
+    assert np.isnan(astray)
+    found, astray = ppf._compare(truth, np.zeros(4, dtype=bool), twice)
+    assert np.isnan(found).all()
+    assert np.isnan(astray)
+
+
+def figures(every: float) -> dict[str, Any]:
+    return {"every": every, "worst": every, "each": every, "astray": None}
+
+
+def measured(classical: list[float], pseudo: list[float]) -> dict[str, Any]:
+    return {
+        name: {CLASSICAL: figures(c), PSEUDO: figures(p), ROBUST: figures(1.0)}
+        for name, c, p in zip(CLIPS, classical, pseudo, strict=True)
+    }
+
+
+def test_it_is_better_where_one_filter_follows_all_and_the_other_does_not() -> None:
+    good = ppf._findings(measured([0.99, 0.0, 0.1], [0.98, 0.95, 0.92]))
+    assert [finding.verdict for finding in good] == ["better"] * 3
+    poor = ppf._findings(measured([0.6, 0.8, 0.0], [0.98, 0.95, 0.7]))
+    assert [finding.verdict for finding in poor] == ["worse"] * 3
+    assert "70.0 %" in poor[2].found
+
+
+def test_the_filters_that_are_compared_differ_in_the_filter_alone() -> None:
+    compared = ppf.methods()
+    assert compared[CLASSICAL].pseudo_particle.filter == "classical"
+    both = [compared[n].pseudo_particle.model_copy(update={"filter": "pseudo"})
+            for n in (CLASSICAL, PSEUDO)]  # fmt: skip
+    assert both[0] == both[1]
+    assert both[0].colour_space == "rgb"
+    assert both[0].resampling == "together"
+    assert {p.single_view for p in compared.values()} == {"pseudo_particle"}
+
+
+def test_of_two_alike_one_filter_follows_both_and_the_other_one(tmp_path: Path) -> None:
+    clip = shortened(CLIPS["2BALL"](), 60)
+    truth = np.array([clip.boxes(step) for step in range(60)])
+    counts = np.zeros((60, 2), dtype=bool)
+    counts[25:] = True
+    scene = Scene(clip.name, clips.write(clip, tmp_path / "clip"), 0, 60, truth, counts)
+    pseudo, classical = (
+        ppf._figures(ppf._follow((scene, name, 2), NOBODY), scene) for name in (PSEUDO, CLASSICAL)
+    )
+    assert pseudo["frames"] == classical["frames"] == 35
+    assert pseudo["every"] > 0.8
+    assert pseudo["worst"] <= pseudo["every"] <= pseudo["each"]
+    assert classical["every"] == 0.0
+    assert classical["each"] <= 0.5
+
+
+@pytest.mark.long
+def test_the_short_form_shows_the_direction_of_each_claim() -> None:
+    result = EXPERIMENTS["ppf"].run(Context(quick=True))
+    assert len(result.rows) == 9
+    assert {len(row) for row in result.rows} == {len(result.head)}
+    scenes = result.numbers["scenes"]
+    for name in ("2BALL", "3FACE"):
+        assert scenes[name][CLASSICAL]["every"] < 0.2 < 0.6 < scenes[name][PSEUDO]["every"]
+        assert scenes[name][ROBUST]["every"] > 0.9
+    assert [finding.verdict for finding in result.findings[:2]] == ["better"] * 2
+    assert "Left out: the real recording" in " ".join(result.notes)
+
+
+def test_the_real_heads_that_count_are_the_certain_ones(data_folder: Path) -> None:
+    assert len(ppf._recorded(Context(data=data_folder, quick=True))[0]) == 1
+    scenes, _ = ppf._recorded(Context(data=data_folder))
+    assert len(scenes) == 3
+    for scene in scenes:
+        there = np.isfinite(scene.truth[:, :, 0])
+        assert np.all(there[scene.counts])
+        assert 0 < scene.counts.sum() < there.sum()
+        assert not scene.counts[:25].any()
