@@ -178,7 +178,8 @@ def test_who_leaves_has_vanished_and_who_comes_back_has_returned(
         patch = np.s_[top : top + height, left : left + width]
         hidden[patch] = empty[patch]
         nobody.append(hidden if step else None)
-    results = run(method_of(one_person, reader), pictures + nobody + film(reader, 45)[30:])
+    method = method_of(one_person, reader, patience=0.4)
+    results = run(method, pictures + nobody + film(reader, 45)[30:])
     assert events_of(results) == {"new": 1, "vanished": 1, "returned": 1}
     assert len(results[44].estimates) == 0
     np.testing.assert_array_equal(results[-1].estimate_labels, [1])
