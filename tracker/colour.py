@@ -21,10 +21,10 @@ from numpy import ndarray
 
 from tracker import image_kernels
 
-ColourSpaceName = Literal["hue_saturation", "rgb"]
+ColourSpaceName = Literal["hue_saturation", "rgb", "hsi"]
 KernelName = Literal["epanechnikov", "flat"]
 
-BINS: dict[str, int] = {"hue_saturation": 16 * 16 + 16, "rgb": 8 * 8 * 8}
+BINS: dict[str, int] = {"hue_saturation": 16 * 16 + 16, "rgb": 8 * 8 * 8, "hsi": 16 * 4 * 4 + 8}
 """Bins of each histogram space."""
 
 LEAST_SATURATION, LEAST_VALUE = 40, 40
@@ -39,7 +39,12 @@ def bin_map(picture: UInt8[ndarray, "h w 3"], space: ColourSpaceName) -> UInt16[
 
     ``rgb`` cuts each channel into 8 (512 bins). ``hue_saturation`` takes 16 hues
     × 16 saturations where the pixel is coloured and 16 values where it is not
-    (272 bins), so that brightness counts only where there is no colour.
+    (272 bins), so that brightness counts only where there is no colour. ``hsi``
+    takes 16 hues × 4 saturations × 4 intensities where it is coloured and 8
+    intensities where it is not (264 bins), of the levels' five upper bits:
+
+        I = (R + G + B) / 3,  S = 1 - min(R, G, B) / I,
+        cos H = (2R - G - B) / (2 sqrt((R - G)² + (R - B)(G - B)))
 
     Raises:
         ValueError: If there is no such space.
@@ -52,9 +57,37 @@ def bin_map(picture: UInt8[ndarray, "h w 3"], space: ColourSpaceName) -> UInt16[
         hsv = cv2.cvtColor(picture, cv2.COLOR_BGR2HSV)
         bins = image_kernels.hue_saturation_bins(hsv, LEAST_SATURATION, LEAST_VALUE)
         return bins
+    if space == "hsi":
+        fives: ndarray = (picture >> 3).astype(np.uint16)
+        looked_up: ndarray = _HSI_BINS[fives[..., 0] << 10 | fives[..., 1] << 5 | fives[..., 2]]
+        return looked_up
     raise ValueError(
         f"colour space: expected one of {', '.join(get_args(ColourSpaceName))}, got {space!r}"
     )
+
+
+def _hsi_bins() -> UInt16[ndarray, " 32768"]:
+    """The bin of every colour of five bits a channel, blue first."""
+    levels = np.arange(32) * 8.0 + 3.5
+    blue, green, red = np.meshgrid(levels, levels, levels, indexing="ij")
+    intensity = (red + green + blue) / 3.0
+    least = np.minimum(np.minimum(red, green), blue)
+    saturation = 1.0 - least / intensity
+    root = np.sqrt((red - green) ** 2 + (red - blue) * (green - blue))
+    cosine = np.divide(2.0 * red - green - blue, 2.0 * root, out=np.ones_like(red), where=root > 0)
+    angle = np.arccos(np.clip(cosine, -1.0, 1.0))
+    hue = np.where(blue <= green, angle, 2.0 * np.pi - angle) / (2.0 * np.pi)
+    cut = np.minimum(
+        np.floor([hue * 16, saturation * 4, intensity / 64]), [[[[15]]], [[[3]]], [[[3]]]]
+    )
+    coloured = cut[0] * 16 + cut[1] * 4 + cut[2]
+    grey = 256 + np.floor(intensity / 32)
+    # the hue of what is pale or dark is mostly noise
+    has_hue = (saturation * 255 >= LEAST_SATURATION) & (intensity >= LEAST_VALUE)
+    return np.asarray(np.where(has_hue, coloured, grey).reshape(-1), dtype=np.uint16)
+
+
+_HSI_BINS = _hsi_bins()
 
 
 def distance(

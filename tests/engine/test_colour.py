@@ -12,7 +12,7 @@ from numpy import ndarray
 from tracker import colour
 from tracker.colour import BINS, ColourModel, ColourSpaceName, KernelName
 
-SPACES: tuple[ColourSpaceName, ...] = ("hue_saturation", "rgb")
+SPACES: tuple[ColourSpaceName, ...] = ("hue_saturation", "rgb", "hsi")
 KERNELS: tuple[KernelName, ...] = ("epanechnikov", "flat")
 
 
@@ -148,7 +148,7 @@ def test_a_model_says_what_is_wrong() -> None:
         ColourModel.of(np.zeros((0, 512)), [], "rgb", "flat")
     with pytest.raises(ValueError, match=r"272 bins.*got \(1, 512\)"):
         ColourModel.of(np.zeros((1, 512)), ["Ann"], "hue_saturation", "flat")
-    with pytest.raises(ValueError, match="expected one of hue_saturation, rgb, got 'hsv'"):
+    with pytest.raises(ValueError, match="expected one of hue_saturation, rgb, hsi, got 'hsv'"):
         colour.bin_map(picture_of(7), "hsv")  # type: ignore[arg-type]
 
 
@@ -158,3 +158,31 @@ def test_hue_saturation_bins_agree_with_numpy() -> None:
     coloured = (saturation >= colour.LEAST_SATURATION) & (value >= colour.LEAST_VALUE)
     expected = np.where(coloured, hue * 16 // 180 * 16 + saturation // 16, 256 + value // 16)
     np.testing.assert_array_equal(colour.bin_map(picture_of(8), "hue_saturation"), expected)
+
+
+@pytest.mark.parametrize(
+    ("colour_bgr", "hue", "saturation", "intensity"),
+    [
+        ((0, 0, 250), 0, 3, 1),
+        ((0, 250, 250), 2, 3, 2),
+        ((0, 250, 0), 5, 3, 1),
+        ((250, 250, 0), 8, 3, 2),
+        ((250, 0, 0), 10, 3, 1),
+        ((250, 0, 250), 13, 3, 2),
+        ((100, 100, 220), 0, 1, 2),
+        ((50, 50, 110), 0, 1, 1),  # half the light: the same hue and saturation
+    ],
+)
+def test_hsi_bins_are_of_hue_saturation_and_intensity(
+    colour_bgr: tuple[int, int, int], hue: int, saturation: int, intensity: int
+) -> None:
+    pixel = np.array([[colour_bgr]], dtype=np.uint8)
+    assert colour.bin_map(pixel, "hsi")[0, 0] == hue * 16 + saturation * 4 + intensity
+
+
+@given(st.integers(0, 255), st.integers(-6, 6), st.integers(-6, 6))
+def test_what_is_grey_or_dark_has_no_hue_in_hsi(level: int, green: int, red: int) -> None:
+    pixel = np.clip([[[level, level + green, level + red]]], 0, 255).astype(np.uint8)
+    mean = np.mean((pixel >> 3) * 8.0 + 3.5)
+    if level > 90 or level < 25:
+        assert colour.bin_map(pixel, "hsi")[0, 0] == 256 + int(mean // 32)

@@ -12,7 +12,7 @@ import numpy as np
 from tracker.foreground.adaptive import AdaptiveForeground
 from tracker.foreground.exposure import BackgroundModel, LearntForeground, tone_curve
 from tracker.foreground.segmentation import ForegroundModel, Segmentation, pack, unpack
-from tracker.foreground.shares import box_shares, integral
+from tracker.foreground.shares import box_shares, integral, shape_scores
 from tracker.parameters.foreground import ForegroundParams
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
@@ -27,6 +27,7 @@ __all__ = [
     "integral",
     "learn",
     "pack",
+    "shape_scores",
     "tone_curve",
     "unpack",
 ]

@@ -9,6 +9,16 @@ from numpy import ndarray
 
 from tracker import image_kernels
 
+# in half sizes from a box's centre, left, top, right, bottom: inside, above, left and right
+_PARTS = np.array(
+    [
+        [-1.0, -1.0, 1.0, 1.0],
+        [-1.0, -2.0, 1.0, -1.3],
+        [-2.2, -1.0, -1.4, 0.3],
+        [1.4, -1.0, 2.2, 0.3],
+    ]
+)
+
 
 def integral(mask: UInt8[ndarray, "h w"]) -> Int[ndarray, "h1 w1"]:
     """Sums above and to the left of each corner, for :func:`box_shares`."""
@@ -24,3 +34,27 @@ def box_shares(sums: Int[ndarray, "h1 w1"], edges: Float[ndarray, "N 4"]) -> Flo
     """
     shares: ndarray = image_kernels.box_means(sums, np.ascontiguousarray(edges, dtype=float))
     return shares
+
+
+def shape_scores(
+    sums: Int[ndarray, "h1 w1"],
+    boxes: Float[ndarray, "N 4"],
+    *,
+    inside_weight: float,
+    around_weight: float,
+) -> tuple[Float[ndarray, " N"], Float[ndarray, " N"]]:
+    """What the foreground says of boxes: log factors of their likelihood, and shares inside.
+
+    A box on a person is full of foreground, with background above and beside it:
+    a ln(inside + 0.02) - b (above + (left + right) / 2).
+
+    Args:
+        sums: :func:`integral` of the mask.
+        boxes: Centre and half sizes, pixels.
+        inside_weight: a.
+        around_weight: b.
+    """
+    middles, half_sizes = boxes[:, [0, 1, 0, 1]], boxes[:, [2, 3, 2, 3]]
+    inside, above, left, right = (box_shares(sums, middles + part * half_sizes) for part in _PARTS)
+    around = above + (left + right) / 2.0
+    return inside_weight * np.log(inside + 0.02) - around_weight * around, inside

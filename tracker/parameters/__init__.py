@@ -10,6 +10,7 @@ where ours differs.
 
 from __future__ import annotations
 
+from tracker.parameters.association_matrix import AssociationMatrixParams
 from tracker.parameters.changing import (
     ParameterError,
     changed,
@@ -31,6 +32,7 @@ __all__ = [
     "METHODS",
     "PARAMETERS",
     "PRESETS",
+    "AssociationMatrixParams",
     "ColourPhdParams",
     "DetectionBoxParams",
     "DetectionPhdParams",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
+from tracker.parameters.association_matrix import AssociationMatrixParams
 from tracker.parameters.colour_phd import ColourPhdParams
 from tracker.parameters.definition import Params
 from tracker.parameters.detections import DetectionBoxParams, DetectionPhdParams
@@ -11,11 +12,15 @@ from tracker.parameters.foreground import ForegroundParams
 from tracker.parameters.fusion import FusionParams
 from tracker.parameters.pseudo_particle import PseudoParticleParams
 
-SingleViewName = Literal["colour_phd", "pseudo_particle", "detection_phd", "none"]
+SingleViewName = Literal[
+    "colour_phd", "pseudo_particle", "association_matrix", "detection_phd", "none"
+]
 FusionName = Literal["sequential_phd", "multi_bernoulli"]
 
 
-FOREGROUND_METHODS: frozenset[SingleViewName] = frozenset({"colour_phd", "pseudo_particle"})
+FOREGROUND_METHODS: frozenset[SingleViewName] = frozenset(
+    {"colour_phd", "pseudo_particle", "association_matrix"}
+)
 """The single-view methods that ask what in a picture is foreground."""
 
 
@@ -30,6 +35,7 @@ class RunParameters(Params):
 
     colour_phd: ColourPhdParams = ColourPhdParams()
     pseudo_particle: PseudoParticleParams = PseudoParticleParams()
+    association_matrix: AssociationMatrixParams = AssociationMatrixParams()
     detection_boxes: DetectionBoxParams = DetectionBoxParams()
     detection_phd: DetectionPhdParams = DetectionPhdParams()
     foreground: ForegroundParams = ForegroundParams()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from tracker.parameters import METHODS, RunParameters
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
+from tracker.single_view.association_matrix import AssociationMatrix
 from tracker.single_view.colour_phd import ColourPhd
 from tracker.single_view.detection_phd import DetectionPhd
 from tracker.single_view.none import DetectionBoxes
@@ -29,6 +30,10 @@ def create(
     if name == "colour_phd":
         return ColourPhd(
             sequence, camera_index, parameters.colour_phd, parameters.foreground, reader
+        )
+    if name == "association_matrix":
+        return AssociationMatrix(
+            sequence, camera_index, parameters.association_matrix, parameters.foreground, reader
         )
     if name == "detection_phd":
         return DetectionPhd(sequence, camera_index, parameters.detection_phd)

@@ -14,7 +14,7 @@ from numpy import ndarray
 
 from tracker import colour
 from tracker.colour import ColourSpaceName, KernelName
-from tracker.foreground import ForegroundModel, box_shares, integral, learn
+from tracker.foreground import ForegroundModel, integral, learn, shape_scores
 from tracker.parameters import ForegroundParams
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
@@ -23,16 +23,6 @@ from tracker.single_view.templates import read_templates
 
 SIZE_JITTER = 0.1
 """Relative spread around the size that the target has at a place of the room: people differ."""
-
-# in half sizes from a box's centre, left, top, right, bottom: inside, above, left and right
-_PARTS = np.array(
-    [
-        [-1.0, -1.0, 1.0, 1.0],
-        [-1.0, -2.0, 1.0, -1.3],
-        [-2.2, -1.0, -1.4, 0.3],
-        [1.4, -1.0, 2.2, 0.3],
-    ]
-)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,9 +116,8 @@ class Appearance:
     ) -> tuple[Float[ndarray, " N"], Float[ndarray, " N"]]:
         """What the foreground says of each box: log factors of the likelihood, and shares inside.
 
-        A box on a person is full of foreground, with background above and beside it:
-        a ln(inside + 0.02) - b (above + (left + right) / 2). Without a learnt background
-        the factors are 0 and the shares 1.
+        As :func:`tracker.foreground.shape_scores`; without a foreground model the factors
+        are 0 and the shares 1.
 
         Args:
             scene: The picture.
@@ -138,12 +127,9 @@ class Appearance:
         """
         if scene.sums is None:
             return np.zeros(len(boxes)), np.ones(len(boxes))
-        middles, half_sizes = boxes[:, [0, 1, 0, 1]], boxes[:, [2, 3, 2, 3]]
-        inside, above, left, right = (
-            box_shares(scene.sums, middles + part * half_sizes) for part in _PARTS
+        return shape_scores(
+            scene.sums, boxes, inside_weight=inside_weight, around_weight=around_weight
         )
-        around = above + (left + right) / 2.0
-        return inside_weight * np.log(inside + 0.02) - around_weight * around, inside
 
     def draw_on_foreground(
         self, count: int, scene: Scene, rng: np.random.Generator

@@ -20,6 +20,9 @@ CELLS = 24
 POSITIONS = 60_000
 """Positions in the room that are projected."""
 
+AT_ENTRANCE_HEIGHT, HEIGHT_FACTOR = 0.9, 2.0
+"""Share of the positions at the entrances' heights, and the factor on those heights' spread."""
+
 BELOW_FLOOR = 0.1
 """Metres that a target may reach below the room's volume."""
 
@@ -80,14 +83,30 @@ class BoxSizes:
     """Half width and half height, pixels; 2 if nothing is seen."""
 
     @staticmethod
-    def of(camera: Camera, room: Room, half_extents: Float[ndarray, " 3"]) -> BoxSizes:
-        """Project positions spread evenly over the room's volume."""
+    def of(
+        camera: Camera,
+        room: Room,
+        half_extents: Float[ndarray, " 3"],
+        *,
+        at_entrance_heights: bool = False,
+    ) -> BoxSizes:
+        """Project positions spread evenly over the room's volume.
+
+        Args:
+            camera: The calibrated camera.
+            room: Its volume and entrances.
+            half_extents: Of a target, metres.
+            at_entrance_heights: Whether most of them are at the heights at which people
+                come in, which they mostly keep, rather than at any height.
+        """
         width, height = camera.image_size
         cell = max(width, height) / CELLS
         columns, rows = int(np.ceil(width / cell)), int(np.ceil(height / cell))
         low = room.minimum.copy()
         low[2] = min(low[2] + half_extents[2] - BELOW_FLOOR, room.maximum[2])
         positions = low + _even_points(POSITIONS) * (room.maximum - low)
+        if at_entrance_heights and room.entrances:
+            _bring_to_entrance_heights(positions, room)
         boxes, visible = upright_boxes(camera, positions, half_extents)
         boxes = boxes[visible]
         place = _cells(boxes[:, :2], cell, columns, rows)
@@ -103,6 +122,28 @@ class BoxSizes:
         place = _cells(centres, self.cell, self.columns, self.rows)
         return np.asarray(self.starts[place + 1] > self.starts[place])
 
+    def cells(self, centres: Float[ndarray, "N 2"]) -> Int[ndarray, " N"]:
+        """The cell of each place; places outside the picture go to the nearest one."""
+        return _cells(centres, self.cell, self.columns, self.rows)
+
+    def quantiles(
+        self, count: int
+    ) -> tuple[Float[ndarray, "cells count 2"], Bool[ndarray, " cells"]]:
+        """Sizes from small to large at the places of each cell, and whether there are any.
+
+        Args:
+            count: So many: the middles of as many equally likely parts.
+        """
+        number = np.diff(self.starts)
+        shares = (np.arange(count) + 0.5) / count
+        ranks = self.starts[:-1, None] + (shares * number[:, None]).astype(np.int64)
+        cell = np.repeat(np.arange(len(number)), number)
+        ordered = self.sizes[np.lexsort([self.sizes[:, 1], cell])]
+        there = np.asarray(number > 0)
+        table = np.zeros((len(number), count, 2))
+        table[there] = ordered[ranks[there]]
+        return table, there
+
     def draw(
         self, centres: Float[ndarray, "N 2"], rng: np.random.Generator
     ) -> tuple[Float[ndarray, "N 2"], Bool[ndarray, " N"]]:
@@ -114,6 +155,15 @@ class BoxSizes:
         possible = count > 0
         sizes[possible] = self.sizes[chosen[possible]]
         return sizes, possible
+
+
+def _bring_to_entrance_heights(positions: Float[ndarray, "N 3"], room: Room) -> None:
+    """Move most of the positions to the heights of the entrances, in turn, in place."""
+    moved = positions[: round(AT_ENTRANCE_HEIGHT * len(positions))]
+    spread = norm.ppf(_even_points(len(moved))[:, 2])
+    for number, entrance in enumerate(room.entrances):
+        mine = slice(number, None, len(room.entrances))
+        moved[mine, 2] = entrance.position[2] + HEIGHT_FACTOR * entrance.sigma[2] * spread[mine]
 
 
 def _even_points(count: int) -> Float[ndarray, "N 3"]:

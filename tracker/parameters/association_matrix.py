@@ -1,0 +1,78 @@
+"""Numbers of the single-view tracker by association matrices.
+
+[CMQ07] Chang, Ma, Qiao, "Human oriented multi-target tracking algorithm in video
+sequence", Control and Decision 22(4), 2007.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from tracker.parameters.definition import Params, ui
+
+
+class AssociationMatrixParams(Params):
+    """Single-view tracker by association matrices of foreground objects ([CMQ07])."""
+
+    reach: Annotated[float, Field(ge=0.1, le=10.0), ui("T_d", unit="object sizes", step=0.1)] = 1.0
+    """Same count: how far an object may move in a step, in roots of half width × half height."""
+
+    overlap: Annotated[Literal["pixels", "boxes"], ui("O∩O", published="boxes")] = "pixels"
+    """Other count: whether the pixels that two objects share count, or those of their boxes."""
+
+    overlap_area: Annotated[int, Field(ge=0, le=5000), ui("T_s", unit="px", step=1)] = 30
+    """Other count: objects of two steps that share more than this are the same."""
+
+    confirmation_steps: Annotated[
+        int, Field(ge=1, le=100), ui("n_c", unit="steps", step=1, published=1)
+    ] = 5
+    """Somebody new counts once he was alone for so long; a piece that came off does not."""
+
+    join_gap: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("g", unit="target heights", step=0.01, published=0.0)
+    ] = 0.3
+    """Pieces of foreground above each other, no further apart than this, are one object."""
+
+    interrupted_steps: Annotated[int, Field(ge=1, le=1000), ui("N", unit="steps", log=True)] = 25
+    """A track without an object for longer than this has ended."""
+
+    return_similarity: Annotated[float, Field(ge=0.0, le=1.0), ui("ρ_min", step=0.01)] = 0.6
+    """An object continues an interrupted track if its colours are at least so similar."""
+
+    follow_mild: Annotated[bool, ui("MS")] = True
+    """Whether two who merge under mild occlusion are followed apart by mean shift."""
+
+    mild_share: Annotated[float, Field(ge=0.1, le=1.5), ui("S_k/(S_a+S_b)", step=0.01)] = 0.8
+    """Two who merge into an object larger than this share of both are mildly occluded."""
+
+    occlusion_distance: Annotated[
+        float, Field(ge=0.0, le=3.0), ui("ε", unit="half widths", step=0.05)
+    ] = 0.5
+    """Two who are followed apart are one object once their centres are this near."""
+
+    histogram_rate: Annotated[float, Field(ge=0.0, le=1.0), ui("β", step=0.01)] = 0.1
+    """How far a track's colours go towards those of each step in which it is alone."""
+
+    output: Annotated[Literal["targets", "objects"], ui("Y", published="objects")] = "targets"
+    """What goes to the fusion: target boxes fitted to the objects' outlines, or the objects."""
+
+    acceptance: Annotated[float, Field(ge=-10.0, le=0.0), ui("s_min", step=0.1)] = -2.0
+    """Targets: an object's best box is not taken if the outline fits it worse than this."""
+
+    further_acceptance: Annotated[float, Field(ge=-10.0, le=0.0), ui("s_2", step=0.1)] = -1.4
+    """Targets: nor are the other boxes of a merged object if they fit worse than this."""
+
+    spare_acceptance: Annotated[float, Field(ge=-10.0, le=0.0), ui("s_+", step=0.1)] = -0.7
+    """Targets: a box that fits better than this is taken beyond the object's number of tracks."""
+
+    centre_sigma: Annotated[
+        float, Field(ge=0.02, le=3.0), ui("σ_x", unit="half sizes", step=0.01, log=True)
+    ] = 0.2
+    """Standard deviation of a box's centre."""
+
+    size_sigma: Annotated[
+        float, Field(ge=0.02, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
+    ] = 0.2
+    """Standard deviation of a box's half sizes."""

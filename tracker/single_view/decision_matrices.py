@@ -1,0 +1,101 @@
+"""Which object of one step is which object of the next: distance and overlap, decided to a matrix.
+
+Rows are the objects of the step before, columns those of this one.
+
+[CMQ07] Chang, Ma, Qiao, "Human oriented multi-target tracking algorithm in video
+sequence", Control and Decision 22(4), 2007.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+from scipy.sparse.csgraph import connected_components
+
+RowCase = Literal["interrupted", "continues", "splits"]
+ColumnCase = Literal["new", "continues", "merges"]
+
+
+def distances(before: Float[ndarray, "I 2"], now: Float[ndarray, "J 2"]) -> Float[ndarray, "I J"]:
+    """How far each object is from where each was expected, pixels."""
+    return np.asarray(np.linalg.norm(before[:, None] - now[None, :], axis=2))
+
+
+def decide_by_distance(
+    apart: Float[ndarray, "I J"], reach: Float[ndarray, " I"]
+) -> Bool[ndarray, "I J"]:
+    """R while the count of objects stays: each other's nearest, and within reach.
+
+    Args:
+        apart: Distances.
+        reach: How far each object of the step before may be found, pixels.
+    """
+    if apart.size == 0:
+        return np.zeros(apart.shape, dtype=bool)
+    rows, columns = np.indices(apart.shape)
+    mutual = (apart.argmin(axis=1)[:, None] == columns) & (apart.argmin(axis=0)[None, :] == rows)
+    return np.asarray(mutual & (apart <= reach[:, None]))
+
+
+def box_overlaps(
+    before: Float[ndarray, "I 4"], now: Float[ndarray, "J 4"]
+) -> Float[ndarray, "I J"]:
+    """Pixels that the boxes of two objects share; centres and half sizes."""
+    low = np.maximum((before[:, :2] - before[:, 2:])[:, None], (now[:, :2] - now[:, 2:])[None, :])
+    high = np.minimum((before[:, :2] + before[:, 2:])[:, None], (now[:, :2] + now[:, 2:])[None, :])
+    return np.asarray(np.prod(np.clip(high - low, 0.0, None), axis=2))
+
+
+def pixel_overlaps(
+    before: Int[ndarray, "h w"], now: Int[ndarray, "h w"], rows: int, columns: int
+) -> Int[ndarray, "I J"]:
+    """Pixels that two objects themselves share.
+
+    Args:
+        before: The object that each pixel was of, -1 for none.
+        now: The object that it is of.
+        rows: Number of objects before.
+        columns: Number of objects now.
+    """
+    both = (before >= 0) & (now >= 0)
+    pairs = before[both].astype(np.int64) * columns + now[both]
+    return np.bincount(pairs, minlength=rows * columns).reshape(rows, columns)
+
+
+def is_one_to_one(decision: Bool[ndarray, "I J"]) -> bool:
+    """Whether every object of either step has exactly one of the other."""
+    return bool((decision.sum(axis=0) == 1).all() and (decision.sum(axis=1) == 1).all())
+
+
+def row_case(decision: Bool[ndarray, "I J"], row: int) -> RowCase:
+    """What happened to an object of the step before: sum 0, 1 or more."""
+    total = int(decision[row].sum())
+    return "interrupted" if total == 0 else "continues" if total == 1 else "splits"
+
+
+def column_case(decision: Bool[ndarray, "I J"], column: int) -> ColumnCase:
+    """Where an object of this step comes from: sum 0, 1 or more."""
+    total = int(decision[:, column].sum())
+    return "new" if total == 0 else "continues" if total == 1 else "merges"
+
+
+def families(decision: Bool[ndarray, "I J"]) -> list[tuple[list[int], list[int]]]:
+    """Rows and columns that hang together; each object is in exactly one family.
+
+    A family of one row and one column continues; of no row is new; of no column is
+    interrupted; with several rows merges, with several columns splits, or both at once.
+    """
+    rows, columns = decision.shape
+    graph = np.zeros((rows + columns, rows + columns), dtype=bool)
+    graph[:rows, rows:] = decision
+    count, owners = connected_components(graph, directed=False)
+    return [
+        (
+            np.flatnonzero(owners[:rows] == family).tolist(),
+            np.flatnonzero(owners[rows:] == family).tolist(),
+        )
+        for family in range(count)
+    ]
