@@ -13,7 +13,12 @@ from tracker.kernels import _kernel
 
 @_kernel
 def epanechnikov_climb(
-    boxes: ndarray, counts: ndarray, bandwidth: float, iterations: int, tolerance: float
+    boxes: ndarray,
+    counts: ndarray,
+    groups: ndarray,
+    bandwidth: float,
+    iterations: int,
+    tolerance: float,
 ) -> tuple[ndarray, ndarray]:
     """Climb from every box to a fixed point of the mean shift with the Epanechnikov kernel.
 
@@ -24,6 +29,7 @@ def epanechnikov_climb(
     Args:
         boxes: (S, 4), centre x, centre y, half width, half height.
         counts: (S,), how many particles each stands for; those of 0 are not there.
+        groups: (S,); the boxes of other groups are not there either.
         bandwidth: In half sizes.
         iterations: At most so many steps.
         tolerance: Stop when a step is shorter than this many half sizes.
@@ -44,7 +50,7 @@ def epanechnikov_climb(
             shifted[:] = 0.0
             total, density = 0.0, 0.0
             for i in range(size):
-                if not counts[i] > 0.0:
+                if groups[i] != groups[k] or not counts[i] > 0.0:
                     continue
                 u = (boxes[i, 0] - points[k, 0]) * scale_x
                 v = (boxes[i, 1] - points[k, 1]) * scale_y

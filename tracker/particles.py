@@ -100,6 +100,7 @@ class Clusters:
 def clusters(
     boxes: Float[ndarray, "S 4"],
     counts: Int[ndarray, " S"],
+    groups: Int[ndarray, " S"],
     *,
     bandwidth: float,
     merge_distance: float,
@@ -115,6 +116,7 @@ def clusters(
     Args:
         boxes: Particles, each once.
         counts: How often each was drawn.
+        groups: Each group's particles have modes of their own; all the same for one group.
         bandwidth: h, in half sizes.
         merge_distance: Fixed points nearer than this, in half sizes, are one mode: the densest.
 
@@ -123,7 +125,7 @@ def clusters(
     """
     weights = np.ascontiguousarray(counts, dtype=float)
     points, densities = particle_kernels.epanechnikov_climb(
-        np.ascontiguousarray(boxes, dtype=float), weights, bandwidth, ITERATIONS, TOLERANCE
+        np.ascontiguousarray(boxes, dtype=float), weights, groups, bandwidth, ITERATIONS, TOLERANCE
     )
     order = np.argsort(-densities, kind="stable")
     owners, leaders = particle_kernels.join_modes(points, weights, order, merge_distance)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy import ndarray
 
 from tracker import particle_kernels, particles
-from tracker.particles import clusters
+from tracker.particles import Clusters, clusters
 
 CENTRES = np.array([[60.0, 50.0, 10.0, 15.0], [110.0, 52.0, 12.0, 16.0], [62.0, 140.0, 8.0, 12.0]])
 
@@ -24,6 +24,19 @@ def around(centres: ndarray, counts: list[int], seed: int = 0, spread: float = 0
             centre + rng.normal(0.0, spread, (count, 4)) * centre[[2, 3, 2, 3]] * [1, 1, 0.2, 0.2]
             for centre, count in zip(centres, counts, strict=True)
         ]
+    )
+
+
+def one_group(boxes: ndarray) -> ndarray:
+    return np.zeros(len(boxes), dtype=np.int64)
+
+
+def together(
+    boxes: ndarray, counts: ndarray, merge_distance: float = 1.0, **more: float
+) -> Clusters:
+    """Clusters of all particles at once."""
+    return clusters(
+        boxes, counts, one_group(boxes), merge_distance=merge_distance, **{"bandwidth": 1.0, **more}
     )
 
 
@@ -100,7 +113,7 @@ def test_resampling_draws_each_particle_as_often_as_it_weighs() -> None:
 
 def test_the_modes_are_the_targets_the_largest_cluster_first() -> None:
     boxes = around(CENTRES, [300, 200, 100])
-    found = clusters(boxes, np.ones(600, dtype=int), bandwidth=1.0, merge_distance=1.0)
+    found = together(boxes, np.ones(600, dtype=int))
     assert len(found.modes) == 3
     np.testing.assert_allclose(found.shares, [1 / 2, 1 / 3, 1 / 6], atol=0.01)
     assert np.abs((found.modes - CENTRES)[:, :2] / CENTRES[:, 2:]).max() < 0.12
@@ -112,7 +125,7 @@ def test_each_particle_climbs_as_the_definition_says(bandwidth: float) -> None:
     boxes = around(CENTRES, [40, 30, 20], spread=0.6)
     counts = np.random.default_rng(3).integers(0, 4, len(boxes)).astype(float)
     points, densities = particle_kernels.epanechnikov_climb(
-        boxes, counts, bandwidth, particles.ITERATIONS, particles.TOLERANCE
+        boxes, counts, one_group(boxes), bandwidth, particles.ITERATIONS, particles.TOLERANCE
     )
     for start, count, point, density in zip(boxes, counts, points, densities, strict=True):
         if count == 0:
@@ -132,15 +145,15 @@ def test_a_climb_never_goes_down() -> None:
         offsets = (boxes[None, :, :2] - points[:, None, :2]) / [10.0, 14.0]
         return (counts * np.maximum(1.0 - (offsets**2).sum(axis=2), 0.0)).sum(axis=1)
 
-    points, _ = particle_kernels.epanechnikov_climb(boxes, counts, 1.0, 30, 0.0)
+    points, _ = particle_kernels.epanechnikov_climb(boxes, counts, one_group(boxes), 1.0, 30, 0.0)
     assert np.all(density(points) >= density(boxes) - 1e-9)
 
 
 @given(st.floats(0.1, 20.0), st.floats(-300.0, 300.0), st.floats(-300.0, 300.0))
 def test_the_bandwidth_follows_the_radius(scale: float, x: float, y: float) -> None:
     boxes, counts = around(CENTRES, [30, 20, 10]), np.ones(60, dtype=int)
-    here = clusters(boxes, counts, bandwidth=1.0, merge_distance=1.0)
-    there = clusters(boxes * scale + [x, y, 0.0, 0.0], counts, bandwidth=1.0, merge_distance=1.0)
+    here = together(boxes, counts)
+    there = together(boxes * scale + [x, y, 0.0, 0.0], counts)
     np.testing.assert_array_equal(there.owners, here.owners)
     np.testing.assert_allclose(there.modes, here.modes * scale + [x, y, 0, 0], atol=1e-6)
 
@@ -148,13 +161,8 @@ def test_the_bandwidth_follows_the_radius(scale: float, x: float, y: float) -> N
 def test_a_particle_drawn_twice_counts_as_two() -> None:
     boxes = around(CENTRES, [20, 15, 10], spread=0.6)
     counts = np.random.default_rng(2).integers(0, 4, len(boxes))
-    once = clusters(boxes, counts, bandwidth=1.0, merge_distance=1.0)
-    copies = clusters(
-        np.repeat(boxes, counts, axis=0),
-        np.ones(counts.sum(), dtype=int),
-        bandwidth=1.0,
-        merge_distance=1.0,
-    )
+    once = together(boxes, counts)
+    copies = together(np.repeat(boxes, counts, axis=0), np.ones(counts.sum(), dtype=int))
     np.testing.assert_allclose(once.modes, copies.modes)
     np.testing.assert_allclose(once.shares, copies.shares)
     np.testing.assert_array_equal(np.repeat(once.owners, counts), copies.owners)
@@ -162,10 +170,25 @@ def test_a_particle_drawn_twice_counts_as_two() -> None:
     assert once.shares.sum() == pytest.approx(1.0)
 
 
+def test_each_group_has_modes_of_its_own() -> None:
+    # half a box apart: together they are one, by themselves two
+    pair = CENTRES[[0, 0]] + [[0.0, 0, 0, 0], [11.0, 0, 0, 0]]
+    boxes, counts = around(pair, [200, 150], spread=0.25), np.ones(350, dtype=int)
+    groups = np.repeat([4, 1], [200, 150])
+    apart = clusters(boxes, counts, groups, bandwidth=1.0, merge_distance=1.0)
+    assert len(apart.modes) == 2
+    np.testing.assert_array_equal(apart.owners, np.repeat([0, 1], [200, 150]))
+    np.testing.assert_allclose(apart.modes[:, 0], pair[:, 0], atol=0.8)
+    for group, rows in ((0, boxes[:200]), (1, boxes[200:])):
+        alone = together(rows, np.ones(len(rows), dtype=int))
+        np.testing.assert_allclose(alone.modes, apart.modes[[group]])
+    assert len(together(boxes, counts).modes) == 1
+
+
 def test_modes_keep_their_distance() -> None:
     rng = np.random.default_rng(1)
     boxes = np.column_stack([rng.uniform(0, 90, (400, 2)), np.full((400, 2), 10.0)])
-    found = clusters(boxes, np.ones(400, dtype=int), bandwidth=0.6, merge_distance=1.5)
+    found = together(boxes, np.ones(400, dtype=int), 1.5, bandwidth=0.6)
     between = np.linalg.norm(found.modes[:, None, :2] - found.modes[None, :, :2], axis=2)
     assert len(found.modes) > 5
     assert between[~np.eye(len(between), dtype=bool)].min() >= 15.0
@@ -174,7 +197,7 @@ def test_modes_keep_their_distance() -> None:
 
 def test_no_particles_have_no_modes() -> None:
     for boxes in (np.zeros((0, 4)), CENTRES):
-        found = clusters(boxes, np.zeros(len(boxes), dtype=int), bandwidth=1.0, merge_distance=1.0)
+        found = together(boxes, np.zeros(len(boxes), dtype=int))
         assert found.modes.shape == (0, 4)
         assert found.shares.shape == (0,)
         np.testing.assert_array_equal(found.owners, np.full(len(boxes), -1))

@@ -72,6 +72,9 @@ class PseudoParticleParams(Params):
     velocity_share: Annotated[float, Field(ge=0.0, le=1.0), ui("v", step=0.05, published=0.0)] = 0.8
     """How much of its mean displacement a target repeats: 0 is a random walk."""
 
+    clusters: Annotated[Literal["each", "together"], ui("m", published="together")] = "each"
+    """Whether particles cluster with those of the same person's colours only, or with all."""
+
     bandwidth: Annotated[
         float, Field(ge=0.2, le=3.0), ui("h", unit="half sizes", step=0.05, log=True)
     ] = 1.0
@@ -102,7 +105,7 @@ class PseudoParticleParams(Params):
 
     separation: Annotated[
         float, Field(ge=0.0, le=5.0), ui("r_n", unit="half sizes", step=0.1, published=0.0)
-    ] = 1.5
+    ] = 2.0
     """A mode nearer than this to a target's mode is no newcomer."""
 
     targets_per_person: Annotated[int, Field(ge=1, le=10), ui("n_g", step=1, published=1)] = 2

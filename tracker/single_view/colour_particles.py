@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
 from tracker import particles as particle_set
@@ -88,12 +88,14 @@ class ColourParticles:
             scene, boxes, inside_weight=p.foreground_weight, around_weight=p.surroundings_weight
         )
 
-    def scores(self, scene: Scene, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, " N"]:
-        """The logarithm of each box's weight."""
+    def scores(
+        self, scene: Scene, boxes: Float[ndarray, "N 4"]
+    ) -> tuple[Float[ndarray, " N"], Int[ndarray, " N"]]:
+        """The logarithm of each box's weight, and the person whose colours it fits best."""
         distances = self._appearance.distances(scene, boxes)
         colours = particle_set.log_likelihoods(distances, self._parameters.sharpness)
         evidence, _ = self.evidence(scene, boxes)
-        return np.asarray(colours + evidence)
+        return np.asarray(colours + evidence), np.asarray(distances.argmin(axis=1))
 
     def distances(self, scene: Scene, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N G"]:
         """d of each box to each person's colours."""

@@ -58,9 +58,10 @@ class PseudoParticle:
     The classical filter, for contrast, has one posterior and its mean.
 
     Beyond the paper, and switched off by the preset ``published``: bins of hue and
-    saturation; what the foreground says of a box; newcomers looked for on it; targets
-    that keep some of their velocity; all modes, not the confirmed targets, go to the
-    fusion.
+    saturation; what the foreground says of a box; newcomers looked for on it; each
+    target's particles resampled for themselves, and clusters for each person's colours;
+    targets that keep some of their velocity; newcomers who stand apart; all modes, not
+    the confirmed targets, go to the fusion.
     """
 
     needs_pictures = True
@@ -118,7 +119,7 @@ class PseudoParticle:
         p = self._parameters
         samples = np.concatenate([moved, self._model.newcomers(p.samples - len(moved), scene, rng)])
         expected = register.targets.moved(p.velocity_share)
-        scores = self._model.scores(scene, samples)
+        scores, persons = self._model.scores(scene, samples)
         weights = (
             particle_set.normalised(scores)
             if p.resampling == "together"
@@ -126,7 +127,11 @@ class PseudoParticle:
         )
         counts = particle_set.resample(weights, p.samples, rng)
         found = particle_set.clusters(
-            samples, counts, bandwidth=p.bandwidth, merge_distance=MERGE_DISTANCE
+            samples,
+            counts,
+            persons if p.clusters == "each" else np.zeros_like(persons),
+            bandwidth=p.bandwidth,
+            merge_distance=MERGE_DISTANCE,
         )
         modes = found.modes[found.shares >= p.smallest_cluster]
         distances = self._model.distances(scene, modes)
@@ -193,10 +198,10 @@ class PseudoParticle:
         """Sampling, importance weights, resampling: one posterior, and its mean."""
         p = self._parameters
         samples = moved if len(moved) else self._model.newcomers(p.samples, scene, rng)
-        weights = particle_set.normalised(self._model.scores(scene, samples))
+        weights = particle_set.normalised(self._model.scores(scene, samples)[0])
         counts = particle_set.resample(weights, p.samples if len(samples) else 0, rng)
         mean = (weights @ samples)[None] if len(samples) else np.zeros((0, 4))
-        scores = self._model.scores(scene, mean)
+        scores, _ = self._model.scores(scene, mean)
         existence = expit(scores + p.sharpness * p.acceptance_distance)
         labels = np.full(len(mean), CLASSICAL_LABEL)
         result = ViewResult(
