@@ -123,7 +123,11 @@ def _serve(command: Serve) -> int:
 
     app = server.create_app(
         server.Settings(
-            host=command.host, sequence=command.sequence, data=command.data, keep_on_disk=True
+            host=command.host,
+            sequence=command.sequence,
+            data=command.data,
+            keep_on_disk=True,
+            say=say,
         )
     )
     try:
@@ -177,7 +181,8 @@ def _track(command: Track) -> None:
     if not output.parent.is_dir():
         raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
 
-    from tracker import export, pipeline
+    from app.compiling import WORDS
+    from tracker import compilation, export, pipeline
     from tracker.sequences import library
     from tracker.stage_cache import StageCache
 
@@ -186,12 +191,19 @@ def _track(command: Track) -> None:
     parameters = table.with_values(pipeline.default_parameters(sequence), changes)
     begin = time.perf_counter()
     stages: set[table.Stage] = set()
+    is_told = False
+
+    def compiles() -> None:
+        nonlocal is_told
+        if not is_told:
+            is_told = True
+            say(WORDS)
 
     def told(_: pipeline.Run, progress: pipeline.Progress) -> None:
         stages.add(progress.stage)
         tracking.at(progress.done, progress.total)
 
-    with Bar("tracking", "step") as tracking:
+    with Bar("tracking", "step") as tracking, compilation.followed(compiles):
         tracking.at(0, sequence.frames)
         run = pipeline.compute(
             sequence,

@@ -15,8 +15,10 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
+from app.compiling import WORDS, Compiling
 from app.errors import sentence
 from app.snapshot import Change, Opening, Snapshot
 from app.workbench import Workbench
@@ -69,6 +71,7 @@ class Jobs:
         data: Path | None = None,
         seed: int = 0,
         cache: StageCache | None = None,
+        compiling: Compiling | None = None,
     ) -> None:
         """Begin to follow the workbench.
 
@@ -77,6 +80,7 @@ class Jobs:
             data: Its folders are sequences by name.
             seed: Of all runs.
             cache: Where columns of runs are kept; in memory only, if none is given.
+            compiling: Whom to wait for before a sequence is shown; closed with this.
         """
         self._workbench = workbench
         self._data = data
@@ -85,6 +89,7 @@ class Jobs:
         self._wanted: _Wanted | None = None
         self._under_way: _Wanted | None = None
         self._cache = cache or StageCache()
+        self._compiling = compiling
         self._opening: threading.Event | None = None
         self._openings: list[threading.Thread] = []
         self._closed = False
@@ -124,19 +129,23 @@ class Jobs:
 
         told_at = 0.0
 
-        def progress(done: int, total: int) -> None:
+        def progress(words: str, done: int, total: int) -> None:
             nonlocal told_at
             now = time.monotonic()
             if cancelled.is_set():
                 return
             if now - told_at >= OPENING_TELLS_SECONDS or done == total:
                 told_at = now
-                self._workbench.set_opening(Opening(name, "rendering", done, total))
+                self._workbench.set_opening(Opening(name, words, done, total))
 
         try:
             sequence = library.open_sequence(
-                locate(name, self._data), progress=progress, cancelled=cancelled.is_set
+                locate(name, self._data),
+                progress=partial(progress, "rendering"),
+                cancelled=cancelled.is_set,
             )
+            if self._compiling is not None:
+                self._compiling.wait(partial(progress, WORDS), cancelled.is_set)
             parameters = pipeline.default_parameters(sequence)
             reader = FrameReader(sequence)
             with self._condition:
@@ -273,6 +282,8 @@ class Jobs:
             if self._under_way is not None:
                 self._under_way.cancelled.set()
             self._condition.notify_all()
+        if self._compiling is not None:
+            self._compiling.close()
         deadline = time.monotonic() + CLOSING_SECONDS
         for thread in (self._worker, *self._openings):
             if thread.ident is not None:

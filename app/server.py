@@ -19,6 +19,7 @@ from fastapi_offline import FastAPIOffline
 from starlette.types import Scope
 
 from app import api, errors, foreground, gateway, stream
+from app.compiling import Compiling
 from app.errors import sentence
 from app.evaluation import routes as evaluation
 from app.evaluation.worker import Evaluator
@@ -57,7 +58,9 @@ class Settings:
     seed: int = 0
     with_viser: bool = True
     keep_on_disk: bool = False
-    """Whether what the cameras found is kept for the next start."""
+    """Whether what was compiled and what the cameras found is kept for the next start."""
+    say: Callable[[str], None] = lambda words: None
+    """Told what somebody in front of the terminal should know."""
 
 
 def create_app(settings: Settings) -> FastAPI:
@@ -107,8 +110,14 @@ class _PageFiles(StaticFiles):
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     settings: Settings = app.state.settings
     workbench = app.state.workbench = Workbench()
-    cache = StageCache.on_disk(in_background) if settings.keep_on_disk else StageCache()
-    jobs = app.state.jobs = Jobs(workbench, data=settings.data, seed=settings.seed, cache=cache)
+    kept = settings.keep_on_disk
+    jobs = app.state.jobs = Jobs(
+        workbench,
+        data=settings.data,
+        seed=settings.seed,
+        cache=StageCache.on_disk(in_background) if kept else StageCache(),
+        compiling=Compiling(settings.say) if kept else None,
+    )
     pictures = app.state.pictures = Pictures(workbench)
     app.state.timelines = Timelines()
     evaluator = app.state.evaluator = Evaluator(workbench)

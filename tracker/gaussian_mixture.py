@@ -170,11 +170,15 @@ def reduce(
 ) -> tuple[GaussianMixture, Int[ndarray, " K"]]:
     """Prune, merge and cap: the step that keeps the recursion bounded (Table II of [VM06]_).
 
+    Where more than J_max components are left, the heaviest stay and take over the weight
+    of the others in proportion: what is expected of all is expected of fewer. Without
+    that, a crowd that needs more components than it may have fades away.
+
     Args:
         mixture: J components.
         pruning_threshold: T, the least weight a component must have.
         merging_threshold: U, the squared Mahalanobis distance of :func:`merge`.
-        max_components: J_max; the heaviest are kept.
+        max_components: J_max.
         owners: Who may absorb whom, as in :func:`merge`.
 
     Returns:
@@ -186,4 +190,8 @@ def reduce(
         mixture.take(kept), merging_threshold, None if owners is None else owners[kept]
     )
     heaviest = np.argsort(-merged.weights, kind="stable")[:max_components]
-    return merged.take(heaviest), kept[leaders[heaviest]]
+    reduced = merged.take(heaviest)
+    if reduced.size < merged.size:
+        weights = reduced.weights * (merged.cardinality / reduced.cardinality)
+        reduced = GaussianMixture(weights, reduced.means, reduced.covariances, reduced.labels)
+    return reduced, kept[leaders[heaviest]]

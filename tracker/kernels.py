@@ -6,19 +6,13 @@ Every kernel has a NumPy or SciPy counterpart in the tests that it must agree wi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, TypeVar, cast
 
-import numba
 import numpy as np
 from numpy import ndarray
 
-_F = TypeVar("_F", bound=Callable[..., Any])
+from tracker.compilation import kernel
 
-
-def _kernel(function: _F) -> _F:
-    """Compile on the first call, keep the machine code on disk, release the interpreter."""
-    return cast(_F, numba.njit(cache=True, nogil=True)(function))
+_kernel = kernel
 
 
 @_kernel

@@ -15,9 +15,9 @@ from typing import Any
 
 from numpy import ndarray
 
+from tracker.folders import cache_folder
 from tracker.fusion.protocol import FusionResult
 from tracker.parameters import Stage
-from tracker.sequences.library import cache_folder
 from tracker.single_view.protocol import ViewResult
 from tracker.stage_files import StageFiles
 from tracker.trajectories import Trajectories

@@ -14,8 +14,8 @@ from tests.benchmarks.filters import Filter, Labelled, Phd, PlainPhd
 from tests.benchmarks.measure import Measurement
 from tests.benchmarks.scenario import Scenario, ospa, scenario
 
-STEPS = {10: 60, 100: 60, 500: 20, 1000: 10}
-THEIR_STEPS = {10: 30, 100: 12, 500: 4, 1000: 2}
+STEPS = {10: 40, 100: 40, 500: 20, 1000: 10}
+THEIR_STEPS = {10: 40, 100: 40, 500: 4, 1000: 2}
 """Stone Soup takes seconds a step where targets are many."""
 
 MILLISECONDS = {100: 0.4, 500: 4.0, 1000: 12.0}

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import httpx2
 
+from tracker.compilation import kernel_folder
+
 
 class Server:
     """`multiview-phd serve` as a person starts it, on a free port."""
@@ -22,6 +24,8 @@ class Server:
         self.folder = sequence
         self._arguments = [str(sequence), "--no-open"]
         self._environment = dict(os.environ)
+        # kernels are those of the machine, whatever the cache folder
+        self._environment["NUMBA_CACHE_DIR"] = str(kernel_folder())
         if cache is not None:
             self._environment["MULTIVIEW_PHD_CACHE"] = str(cache)
         self.port = 0

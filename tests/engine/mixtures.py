@@ -109,11 +109,14 @@ def reference_reduce(
     merging_threshold: float,
     max_components: int,
 ) -> GaussianMixture:
-    """Prune, merge and cap by :func:`reference_merge`."""
+    """Prune, merge and cap by :func:`reference_merge`, keeping the weight of all."""
     heavy = mixture.take(mixture.weights >= pruning_threshold)
     merged, _, _ = reference_merge(heavy, merging_threshold)
-    order = sorted(range(merged.size), key=lambda i: -merged.weights[i])
-    return merged.take(np.array(order[:max_components], dtype=np.int64))
+    order = sorted(range(merged.size), key=lambda i: -merged.weights[i])[:max_components]
+    reduced = merged.take(np.array(order, dtype=np.int64))
+    total = sum(reduced.weights.tolist())
+    weights = reduced.weights * (sum(merged.weights.tolist()) / total if total else 1.0)
+    return GaussianMixture(weights, reduced.means, reduced.covariances, reduced.labels)
 
 
 def reference_update(

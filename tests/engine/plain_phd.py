@@ -153,11 +153,14 @@ def merge(mixture: GaussianMixture, threshold: float) -> tuple[GaussianMixture, 
 def reduce(
     mixture: GaussianMixture, pruning: float, merging: float, most: int
 ) -> tuple[GaussianMixture, ndarray]:
-    """Prune, merge and cap, heaviest first; and who led each."""
+    """Prune, merge and cap, keeping the weight, heaviest first; and who led each."""
     kept = np.flatnonzero(mixture.weights >= pruning)
     merged, leaders = merge(mixture.take(kept), merging)
     heaviest = np.argsort(-merged.weights, kind="stable")[:most]
-    return merged.take(heaviest), kept[leaders[heaviest]]
+    part = merged.take(heaviest)
+    weights = part.weights * (merged.weights.sum() / max(part.weights.sum(), 1e-300))
+    reduced = GaussianMixture(weights, part.means, part.covariances, part.labels)
+    return reduced, kept[leaders[heaviest]]
 
 
 def extract_measured(

@@ -83,6 +83,9 @@ def test_reducing_never_raises_the_cardinality(
     assert (np.diff(reduced.weights) <= 0.0).all()
     assert len(np.unique(leaders)) == reduced.size
     assert_array_equal(reduced.labels, mixture.labels[leaders])
+    if reduced.size:  # however few are left, they stand for all that were not pruned
+        heavy = mixture.weights[mixture.weights >= pruning]
+        assert reduced.cardinality == pytest.approx(heavy.sum())
     reference = reference_reduce(mixture, pruning, merging, most)
     assert_allclose(reduced.weights, reference.weights, rtol=1e-12)
     assert_allclose(reduced.means, reference.means, rtol=1e-9, atol=1e-9)

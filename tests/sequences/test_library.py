@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.synthetic import write_sequence
+from tracker.folders import cache_folder
 from tracker.sequences import library, rendering
 from tracker.sequences.sequence import SequenceError
 
@@ -116,10 +117,10 @@ def test_the_list_has_rooms_and_folders(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="those have a place of their own")
 def test_where_the_cache_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    assert library.cache_folder() == tmp_path / "cache"
+    assert cache_folder() == tmp_path / "cache"
     monkeypatch.delenv("MULTIVIEW_PHD_CACHE")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
-    assert library.cache_folder() == tmp_path / "xdg" / "multiview-phd"
+    assert cache_folder() == tmp_path / "xdg" / "multiview-phd"
     monkeypatch.setenv("XDG_CACHE_HOME", "relative is not allowed")
     monkeypatch.setenv("HOME", str(tmp_path))
-    assert library.cache_folder() == tmp_path / ".cache" / "multiview-phd"
+    assert cache_folder() == tmp_path / ".cache" / "multiview-phd"

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from tracker.folders import cache_folder
 from tracker.sequences.fields import did_you_mean, listed
 from tracker.sequences.reader import FILE, read_sequence, read_summary
 from tracker.sequences.sequence import Sequence, SequenceError
@@ -37,21 +36,6 @@ class SequenceEntry:
     """Where it is, or will be once it is rendered."""
     error: str | None = None
     """Why it cannot be opened, in one sentence."""
-
-
-def cache_folder() -> Path:
-    """Where rendered rooms are kept: ``$MULTIVIEW_PHD_CACHE``, else the platform's place."""
-    own = os.environ.get("MULTIVIEW_PHD_CACHE")
-    if own:
-        return Path(own).expanduser().absolute()
-    if sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    elif sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    else:
-        given = Path(os.environ.get("XDG_CACHE_HOME", ""))
-        base = given if given.is_absolute() else Path.home() / ".cache"
-    return base / "multiview-phd"
 
 
 def available(data: Path | None = None) -> list[SequenceEntry]:

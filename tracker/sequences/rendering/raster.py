@@ -10,9 +10,10 @@ import math
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-import numba
 import numpy as np
 from numpy import ndarray
+
+from tracker.compilation import compiled_later
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -22,9 +23,7 @@ NOBODY = 255
 
 def kernel(function: _F) -> _F:
     """Compile on the first call, keep the machine code on disk, release the interpreter."""
-    options: Any = {"cache": True, "nogil": True, "fastmath": {"contract", "arcp", "nsz"}}
-    compiled: _F = numba.njit(**options)(function)
-    return compiled
+    return compiled_later(function, fastmath={"contract", "arcp", "nsz"})
 
 
 @kernel

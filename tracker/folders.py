@@ -1,0 +1,26 @@
+"""Where the program keeps what it can make again."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+
+def cache_folder() -> Path:
+    """``$MULTIVIEW_PHD_CACHE``, else the platform's place for caches.
+
+    Rendered rooms, finished columns of runs and compiled kernels live there, each in a
+    folder of its own; all of it may be deleted at any time.
+    """
+    own = os.environ.get("MULTIVIEW_PHD_CACHE")
+    if own:
+        return Path(own).expanduser().absolute()
+    if sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    elif sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    else:
+        given = Path(os.environ.get("XDG_CACHE_HOME", ""))
+        base = given if given.is_absolute() else Path.home() / ".cache"
+    return base / "multiview-phd"

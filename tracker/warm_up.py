@@ -1,0 +1,159 @@
+"""Every kernel compiled before it is needed, by a few steps of every method.
+
+numba compiles a function when it is first called, for the arguments it is called with.
+So a tiny made-up recording is tracked with each method and in each way that calls other
+kernels; what the first real run calls is then there.
+
+``python -m tracker.warm_up`` does it in a process of its own, which leaves the interpreter
+of the workbench alone, and tells how far it is: a line ``done total`` whenever a kernel
+has been compiled, a line ``ready`` when the default methods have all of theirs.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from tracker import compilation, pipeline
+from tracker.camera import Camera
+from tracker.parameters import METHODS, PRESETS, RunParameters, with_values
+from tracker.sequences.sequence import Detections, Entrance, Room, Sequence, Template, View
+
+STEPS = 6
+SIZE = (96, 72)
+"""Pixels of a picture."""
+
+_HALF_EXTENTS = np.array([0.3, 0.3, 0.84])
+_COLOURS = ((40, 40, 220), (220, 60, 40))
+"""Of the two people, blue green red."""
+
+_FIRST = ("colour_phd", "none")
+"""What a sequence starts with: for pictures, for boxes."""
+
+_OTHER_WAYS = (
+    {"fusion.update": "unscented"},
+    {"fusion.measurement": "centre", "fusion.motion": "random_walk"},
+    {"fusion.measurement": "box_and_width", "fusion.extraction": "boxes"},
+    {"foreground.model": "adaptive"},
+)
+"""Values that call kernels which neither the defaults nor a preset call."""
+
+
+def compile_kernels(
+    told: Callable[[int, int], None] = lambda done, total: None,
+    ready: Callable[[], None] = lambda: None,
+) -> None:
+    """Compile what has not been compiled on this machine; takes a minute where nothing was.
+
+    Args:
+        told: Called with the number of kernels that are ready and of all, whenever one has
+            been compiled.
+        ready: Called when the methods that a sequence starts with have their kernels.
+    """
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        compilation.followed(lambda: told(*compilation.counts())),
+    ):
+        recording = _recording(Path(folder))
+        for single_view in _FIRST:
+            values = {"single_view": single_view, "fusion_method": "multi_bernoulli"}
+            pipeline.compute(recording, with_values(RunParameters(), values))
+        ready()
+        for parameters in _ways():
+            pipeline.compute(recording, parameters)
+    compilation.mark_compiled()
+
+
+def _ways() -> Iterator[RunParameters]:
+    for preset in PRESETS.values():
+        for single_view in METHODS["single_view"]:
+            for method in METHODS["fusion_method"]:
+                chosen = {"single_view": single_view, "fusion_method": method}
+                yield with_values(RunParameters(), {**preset, **chosen})
+    for values in _OTHER_WAYS:
+        for method in METHODS["fusion_method"]:
+            yield with_values(RunParameters(), {**values, "fusion_method": method})
+
+
+def _recording(folder: Path) -> Sequence:
+    """Two cameras, two people who cross a room, as pictures and as boxes."""
+    rng = np.random.default_rng(0)
+    paths = [
+        np.linspace(*ends, STEPS)
+        for ends in (((-1, 0.2, 0.84), (1, 0.2, 0.84)), ((1, -0.3, 0.84), (-1, -0.3, 0.84)))
+    ]
+    cameras = (_camera("left", -3.2), _camera("right", 3.2))
+    views = []
+    for camera in cameras:
+        rows, boxes, images = [], [], []
+        wall = rng.integers(90, 130, (SIZE[1], SIZE[0], 3), dtype=np.uint8)
+        for step in range(STEPS):
+            picture = wall.copy()
+            found, visible = camera.project_boxes(
+                np.array([path[step] for path in paths]), _HALF_EXTENTS
+            )
+            for box, colour in zip(found[visible], _COLOURS, strict=False):
+                left, top, width, height = box.round().astype(int).tolist()
+                cv2.rectangle(picture, (left, top), (left + width, top + height), colour, -1)
+                rows.append(step)
+                boxes.append(box)
+            images.append(folder / f"{camera.name}{step}.png")
+            cv2.imwrite(str(images[-1]), picture)
+        detections = Detections(
+            np.array(rows, dtype=np.int64), np.array(boxes).reshape(-1, 4), np.ones(len(rows))
+        )
+        views.append(View(camera, images=tuple(images), detections=detections))
+    first = views[0].detections
+    assert first is not None
+    return Sequence(
+        name="warm-up",
+        folder=folder,
+        fps=25.0,
+        frames=STEPS,
+        room=Room(
+            np.array([-1.5, -1.5, 0.0]),
+            np.array([1.5, 1.5, 2.0]),
+            (Entrance(np.array([1.0, -0.3, 0.84]), np.full(3, 0.3)),),
+        ),
+        target_half_extents=_HALF_EXTENTS,
+        views=tuple(views),
+        templates=tuple(
+            Template(f"person{number}", "left", 0, first.boxes[number])
+            for number in range(len(first.boxes[first.at(0)]))
+        ),
+    )
+
+
+def _camera(name: str, place: float) -> Camera:
+    """A camera at one side of the room that looks at its middle."""
+    position = np.array([place, -3.4, 1.6])
+    ahead = np.array([0.0, 0.0, 0.9]) - position
+    ahead /= np.linalg.norm(ahead)
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    rotation = np.stack([right, np.cross(ahead, right), ahead])
+    intrinsics = np.array([[95.0, 0, SIZE[0] / 2], [0, 95.0, SIZE[1] / 2], [0, 0, 1]])
+    distortion = np.array([-0.2, 0.01, 0.001, -0.001, 0.0])
+    return Camera(name, SIZE, intrinsics, rotation, -rotation @ position, distortion)
+
+
+def main() -> None:
+    """Compile everything and tell of it on standard output; whoever works goes first."""
+    if sys.platform != "win32":
+        os.nice(5)
+
+    def say(words: str) -> None:
+        sys.stdout.write(f"{words}\n")
+        sys.stdout.flush()
+
+    compile_kernels(lambda done, total: say(f"{done} {total}"), lambda: say("ready"))
+
+
+if __name__ == "__main__":
+    main()
