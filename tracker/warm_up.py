@@ -25,11 +25,17 @@ from tracker.camera import Camera
 from tracker.parameters import METHODS, PRESETS, RunParameters, with_values
 from tracker.sequences.sequence import Detections, Entrance, Room, Sequence, Template, View
 
-STEPS = 6
-SIZE = (96, 72)
+STEPS = 36
+EMPTY = 12
+"""Steps before anybody is there, of which the background is learnt."""
+
+SIZE = (160, 120)
 """Pixels of a picture."""
 
 _HALF_EXTENTS = np.array([0.3, 0.3, 0.84])
+_WAYS = (((-1.2, 0.2, 0.84), (1.2, 0.2, 0.84)), ((1.2, -0.3, 0.84), (-1.2, -0.3, 0.84)))
+"""Where each of two people comes from and goes to, metres: they pass each other."""
+
 _COLOURS = ((40, 40, 220), (220, 60, 40))
 """Of the two people, blue green red."""
 
@@ -40,7 +46,7 @@ _OTHER_WAYS = (
     {"fusion.update": "unscented"},
     {"fusion.measurement": "centre", "fusion.motion": "random_walk"},
     {"fusion.measurement": "box_and_width", "fusion.extraction": "boxes"},
-    {"foreground.model": "adaptive"},
+    {"single_view": "colour_phd", "foreground.model": "adaptive"},
 )
 """Values that call kernels which neither the defaults nor a preset call."""
 
@@ -73,21 +79,18 @@ def compile_kernels(
 def _ways() -> Iterator[RunParameters]:
     for preset in PRESETS.values():
         for single_view in METHODS["single_view"]:
-            for method in METHODS["fusion_method"]:
-                chosen = {"single_view": single_view, "fusion_method": method}
-                yield with_values(RunParameters(), {**preset, **chosen})
-    for values in _OTHER_WAYS:
+            yield with_values(RunParameters(), {**preset, "single_view": single_view})
+    for values in (*PRESETS.values(), *_OTHER_WAYS):
         for method in METHODS["fusion_method"]:
-            yield with_values(RunParameters(), {**values, "fusion_method": method})
+            chosen = {"single_view": "none", **values, "fusion_method": method}
+            yield with_values(RunParameters(), chosen)
 
 
 def _recording(folder: Path) -> Sequence:
     """Two cameras, two people who cross a room, as pictures and as boxes."""
     rng = np.random.default_rng(0)
-    paths = [
-        np.linspace(*ends, STEPS)
-        for ends in (((-1, 0.2, 0.84), (1, 0.2, 0.84)), ((1, -0.3, 0.84), (-1, -0.3, 0.84)))
-    ]
+    share = np.linspace(0.0, 1.0, STEPS - EMPTY)[:, None]
+    paths = [np.array(one) * (1.0 - share) + np.array(other) * share for one, other in _WAYS]
     cameras = (_camera("left", -3.2), _camera("right", 3.2))
     views = []
     for camera in cameras:
@@ -95,9 +98,8 @@ def _recording(folder: Path) -> Sequence:
         wall = rng.integers(90, 130, (SIZE[1], SIZE[0], 3), dtype=np.uint8)
         for step in range(STEPS):
             picture = wall.copy()
-            found, visible = camera.project_boxes(
-                np.array([path[step] for path in paths]), _HALF_EXTENTS
-            )
+            people = np.array([path[step - EMPTY] for path in paths if step >= EMPTY])
+            found, visible = camera.project_boxes(people.reshape(-1, 3), _HALF_EXTENTS)
             for box, colour in zip(found[visible], _COLOURS, strict=False):
                 left, top, width, height = box.round().astype(int).tolist()
                 cv2.rectangle(picture, (left, top), (left + width, top + height), colour, -1)
@@ -124,8 +126,8 @@ def _recording(folder: Path) -> Sequence:
         target_half_extents=_HALF_EXTENTS,
         views=tuple(views),
         templates=tuple(
-            Template(f"person{number}", "left", 0, first.boxes[number])
-            for number in range(len(first.boxes[first.at(0)]))
+            Template(f"person{number}", "left", EMPTY, box)
+            for number, box in enumerate(first.boxes[first.at(EMPTY)])
         ),
     )
 
@@ -138,7 +140,7 @@ def _camera(name: str, place: float) -> Camera:
     right = np.cross(ahead, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     rotation = np.stack([right, np.cross(ahead, right), ahead])
-    intrinsics = np.array([[95.0, 0, SIZE[0] / 2], [0, 95.0, SIZE[1] / 2], [0, 0, 1]])
+    intrinsics = np.array([[150.0, 0, SIZE[0] / 2], [0, 150.0, SIZE[1] / 2], [0, 0, 1]])
     distortion = np.array([-0.2, 0.01, 0.001, -0.001, 0.0])
     return Camera(name, SIZE, intrinsics, rotation, -rotation @ position, distortion)
 

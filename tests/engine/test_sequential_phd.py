@@ -303,7 +303,8 @@ def test_the_ends_of_the_ranges_give_no_nonsense(
         assert np.isfinite(posterior.weights).all()
         assert np.isfinite(posterior.means).all()
         assert posterior.size <= parameters.max_components + 20
-        assert posterior.cardinality < 40.0
+        # with p_D 0.05 nearly every false box may be somebody: six a step for thirty steps
+        assert posterior.cardinality < 180.0
         assert (np.linalg.eigvalsh(posterior.covariances) > 0.0).all()
 
 
