@@ -1,0 +1,118 @@
+"""The process that compiles the kernels: seen from the workbench, waited for, and ended."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app import compiling
+from app.compiling import WORDS, Compiling
+from app.jobs import Jobs
+from app.workbench import Workbench
+from tests.app.conftest import wait_until
+from tracker import compilation
+
+
+@pytest.fixture
+def uncompiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine on which no kernel was compiled."""
+    monkeypatch.setattr(compilation, "is_compiled", lambda: False)
+
+
+def instead(monkeypatch: pytest.MonkeyPatch, code: str) -> None:
+    """Another program in place of the one that compiles."""
+    real = subprocess.Popen
+
+    def start(_: list[str], **how: Any) -> Any:
+        return real([sys.executable, "-c", code], **how)
+
+    monkeypatch.setattr(compiling.subprocess, "Popen", start)
+
+
+SLOW = """
+import sys, time
+def say(words):
+    print(words, flush=True)
+say("3 50"); time.sleep(0.4); say("20 50"); say("ready"); time.sleep(30)
+"""
+
+
+def test_a_sequence_is_shown_when_its_kernels_are_there(
+    uncompiled: None, monkeypatch: pytest.MonkeyPatch, data: Path
+) -> None:
+    instead(monkeypatch, SLOW)
+    said: list[str] = []
+    bench = Workbench()
+    told: list[tuple[str, int, int]] = []
+
+    def note(change: str) -> None:
+        opening = bench.snapshot().opening
+        if opening is not None:
+            told.append((opening.message, opening.done, opening.total))
+
+    bench.subscribe(note)
+    worker = Compiling(said.append)
+    jobs = Jobs(bench, data=data, compiling=worker)
+    jobs.open("crossing").result(30.0)
+    assert said == [WORDS]
+    assert (WORDS, 3, 50) in told
+    wait_until(lambda: bench.snapshot().run_state.state == "done")
+    begin = time.monotonic()
+    jobs.close()
+    assert time.monotonic() - begin < 5.0
+    process = worker._process
+    assert process is not None
+    assert process.wait(10.0) != 0, "what goes on for the other methods ends with the workbench"
+
+
+def test_where_everything_is_compiled_nothing_starts(monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(compilation, "is_compiled", lambda: True)
+    monkeypatch.setattr(compiling.subprocess, "Popen", never)
+    said: list[str] = []
+    worker = Compiling(said.append)
+    worker.wait(never, lambda: False)
+    worker.close()
+    assert said == []
+
+
+@pytest.mark.parametrize("code", ["raise SystemExit(3)", "import os; os.abort()"])
+def test_nobody_waits_for_a_process_that_failed(
+    uncompiled: None,
+    monkeypatch: pytest.MonkeyPatch,
+    code: str,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    instead(monkeypatch, code)
+    worker = Compiling()
+    worker.wait(lambda done, total: None, lambda: False)
+    assert "compiling ended with status" in caplog.text
+
+
+def test_nobody_waits_where_no_process_can_be_started(
+    uncompiled: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError("no more processes")
+
+    monkeypatch.setattr(compiling.subprocess, "Popen", refuse)
+    Compiling().wait(lambda done, total: None, lambda: False)
+
+
+def test_who_does_not_want_the_sequence_any_more_does_not_wait(
+    uncompiled: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    instead(monkeypatch, "import time; time.sleep(30)")
+    worker = Compiling()
+    wanted = threading.Event()
+    threading.Timer(0.2, wanted.set).start()
+    worker.wait(lambda done, total: None, wanted.is_set)
+    worker.close()
