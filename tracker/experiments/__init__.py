@@ -5,7 +5,7 @@ One module a claim; its ``EXPERIMENT`` is entered here under its name.
 
 from __future__ import annotations
 
-from tracker.experiments import cameras, cmc, fig1, fig2, fig3, ppf, sequences
+from tracker.experiments import association, cameras, cmc, fig1, fig2, fig3, ppf, sequences
 from tracker.experiments.experiment import (
     Context,
     Experiment,
@@ -25,6 +25,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         sequences.EXPERIMENT,
         cmc.EXPERIMENT,
         ppf.EXPERIMENT,
+        association.EXPERIMENT,
     )
 }
 """By name, in the order in which ``--all`` runs them."""

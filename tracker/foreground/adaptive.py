@@ -136,6 +136,12 @@ class AdaptiveForeground:
         still = np.full(self._first.shape[:2], 255, dtype=np.uint8)
         return AdaptiveState(self._first.astype(np.uint16) * 256, still)
 
+    def thresholds(self, difference: UInt8[ndarray, "h w 3"]) -> Float[ndarray, " 3"]:
+        """What a pixel must differ by in each channel, grey levels: those of iteration k*."""
+        found = cluster(difference, self._parameters)
+        chosen: ndarray = found.thresholds[found.chosen]
+        return chosen
+
     def step(
         self, state: AdaptiveState, picture: UInt8[ndarray, "h w 3"]
     ) -> tuple[AdaptiveState, Segmentation]:
@@ -153,13 +159,12 @@ class AdaptiveForeground:
             kernels.clear_shadows(
                 difference, picture, shown, DARKEST_SHADOW, SHADOW_TINT, p.least_threshold
             )
-        found = cluster(difference, p)
-        thresholds = found.thresholds[found.chosen]
-        share = found.counts[found.chosen] / (picture.shape[0] * picture.shape[1])
+        thresholds = self.thresholds(difference)
+        different = kernels.above(difference, thresholds)
+        share = cv2.countNonZero(different) / different.size
         if share > BLINDING or cv2.meanStdDev(picture)[1].max() < BLANK:
-            nothing = np.zeros(picture.shape[:2], dtype=np.uint8)
-            return state, Segmentation(nothing, thresholds)
-        mask = clean(kernels.above(difference, thresholds), p.minimum_area)
+            return state, Segmentation(np.zeros_like(different), thresholds)
+        mask = clean(different, p.minimum_area)
         background, still = kernels.update_background(
             state.background,
             state.still,
