@@ -1,4 +1,4 @@
-"""The command line: serve, track, evaluate, experiment, sequences, render, parameters.
+"""The command line: serve, track, evaluate, experiment, benchmark, sequences, …
 
 Status 0 for success, 1 for a failure told in one line on standard error, 2 for
 wrong usage, 130 after Ctrl-C. The engine is imported by the command that needs it.
@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import errno
 import os
+import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 from typing import Any
 
 from app.flags import (
     Arguments,
+    Benchmark,
     Evaluate,
     Experiment,
     Parameters,
@@ -70,6 +73,8 @@ def _run(command: Arguments) -> int:
             from app.experiment import experiment
 
             experiment(command)
+        case Benchmark():
+            return _benchmark(command)
         case Sequences():
             _sequences(command)
         case Render():
@@ -223,6 +228,20 @@ def _track(command: Track) -> None:
 
 
 # the rest
+
+
+def _benchmark(command: Benchmark) -> int:
+    root = Path(__file__).resolve().parent.parent
+    if not (root / "tests" / "benchmarks" / "__main__.py").is_file():
+        raise CommandError(
+            "the benchmarks belong to the source, not to the installed package: get a checkout, "
+            'install it by `pip install --editable ".[test]"`, and run `multiview-phd benchmark` '
+            "from there"
+        )
+    line = [sys.executable, "-m", "tests.benchmarks", *command.names]
+    line += ["--short"] if command.short else []
+    line += ["--json", str(command.json.absolute())] if command.json is not None else []
+    return subprocess.run(line, cwd=root).returncode
 
 
 def _sequences(command: Sequences) -> None:

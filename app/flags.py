@@ -172,6 +172,20 @@ class Render:
 
 
 @dataclass
+class Benchmark:
+    """Measure this machine: kernels, filters, pipeline, growth and server. From a checkout only."""
+
+    names: Annotated[
+        Positional[tuple[str, ...]],
+        arg(metavar="[NAME …]", help="Which parts; all, if none is named."),
+    ] = ()
+    short: FlagCreatePairsOff[bool] = False
+    """The form of a minute or two that the checks run."""
+    json: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
+    """Write the figures to this file as well, with the machine and the versions."""
+
+
+@dataclass
 class Parameters:
     """List every parameter with its range, unit, default and meaning."""
 
@@ -244,7 +258,7 @@ def _evaluate_with_flags() -> Any:
     return with_flags
 
 
-Arguments = Serve | Track | Evaluate | Experiment | Sequences | Render | Parameters
+Arguments = Serve | Track | Evaluate | Experiment | Benchmark | Sequences | Render | Parameters
 
 
 def parse(arguments: list[str] | None = None) -> Arguments:
@@ -258,6 +272,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         | Annotated[track, subcommand("track")]
         | Annotated[evaluate, subcommand("evaluate")]
         | Annotated[Experiment, subcommand("experiment")]
+        | Annotated[Benchmark, subcommand("benchmark")]
         | Annotated[Sequences, subcommand("sequences")]
         | Annotated[Render, subcommand("render")]
         | Annotated[Parameters, subcommand("parameters")]

@@ -90,6 +90,36 @@ def test_stage_1_is_kept_for_the_next_run_unless_told_otherwise(
     assert "was kept" not in run(*line, "--no-cache")[2]
 
 
+def test_benchmarks_run_from_a_checkout(
+    run: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines: list[tuple[list[str], Path]] = []
+
+    def note(line: list[str], cwd: Path) -> subprocess.CompletedProcess[str]:
+        lines.append((line[1:], cwd))
+        return subprocess.CompletedProcess(line, 1)
+
+    monkeypatch.setattr(cli.subprocess, "run", note)
+    wanted = tmp_path / "figures.json"
+    assert run("benchmark", "kernels", "targets", "--short", "--json", wanted)[0] == 1
+    ((line, where),) = lines
+    assert line == [
+        *("-m", "tests.benchmarks", "kernels", "targets", "--short"),
+        *("--json", str(wanted)),
+    ]
+    assert (where / "tests" / "benchmarks" / "__main__.py").is_file()
+
+
+def test_an_installed_package_says_where_its_benchmarks_are(
+    run: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cli, "__file__", str(tmp_path / "site-packages" / "app" / "cli.py"))
+    status, _, stderr = run("benchmark")
+    assert status == 1
+    assert "get a checkout" in stderr
+    assert len(stderr.strip().splitlines()) == 1
+
+
 def test_every_parameter_has_its_flag() -> None:
     for key, parameter in PARAMETERS.items():
         flag = "--" + key.replace("_", "-")
