@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-from tests.benchmarks import jpda, kernels, pipeline, server, targets
+from tests.benchmarks import growth, jpda, kernels, live, pipeline, server, targets
 from tests.benchmarks.measure import Measurement, machine
 
 SUITES = {
@@ -15,6 +15,8 @@ SUITES = {
     "targets": targets.run,
     "jpda": jpda.run,
     "pipeline": pipeline.run,
+    "growth": growth.run,
+    "live": live.run,
     "server": server.run,
 }
 

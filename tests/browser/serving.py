@@ -43,9 +43,12 @@ class Server:
             env=self._environment,
         )
         assert self.process.stdout is not None
-        line = self.process.stdout.readline()
-        found = re.search(r"http://[\w.]+:(\d+)", line)
-        assert found, f"the server did not say where it is: {line}"
+        said, found = "", None
+        while found is None:  # it may say first that it compiles its kernels
+            line = self.process.stdout.readline()
+            assert line, f"the server did not say where it is: {said}"
+            said += line
+            found = re.search(r"http://[\w.]+:(\d+)", line)
         self.port = int(found[1])
 
     @property
