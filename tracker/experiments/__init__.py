@@ -5,7 +5,17 @@ One module a claim; its ``EXPERIMENT`` is entered here under its name.
 
 from __future__ import annotations
 
-from tracker.experiments import association, cameras, cmc, fig1, fig2, fig3, ppf, sequences
+from tracker.experiments import (
+    association,
+    cameras,
+    cmc,
+    fig1,
+    fig2,
+    fig3,
+    methods,
+    ppf,
+    sequences,
+)
 from tracker.experiments.experiment import (
     Context,
     Experiment,
@@ -26,6 +36,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         cmc.EXPERIMENT,
         ppf.EXPERIMENT,
         association.EXPERIMENT,
+        methods.EXPERIMENT,
     )
 }
 """By name, in the order in which ``--all`` runs them."""
