@@ -218,6 +218,8 @@ class Controls:
                     label = "• Method" if key in changed else "Method"
                 handle.label = label
             shown = self._shown_keys(parameters)
+            for key, handle in self._inputs.items():
+                handle.visible = key in shown
             groups = {table.PARAMETERS[key].group for key in shown if key in table.PARAMETERS}
             for group, folders in self._groups.items():
                 for folder in folders:

@@ -18,11 +18,12 @@ from tracker.parameters.changing import (
     value,
     with_values,
 )
-from tracker.parameters.colour_phd import ColourPhdParams
+from tracker.parameters.colour_phd import ColourPeakParams, ColourPhdParams
 from tracker.parameters.definition import Params, Stage
 from tracker.parameters.detections import DetectionBoxParams, DetectionPhdParams
 from tracker.parameters.foreground import ForegroundParams
 from tracker.parameters.fusion import FusionParams
+from tracker.parameters.jpda import JpdaParams
 from tracker.parameters.pseudo_particle import PseudoParticleParams
 from tracker.parameters.run import FusionName, RunParameters, SingleViewName
 from tracker.parameters.table import GROUPS, METHODS, PARAMETERS, PRESETS, Parameter
@@ -33,12 +34,14 @@ __all__ = [
     "PARAMETERS",
     "PRESETS",
     "AssociationMatrixParams",
+    "ColourPeakParams",
     "ColourPhdParams",
     "DetectionBoxParams",
     "DetectionPhdParams",
     "ForegroundParams",
     "FusionName",
     "FusionParams",
+    "JpdaParams",
     "Parameter",
     "ParameterError",
     "Params",

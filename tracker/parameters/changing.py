@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Mapping
 from typing import Any
 
+from tracker.parameters.colour_phd import ColourPeakParams
 from tracker.parameters.definition import Stage
 from tracker.parameters.run import FOREGROUND_METHODS, RunParameters
 from tracker.parameters.table import METHODS, PARAMETERS, Parameter
@@ -101,16 +102,31 @@ def changed(parameters: RunParameters, reference: RunParameters | None = None) -
 
 def stage_values(parameters: RunParameters, stage: Stage) -> dict[str, Any]:
     """What the result of one stage depends on by itself: its method and its parameters."""
-    single_view = "detection_boxes" if parameters.single_view == "none" else parameters.single_view
-    groups: set[str] = {single_view} if stage == "single_view" else {"fusion"}
-    if stage == "single_view" and parameters.single_view in FOREGROUND_METHODS:
-        groups.add("foreground")
     values: dict[str, Any] = {}
     if stage == "single_view":
         values["single_view"] = parameters.single_view
     if stage == "fusion":
         values["fusion_method"] = parameters.fusion_method
     for key, parameter in PARAMETERS.items():
-        if parameter.group in groups and parameter.stage == stage:
+        if parameter.stage == stage and (stage != "single_view" or _reads(parameters, parameter)):
             values[key] = value(parameters, key)
     return values
+
+
+def _reads(parameters: RunParameters, parameter: Parameter) -> bool:
+    """Whether the chosen single-view method reads a number."""
+    method, group = parameters.single_view, parameter.group
+    if group == ("detection_boxes" if method == "none" else method):
+        return True
+    if method == "jpda":
+        source = parameters.jpda.measurements
+        return (
+            (group == "foreground" and source != "detections")
+            or (group == "detection_boxes" and source == "detections")
+            or (
+                group == "colour_phd"
+                and source == "colour"
+                and parameter.name in ColourPeakParams.model_fields
+            )
+        )
+    return group == "foreground" and method in FOREGROUND_METHODS

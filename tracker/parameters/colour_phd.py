@@ -13,16 +13,8 @@ from pydantic import Field
 from tracker.parameters.definition import Params, ui
 
 
-class ColourPhdParams(Params):
-    """Single-view GM-PHD filter on colour likelihood ([ZW21] §2.1–2.3)."""
-
-    survival_probability: Annotated[float, Field(ge=0.5, le=1.0), ui("p_S", step=0.001)] = 0.99
-    """Probability that a person in the picture is still there a step later."""
-
-    detection_probability: Annotated[
-        float, Field(ge=0.05, le=1.0), ui("p_D", step=0.01, published=0.98)
-    ] = 0.8
-    """Probability that a person in the picture makes a colour peak."""
+class ColourPeakParams(Params):
+    """Peaks of the colour likelihood ([ZW21] §2.2)."""
 
     colour_space: Annotated[Literal["hue_saturation", "rgb"], ui("u", published="rgb")] = (
         "hue_saturation"
@@ -79,6 +71,28 @@ class ColourPhdParams(Params):
     ] = 0.8
     """Width of the mean shift's kernel."""
 
+    centre_sigma: Annotated[
+        float, Field(ge=0.02, le=3.0), ui("σ_x", unit="half sizes", step=0.01, log=True)
+    ] = 0.5
+    """Standard deviation of a peak's centre."""
+
+    size_sigma: Annotated[
+        float, Field(ge=0.02, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
+    ] = 0.5
+    """Standard deviation of a peak's half sizes: colour alone hardly tells them."""
+
+
+class ColourPhdParams(ColourPeakParams):
+    """Single-view GM-PHD filter on colour likelihood ([ZW21] §2.1–2.3)."""
+
+    survival_probability: Annotated[float, Field(ge=0.5, le=1.0), ui("p_S", step=0.001)] = 0.99
+    """Probability that a person in the picture is still there a step later."""
+
+    detection_probability: Annotated[
+        float, Field(ge=0.05, le=1.0), ui("p_D", step=0.01, published=0.98)
+    ] = 0.8
+    """Probability that a person in the picture makes a colour peak."""
+
     motion_sigma: Annotated[
         float, Field(ge=0.1, le=50.0), ui("σ_w", unit="half sizes/√s", step=0.1, log=True)
     ] = 3.0
@@ -103,16 +117,6 @@ class ColourPhdParams(Params):
         float, Field(ge=0.001, le=50.0), ui("λ_c", unit="1/step", step=0.1, log=True)
     ] = 1.0
     """Expected number of peaks that are nobody, uniform over the picture and the sizes."""
-
-    centre_sigma: Annotated[
-        float, Field(ge=0.02, le=3.0), ui("σ_x", unit="half sizes", step=0.01, log=True)
-    ] = 0.5
-    """Standard deviation of a peak's centre."""
-
-    size_sigma: Annotated[
-        float, Field(ge=0.02, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
-    ] = 0.5
-    """Standard deviation of a peak's half sizes: colour alone hardly tells them."""
 
     pruning_threshold: Annotated[float, Field(ge=1e-8, le=0.1), ui("T", log=True)] = 1e-4
     """Components lighter than this are dropped."""

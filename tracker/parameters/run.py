@@ -10,10 +10,11 @@ from tracker.parameters.definition import Params
 from tracker.parameters.detections import DetectionBoxParams, DetectionPhdParams
 from tracker.parameters.foreground import ForegroundParams
 from tracker.parameters.fusion import FusionParams
+from tracker.parameters.jpda import JpdaParams
 from tracker.parameters.pseudo_particle import PseudoParticleParams
 
 SingleViewName = Literal[
-    "colour_phd", "pseudo_particle", "association_matrix", "detection_phd", "none"
+    "colour_phd", "jpda", "pseudo_particle", "association_matrix", "detection_phd", "none"
 ]
 FusionName = Literal["sequential_phd", "multi_bernoulli"]
 
@@ -34,6 +35,7 @@ class RunParameters(Params):
     """Method of stage 2: how the cameras' boxes become 3D positions."""
 
     colour_phd: ColourPhdParams = ColourPhdParams()
+    jpda: JpdaParams = JpdaParams()
     pseudo_particle: PseudoParticleParams = PseudoParticleParams()
     association_matrix: AssociationMatrixParams = AssociationMatrixParams()
     detection_boxes: DetectionBoxParams = DetectionBoxParams()

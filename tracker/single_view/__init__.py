@@ -8,6 +8,7 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.association_matrix import AssociationMatrix
 from tracker.single_view.colour_phd import ColourPhd
 from tracker.single_view.detection_phd import DetectionPhd
+from tracker.single_view.jpda import Jpda
 from tracker.single_view.none import DetectionBoxes
 from tracker.single_view.protocol import SingleViewMethod, ViewResult
 from tracker.single_view.pseudo_particle import PseudoParticle
@@ -35,6 +36,8 @@ def create(
         return AssociationMatrix(
             sequence, camera_index, parameters.association_matrix, parameters.foreground, reader
         )
+    if name == "jpda":
+        return Jpda(sequence, camera_index, parameters, reader)
     if name == "detection_phd":
         return DetectionPhd(sequence, camera_index, parameters.detection_phd)
     if name == "pseudo_particle":

@@ -15,7 +15,7 @@ from numpy import ndarray
 
 from tracker import mean_shift
 from tracker.gaussian_mixture import GaussianMixture
-from tracker.parameters import ColourPhdParams, ForegroundParams
+from tracker.parameters import ColourPeakParams, ForegroundParams
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.appearance import Appearance, Scene
@@ -57,7 +57,7 @@ class PeakFinder:
         self,
         sequence: Sequence,
         camera_index: int,
-        parameters: ColourPhdParams,
+        parameters: ColourPeakParams,
         foreground: ForegroundParams,
         reader: FrameReader,
     ) -> None:

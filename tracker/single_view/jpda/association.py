@@ -1,0 +1,86 @@
+"""The association matrix of one step: which target may have made which measurement."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+from scipy.special import gammaln
+
+from tracker import association
+from tracker.association import MOST_ITEMS, Marginals
+from tracker.parameters import JpdaParams
+from tracker.single_view.jpda.targets import Innovations
+
+
+def associate(
+    found: Innovations,
+    possible: Bool[ndarray, "n M"],
+    area: float,
+    parameters: JpdaParams,
+) -> tuple[Float[ndarray, "n M"], Int[ndarray, " n"]]:
+    """Association probabilities β_tj, and the likeliest joint event.
+
+    By Bayes' rule a joint event has the weight Π_t P_D Λ_tj or 1 − P_D P_G, times
+
+    * **poisson**: λ_c / area for each false measurement;
+    * **diffuse**, as published: Φ! / V^Φ, of whose number Φ nothing is known. V is one
+      number for all gates, so it is taken in units of √|S|, as is then Λ.
+
+    Groups of targets that share no measurement are independent.
+
+    Args:
+        found: How the measurements lie to the predictions.
+        possible: What lies in whose gate: the validation matrix without its column of false
+            alarms, turned.
+        area: Of the picture, square pixels.
+        parameters: P_D, P_G, which joint events, and what is known of Φ.
+
+    Returns:
+        β_tj, and the measurement that the likeliest joint event gives each target, or -1.
+    """
+    p = parameters
+    targets, count = possible.shape
+    matrix = np.zeros((targets, count))
+    own = np.full(targets, -1, dtype=np.int64)
+    densities, clutter = found.densities, p.clutter_rate / area
+    if p.clutter == "diffuse":
+        densities = densities * np.sqrt(np.linalg.det(found.covariances))
+        clutter = 1.0 / p.gate_volume
+    detected = np.where(possible, p.detection_probability * densities, 0.0)
+    # a density can be so small that it is 0 inside its gate; the pair stays possible
+    detected[possible] = np.maximum(detected[possible], np.finfo(float).tiny)
+    miss = 1.0 - p.detection_probability * p.gate_probability
+    for members, shared in association.clusters(possible):
+        if not len(shared):
+            continue
+        part = np.ix_(members, shared)
+        weights = (np.full(len(members), miss), detected[part], np.full(len(shared), clutter))
+        matrix[part] = _marginals(*weights, p).detected
+        sources = association.murty(*weights, 1).sources[0]
+        own[members[sources[sources >= 0]]] = shared[sources >= 0]
+    return matrix, own
+
+
+def _marginals(
+    missed: Float[ndarray, " n"],
+    detected: Float[ndarray, "n M"],
+    unexplained: Float[ndarray, " M"],
+    p: JpdaParams,
+) -> Marginals:
+    count = len(unexplained)
+    false_counts = np.exp(gammaln(np.arange(count + 1) + 1.0)) if p.clutter == "diffuse" else None
+    if p.association == "exact":
+        if min(detected.shape) <= MOST_ITEMS:
+            return association.exact_marginals(
+                missed, detected, unexplained, false_counts=false_counts
+            )
+        return association.marginals(missed, detected, unexplained)
+    if p.association == "murty":
+        events = association.murty(missed, detected, unexplained, p.events)
+    else:
+        events = association.simplified_murty(missed, detected, unexplained)
+    weights = association.log_weights(
+        events, missed, detected, unexplained, false_counts=false_counts
+    )
+    return association.marginals_of(events, weights)

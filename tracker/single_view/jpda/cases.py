@@ -1,0 +1,159 @@
+"""Five cases that the association matrix tells apart: normal, new, vanished, occluded, split.
+
+[WW10] Wang, Wan, "Fast tracking of multiple targets in video by joint probabilistic
+data association", patent CN101783020A, 2010.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+
+LEAP = 2.0
+"""A measurement may be that of a target whose gate it missed if it is so many half sizes away."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cases:
+    """What the rows and columns of one association matrix say of n targets and M measurements."""
+
+    own: Int[ndarray, " n"]
+    """The measurement that the likeliest joint event gives each target, -1 for none."""
+    shared: Int[ndarray, " n"]
+    """Occluded: the measurement that it shares with others, -1 for none."""
+    split: Bool[ndarray, " n"]
+    """Several measurements are its own and nobody else's."""
+    missed: Bool[ndarray, " n"]
+    """Its column is zero: vanished, once that lasts."""
+    new: Bool[ndarray, " M"]
+    """Its row is zero: somebody new, or back."""
+
+
+def tell_apart(
+    matrix: Float[ndarray, "n M"],
+    own: Int[ndarray, " n"],
+    least_probability: float,
+    *,
+    every_shared_row: bool,
+) -> Cases:
+    """Read the association matrix ([WW10]_; there measurements are rows and targets columns).
+
+    Entries up to ``least_probability`` count as 0.
+
+    * **New**: a measurement whose row is zero.
+    * **Vanished**: a target whose column is zero.
+    * **Occluded**: a row with several positive entries. Two targets close together with a
+      measurement each have such rows too: as published, each of them goes where the
+      likeliest joint event says; else only those count of which some have no measurement
+      of their own.
+    * **Split**: a column with several positive entries in rows of which it has the largest.
+    * **Normal**: all others.
+
+    Args:
+        matrix: β_tj.
+        own: The likeliest joint event.
+        least_probability: β_min.
+        every_shared_row: Whether targets with a measurement each can be occluded.
+    """
+    targets, count = matrix.shape
+    positive = np.asarray(matrix > least_probability)
+    missed = np.asarray(~positive.any(axis=1))
+    new = np.asarray(~positive.any(axis=0))
+    own = np.where(missed, -1, own)
+    if not targets or not count:
+        nobody = np.full(targets, -1)
+        return Cases(own, nobody, nobody >= 0, missed, new)
+    wanted = np.where(own >= 0, own, matrix.argmax(axis=1))
+    wanted[missed] = -1
+    if every_shared_row:
+        together = (positive & (positive.sum(axis=0) > 1)).any(axis=1)
+    else:
+        together = np.bincount(wanted[~missed], minlength=count)[wanted] > 1
+    shared = np.where(~missed & together, wanted, -1)
+    largest = np.zeros_like(positive)
+    largest[matrix.argmax(axis=0), np.arange(count)] = True
+    split = ((positive & largest).sum(axis=1) > 1) & (shared < 0)
+    return Cases(own, shared, split, missed, new)
+
+
+def part_strangers(
+    cases: Cases,
+    matrix: Float[ndarray, "n M"],
+    expected: Float[ndarray, "n 4"],
+    boxes: Float[ndarray, "M 4"],
+) -> tuple[Cases, Float[ndarray, "n M"]]:
+    """Beyond [WW10]_: of a target that splits, only what lies in its own box is a part of it.
+
+    Between two people who have come apart the weighted state would stand still, and its
+    gate would widen with their distance. What lies outside the target's box is somebody
+    new, and its probability goes to the measurement that is the target's own.
+
+    Args:
+        cases: As the matrix has them.
+        matrix: β_tj.
+        expected: The targets' boxes, pixels.
+        boxes: The measurements.
+
+    Returns:
+        The cases and the matrix.
+    """
+    matrix, split, new = matrix.copy(), cases.split.copy(), cases.new.copy()
+    for t in np.flatnonzero(cases.split & (cases.own >= 0)):
+        own = cases.own[t]
+        apart = np.abs(boxes[:, :2] - boxes[own, :2]) / np.maximum(expected[t, 2:], 0.5)
+        strange = (matrix.argmax(axis=0) == t) & (matrix[t] > 0.0) & (apart.max(axis=1) > 1.0)
+        if not strange.any():
+            continue
+        matrix[t, own] += matrix[t, strange].sum()
+        matrix[:, strange] = 0.0
+        new[strange] = True
+        split[t] = ((matrix.argmax(axis=0) == t) & (matrix[t] > 0.0)).sum() > 1
+    return replace(cases, split=split, new=new), matrix
+
+
+def look_into_pieces(
+    cases: Cases,
+    expected: Float[ndarray, "n 4"],
+    boxes: Float[ndarray, "M 4"],
+    pieces: Float[ndarray, "M 4"],
+) -> Cases:
+    """Beyond [WW10]_: what comes together makes a measurement outside everybody's gate.
+
+    A target whose column is zero, and whose expected centre lies in what a measurement was
+    found in, has not vanished. If that measurement is nobody's and near, it is the
+    target's; all other such targets are hidden there.
+
+    Args:
+        cases: As the matrix has them.
+        expected: The targets' boxes, pixels.
+        boxes: The measurements.
+        pieces: What each was found in.
+    """
+    lost = np.flatnonzero(cases.missed)
+    if not len(lost) or not len(boxes):
+        return cases
+    own, shared = cases.own.copy(), cases.shared.copy()
+    missed, new = cases.missed.copy(), cases.new.copy()
+    to_piece = np.abs(expected[lost, None, :2] - pieces[None, :, :2]) / pieces[None, :, 2:]
+    to_box = np.abs(expected[lost, None, :2] - boxes[None, :, :2]) / expected[lost, None, 2:]
+    reach, leap = to_piece.max(axis=2), to_box.max(axis=2)
+    for i in np.argsort(leap.min(axis=1), kind="stable"):
+        covering = np.flatnonzero(reach[i] <= 1.0)
+        if not len(covering):
+            continue
+        # of the measurements of one piece the nearest
+        j = int(covering[leap[i, covering].argmin()])
+        missed[lost[i]] = False
+        if new[j] and leap[i, j] <= LEAP:
+            own[lost[i]] = j
+            new[j] = False
+        else:
+            shared[lost[i]] = j
+    owners = (own >= 0) & (shared < 0) & np.isin(own, shared[shared >= 0])
+    shared[owners] = own[owners]
+    return replace(
+        cases, own=own, shared=shared, missed=missed, new=new, split=cases.split & (shared < 0)
+    )

@@ -1,0 +1,253 @@
+"""What the data association is given: boxes of the foreground, of colour peaks, of a detector.
+
+Boxes are ``centre_x, centre_y, half_width, half_height`` in pixels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from jaxtyping import Float, UInt8
+from numpy import ndarray
+
+from tracker.blobs import blobs
+from tracker.foreground import ForegroundModel, box_shares, integral, learn
+from tracker.gaussian_mixture import GaussianMixture
+from tracker.parameters import ForegroundParams, JpdaParams, RunParameters
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.colour_peaks import PeakFinder
+from tracker.single_view.crowns import TargetSizes, crowns
+from tracker.single_view.detector_boxes import DetectorBoxes, trust
+
+COVER = 2.0
+"""Without a piece of foreground, whoever is hidden lies within so many half sizes of the box."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measured:
+    """The measurements of one step, and what there is to see of how they were found."""
+
+    boxes: Float[ndarray, "M 4"]
+    scores: Float[ndarray, " M"]
+    """0 … 1."""
+    sigmas: Float[ndarray, "M 4"]
+    """Standard deviations of the boxes' numbers, pixels."""
+    pieces: Float[ndarray, "M 4"]
+    """The box of what each was found in: whoever it hides is inside."""
+    shown: Float[ndarray, "S 4"] | None = None
+    """Boxes worth showing that were found out to be nobody's; None for no others."""
+    shown_scores: Float[ndarray, " S"] | None = None
+    samples: Float[ndarray, "S 4"] = field(default_factory=lambda: np.zeros((0, 4)))
+    sample_weights: Float[ndarray, " S"] = field(default_factory=lambda: np.zeros(0))
+    mask: UInt8[ndarray, "h w"] | None = None
+    information: dict[str, float] = field(default_factory=dict)
+
+    @staticmethod
+    def nothing() -> Measured:
+        """There was no picture."""
+        none = np.zeros((0, 4))
+        return Measured(none, np.zeros(0), none, none)
+
+
+class Source(Protocol):
+    """Where one camera's measurements come from."""
+
+    needs_pictures: bool
+
+    def start(self) -> Any:
+        """The state before the first step."""
+        ...
+
+    def measure(
+        self,
+        state: Any,
+        frame: int,
+        picture: UInt8[ndarray, "h w 3"] | None,
+        expected: GaussianMixture,
+        rng: np.random.Generator,
+    ) -> tuple[Any, Measured]:
+        """The measurements of one step.
+
+        Args:
+            state: What the step before returned.
+            frame: The step.
+            picture: BGR; None where there is none.
+            expected: The targets as they are expected, over boxes.
+            rng: The only source of randomness.
+        """
+        ...
+
+    def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
+        """How far boxes of this size are to be trusted, pixels."""
+        ...
+
+
+def source_of(
+    sequence: Sequence, camera_index: int, parameters: RunParameters, reader: FrameReader
+) -> Source:
+    """The chosen source, prepared for one camera.
+
+    Without a single template there are no colours to look for; the foreground says then
+    where people are.
+
+    Raises:
+        ValueError: If the camera lacks what the source needs.
+    """
+    p = parameters.jpda
+    if p.measurements == "detections":
+        return _Detector(sequence, camera_index, parameters)
+    if p.measurements == "colour" and sequence.templates:
+        return _Colours(sequence, camera_index, parameters, reader)
+    view = sequence.views[camera_index]
+    if not view.has_pictures:
+        raise ValueError(
+            f'camera "{view.camera.name}" of {sequence.name} has no pictures; give it a video '
+            "or images in sequence.toml, or set jpda.measurements to detections"
+        )
+    return _Foreground(sequence, camera_index, p, parameters.foreground, reader)
+
+
+class _Foreground:
+    """Boxes of the pieces of foreground, or of a target under each top of a piece."""
+
+    needs_pictures = True
+
+    def __init__(
+        self,
+        sequence: Sequence,
+        camera_index: int,
+        parameters: JpdaParams,
+        foreground: ForegroundParams,
+        reader: FrameReader,
+    ) -> None:
+        self._parameters = parameters
+        self._minimum_area = foreground.minimum_area
+        self._model: ForegroundModel | None = learn(sequence, camera_index, reader, foreground)
+        camera = sequence.views[camera_index].camera
+        self._sizes = (
+            TargetSizes(camera, sequence.room, sequence.target_half_extents)
+            if parameters.foreground_box == "target"
+            else None
+        )
+
+    def start(self) -> Any:
+        return None if self._model is None else self._model.start()
+
+    def measure(
+        self,
+        state: Any,
+        frame: int,
+        picture: UInt8[ndarray, "h w 3"] | None,
+        expected: GaussianMixture,
+        rng: np.random.Generator,
+    ) -> tuple[Any, Measured]:
+        if picture is None or self._model is None:
+            return state, Measured.nothing()
+        state, found = self._model.step(state, picture)
+        if self._sizes is None:
+            boxes = blobs(found.mask, self._minimum_area).boxes
+            pieces = boxes
+            edges = np.concatenate([boxes[:, :2] - boxes[:, 2:], boxes[:, :2] + boxes[:, 2:]], 1)
+            scores = box_shares(integral(found.mask), edges)
+        else:
+            targets = crowns(found.mask, self._sizes, self._minimum_area)
+            boxes, pieces, scores = targets.boxes, targets.pieces, targets.inside
+        return state, Measured(
+            boxes,
+            scores,
+            self.sigmas(boxes),
+            pieces,
+            mask=found.mask,
+            information={"foreground share": float(found.mask.mean())},
+        )
+
+    def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
+        p = self._parameters
+        half_sizes = np.maximum(boxes[:, 2:], 0.5)
+        centres = np.hypot(p.centre_sigma * half_sizes, p.pixel_sigma)
+        return np.concatenate([centres, p.size_sigma * half_sizes], axis=1)
+
+
+class _Colours:
+    """Peaks of the colour likelihood, with the numbers of ``colour_phd``."""
+
+    needs_pictures = True
+
+    def __init__(
+        self,
+        sequence: Sequence,
+        camera_index: int,
+        parameters: RunParameters,
+        reader: FrameReader,
+    ) -> None:
+        self._finder = PeakFinder(
+            sequence, camera_index, parameters.colour_phd, parameters.foreground, reader
+        )
+
+    def start(self) -> Any:
+        return self._finder.start()
+
+    def measure(
+        self,
+        state: Any,
+        frame: int,
+        picture: UInt8[ndarray, "h w 3"] | None,
+        expected: GaussianMixture,
+        rng: np.random.Generator,
+    ) -> tuple[Any, Measured]:
+        if picture is None:
+            return state, Measured.nothing()
+        state, peaks = self._finder.find(state, picture, expected, rng)
+        return state, Measured(
+            peaks.boxes,
+            peaks.scores,
+            self.sigmas(peaks.boxes),
+            peaks.boxes * [1.0, 1.0, COVER, COVER],
+            samples=peaks.samples,
+            sample_weights=peaks.sample_weights,
+            mask=peaks.mask,
+            information=peaks.information,
+        )
+
+    def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
+        return self._finder.sigmas(boxes)
+
+
+class _Detector:
+    """An outside detector's boxes, with the numbers of ``detection_boxes``."""
+
+    needs_pictures = False
+
+    def __init__(self, sequence: Sequence, camera_index: int, parameters: RunParameters) -> None:
+        self._parameters = parameters.detection_boxes
+        self._boxes = DetectorBoxes(sequence, camera_index, self._parameters)
+
+    def start(self) -> None:
+        return None
+
+    def measure(
+        self,
+        state: Any,
+        frame: int,
+        picture: UInt8[ndarray, "h w 3"] | None,
+        expected: GaussianMixture,
+        rng: np.random.Generator,
+    ) -> tuple[Any, Measured]:
+        found = self._boxes.at(frame)
+        good = found.plausible
+        boxes = found.boxes[good]
+        return state, Measured(
+            boxes,
+            found.scores[good],
+            found.sigmas[good],
+            boxes * [1.0, 1.0, COVER, COVER],
+            shown=found.boxes,
+            shown_scores=found.scores,
+            information={"boxes outside the room": float((~good).sum())},
+        )
+
+    def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
+        return trust(boxes, self._parameters)

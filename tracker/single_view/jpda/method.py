@@ -1,0 +1,225 @@
+"""Tracking in one camera by joint probabilistic data association, with five cases.
+
+[WW10] Wang, Wan, "Fast tracking of multiple targets in video by joint probabilistic
+data association", patent CN101783020A, 2010.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from jaxtyping import UInt8
+from numpy import ndarray
+from scipy.stats import chi2
+
+from tracker.association import validation_matrix
+from tracker.foreground import pack
+from tracker.parameters import RunParameters
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.jpda.association import associate
+from tracker.single_view.jpda.cases import Cases, look_into_pieces, part_strangers, tell_apart
+from tracker.single_view.jpda.lives import Lives, live_on
+from tracker.single_view.jpda.measurements import Measured, source_of
+from tracker.single_view.jpda.moves import Moved, move
+from tracker.single_view.jpda.targets import Targets, innovations
+from tracker.single_view.protocol import ViewEvent, ViewResult
+
+LONGEST_HIDDEN = 4.0
+"""Seconds after which somebody who never came out from behind another is given up."""
+
+BELIEVED = 0.5
+"""A measurement that targets explain with more than this probability is somebody's."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JpdaState:
+    """Who is there, who was until a moment ago, and the next free label."""
+
+    targets: Targets
+    vanished: Targets
+    """Their misses count since they were last measured."""
+    next_label: int
+    source: Any
+    """Of the measurements' source."""
+
+
+class Jpda:
+    """Kalman filters that share the measurements by their association probabilities ([WW10]_).
+
+    State [p_x, v_x, p_y, v_y], constant velocity, measured at the position; the box's
+    size is smoothed along. Per step: the validation matrix says what lies in whose gate;
+    joint events, and Bayes' rule for each, make the association matrix β; its rows and
+    columns tell five cases apart (:func:`~tracker.single_view.jpda.cases.tell_apart`):
+
+    * normal and split targets take the mean over all associations;
+    * occluded ones take the measurement's position and stand still, or, beyond the patent,
+      go on as they were, but inside the piece that hides them;
+    * a target without measurement goes on, and has vanished after three steps;
+    * a measurement of nobody is compared with who vanished in the last few steps before
+      it is somebody new; both begin at rest.
+
+    Without the five cases this is the classical filter: targets begin where nothing is
+    expected, end when they are not measured, and everybody else takes the mean.
+    """
+
+    def __init__(
+        self,
+        sequence: Sequence,
+        camera_index: int,
+        parameters: RunParameters,
+        reader: FrameReader,
+    ) -> None:
+        """Prepare for one camera.
+
+        Raises:
+            ValueError: If the camera lacks what the measurements are made from.
+        """
+        self._parameters = p = parameters.jpda
+        self._source = source_of(sequence, camera_index, parameters, reader)
+        self.needs_pictures = self._source.needs_pictures
+        self._step_time = sequence.step_time
+        self._longest_hidden = max(1, round(LONGEST_HIDDEN * sequence.fps))
+        self._gate = float(chi2.ppf(p.gate_probability, df=2))
+        width, height = sequence.cameras[camera_index].image_size
+        self._area = float(width * height)
+
+    def start(self) -> JpdaState:
+        """Nobody is in the picture."""
+        return JpdaState(Targets.empty(), Targets.empty(), 1, self._source.start())
+
+    def step(
+        self,
+        state: JpdaState,
+        frame: int,
+        picture: UInt8[ndarray, "h w 3"] | None,
+        rng: np.random.Generator,
+    ) -> tuple[JpdaState, ViewResult]:
+        """One step; without a picture nothing is measured."""
+        p = self._parameters
+        expected = state.targets.predict(self._step_time, p.acceleration_sigma)
+        vanished = state.vanished.predict(self._step_time, p.acceleration_sigma)
+        vanished = replace(vanished, misses=vanished.misses + 1)
+        boxes = expected.as_boxes(self._source.sigmas(expected.boxes))
+        source, seen = self._source.measure(state.source, frame, picture, boxes, rng)
+        found = innovations(expected, seen.boxes[:, :2], seen.sigmas[:, :2])
+        possible = validation_matrix(found.squared, self._gate)[:, 1:].T
+        matrix, own = associate(found, possible, self._area, p)
+        cases, matrix = self._cases(expected, matrix, own, seen)
+        moved = move(expected, found, matrix, cases, seen, p)
+        lives = live_on(
+            moved.targets,
+            vanished,
+            state.next_label,
+            cases.new,
+            seen,
+            p,
+            gate=self._gate,
+            longest_hidden=self._longest_hidden,
+        )
+        result = self._result(expected, seen, cases, moved, lives)
+        return JpdaState(lives.targets, lives.vanished, lives.next_label, source), result
+
+    def _cases(
+        self, expected: Targets, matrix: ndarray, own: ndarray, seen: Measured
+    ) -> tuple[Cases, ndarray]:
+        p = self._parameters
+        if not p.five_cases:
+            cases = tell_apart(matrix, own, 0.0, every_shared_row=False)
+            nobody = np.full(expected.size, -1)
+            return replace(cases, shared=nobody, split=nobody >= 0), matrix
+        inside = p.occlusion == "inside"
+        cases = tell_apart(matrix, own, p.least_probability, every_shared_row=not inside)
+        if inside:
+            cases, matrix = part_strangers(cases, matrix, expected.boxes, seen.boxes)
+            cases = look_into_pieces(cases, expected.boxes, seen.boxes, seen.pieces)
+        return cases, matrix
+
+    def _result(
+        self, expected: Targets, seen: Measured, cases: Cases, moved: Moved, lives: Lives
+    ) -> ViewResult:
+        p, targets = self._parameters, lives.targets
+        # those that are back or new are where they were measured
+        arrived = np.ones(len(lives.sources))
+        weights = np.concatenate([_weights(moved, cases)[lives.stayed], arrived])
+        counting = targets.labels > 0
+        shown = np.flatnonzero(counting)
+        estimates = targets.boxes[shown]
+        if p.output == "measurements":
+            boxes, sigmas, box_weights, labels = self._believed(seen, moved, lives)
+        else:
+            seen_now = counting & (targets.misses == 0)
+            if p.occlusion == "inside":
+                seen_now &= targets.hidden == 0  # nobody knows where exactly
+            chosen = np.flatnonzero(seen_now)
+            boxes, box_weights = targets.boxes[chosen], weights[chosen]
+            sigmas, labels = self._source.sigmas(boxes), targets.labels[chosen]
+        return ViewResult(
+            boxes=boxes,
+            weights=box_weights,
+            labels=labels,
+            sigmas=sigmas,
+            estimates=estimates,
+            estimate_weights=weights[shown],
+            estimate_labels=targets.labels[shown],
+            measurements=seen.boxes if seen.shown is None else seen.shown,
+            measurement_scores=seen.scores if seen.shown_scores is None else seen.shown_scores,
+            samples=seen.samples.astype(np.float32),
+            sample_weights=seen.sample_weights.astype(np.float32),
+            information={**seen.information, "newcomers": float((~counting).sum())},
+            events=_events(expected, cases, moved, lives),
+            gates=self._gates(expected),
+            foreground=None if seen.mask is None else pack(seen.mask),
+        )
+
+    def _believed(
+        self, seen: Measured, moved: Moved, lives: Lives
+    ) -> tuple[ndarray, ndarray, ndarray, ndarray]:
+        """The measurements that are somebody's: boxes, sigmas, probabilities and labels."""
+        after = len(lives.targets.labels)
+        matrix = np.zeros((after, len(seen.boxes)))
+        matrix[: len(lives.stayed)] = moved.matrix[lives.stayed]
+        matrix[np.arange(len(lives.stayed), after), lives.sources] = 1.0
+        matrix = matrix[lives.targets.labels > 0]
+        labels = lives.targets.labels[lives.targets.labels > 0]
+        explained = matrix.sum(axis=0)
+        taken = np.flatnonzero(explained > BELIEVED)
+        if not len(taken):
+            return seen.boxes[:0], seen.sigmas[:0], np.zeros(0), np.zeros(0, dtype=np.int64)
+        whose = labels[matrix[:, taken].argmax(axis=0)]
+        return seen.boxes[taken], seen.sigmas[taken], np.minimum(explained[taken], 1.0), whose
+
+    def _gates(self, expected: Targets) -> ndarray:
+        """The gates of measurements of the targets' own sizes."""
+        counting = expected.take(np.flatnonzero(expected.labels > 0))
+        noise = self._source.sigmas(counting.boxes)[:, :2] ** 2
+        spread = counting.place_covariances + noise[:, :, None] * np.eye(2)
+        border = self._gate * spread[:, [0, 0, 1], [0, 1, 1]]
+        return np.concatenate([counting.positions, border], axis=1)
+
+
+def _weights(moved: Moved, cases: Cases) -> ndarray:
+    """The probability that each target was measured; of the hidden ones nobody knows."""
+    weights = np.minimum(moved.matrix.sum(axis=1), 1.0)
+    return np.where(moved.hidden, 0.5, weights)
+
+
+def _events(expected: Targets, cases: Cases, moved: Moved, lives: Lives) -> tuple[ViewEvent, ...]:
+    """What happened to whom; of newcomers that do not count yet nothing is told."""
+    labels = expected.labels
+    events = []
+    for j in np.unique(cases.shared[cases.shared >= 0]):
+        group = np.flatnonzero((cases.shared == j) & (labels > 0))
+        if len(group) > 1 and moved.hidden[group].any():
+            events.append(ViewEvent("occluded", tuple(sorted(labels[group].tolist()))))
+    for label in labels[cases.split & (labels > 0)].tolist():
+        events.append(ViewEvent("split", (label,)))
+    for label in lives.vanished_labels:
+        events.append(ViewEvent("vanished", (label,)))
+    for label in lives.returned_labels:
+        events.append(ViewEvent("returned", (label,)))
+    for label in lives.new_labels:
+        events.append(ViewEvent("new", (label,)))
+    return tuple(events)

@@ -1,0 +1,139 @@
+"""Where the targets of one step are: by all associations, by one, or behind somebody."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray
+
+from tracker.parameters import JpdaParams
+from tracker.single_view.jpda import targets as kalman
+from tracker.single_view.jpda.cases import Cases
+from tracker.single_view.jpda.measurements import Measured
+from tracker.single_view.jpda.targets import Innovations, Targets, innovations
+
+SAME_SIZE = 1.5
+"""A measurement that differs from its target's box by more than this factor is not of it alone."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moved:
+    """The targets after one step, in the order of before."""
+
+    targets: Targets
+    matrix: Float[ndarray, "n M"]
+    """β_tj as it was used."""
+    hidden: Bool[ndarray, " n"]
+    """Occluded, and not the one in front."""
+
+
+def move(
+    targets: Targets,
+    found: Innovations,
+    matrix: Float[ndarray, "n M"],
+    cases: Cases,
+    seen: Measured,
+    parameters: JpdaParams,
+) -> Moved:
+    """Update every target by its case.
+
+    Args:
+        targets: Predicted.
+        found: How the measurements lie to them.
+        matrix: β_tj.
+        cases: What is to be done with each.
+        seen: The measurements.
+        parameters: What occluded targets do, and those that come out.
+    """
+    p = parameters
+    hidden = cases.shared >= 0
+    if p.occlusion == "inside":
+        hidden &= ~((cases.own == cases.shared) & _alike(targets, cases, seen))
+    if p.occlusion == "inside":
+        matrix = _one_each(targets, cases, matrix)
+    # whom the update by all associations is not for
+    matrix = np.where((hidden | cases.missed)[:, None], 0.0, matrix)
+    moved = kalman.update(targets, found, matrix)
+    moved = replace(moved, half_sizes=_sizes(targets, cases, hidden, matrix, seen, p))
+    for t in np.flatnonzero(hidden):
+        moved = _put(moved, int(t), _behind(targets, int(t), int(cases.shared[t]), seen, p))
+    # who is measured by himself is hidden by nobody, even if he stands still for it
+    lost = hidden & ((cases.own != cases.shared) | (p.occlusion == "inside"))
+    return Moved(
+        replace(
+            moved,
+            hits=np.where(cases.missed, 0, targets.hits + 1),
+            misses=np.where(cases.missed, targets.misses + 1, 0),
+            hidden=np.where(lost, targets.hidden + 1, 0),
+        ),
+        matrix,
+        hidden,
+    )
+
+
+def _alike(targets: Targets, cases: Cases, seen: Measured) -> Bool[ndarray, " n"]:
+    """Whether each target's own measurement is of about its size; false where it has none."""
+    alike = np.zeros(targets.size, dtype=bool)
+    there = np.flatnonzero(cases.own >= 0)
+    ratios = np.log(seen.boxes[cases.own[there], 2:] / targets.half_sizes[there])
+    alike[there] = (np.abs(ratios) < np.log(SAME_SIZE)).all(axis=1)
+    return alike
+
+
+def _one_each(
+    targets: Targets, cases: Cases, matrix: Float[ndarray, "n M"]
+) -> Float[ndarray, "n M"]:
+    """The matrix with a single 1 in the rows of targets that take one measurement alone.
+
+    That are those in front of others, and those which come out of an occlusion: where
+    two were in one place the mean over all associations would keep both between the two.
+    And those whose measurement was found outside their gate.
+    """
+    there = np.flatnonzero(cases.own >= 0)
+    leapt = matrix[there, cases.own[there]] == 0.0
+    alone = there[leapt | (targets.hidden[there] > 0) | (cases.shared[there] >= 0)]
+    result = matrix.copy()
+    result[alone] = 0.0
+    result[alone, cases.own[alone]] = 1.0
+    return result
+
+
+def _sizes(
+    targets: Targets,
+    cases: Cases,
+    hidden: Bool[ndarray, " n"],
+    matrix: Float[ndarray, "n M"],
+    seen: Measured,
+    p: JpdaParams,
+) -> Float[ndarray, "n 2"]:
+    """Half sizes after a step: they follow the measurements of targets that are seen whole."""
+    whole = ~(hidden | cases.split | cases.missed)
+    shares = matrix.sum(axis=1, keepdims=True)
+    measured = matrix @ seen.boxes[:, 2:] + (1.0 - shares) * targets.half_sizes
+    followed = targets.half_sizes + p.size_rate * (measured - targets.half_sizes)
+    return np.where(whole[:, None], followed, targets.half_sizes)
+
+
+def _behind(targets: Targets, t: int, j: int, seen: Measured, p: JpdaParams) -> Targets:
+    """One occluded target: at rest at the measurement, or going on inside its piece."""
+    one = targets.take(np.array([t]))
+    if p.occlusion == "measurement":
+        place = np.concatenate([seen.boxes[j, :2], one.half_sizes[0]])
+        rest = Targets.at_rest(place[None], seen.sigmas[[j]], p.velocity_sigma, one.labels)
+        return replace(one, means=rest.means, covariances=rest.covariances)
+    room = np.maximum(seen.pieces[j, 2:] - one.half_sizes[0], 0.0)
+    middle = seen.pieces[j, :2]
+    nearest = np.clip(one.positions[0], middle - room, middle + room)
+    # no innovation while it is inside; how far it may be off, the piece tells
+    unsure = np.hypot(room, seen.sigmas[j, :2])
+    found = innovations(one, nearest[None], unsure[None])
+    return kalman.update(one, found, np.ones((1, 1)))
+
+
+def _put(targets: Targets, t: int, one: Targets) -> Targets:
+    """The targets with one of them elsewhere."""
+    means, covariances = targets.means.copy(), targets.covariances.copy()
+    means[t], covariances[t] = one.means[0], one.covariances[0]
+    return replace(targets, means=means, covariances=covariances)
