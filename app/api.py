@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 
-from app import models, results
+from app import models, results, steps
 from app.errors import ApiError, ErrorBody, sentence
 from app.jobs import Jobs
 from app.pictures import Pictures
@@ -181,18 +181,16 @@ async def set_layers(wish: models.LayerChanges, bench: Bench) -> models.State:
 
 @router.post("/view")
 async def view(wish: models.ViewChange, bench: Bench) -> models.State:
-    """Look through a camera in 3D, or freely again."""
-    snapshot = bench.snapshot()
-    count = len(snapshot.sequence.views) if snapshot.sequence is not None else 0
-    if wish.camera is not None and not 0 <= wish.camera < count:
-        raise ApiError(
-            422,
-            "no_camera",
-            f"camera: expected an index below {count} or null, got {wish.camera}",
-            field="camera",
-        )
-    bench.view(wish.camera)
-    return results.state_of(snapshot)
+    """Look through a camera in 3D, from above, or freely again."""
+    bench.look(wish.camera)
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/theme")
+async def theme(wish: models.ThemeChange, bench: Bench) -> models.State:
+    """Have the 3D view dark or light, as the page is."""
+    bench.set_theme(wish.theme)
+    return results.state_of(bench.snapshot())
 
 
 @router.get(
@@ -218,6 +216,7 @@ async def step(
     step: int,
     bench: Bench,
     samples: Annotated[bool, Query(description="With each camera's samples.")] = False,
+    trails: Annotated[bool, Query(description="With the tracks' ways in the pictures.")] = False,
 ) -> models.Step:
     """One step of the shown run: what each camera found, the targets, the truth."""
     snapshot = bench.snapshot()
@@ -231,7 +230,7 @@ async def step(
             f"There is no step {step}: {sequence.name} has 0 … {sequence.frames - 1}.",
             field="step",
         )
-    return results.step_of(sequence, snapshot.run, step, with_samples=samples)
+    return steps.step_of(sequence, snapshot.run, step, with_samples=samples, with_trails=trails)
 
 
 @router.get("/timeline")

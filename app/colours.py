@@ -1,11 +1,14 @@
 """Colours that mean something, once: the 24 of the tracks and the greys of the 3D scene.
 
 The page has the same colours as custom properties in its tokens; a test compares them.
-Pictures and the 3D scene always use the dark set. A track's colour follows its id, never
-its rank, so it stays the same whatever else comes and goes.
+Pictures always use the dark set, the 3D scene that of the theme. A track's colour follows
+its id, never its rank, so it stays the same whatever else comes and goes.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
@@ -33,23 +36,97 @@ TRACK_HEX = (
 )
 """``--id-1`` … ``--id-24``: the first eight differ most, also with a colour deficiency."""
 
-TRACK_COLOURS = np.array([from_hex(text) for text in TRACK_HEX], dtype=np.uint8)
-"""The same as (24, 3) red, green, blue."""
+LIGHT_HEX = (
+    *("#a05300", "#286ec2", "#558452", "#7d2259", "#a28d06", "#402cac", "#039ca6", "#8e0316"),
+    *("#c4667b", "#864e53", "#00586d", "#87628c", "#2386ae", "#057664", "#954095", "#89924f"),
+    *("#58632f", "#b44366", "#45771f", "#0a9278", "#374386", "#913a03", "#897e34", "#2c5531"),
+)
+"""The same of the light theme: as far apart, but dark enough for a white ground."""
 
 LIGHT_INK_IDS = frozenset({8})
 """The tracks whose tag is written in white; all others carry black ink."""
 
-CANVAS = from_hex("#141414")
-"""viser's dark background: what a fading colour fades to."""
-GRID_MINOR = from_hex("#262626")
-GRID_MAJOR = from_hex("#383838")
-SCENE_LINE = from_hex("#8b8b8b")
-"""Volume, frusta, and components that belong to no track."""
-VOLUME_LINE = from_hex("#5c5c5c")
-ENTRANCE_LINE = from_hex("#4a4a4a")
-TRUTH_LINE = from_hex("#ababab")
 PICTURE_EMPTY = from_hex("#202020")
 """Where a camera has no picture."""
+
+Theme = Literal["dark", "light"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Palette:
+    """The colours of the 3D scene in one theme."""
+
+    tracks: UInt8[ndarray, "24 3"]
+    canvas: Rgb
+    """viser's background: what a fading colour fades to."""
+    grid_minor: Rgb
+    grid_major: Rgb
+    line: Rgb
+    """Frusta, and components that belong to no track."""
+    volume: Rgb
+    entrance: Rgb
+    truth: Rgb
+    pinned: Rgb
+    """Whatever belongs to the run that this one is compared with."""
+    errors: tuple[Rgb, Rgb]
+    """Of the line from truth to estimate: without an error, and with one as large as counts."""
+
+    def of(self, tracks: Int[ndarray, " N"]) -> UInt8[ndarray, "N 3"]:
+        """Red, green and blue of each track id."""
+        places = (np.asarray(tracks, dtype=np.int64) - 1) % len(self.tracks)
+        return np.asarray(self.tracks[places], dtype=np.uint8)
+
+    def fade(
+        self, colours: UInt8[ndarray, "*N 3"], strength: Float[ndarray, "*N"] | float
+    ) -> UInt8[ndarray, "*N 3"]:
+        """Colours blended into the background: 1 leaves them, 0 makes them disappear."""
+        return mix(np.asarray(self.canvas), colours, strength)
+
+    def error(self, share: Float[ndarray, " N"]) -> UInt8[ndarray, "N 3"]:
+        """From the colour of no error to that of the largest that counts."""
+        none, most = (np.asarray(colour, dtype=np.uint8) for colour in self.errors)
+        return mix(none, np.broadcast_to(most, (*np.shape(share), 3)), share)
+
+
+def mix(
+    ground: ndarray, colours: UInt8[ndarray, "*N 3"], share: Float[ndarray, "*N"] | float
+) -> UInt8[ndarray, "*N 3"]:
+    """Colours over a ground: at share 1 they alone, at 0 the ground alone."""
+    share = np.clip(np.asarray(share, dtype=float), 0.0, 1.0)[..., None]
+    mixed = np.asarray(colours, dtype=float) * share + ground * (1.0 - share)
+    return np.asarray(np.rint(mixed), dtype=np.uint8)
+
+
+def _tracks(texts: tuple[str, ...]) -> UInt8[ndarray, "24 3"]:
+    return np.array([from_hex(text) for text in texts], dtype=np.uint8)
+
+
+PALETTES: dict[Theme, Palette] = {
+    "dark": Palette(
+        tracks=_tracks(TRACK_HEX),
+        canvas=from_hex("#141414"),
+        grid_minor=from_hex("#262626"),
+        grid_major=from_hex("#383838"),
+        line=from_hex("#8b8b8b"),
+        volume=from_hex("#5c5c5c"),
+        entrance=from_hex("#4a4a4a"),
+        truth=from_hex("#ababab"),
+        pinned=from_hex("#d9d9d9"),
+        errors=(from_hex("#6cb2f5"), from_hex("#e6a24c")),
+    ),
+    "light": Palette(
+        tracks=_tracks(LIGHT_HEX),
+        canvas=from_hex("#ffffff"),
+        grid_minor=from_hex("#ececea"),
+        grid_major=from_hex("#d9d9d6"),
+        line=from_hex("#6e6e6e"),
+        volume=from_hex("#a9a9a5"),
+        entrance=from_hex("#bdbdb9"),
+        truth=from_hex("#5a5a5a"),
+        pinned=from_hex("#333333"),
+        errors=(from_hex("#1a66b0"), from_hex("#b06a0a")),
+    ),
+}
 
 
 def track_index(track: int) -> int:
@@ -62,21 +139,6 @@ def track_colour(track: int) -> Rgb:
     return from_hex(TRACK_HEX[track_index(track)])
 
 
-def track_colours(tracks: Int[ndarray, " N"]) -> UInt8[ndarray, "N 3"]:
-    """Red, green and blue of each track id."""
-    places = (np.asarray(tracks, dtype=np.int64) - 1) % len(TRACK_HEX)
-    return np.asarray(TRACK_COLOURS[places], dtype=np.uint8)
-
-
 def track_ink(track: int) -> str:
     """The colour of text on a tag of the track's colour."""
     return "#fff" if track_index(track) + 1 in LIGHT_INK_IDS else "#000"
-
-
-def fade(
-    colours: UInt8[ndarray, "*N 3"], strength: Float[ndarray, "*N"] | float, towards: Rgb = CANVAS
-) -> UInt8[ndarray, "*N 3"]:
-    """Colours blended into a background: 1 leaves them, 0 makes them disappear."""
-    share = np.clip(np.asarray(strength, dtype=float), 0.0, 1.0)[..., None]
-    mixed = np.asarray(colours, dtype=float) * share + np.asarray(towards) * (1.0 - share)
-    return np.asarray(np.rint(mixed), dtype=np.uint8)

@@ -7,21 +7,25 @@ reaches the browsers together, the written step included.
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Callable, Set
 from functools import partial
 
 import numpy as np
 import viser
 
 from app import scene_geometry
+from app.colours import PALETTES, Theme
 from app.scene_geometry import Pose
 from app.scene_people import PeopleNodes
+from app.scene_reference import ReferenceNodes
 from app.scene_room import GRID_CELL, FrustumNodes, RoomNodes, pose_through
 from app.scene_views import Views
 from app.scene_worker import LatestWorker
-from app.snapshot import Change, Event, Snapshot, ViewRequest
+from app.snapshot import Change, Snapshot, View
 from app.workbench import Workbench
 from tracker.pipeline import Run
+from tracker.sequences.sequence import Room
+from tracker.trajectories import Trajectories
 
 
 class Scene:
@@ -38,21 +42,18 @@ class Scene:
         self._workbench = workbench
         self._shown = Snapshot()
         self._drawn: tuple[object, ...] = ()
-        self._wanted_view: int | None = None
-        self._through: int | None = None
-        server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
+        self._looking: View = None
+        self._theme: Theme | None = None
         server.scene.set_up_direction("+z")
         server.scene.world_axes.visible = False
         self._status = server.gui.add_html(status_html(self._shown, None))
         self._room = RoomNodes(server)
         self._frusta = FrustumNodes(server, self._look_through)
+        self._reference = ReferenceNodes(server)
         self._people = PeopleNodes(server, self._pick)
         self._views = Views(server, self._overview)
         self._worker = LatestWorker("scene", self._work)
-        self._unsubscribe = (
-            workbench.subscribe(self._note),
-            workbench.subscribe_events(self._hear),
-        )
+        self._unsubscribe = workbench.subscribe(self._note)
         self._worker.ask("sequence")
 
     def wait(self, timeout: float) -> bool:
@@ -65,8 +66,7 @@ class Scene:
 
     def close(self) -> None:
         """Stop following; the nodes stay as they are."""
-        for end in self._unsubscribe:
-            end()
+        self._unsubscribe()
         self._worker.close()
         self._views.close()
 
@@ -76,59 +76,70 @@ class Scene:
         if change not in ("parameters", "opening"):
             self._worker.ask(change)
 
-    def _hear(self, event: Event) -> None:
-        if isinstance(event, ViewRequest):
-            self._wanted_view = event.camera
-            self._worker.ask("view")
-
     def _pick(self, track: int) -> None:
         selected = self._workbench.snapshot().selection
         self._workbench.select(None if track == selected else track)
 
     def _look_through(self, camera: int) -> None:
-        self._workbench.view(None if camera == self._through else camera)
+        self._workbench.look(None if camera == self._looking else camera)
 
     # the worker's thread
 
     def _work(self, topics: Set[str]) -> None:
         snapshot = self._workbench.snapshot()
+        themed = snapshot.theme != self._theme
+        if themed:
+            self._theme = snapshot.theme
+            self._server.gui.configure_theme(
+                dark_mode=snapshot.theme == "dark", show_logo=False, show_share_button=False
+            )
         sequence = snapshot.sequence
         if sequence is None:
             return
         another = sequence is not self._shown.sequence
-        if another:
-            self._wanted_view = None
-        view = self._wanted_view
-        if view is not None and view >= len(sequence.views):
-            view = None
-        turned = view != self._through
-        self._through = view
+        turned = snapshot.view != self._looking
+        self._looking = snapshot.view
         self._shown = snapshot
-        if another or turned or "layers" in topics:
+        if another or turned or themed or "layers" in topics:
+            palette, through = PALETTES[snapshot.theme], self._through
             with self._server.atomic():
-                self._room.show(sequence.room, volume=snapshot.layers["volume"], floor=view is None)
-                self._frusta.place(sequence.cameras, sequence.room, view)
+                self._room.show(
+                    sequence.room,
+                    palette,
+                    volume=snapshot.layers["volume"],
+                    floor=through is None,
+                )
+                self._frusta.place(sequence.cameras, sequence.room, through, palette)
         self._draw_step(snapshot, shown_run(snapshot))
         if another:
             self._set_home(snapshot)
             self._views.home()
         elif turned:
-            self._views.look(None if view is None else self._pose_through(snapshot, view))
+            self._views.look(self._pose_of(snapshot))
+
+    @property
+    def _through(self) -> int | None:
+        """The camera that is looked through."""
+        return self._looking if isinstance(self._looking, int) else None
 
     def _draw_step(self, snapshot: Snapshot, run: Run | None) -> None:
         sequence = snapshot.sequence
         assert sequence is not None
         step = snapshot.playhead
         drawing = (
-            sequence, run, step, snapshot.selection, dict(snapshot.layers), self._through,
-            snapshot.run_state.state,
+            sequence, run, step, snapshot.selection, dict(snapshot.layers), self._looking,
+            snapshot.run_state.state, snapshot.theme, snapshot.scores.pinned,
         )  # fmt: skip
         if drawing == self._drawn:
             return
         self._drawn = ()
         pictures = [self._picture(snapshot, run, camera) for camera in range(len(sequence.views))]
         with self._server.atomic():
-            self._people.show(sequence, run, step, snapshot.selection, snapshot.layers)
+            layers, palette = snapshot.layers, PALETTES[snapshot.theme]
+            self._people.show(sequence, run, step, snapshot.selection, layers, palette)
+            tracks = run.tracks if run is not None else Trajectories.empty(len(sequence.views))
+            self._reference.show_truth(sequence, tracks, step if layers["truth"] else None, palette)
+            self._reference.show_pinned(sequence, pinned_tracks(snapshot), step, palette)
             for camera, picture in enumerate(pictures):
                 self._frusta.show_picture(camera, picture)
             self._status.content = status_html(snapshot, run)
@@ -172,13 +183,34 @@ class Scene:
             home = self._server.initial_camera
             home.position, home.look_at, home.fov = pose.position, pose.look_at, pose.fov
 
-    def _pose_through(self, snapshot: Snapshot, camera: int) -> partial[Pose]:
+    def _pose_of(self, snapshot: Snapshot) -> Callable[[float], Pose] | None:
+        """The pose of the view that is chosen, for an aspect; None is the free view."""
         assert snapshot.sequence is not None
         room = snapshot.sequence.room
-        view = self._frusta.view(camera)
+        if snapshot.view is None:
+            return None
+        if snapshot.view == "top":
+            return partial(scene_geometry.from_above, _margin_around(room))
+        view = self._frusta.view(snapshot.view)
         middle = (room.minimum + room.maximum)[None] / 2.0
         distance = max(0.5, float(view.camera.to_camera(middle)[0, 2]))
         return partial(pose_through, view, distance)
+
+
+def _margin_around(room: Room) -> np.ndarray:
+    """The corners of a room and a little of the floor around it."""
+    beside = np.array([0.25, 0.25, 0.0])
+    return scene_geometry.box_corners(room.minimum - beside, room.maximum + beside)
+
+
+def pinned_tracks(snapshot: Snapshot) -> Trajectories | None:
+    """What is drawn of the pinned run; nothing where it is the shown run itself."""
+    pinned = snapshot.scores.pinned
+    if pinned is None or not snapshot.layers["pinned"]:
+        return None
+    if snapshot.run is not None and pinned.key == snapshot.run.key:
+        return None
+    return pinned.tracks
 
 
 def shown_run(snapshot: Snapshot) -> Run | None:

@@ -15,6 +15,9 @@ from tracker.trajectories import Trajectories
 DEFAULT_MASS = 0.9
 """Probability that an ellipsoid holds of its Gaussian."""
 
+TRAIL_SECONDS, FUTURE_SECONDS = 4.0, 2.0
+"""How far back, and how far ahead, the way of a track is drawn."""
+
 _CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 _EDGES = np.array(
     [[a, b] for a in range(8) for b in range(a + 1, 8) if (a ^ b).bit_count() == 1], dtype=np.int64
@@ -185,40 +188,46 @@ def floor_grid(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trails:
-    """Segments of the way that each track came, oldest first."""
+    """Segments of the way of each track, oldest first."""
 
     segments: Float[ndarray, "S 2 3"]
     ids: Int[ndarray, " S"]
     ages: Float[ndarray, "S 2"]
-    """Seconds before the shown step, of both ends."""
+    """Seconds before the shown step, of both ends; negative after it."""
 
 
 def trails(
-    tracks: Trajectories, step: int, seconds: float, fps: float, drop: float = 0.0
+    tracks: Trajectories,
+    step: int,
+    seconds: float,
+    fps: float,
+    drop: float = 0.0,
+    ahead: float = 0.0,
 ) -> Trails:
-    """The way of every track over the last seconds; a gap where no camera saw it.
+    """The way of every track around a step; a gap where no camera saw it.
 
     Args:
         tracks: Rows sorted by step.
-        step: The shown one; nothing after it is drawn.
+        step: The shown one.
         seconds: How far back.
         fps: Steps a second.
         drop: Metres below the position, for instance half a person's height.
+        ahead: Seconds after the step; 0 draws nothing that is still to come.
     """
-    oldest = step - round(seconds * fps)
-    first, last = np.searchsorted(tracks.frames, [oldest, step + 1])
+    ends = [step - round(seconds * fps), step + round(ahead * fps) + 1]
+    first, last = np.searchsorted(tracks.frames, ends)
     rows = np.arange(first, last)
     order = rows[np.lexsort((tracks.frames[rows], tracks.ids[rows]))]
     frames, ids = tracks.frames[order], tracks.ids[order]
     seen: Bool[ndarray, " M"] = np.asarray(tracks.seen[order].any(axis=1))
     joined = (np.diff(ids) == 0) & (np.diff(frames) == 1) & (seen[1:] | seen[:-1])
-    ends = np.flatnonzero(joined)
+    starts = np.flatnonzero(joined)
     positions = tracks.positions[order] - np.array([0.0, 0.0, drop])
     ages = (step - frames) / fps
     return Trails(
-        segments=np.stack([positions[ends], positions[ends + 1]], axis=1),
-        ids=ids[ends],
-        ages=np.stack([ages[ends], ages[ends + 1]], axis=1),
+        segments=np.stack([positions[starts], positions[starts + 1]], axis=1),
+        ids=ids[starts],
+        ages=np.stack([ages[starts], ages[starts + 1]], axis=1),
     )
 
 
@@ -283,3 +292,19 @@ def overview(
         shift_y += float(upright.max() + upright.min()) * distance / 2.0
     target = centre + shift_x * right + shift_y * up
     return Pose(target + distance * away, target, np.array([0.0, 0.0, 1.0]), fov)
+
+
+def from_above(points: Float[ndarray, "N 3"], aspect: float, fov: float = 0.3) -> Pose:
+    """A pose high above that has all points in the picture: nearly a plan, x to the right.
+
+    Args:
+        points: What must be seen.
+        aspect: Width over height of the picture.
+        fov: Vertical field of view, radians; small, so that little is drawn askew.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    centre = (low + high) / 2.0
+    wide, tall = (high - low)[:2] / 2.0 * 1.08  # a margin at the edges
+    distance = max(tall, wide / aspect) / np.tan(fov / 2.0)
+    eye = np.array([centre[0], centre[1], high[2] + distance])
+    return Pose(eye, centre, np.array([0.0, 1.0, 0.0]), fov)

@@ -1,4 +1,4 @@
-"""What moves in the 3D scene: components, estimates, trails and truth of the shown step."""
+"""What the run says in the 3D scene: components, estimates and trails of the shown step."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ import viser
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from app import colours, scene_geometry
+from app import scene_geometry
+from app.colours import PALETTES, Palette
+from app.scene_geometry import FUTURE_SECONDS, TRAIL_SECONDS
 from app.scene_nodes import Lines, Meshes, Tag, Tags
 from tracker.gaussian_mixture import GaussianMixture
 from tracker.pipeline import Run
 from tracker.sequences.sequence import Sequence
 from tracker.trajectories import Trajectories
 
-TRAIL_SECONDS = 4.0
 TAGS = 16
 """Made at once; a step with more people adds some for good."""
 UNREPORTED_WEIGHT = 0.02
@@ -25,7 +26,7 @@ next to nothing."""
 
 
 class PeopleNodes:
-    """Everything that changes with the step."""
+    """Everything of the run that changes with the step."""
 
     def __init__(self, server: viser.ViserServer, on_pick: Callable[[int], None]) -> None:
         """Make the nodes, hidden.
@@ -35,9 +36,10 @@ class PeopleNodes:
             on_pick: Called with the id of the track whose box or ellipsoid was clicked.
         """
         self._on_pick = on_pick
+        self._palette = PALETTES["dark"]
         self._box_ids: Int[ndarray, " N"] = np.zeros(0, dtype=np.int64)
         self._component_ids: Int[ndarray, " J"] = np.zeros(0, dtype=np.int64)
-        self._truth = Lines(server, "/people/truth", 1.0)
+        self._future = Lines(server, "/people/future", 1.0)
         self._trails = Lines(server, "/people/trails", 1.75)
         self._selected_trail = Lines(server, "/people/selected_trail", 2.5)
         self._rays = Lines(server, "/people/rays", 1.0)
@@ -66,18 +68,24 @@ class PeopleNodes:
         step: int,
         selected: int | None,
         layers: Mapping[str, bool],
+        palette: Palette,
     ) -> None:
         """Draw one step.
 
         Args:
-            sequence: Gives the truth and a person's size.
-            run: Has the step; None where it is not computed: only truth is drawn then.
+            sequence: Gives a person's size.
+            run: Has the step; None where it is not computed: nothing is drawn then.
             step: 0-based.
             selected: The track that is drawn stronger.
-            layers: Which of boxes, ellipsoids, trails and truth are on.
+            layers: Which of boxes, ellipsoids and trails are on, and whether tracks other
+                than the selected one are.
+            palette: Of the theme.
         """
-        self._show_truth(sequence, step if layers["truth"] else None)
+        self._palette = palette
         tracks = run.tracks if run is not None else Trajectories.empty(len(sequence.views))
+        alone = selected is not None and not layers["others"]
+        if alone:
+            tracks = tracks.take(tracks.ids == selected)
         now = tracks.at(step)
         ids, positions = tracks.ids[now], tracks.positions[now]
         half = sequence.target_half_extents
@@ -98,7 +106,10 @@ class PeopleNodes:
             now.stop,
         )
         known = dict(zip(tracks.labels[recent].tolist(), tracks.ids[recent].tolist(), strict=True))
-        self.show_components(
+        if alone:
+            kept = [known.get(label) == selected for label in posterior.labels.tolist()]
+            posterior = posterior.take(np.array(kept, dtype=bool))
+        self._show_components(
             posterior if layers["ellipsoids"] else GaussianMixture.empty(3), known, selected
         )
         named = boxes or layers["ellipsoids"]
@@ -116,23 +127,6 @@ class PeopleNodes:
             ]
         )
 
-    def _show_truth(self, sequence: Sequence, step: int | None) -> None:
-        truth = sequence.ground_truth
-        if truth is None or step is None:
-            self._truth.show(np.zeros((0, 2, 3)), colours.TRUTH_LINE)
-            return
-        now = truth.at(step)
-        half = sequence.target_half_extents
-        edges = scene_geometry.box_edges(truth.positions[now], half)
-        strength = np.where(truth.valid[now], 0.75, 0.35)
-        parts = [scene_geometry.dashes(box, 0.18 * float(half.max())) for box in edges]
-        segments = np.concatenate([np.zeros((0, 2, 3)), *parts])
-        shades = colours.fade(
-            np.array([colours.TRUTH_LINE] * len(parts), dtype=np.uint8).reshape(-1, 3), strength
-        )
-        counts = [len(part) for part in parts]
-        self._truth.show(segments, np.repeat(shades, counts, axis=0)[:, None])
-
     def _show_boxes(
         self,
         ids: Int[ndarray, " N"],
@@ -141,7 +135,7 @@ class PeopleNodes:
         selected: int | None,
     ) -> None:
         edges = scene_geometry.box_edges(positions, half)
-        shades = colours.track_colours(ids)
+        shades = self._palette.of(ids)
         chosen = ids == (selected if selected is not None else -1)
         for node, rows in ((self._boxes, ~chosen), (self._selected_box, chosen)):
             node.show(edges[rows].reshape(-1, 2, 3), np.repeat(shades[rows], 12, axis=0)[:, None])
@@ -158,7 +152,7 @@ class PeopleNodes:
         """From each camera that saw the selected one to where it was put."""
         row = np.flatnonzero(tracks.ids[now] == (selected if selected is not None else -1))
         if not len(row):
-            self._rays.show(np.zeros((0, 2, 3)), colours.SCENE_LINE)
+            self._rays.show(np.zeros((0, 2, 3)), self._palette.line)
             return
         position = tracks.positions[now][row[0]]
         eyes = [
@@ -167,20 +161,28 @@ class PeopleNodes:
             if seen
         ]
         segments = np.array([[eye, position] for eye in eyes]).reshape(-1, 2, 3)
-        shade = colours.fade(colours.track_colours(tracks.ids[now][row]), 0.5)
+        shade = self._palette.fade(self._palette.of(tracks.ids[now][row]), 0.5)
         self._rays.show(segments, shade[None])
 
     def _show_trails(
         self, tracks: Trajectories, step: int, fps: float, drop: float, selected: int | None
     ) -> None:
-        way = scene_geometry.trails(tracks, step, TRAIL_SECONDS, fps, drop)
-        strength = 0.92 - 0.8 * way.ages / TRAIL_SECONDS
-        shades = colours.fade(colours.track_colours(way.ids)[:, None].repeat(2, axis=1), strength)
+        way = scene_geometry.trails(tracks, step, TRAIL_SECONDS, fps, drop, FUTURE_SECONDS)
+        past = way.ages[:, 1] >= 0.0
+        span = np.where(past, TRAIL_SECONDS, -FUTURE_SECONDS)[:, None]
+        full = np.where(past, 0.92, 0.5)[:, None]
+        strength = full - (full - 0.12) * way.ages / span
+        shades = self._palette.of(way.ids)[:, None].repeat(2, axis=1)
+        shades = self._palette.fade(shades, strength)
         chosen = way.ids == (selected if selected is not None else -1)
-        for node, rows in ((self._trails, ~chosen), (self._selected_trail, chosen)):
+        for node, rows in (
+            (self._future, ~past),
+            (self._trails, past & ~chosen),
+            (self._selected_trail, past & chosen),
+        ):
             node.show(way.segments[rows], shades[rows])
 
-    def show_components(
+    def _show_components(
         self, mixture: GaussianMixture, ids: Mapping[int, int], selected: int | None
     ) -> None:
         """Draw Gaussian components as the ellipsoids that hold a stated share of each.
@@ -199,8 +201,8 @@ class PeopleNodes:
         wxyzs, axes = scene_geometry.ellipsoids(mixture.covariances[:, :3, :3])
         shades = np.where(
             (numbers > 0)[:, None],
-            colours.track_colours(numbers),
-            np.array(colours.SCENE_LINE, dtype=np.uint8),
+            self._palette.of(numbers),
+            np.array(self._palette.line, dtype=np.uint8),
         )
         weights = np.clip(mixture.weights, 0.0, 1.0)
         opacities = np.where(numbers > 0, 0.06 + 0.44 * weights, 0.04 + 0.3 * weights)

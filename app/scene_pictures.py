@@ -114,7 +114,7 @@ class StraightView:
         if source is None:
             return np.full((height, width, 3), colours.PICTURE_EMPTY[::-1], dtype=np.uint8)
         first, second = self._maps
-        border = colours.CANVAS[::-1]
+        border = colours.PALETTES["dark"].canvas[::-1]
         straight = cv2.remap(source, first, second, cv2.INTER_LINEAR, borderValue=border)
         return np.asarray(straight, dtype=np.uint8)
 

@@ -10,6 +10,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from app import colours, scene_geometry
+from app.colours import Palette
 from app.scene_geometry import Pose
 from app.scene_nodes import Lines, Meshes, Tag, Tags
 from app.scene_pictures import StraightView
@@ -42,11 +43,12 @@ class RoomNodes:
         self._rims = Lines(server, "/room/entrance_rims", 1.0)
         self._names = Tags(server, "/labels/entrances", 4, 0.7)
 
-    def show(self, room: Room, *, volume: bool, floor: bool) -> None:
+    def show(self, room: Room, palette: Palette, *, volume: bool, floor: bool) -> None:
         """Draw a room.
 
         Args:
             room: Its volume and entrances.
+            palette: Of the theme.
             volume: Whether that layer is on.
             floor: Whether the grid is drawn, with the entrances on it.
         """
@@ -55,19 +57,19 @@ class RoomNodes:
         minor, major = scene_geometry.floor_grid(
             low[:2] - GRID_MARGIN, high[:2] + GRID_MARGIN, height, GRID_CELL
         )
-        self._minor.show(minor[: None if floor else 0], colours.GRID_MINOR)
-        self._major.show(major[: None if floor else 0], colours.GRID_MAJOR)
+        self._minor.show(minor[: None if floor else 0], palette.grid_minor)
+        self._major.show(major[: None if floor else 0], palette.grid_major)
         edges = scene_geometry.box_edges((low + high)[None] / 2.0, (high - low) / 2.0)[0]
-        self._volume.show(edges if volume else edges[:0], colours.VOLUME_LINE)
+        self._volume.show(edges if volume else edges[:0], palette.volume)
         entrances = room.entrances if volume and floor else ()
         places = np.array([e.position for e in entrances]).reshape(-1, 3)
         sigmas = np.array([e.sigma for e in entrances]).reshape(-1, 3)
         places[:, 2] = height + 0.004  # on the floor, in front of its lines
         radius = scene_geometry.mass_radius(scene_geometry.DEFAULT_MASS, 2)
         axes = np.concatenate([sigmas[:, :2] * radius, np.full((len(sigmas), 1), 1e-3)], axis=1)
-        grey = np.broadcast_to(np.array(colours.SCENE_LINE, dtype=np.uint8), places.shape)
+        grey = np.broadcast_to(np.array(palette.line, dtype=np.uint8), places.shape)
         self._entrances.show(places, axes, grey, np.full(len(places), 0.06))
-        self._rims.show(_rims(places, axes), colours.ENTRANCE_LINE)
+        self._rims.show(_rims(places, axes), palette.entrance)
         self._names.show([Tag(tuple(place.tolist()), "entrance") for place in places])
 
 
@@ -109,7 +111,7 @@ class FrustumNodes:
             aspect=1.0,
             thickness=1.0,
             thickness_units="screen",
-            color=colours.SCENE_LINE,
+            color=colours.PALETTES["dark"].line,
             jpeg_quality=80,
             format="jpeg",
             cast_shadow=False,
@@ -123,13 +125,16 @@ class FrustumNodes:
 
         self._handles.append(handle)
 
-    def place(self, cameras: tuple[Camera, ...], room: Room, through: int | None) -> None:
+    def place(
+        self, cameras: tuple[Camera, ...], room: Room, through: int | None, palette: Palette
+    ) -> None:
         """Put the frusta where the cameras are.
 
         Args:
             cameras: Those of the sequence.
             room: Gives the measure of how large to draw them.
             through: The one that is looked through: its picture stands behind the room.
+            palette: Of the theme.
         """
         if cameras != self._cameras:
             self._cameras, self._views = cameras, {}
@@ -148,6 +153,7 @@ class FrustumNodes:
                 above = camera.centre + np.array([0.0, 0.0, 0.18 * self._size])
                 tags.append(Tag((above[0], above[1], above[2]), camera.name))
             handle.fov, handle.aspect = view.fov, view.aspect
+            handle.color = palette.line
             handle.scale = depth / handle.compute_canonical_frustum_size()[2]
             handle.position = camera.centre
             handle.wxyz = scene_geometry.quaternions(view.rotation.T[None])[0]

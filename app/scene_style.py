@@ -7,13 +7,18 @@ those of its client in the version that the project pins.
 from __future__ import annotations
 
 PANEL = """<style>
+:root { --mvp-ink-1: #ededed; --mvp-ink-2: #bdbdbd; --mvp-ink-3: #979797; --mvp-busy: #6cb2f5;
+  --mvp-field: #2e2e2e; --mvp-line: #383838; --mvp-thumb: #f1f3f5; --mvp-rim: transparent; }
+[data-mantine-color-scheme="light"] { --mvp-ink-1: #1b1b1b; --mvp-ink-2: #444444;
+  --mvp-ink-3: #656565; --mvp-busy: #1a66b0; --mvp-field: #ffffff; --mvp-line: #dededb;
+  --mvp-thumb: #ffffff; --mvp-rim: #1a66b0; }
 /* the step */
-.mvp-status { padding: 0 16px 6px 10px; color: #bdbdbd; line-height: 16px; }
+.mvp-status { padding: 0 16px 6px 10px; color: var(--mvp-ink-2); line-height: 16px; }
 .mvp-status p { margin: 0 0 2px; font-size: 13px; font-variant-numeric: tabular-nums; }
-.mvp-status b { color: #ededed; font-weight: 600; }
+.mvp-status b { color: var(--mvp-ink-1); font-weight: 600; }
 .mvp-status span { float: right; font-size: 12px; }
-.mvp-status small { display: block; font-size: 10px; line-height: 14px; color: #979797; }
-.mvp-status[data-state="computing"] span { color: #6cb2f5; }
+.mvp-status small { display: block; font-size: 10px; line-height: 14px; color: var(--mvp-ink-3); }
+.mvp-status[data-state="computing"] span { color: var(--mvp-busy); }
 /* rows: label, slider, number */
 div:has(> .mantine-Flex-root > div > .mantine-Text-root > label[for]) {
   padding: 0 16px 2px 10px !important; }
@@ -22,26 +27,27 @@ div:has(> .mantine-Text-root > label[for]) { width: 128px !important; flex-shrin
   padding-right: 8px !important; }
 .mantine-Flex-root:has(.mantine-Select-root) > div:first-child { width: 92px !important; }
 .mantine-Text-root:has(> label[for]) { font-size: 11px !important; line-height: 13px !important;
-  letter-spacing: 0 !important; font-weight: 400 !important; color: #b3b3b3 !important;
+  letter-spacing: 0 !important; font-weight: 400 !important; color: var(--mvp-ink-2) !important;
   overflow-wrap: normal !important; }
 label[for] > wbr { display: none; }
 .mantine-Slider-root { padding: 0 !important; align-self: center; }
 .mantine-Slider-mark, .mantine-Slider-markLabel { display: none !important; }
-.mantine-Slider-thumb { background: #f1f3f5 !important; border: 0 !important;
+.mantine-Slider-thumb { background: var(--mvp-thumb) !important;
+  border: 1px solid var(--mvp-rim) !important;
   width: 6px !important; height: 12px !important; }
 .mantine-NumberInput-root { width: 48px !important; margin-left: 10px !important; }
 .mantine-Input-input { font-size: 11px !important; letter-spacing: 0 !important;
   min-height: 22px !important; height: 22px !important; padding: 0 6px !important;
-  background: #2e2e2e; border-color: #383838; color: #c9c9c9;
+  background: var(--mvp-field); border-color: var(--mvp-line); color: var(--mvp-ink-1);
   font-variant-numeric: tabular-nums; }
 .mantine-Checkbox-root { transform: scale(.8); transform-origin: left; }
 /* sections with a line above instead of frames */
 .mantine-Paper-root:has(> .mantine-Paper-root + div) { margin: 0 !important;
-  padding: 0 0 6px !important; border: 0 solid #383838; border-top-width: 1px !important;
+  padding: 0 0 6px !important; border: 0 solid var(--mvp-line); border-top-width: 1px !important;
   border-radius: 0; background: none; }
 .mantine-Paper-root:has(> .mantine-Paper-root + div) > .mantine-Paper-root {
   position: static; transform: none; padding: 7px 10px 3px !important; background: none;
-  font-size: 12px; font-weight: 600; line-height: 16px; color: #dcdcdc; }
+  font-size: 12px; font-weight: 600; line-height: 16px; color: var(--mvp-ink-1); }
 .mantine-Paper-root:has(> .mantine-Paper-root + div) [style*="padding-top"] {
   padding-top: 0 !important; }
 .mantine-Button-root { height: 24px !important; min-height: 24px !important;
@@ -49,8 +55,8 @@ label[for] > wbr { display: none; }
 </style>"""
 
 
-NUMBER = """height: 22px; line-height: 20px; padding: 0 6px; border: 1px solid #383838;
-border-radius: 3px; background: #2e2e2e; color: #c9c9c9; font-size: 11px; box-sizing: border-box;
+NUMBER = """height: 22px; line-height: 20px; padding: 0 6px; border: 1px solid var(--mvp-line);
+border-radius: 3px; background: var(--mvp-field); color: var(--mvp-ink-1); font-size: 11px; box-sizing: border-box;
 white-space: nowrap; font-variant-numeric: tabular-nums;"""
 
 
@@ -72,5 +78,5 @@ def values(numbers: dict[str, str], marked: list[str]) -> str:
         inputs = ",".join(f'[id="{uuid}"] + .mantine-InputWrapper-root > *' for uuid in numbers)
         rules.append(f"{inputs} {{ display: none; }}")
     if labels:
-        rules.append(f"{labels} {{ color: #ededed; }}")
+        rules.append(f"{labels} {{ color: var(--mvp-ink-1); font-weight: 600; }}")
     return f"<style>{' '.join(rules)}</style>"

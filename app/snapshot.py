@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, Literal
 
+from app.colours import Theme
 from app.evaluation.scores import Scores
 from tracker import parameters as table
 from tracker.parameters import RunParameters
@@ -16,7 +17,7 @@ from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
 Change = Literal[
-    "sequence", "opening", "parameters", "playhead", "selection", "layers",
+    "sequence", "opening", "parameters", "playhead", "selection", "layers", "view", "theme",
     "run", "progress", "evaluation", "pinned",
 ]  # fmt: skip
 """What is another now: ``run`` is a run's beginning and its end, ``progress`` its new steps."""
@@ -25,8 +26,12 @@ RunPhase = Literal["idle", "computing", "done", "failed", "cancelled"]
 
 Level = Literal["info", "warn", "error"]
 
-LAYERS = ("boxes", "ellipsoids", "trails", "truth", "volume")
-"""The layers of the 3D view that can be switched."""
+LAYERS = ("boxes", "ellipsoids", "trails", "truth", "volume", "pinned", "others")
+"""The layers of the 3D view that can be switched; ``others`` are the tracks that are not
+selected, while one is."""
+
+View = int | Literal["top"] | None
+"""What the 3D view looks through: a camera by its index, from above, or freely."""
 
 CLAMPED_ORIGIN = "viser"
 """Whose numbers are moved into their range rather than refused: viser clamps nothing itself."""
@@ -58,15 +63,8 @@ class Opening:
 
 
 @dataclass(frozen=True, slots=True)
-class ViewRequest:
-    """Somebody wants to look through a camera in 3D; None is the free view."""
-
-    camera: int | None
-
-
-@dataclass(frozen=True, slots=True)
 class Command:
-    """A transport key was pressed inside the 3D view."""
+    """A key was pressed inside a 3D view in a window of its own."""
 
     name: str
 
@@ -80,7 +78,7 @@ class Notice:
     hint: str | None = None
 
 
-Event = ViewRequest | Command | Notice
+Event = Command | Notice
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,6 +108,9 @@ class Snapshot:
     layers: Mapping[str, bool] = field(
         default_factory=lambda: MappingProxyType(dict.fromkeys(LAYERS, True))
     )
+    view: View = None
+    theme: Theme = "dark"
+    """Of the 3D view."""
 
     @property
     def step_is_computed(self) -> bool:

@@ -15,8 +15,8 @@ from typing import Any
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import TypeAdapter, ValidationError
 
-from app import models, results
-from app.snapshot import Change, Command, Event, Notice, Snapshot, ViewRequest
+from app import models, results, steps
+from app.snapshot import Change, Command, Event, Notice, Snapshot
 from app.workbench import Workbench
 
 SECONDS_BETWEEN = {"progress": 0.1, "timeline": 0.25}
@@ -102,8 +102,6 @@ class Stream:
                 text = json.dumps(notice)
                 if level == "error":
                     self._last_error = text  # also for a page that is not there yet
-            case ViewRequest():
-                return  # the 3D view's own business
         for page in self._pages:
             page.messages = [*page.messages, text][-MOST_NOTICES:]
             page.wake.set()
@@ -179,7 +177,7 @@ class Stream:
             return
         text = self._steps.get(key)
         if text is None:
-            message = results.step_of(sequence, run, step)
+            message = steps.step_of(sequence, run, step)
             text = _with_type("step", message)
             if message.computed == computed:  # else it was computed this very moment
                 self._steps[key] = text

@@ -15,6 +15,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Literal
 
+from app.colours import Theme
 from app.evaluation.scores import Scored, Scores
 from app.snapshot import (
     CLAMPED_ORIGIN,
@@ -27,7 +28,7 @@ from app.snapshot import (
     Opening,
     RunState,
     Snapshot,
-    ViewRequest,
+    View,
     clamp,
 )
 from tracker import parameters as table
@@ -173,12 +174,29 @@ class Workbench:
             if now.scores.pinned is not None:
                 self._put("pinned", scores=replace(now.scores, pinned=None))
 
-    def view(self, camera: int | None) -> None:
-        """Ask the 3D view to look through a camera; None is the free view."""
-        self._tell(ViewRequest(camera))
+    def look(self, view: View) -> None:
+        """Have the 3D view look through a camera, from above, or freely.
+
+        Raises:
+            ParameterError: If there is no such camera.
+        """
+        with self._edit() as now:
+            cameras = len(now.sequence.views) if now.sequence is not None else 0
+            if isinstance(view, int) and not 0 <= view < cameras:
+                raise ParameterError(
+                    "camera", f"expected an index below {cameras}, top or null, got {view}"
+                )
+            if view != now.view:
+                self._put("view", view=view)
+
+    def set_theme(self, theme: Theme) -> None:
+        """Have the 3D view dark or light."""
+        with self._edit() as now:
+            if theme != now.theme:
+                self._put("theme", theme=theme)
 
     def command(self, name: str) -> None:
-        """Relay a transport key that was pressed inside the 3D view to the pages."""
+        """Relay a key that was pressed inside the 3D view to the pages."""
         self._tell(Command(name))
 
     def notify(self, level: Level, message: str, hint: str | None = None) -> None:
@@ -219,6 +237,7 @@ class Workbench:
                 playhead=0,
                 playhead_origin="",
                 selection=None,
+                view=None,
                 run=None,
                 run_state=RunState(total=sequence.frames),
                 scores=Scores(),

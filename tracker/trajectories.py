@@ -47,6 +47,10 @@ class Trajectories:
         first, last = np.searchsorted(self.frames, [frame, frame + 1])
         return slice(int(first), int(last))
 
+    def take(self, rows: ndarray) -> Trajectories:
+        """Some of the rows, by mask or ascending index."""
+        return Trajectories(*(getattr(self, name)[rows] for name in type(self).__slots__))
+
     @staticmethod
     def empty(cameras: int) -> Trajectories:
         """No rows."""

@@ -45,8 +45,14 @@ class LayerChanges(Model):
 class ViewChange(Model):
     """Look through a camera in 3D."""
 
-    camera: int | None
+    camera: int | Literal["top"] | None
     """Its index; null for the free view."""
+
+
+class ThemeChange(Model):
+    """Have the 3D view dark or light."""
+
+    theme: Literal["dark", "light"]
 
 
 class SelectChange(Model):

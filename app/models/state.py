@@ -123,6 +123,10 @@ class State(Model):
     selection: int | None
     layers: dict[str, bool]
     """Of the 3D view."""
+    view: int | Literal["top"] | None
+    """What the 3D view looks through: a camera's index, from above, or freely."""
+    theme: Literal["dark", "light"]
+    """Of the 3D view."""
     run: RunInfo
     pinned: PinnedInfo | None
     viser: ViserInfo

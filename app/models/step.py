@@ -37,6 +37,19 @@ Gate = tuple[float, float, float, float, float]
 """An ellipse: centre x and y, and xx, xy, yy of the matrix C with (z − c)ᵀ C⁻¹ (z − c) = 1."""
 
 
+Reason = Literal["out of view", "behind camera", "near the edge"]
+
+
+class Feeding(Model):
+    """The box that fed a track, as the camera gave it to the fusion."""
+
+    box: Box
+    weight: float
+    """Its weight, existence or detector's score."""
+    share: float
+    """Probability that it is this track's."""
+
+
 class CameraTrack(Model):
     """One 3D target as one camera should see it, and what that camera said of it."""
 
@@ -48,12 +61,15 @@ class CameraTrack(Model):
     detection_probability: float
     source: int
     """Index of the box that fed it among what the camera gave the fusion, -1 for none."""
+    fed_by: Feeding | None
     hidden_by: int | None
     """Id of the target in front of it."""
     visible: bool
-    reason: Literal["out of view", "behind camera"] | None
-    """Why it is not visible."""
+    reason: Reason | None
+    """Why it is not, or hardly, visible."""
     centre: tuple[float, float] | None
+    trail: list[tuple[int, float, float]] = Field(default_factory=list)
+    """Steps from this one, x and y of the feet; only where asked for."""
 
 
 class CameraTruth(Model):
@@ -102,6 +118,10 @@ class Truth(Model):
     id: int
     position: Vector
     valid: bool
+    track: int | None = None
+    """The track that is this person's at this step."""
+    error: float | None = None
+    """How far that is away, metres."""
 
 
 class Step(Model):

@@ -66,7 +66,7 @@ def test_nothing_open(empty: TestClient) -> None:
     assert_error(empty.get("/api/picture/x/0/0.jpg"), 404, "no_picture")
     assert empty.post("/api/run/cancel").status_code == 200
     assert empty.post("/api/run").status_code == 200
-    assert_error(empty.post("/api/view", json={"camera": 0}), 422, "no_camera", "below 0")
+    assert_error(empty.post("/api/view", json={"camera": 0}), 422, "bad_parameter", "below 0")
 
 
 def test_schema_has_every_parameter_with_all_a_slider_needs(client: TestClient) -> None:
@@ -271,9 +271,11 @@ def test_playhead_selection_layers_view(client: TestClient) -> None:
     assert client.post("/api/select", json={"id": None}).json()["selection"] is None
     layers = client.patch("/api/layers", json={"changes": {"trails": False}}).json()["layers"]
     assert not layers["trails"]
-    assert client.post("/api/view", json={"camera": 2}).status_code == 200
-    assert client.post("/api/view", json={"camera": None}).status_code == 200
-    assert_error(client.post("/api/view", json={"camera": 3}), 422, "no_camera", "below 3")
+    for view in (2, "top", None):
+        assert client.post("/api/view", json={"camera": view}).json()["view"] == view
+    assert_error(client.post("/api/view", json={"camera": 3}), 422, "bad_parameter", "below 3")
+    assert client.post("/api/theme", json={"theme": "light"}).json()["theme"] == "light"
+    assert_error(client.post("/api/theme", json={"theme": "red"}), 422, "bad_request", "theme")
 
 
 def test_opening_what_cannot_be_opened_leaves_what_was_open(client: TestClient) -> None:
@@ -372,6 +374,7 @@ def test_every_route_is_documented(client: TestClient) -> None:
         ("DELETE", "/api/run/pin"),
         ("PATCH", "/api/layers"),
         ("POST", "/api/view"),
+        ("POST", "/api/theme"),
         ("POST", "/api/seek"),
         ("POST", "/api/select"),
     } == {route for route in routes if route[1].startswith("/api/")}

@@ -105,7 +105,8 @@ def test_the_nodes_are_a_fixed_set(server: viser.ViserServer) -> None:
         workbench.seek(step)
         workbench.select(step % 3 or None)
         assert view.wait(SECONDS)
-    workbench.view(1)
+    workbench.look(1)
+    workbench.set_theme("light")
     workbench.set_layers({"trails": False})
     assert view.wait(SECONDS)
     scene_case.show(workbench, second, scene_case.run(second))
@@ -186,13 +187,85 @@ def test_a_click_selects_and_the_next_one_clears(server: viser.ViserServer) -> N
     view.close()
 
 
+def test_the_selected_track_alone(server: viser.ViserServer) -> None:
+    of = scene_case.sequence()
+    workbench = scene_case.opened(of, scene_case.run(of))
+    view = Scene(server, workbench)
+    workbench.seek(30)
+    workbench.set_layers({"others": False})
+    assert view.wait(SECONDS)
+    assert nodes(server)["/people/boxes"].points.shape == (24, 2, 3)  # nobody is selected
+    workbench.select(2)
+    assert view.wait(SECONDS)
+    assert not nodes(server)["/people/boxes"].visible
+    assert nodes(server)["/people/selected_box"].points.shape == (12, 2, 3)
+    assert len(nodes(server)["/people/ellipsoids"].batched_positions) == 1
+    assert len(visible(server, "/labels/people")) == 1
+    view.close()
+
+
+def test_lines_from_truth_to_estimate_say_how_far(server: viser.ViserServer) -> None:
+    of = scene_case.sequence()
+    shown = scene_case.run(of)
+    workbench = scene_case.opened(of, shown)
+    view = Scene(server, workbench)
+    workbench.seek(10)
+    assert view.wait(SECONDS)
+    lines = nodes(server)["/people/errors"].points
+    assert lines.shape == (2, 2, 3)
+    np.testing.assert_allclose(
+        lines[:, 0], of.ground_truth.positions[of.ground_truth.at(10)], rtol=1e-6
+    )
+    np.testing.assert_allclose(lines[:, 1], shown.tracks.positions[shown.tracks.at(10)], rtol=1e-6)
+    workbench.set_layers({"truth": False})
+    assert view.wait(SECONDS)
+    assert not nodes(server)["/people/errors"].visible
+    view.close()
+
+
+def test_the_pinned_run_is_drawn_beside_another(server: viser.ViserServer) -> None:
+    of = scene_case.sequence()
+    workbench = scene_case.opened(of, scene_case.run(of))
+    view = Scene(server, workbench)
+    workbench.seek(30)
+    assert workbench.pin()
+    assert view.wait(SECONDS)
+    assert not nodes(server)["/people/pinned"].visible  # it is the shown one
+    other = scene_case.run(of, walkers=3)
+    other.keys = {**other.keys, "tracks": "another"}
+    workbench.run_begins(other.key)
+    workbench.run_progresses(other, Progress("tracks", of.frames, of.frames, 1.0, of.frames))
+    assert view.wait(SECONDS)
+    assert nodes(server)["/people/pinned"].visible
+    assert nodes(server)["/people/pinned_trails"].visible
+    workbench.set_layers({"pinned": False})
+    assert view.wait(SECONDS)
+    assert not nodes(server)["/people/pinned"].visible
+    view.close()
+
+
+def test_the_theme_reaches_every_line(server: viser.ViserServer) -> None:
+    of = scene_case.sequence()
+    workbench = scene_case.opened(of, scene_case.run(of))
+    view = Scene(server, workbench)
+    assert view.wait(SECONDS)
+    dark = {
+        name: np.array(nodes(server)[name].colors) for name in ("/room/volume", "/people/boxes")
+    }
+    workbench.set_theme("light")
+    assert view.wait(SECONDS)
+    for name, before in dark.items():
+        assert (nodes(server)[name].colors != before).any(), name
+    view.close()
+
+
 def test_nothing_of_another_run_is_shown(server: viser.ViserServer) -> None:
     of = scene_case.sequence()
     workbench = scene_case.opened(of, scene_case.run(of))
     view = Scene(server, workbench)
     workbench.seek(40)
     assert view.wait(SECONDS)
-    assert visible(server, "/people") > {"/people/truth"}
+    assert visible(server, "/people") > {"/people/truth", "/people/errors", "/people/future"}
     workbench.run_begins("another")
     assert view.wait(SECONDS)
     assert visible(server, "/people") == {"/people/truth"}

@@ -157,6 +157,27 @@ def test_looking_through_a_camera_fits_its_whole_picture_into_any_window() -> No
         np.testing.assert_allclose(pose.position, view.camera.centre)
 
 
+@pytest.mark.parametrize("aspect", [0.6, 1.0, 2.2])
+def test_the_view_from_above_has_everything_in_it(aspect: float) -> None:
+    points = scene_geometry.box_corners(np.array([-1.0, -4.0, 0.0]), np.array([3.0, 2.0, 2.0]))
+    pose = scene_geometry.from_above(points, aspect)
+    assert pose.position[:2] == pytest.approx([1.0, -1.0])
+    depth = pose.position[2] - points[:, 2]
+    tangent = np.tan(pose.fov / 2.0)
+    assert (np.abs(points[:, 0] - 1.0) / depth <= tangent * aspect).all()
+    assert (np.abs(points[:, 1] + 1.0) / depth <= tangent).all()
+
+
+def test_trails_go_back_and_ahead() -> None:
+    tracks = scene_case.run(scene_case.sequence()).tracks
+    past = scene_geometry.trails(tracks, 40, 1.0, 10.0)
+    both = scene_geometry.trails(tracks, 40, 1.0, 10.0, ahead=0.5)
+    assert past.ages.min() == 0.0
+    assert past.ages.max() == pytest.approx(1.0)
+    assert both.ages.min() == pytest.approx(-0.5)
+    assert len(both.segments) == len(past.segments) + 2 * 5  # two walkers
+
+
 def test_a_flight_begins_and_ends_where_it_should() -> None:
     view = StraightView(scene_case.camera(1, 3), 320)
     start = overview(np.eye(3), np.zeros((0, 3)), np.zeros(3), 1.0)
@@ -183,25 +204,45 @@ def test_drawn_boxes_leave_a_mark_in_their_colour() -> None:
 
 
 def test_the_colours_are_those_of_the_page() -> None:
-    dark = TOKENS.read_text(encoding="utf-8").split('[data-theme="light"]')[0]
-    tokens = dict(re.findall(r"--((?:id|on)-\d+): (#\w+);", dark))
-    for index, text in enumerate(colours.TRACK_HEX, 1):
-        assert tokens[f"id-{index}"] == text
-        assert tokens[f"on-{index}"] == colours.track_ink(index)
+    themes = TOKENS.read_text(encoding="utf-8").split('[data-theme="light"]')
+    for theme, texts in zip(themes, (colours.TRACK_HEX, colours.LIGHT_HEX), strict=True):
+        tokens = dict(re.findall(r"--((?:id|on)-\d+): (#\w+);", theme))
+        for index, text in enumerate(texts, 1):
+            assert tokens[f"id-{index}"] == text
+            if texts is colours.TRACK_HEX:  # the only set that tags in pictures have
+                assert tokens[f"on-{index}"] == colours.track_ink(index)
 
 
 def test_a_colour_follows_the_id() -> None:
     assert colours.track_colour(1) == colours.track_colour(25) == (0xE9, 0x8F, 0x48)
-    np.testing.assert_array_equal(colours.track_colours(np.array([2]))[0], colours.track_colour(2))
-    assert colours.track_colours(np.zeros(0, dtype=np.int64)).shape == (0, 3)
+    dark = colours.PALETTES["dark"]
+    np.testing.assert_array_equal(dark.of(np.array([2, 26]))[1], colours.track_colour(2))
+    assert dark.of(np.zeros(0, dtype=np.int64)).shape == (0, 3)
     with pytest.raises(ValueError, match="#rrggbb"):
         colours.from_hex("red")
 
 
-def test_fading_ends_in_the_background() -> None:
-    full = colours.track_colours(np.array([1, 2]))
-    np.testing.assert_array_equal(colours.fade(full, np.array([1.0, 1.0])), full)
-    np.testing.assert_array_equal(colours.fade(full, 0.0), [colours.CANVAS] * 2)
+@pytest.mark.parametrize("palette", colours.PALETTES.values(), ids=colours.PALETTES)
+def test_fading_ends_in_the_background(palette: colours.Palette) -> None:
+    full = palette.of(np.array([1, 2]))
+    np.testing.assert_array_equal(palette.fade(full, np.array([1.0, 1.0])), full)
+    np.testing.assert_array_equal(palette.fade(full, 0.0), [palette.canvas] * 2)
+    np.testing.assert_array_equal(
+        palette.error(np.array([0.0, 1.0, 7.0])), [*palette.errors, palette.errors[1]]
+    )
+
+
+@pytest.mark.parametrize("palette", colours.PALETTES.values(), ids=colours.PALETTES)
+def test_tracks_stand_out_from_the_background(palette: colours.Palette) -> None:
+    def luminance(rgb: np.ndarray) -> np.ndarray:
+        share = np.asarray(rgb) / 255.0
+        light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+        return light @ [0.2126, 0.7152, 0.0722]
+
+    ground = luminance(np.array(palette.canvas))
+    for colour in [*palette.tracks, *palette.errors, palette.truth, palette.pinned]:
+        pair = sorted((luminance(np.array(colour)), ground))
+        assert (pair[1] + 0.05) / (pair[0] + 0.05) > 3.0
 
 
 def test_linear_colours_keep_black_and_white() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from app.snapshot import LAYERS, Change, Command, Event, Notice, ViewRequest, clamp
+from app.snapshot import LAYERS, Change, Command, Event, Notice, clamp
 from app.workbench import Workbench
 from tracker import pipeline
 from tracker.parameters import PARAMETERS, PRESETS, ParameterError, value
@@ -133,14 +133,28 @@ def test_only_what_changed_is_told_and_only_while_subscribed(bench: Workbench) -
     assert len(told) == 3
 
 
+def test_the_3d_view_looks_through_cameras_that_there_are(bench: Workbench) -> None:
+    cameras = len(bench.snapshot().sequence.views)
+    told: list[Change] = []
+    bench.subscribe(told.append)
+    for view in (cameras - 1, "top", "top", None):
+        bench.look(view)
+    assert told == ["view"] * 3
+    for wrong in (cameras, -1):
+        with pytest.raises(ParameterError, match=f"below {cameras}, top or null"):
+            bench.look(wrong)
+    bench.set_theme("light")
+    bench.set_theme("light")
+    assert told[3:] == ["theme"]
+
+
 def test_events_pass_and_leave_no_trace(bench: Workbench) -> None:
     heard: list[Event] = []
     end = bench.subscribe_events(heard.append)
     version = bench.snapshot().version
-    bench.view(1)
     bench.command("play")
     bench.notify("warn", "so", "do")
-    assert heard == [ViewRequest(1), Command("play"), Notice("warn", "so", "do")]
+    assert heard == [Command("play"), Notice("warn", "so", "do")]
     assert bench.snapshot().version == version
     end()
 
