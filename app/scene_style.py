@@ -56,8 +56,8 @@ label[for] > wbr { display: none; }
 
 
 NUMBER = """height: 22px; line-height: 20px; padding: 0 6px; border: 1px solid var(--mvp-line);
-border-radius: 3px; background: var(--mvp-field); color: var(--mvp-ink-1); font-size: 11px; box-sizing: border-box;
-white-space: nowrap; font-variant-numeric: tabular-nums;"""
+border-radius: 3px; background: var(--mvp-field); color: var(--mvp-ink-1); font-size: 11px;
+box-sizing: border-box; white-space: nowrap; font-variant-numeric: tabular-nums;"""
 
 
 def values(numbers: dict[str, str], marked: list[str]) -> str:

@@ -129,13 +129,10 @@ export function createActions({ store, seek, send, receive }) {
 			const count = store.get().server?.sequence?.cameras.length ?? 0;
 			if (index < count) store.set({ large: store.get().large === index ? null : index });
 		},
-		lookThrough(camera) {
-			store.set({ view3d: camera });
-			void actions.ask("POST", "view", { camera: camera < 0 ? null : camera });
-		},
+		lookThrough: (view) => void actions.ask("POST", "view", { camera: view }),
 		freeView() {
 			store.set({ large: null });
-			actions.lookThrough(-1);
+			actions.lookThrough(null);
 		},
 		toggleLayer(layer) {
 			const { layers2d, layers3d } = store.get();
@@ -197,7 +194,12 @@ export function createActions({ store, seek, send, receive }) {
 		},
 
 		// page
-		toggleTheme: () => store.set({ theme: store.get().theme === "dark" ? "light" : "dark" }),
+		showTab: (tab) => store.set({ tab, layout: { ...store.get().layout, ...(store.get().layout.max && { max: "side" }) } }),
+		toggleTheme() {
+			const theme = store.get().theme === "dark" ? "light" : "dark";
+			store.set({ theme });
+			void actions.ask("POST", "theme", { theme });
+		},
 		maximise(pane) {
 			const { layout } = store.get();
 			store.set({ layout: pane === null ? {} : { ...layout, max: layout.max === pane ? undefined : pane } });

@@ -42,14 +42,21 @@ export function eventsOf(tracks, { fps, done, switches = [] }) {
 export const scoresOf = ({ scores, basis }) => (scores?.series.run === basis ? scores : null);
 
 /**
- * Events of the shown run, switches among them where there is truth.
+ * Events of the shown run that somebody wants to see, switches among them where there is truth.
  * @param {Readonly<PageState>} state
  */
 export function eventsNow(state) {
-	const { timeline, server } = state;
+	const { timeline, server, eventKind } = state;
 	const { done = 0, tracks = [] } = timeline ?? {};
-	return eventsOf(tracks, { fps: server?.sequence?.fps ?? 25, done, switches: scoresOf(state)?.series.switches });
+	const all = eventsOf(tracks, { fps: server?.sequence?.fps ?? 25, done, switches: scoresOf(state)?.series.switches });
+	return all.filter(({ kind }) => !eventKind || kind === eventKind);
 }
+
+/**
+ * Whether only the selected track is shown.
+ * @param {Readonly<PageState>} state
+ */
+export const isAlone = ({ selection, layers3d }) => selection !== null && layers3d.others === false;
 
 /**
  * What a camera's method says of the people in its picture: "3 and 5 occluded, 7 new".

@@ -52,10 +52,10 @@ const store = createStore(
 		range: [null, null],
 		selection: start.place.selection,
 		hover: null,
-		layers3d: { boxes: true, ellipsoids: true, trails: true, truth: false, volume: true },
-		view3d: -1,
+		layers3d: {},
 		large: start.place.camera,
 		tab: "tracks",
+		eventKind: "",
 		scores: null,
 		measure: "ospa",
 		laneOrder: "longest",
@@ -63,8 +63,8 @@ const store = createStore(
 		singleKeys: true,
 		notes: [],
 		...remembered(),
-		layers2d: { measurements: true, estimates: false, boxes: true, samples: false, truth: true, ...remembered().layers2d },
-		theme: document.documentElement.dataset.theme ?? "dark",
+		layers2d: { measurements: true, estimates: false, boxes: true, samples: false, likelihood: false, foreground: false, trails: false, truth: true, ...remembered().layers2d },
+		theme: document.documentElement.dataset.theme === "light" ? "light" : "dark",
 	}),
 );
 
@@ -151,8 +151,13 @@ function receiveState(told, streamed = false) {
 	} else if (before) {
 		actions.remember(before.parameters, server.parameters);
 		if (before.selection !== server.selection) store.set({ selection: server.selection });
+		// Whoever looks through a camera in 3D wants to see its picture.
+		if (before.view !== server.view && typeof server.view === "number") store.set({ large: server.view });
 	}
-	store.set({ server, run: server.run, ...(server.layers ? { layers3d: { ...store.get().layers3d, ...server.layers } } : {}) });
+	store.set({ server, run: server.run, layers3d: server.layers });
+	// The first word on the theme is this browser's, later ones are everybody's.
+	if (before) store.set({ theme: server.theme });
+	else if (server.theme !== store.get().theme) void actions.ask("POST", "theme", { theme: store.get().theme });
 	if (changed) arrive(server);
 	if (changed || before?.pinned?.key !== server.pinned?.key) void fetchScores();
 	if (before === null || before.opening?.name !== server.opening?.name) void fetchSequences();

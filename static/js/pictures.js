@@ -3,25 +3,35 @@
 import { request } from "./api.js";
 import { createCache } from "./cache.js";
 
-/**
- * A decoded picture, or why there is none.
- */
-
 /** Decoded pictures kept, in bytes: a minute of two small cameras, some seconds of four large ones. */
 export const PICTURE_BUDGET = 256 * 2 ** 20;
 
 /**
- * @param {{sequence: string, camera: number, step: number}} what
+ * Their names are their addresses.
+ * @param {string} sequence  its key
+ * @param {number} camera
+ * @param {number} step
+ * @param {string} [kind]  of the picture itself, or of what is laid over it
  */
-export function pictureName({ sequence, camera, step }) {
-	return `${sequence}/${camera}/${step}`;
-}
+export const pictureName = (sequence, camera, step, kind = "picture") => `/api/${kind}/${sequence}/${camera}/${step}.${kind === "picture" ? "jpg" : "png"}`;
+
+/** What can be laid over a picture. */
+const MAPS = /** @type {const} */ (["foreground", "likelihood"]);
+
+/**
+ * The addresses of what is laid over the pictures of a step, by camera.
+ * @param {string} sequence  its key
+ * @param {StepResult} result
+ * @param {Record<string, boolean>} layers
+ */
+export const mapNames = (sequence, result, layers) =>
+	result.cameras.map((view, camera) => MAPS.flatMap((kind) => (layers[kind] && view[kind] ? [`${pictureName(sequence, camera, result.step, kind)}?run=${view[kind]}`] : [])));
 
 /** @param {(name: string) => void} arrived */
 export function createPictures(arrived) {
 	return createCache({
 		load: async (name, signal) => {
-			const response = await request(`/api/picture/${name}.jpg`, { signal });
+			const response = await request(name, { signal });
 			const bitmap = await createImageBitmap(await response.blob());
 			return /** @type {Picture} */ ({ bitmap, missing: null });
 		},

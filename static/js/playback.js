@@ -9,7 +9,7 @@
 import { getJson } from "./api.js";
 import { createCache } from "./cache.js";
 import { advance, clampStep, playedRange, prefetchWindow } from "./clock.js";
-import { createPictures, pictureName, PICTURE_BUDGET } from "./pictures.js";
+import { createPictures, mapNames, pictureName, PICTURE_BUDGET } from "./pictures.js";
 
 const RESULTS_KEPT = 600;
 
@@ -39,12 +39,10 @@ export function createPlayback(store, sendSeek) {
 
 	const results = createCache({
 		load: async (name, signal) => {
-			const [, step, samples] = name.split("/");
+			const [, step, query] = name.split("/");
 			/** @type {StepResult} */
-			const result = await getJson(`/api/step/${step}${samples ? "?samples=1" : ""}`, { signal });
-			if (name !== resultName(result.run, result.step, Boolean(samples))) {
-				throw new Error(`asked for ${name}, the server shows run ${result.run} by now`);
-			}
+			const result = await getJson(`/api/step/${step}${query}`, { signal });
+			if (name !== resultName(result.run, result.step, query)) throw new Error(`asked for ${name}, the server shows run ${result.run} by now`);
 			return result;
 		},
 		sizeOf: () => 1,
@@ -52,6 +50,8 @@ export function createPlayback(store, sendSeek) {
 		parallel: 2,
 		arrived: (name) => {
 			if (Number(name.split("/")[1]) === store.get().step) dirty = true;
+			const { foreground, likelihood } = store.get().layers2d;
+			windowDirty ||= foreground || likelihood;
 			ask();
 		},
 		failed: () => {
@@ -60,10 +60,14 @@ export function createPlayback(store, sendSeek) {
 		},
 	});
 
-	/** @param {string} run @param {number} step @param {boolean} samples */
-	function resultName(run, step, samples) {
-		return `${run || "none"}/${step}${samples ? "/samples" : ""}`;
-	}
+	/** @param {string} run @param {number} step @param {string} query  for what is not in every answer */
+	const resultName = (run, step, query) => `${run || "none"}/${step}/${query}`;
+
+	/** What the layers need of a result besides what is always in it. */
+	const queryNow = () => {
+		const { samples, trails } = store.get().layers2d;
+		return samples || trails ? `?samples=${Boolean(samples)}&trails=${Boolean(trails)}` : "";
+	};
 
 	/** Try again after something failed that may come back. */
 	function later() {
@@ -94,15 +98,15 @@ export function createPlayback(store, sendSeek) {
 		const most = Math.min(400, Math.floor((PICTURE_BUDGET * 0.9) / Math.max(1, bytes)));
 		const steps = prefetchWindow(step, { ...how, most });
 		pictures.want(
-			steps.flatMap((k) =>
-				sequence.cameras.flatMap((camera, index) =>
-					camera.has_pictures ? [pictureName({ sequence: sequence.key, camera: index, step: k })] : [],
-				),
-			),
+			steps.flatMap((k) => {
+				const result = results.get(resultName(basis, k, queryNow()));
+				const maps = result ? mapNames(sequence.key, result, layers2d).flat() : [];
+				return [...sequence.cameras.flatMap((camera, index) => (camera.has_pictures ? [pictureName(sequence.key, index, k)] : [])), ...maps];
+			}),
 		);
 		const done = shownDone(state);
 		const useful = steps.filter((k) => k === step || k < done);
-		results.want(useful.slice(0, RESULTS_KEPT / 2).map((k) => resultName(basis, k, layers2d.samples)));
+		results.want(useful.slice(0, RESULTS_KEPT / 2).map((k) => resultName(basis, k, queryNow())));
 	}
 
 	/**
@@ -116,21 +120,23 @@ export function createPlayback(store, sendSeek) {
 		const lost = state.link === "lost";
 		const found = sequence.cameras.map((camera, index) =>
 			camera.has_pictures
-				? pictures.get(pictureName({ sequence: sequence.key, camera: index, step }))
+				? pictures.get(pictureName(sequence.key, index, step))
 				: { bitmap: null, missing: null },
 		);
 		if (!lost && found.some((picture) => picture === undefined)) return null;
-		const { samples } = state.layers2d;
-		const result =
-			results.get(resultName(state.basis, step, samples)) ?? results.get(resultName(state.basis, step, !samples));
+		const result = results.get(resultName(state.basis, step, queryNow())) ?? (lost ? results.get(resultName(state.basis, step, "")) : undefined);
+		const names = result ? mapNames(sequence.key, result, state.layers2d) : [];
+		const maps = names.map((list) => list.flatMap((name) => pictures.get(name) ?? []));
+		if (!lost && maps.flat().length < names.flat().length) return null;
+		const frame = { step, pictures: found, maps };
 		const computing = state.run?.state === "computing";
-		if (result?.computed) return { step, pictures: found, result, stale: computing && result.run !== state.run?.key };
+		if (result?.computed) return { ...frame, result, stale: computing && result.run !== state.run?.key };
 		// Until the new run comes to this step, the one before is faintly better than nothing.
 		const before = state.result;
 		if (computing && before?.computed && before.step === step && state.shown === step) {
-			return { step, pictures: found, result: before, stale: true };
+			return { ...frame, result: before, stale: true };
 		}
-		return result || lost ? { step, pictures: found, result: result ?? null, stale: false } : null;
+		return result || lost ? { ...frame, result: result ?? null, stale: false } : null;
 	}
 
 	/** @param {number} now */
@@ -203,8 +209,7 @@ export function createPlayback(store, sendSeek) {
 		 * @param {StepResult} result
 		 */
 		receive(result) {
-			const samples = result.cameras.some((camera) => (camera.samples?.length ?? 0) > 0);
-			results.put(resultName(result.run, result.step, samples), result);
+			results.put(resultName(result.run, result.step, ""), result);
 			if (result.step === store.get().step) dirty = true;
 			ask();
 		},
@@ -238,7 +243,8 @@ export function createPlayback(store, sendSeek) {
 			/** @type {Map<number, number>} */
 			const counts = new Map();
 			for (const name of pictures.names()) {
-				const step = Number(name.slice(name.lastIndexOf("/") + 1));
+				if (!name.startsWith("/api/picture/")) continue;
+				const step = parseInt(name.slice(name.lastIndexOf("/") + 1));
 				counts.set(step, (counts.get(step) ?? 0) + 1);
 			}
 			return [...counts].filter(([, count]) => count === cameras).map(([step]) => step);

@@ -49,19 +49,22 @@
  * @property {RunState} run
  * @property {{key: string, changed: string[]} | null} pinned
  * @property {{path: string}} viser
- * @property {Record<string, boolean>} [layers]
- * @property {number | null} [view]
+ * @property {Record<string, boolean>} layers  of the 3D view
+ * @property {number | "top" | null} view  what the 3D view looks through
+ * @property {"dark" | "light"} theme
  *
  * @typedef {object} TrackInView
  * @property {number} id
  * @property {Box | null} box
  * @property {boolean} seen
  * @property {number | null} detection_probability
- * @property {number | null} source  index of the box that fed it, -1 where none did
+ * @property {number} source  index of the box that fed it, -1 where none did
+ * @property {{box: Box, weight: number, share: number} | null} fed_by
  * @property {number | null} hidden_by
  * @property {boolean} visible
  * @property {string | null} reason
  * @property {[number, number] | null} centre
+ * @property {[number, number, number][]} trail  steps from now, x and y of the feet
  *
  * @typedef {{kind: string, labels: number[]}} ViewEvent  labels of the camera's own estimates
  *
@@ -71,6 +74,9 @@
  * @property {{box: Box, weight: number, label: number}[]} estimates
  * @property {[number, number, number][] | null} [samples]
  * @property {ViewEvent[]} events
+ * @property {Record<string, number>} information  of the method, by name
+ * @property {string | null} foreground  the query of its address, null where there is none
+ * @property {string | null} likelihood  the same of the map of likelihoods
  * @property {[number, number, number, number, number][]} gates  centre x and y; xx, xy, yy of the ellipse's matrix
  * @property {TrackInView[]} tracks
  * @property {{id: number, box: Box | null, valid: boolean}[]} truth
@@ -81,7 +87,7 @@
  * @property {boolean} computed
  * @property {CameraStep[]} cameras
  * @property {{id: number, position: number[], sigma: number[], existence: number, seen: boolean[]}[]} tracks
- * @property {{id: number, position: number[], valid: boolean}[]} truth
+ * @property {{id: number, position: number[], valid: boolean, track: number | null, error: number | null}[]} truth
  * @property {number} components
  * @property {number} cardinality
  *
@@ -153,14 +159,14 @@
  * @property {{id: number, camera: number} | null} hover
  * @property {Record<string, boolean>} layers2d
  * @property {Record<string, boolean>} layers3d
- * @property {number} view3d  -1 is the free view, otherwise a camera's index
  * @property {number | null} large  the camera that is shown large; null: all alike
- * @property {"tracks" | "changes" | "compare" | "runs"} tab
+ * @property {"tracks" | "step" | "events" | "changes" | "compare" | "runs"} tab
+ * @property {"" | LaneEvent["kind"]} eventKind  the events that are listed and gone to; all where empty
  * @property {Scores | null} scores  of the run that was set against the truth last
  * @property {"ospa" | "gospa"} measure  what the timeline plots
  * @property {"longest" | "born"} laneOrder
  * @property {{right?: number, cams?: number, lanes?: number, max?: PaneName}} layout  shares of the window, and the pane that is alone
- * @property {string} theme
+ * @property {"dark" | "light"} theme
  * @property {boolean} singleKeys
  * @property {Note[]} notes
  *
@@ -232,7 +238,7 @@
  * @property {() => void} clear
  * @property {() => void} exportTracks
  * @property {(index: number) => void} chooseCamera  as the large picture
- * @property {(camera: number) => void} lookThrough  in 3D; -1 is the free view
+ * @property {(view: number | "top" | null) => void} lookThrough  in 3D; null is the free view
  * @property {() => void} freeView
  * @property {(layer: string) => void} toggleLayer  in the pictures and in 3D
  * @property {(layer: string) => void} toggleLayer2d
@@ -248,6 +254,7 @@
  * @property {() => void} forget  what can be undone
  * @property {(direction: -1 | 1) => void} undo  or redo
  * @property {(what: "command" | "json") => void} copyRun
+ * @property {(tab: PageState["tab"]) => void} showTab
  * @property {() => void} toggleTheme
  * @property {(pane: PaneName | null) => void} maximise  null: all panes as they were at first
  * @property {() => void} help
@@ -257,6 +264,7 @@
  * @typedef {object} Frame  what is painted at once
  * @property {number} step
  * @property {(Picture | undefined)[]} pictures  by camera; undefined where it is not loaded and will not be
+ * @property {Picture[][]} maps  by camera: what is laid over its picture
  * @property {StepResult | null} result
  * @property {boolean} stale  the result is of the run before, shown faintly until the new one is there
  *
@@ -289,6 +297,8 @@
  * @property {Record<string, boolean>} layers
  * @property {number | null} selection
  * @property {number | null} hover
+ * @property {boolean} alone  only the selected track
+ * @property {StepResult["truth"]} people
  * @property {number} opacity
  * @property {Palette} ink
  */

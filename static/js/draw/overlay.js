@@ -61,6 +61,7 @@ export function drawOverlay(g, view, scene) {
 	g.globalAlpha = scene.opacity;
 	g.lineJoin = "miter";
 	if (layers.samples && view.samples) drawSamples(g, view.samples, scale);
+	if (layers.trails) drawTrails(g, shown(view, scene), scene);
 	if (layers.truth && roomy) {
 		for (const { box, valid } of view.truth) {
 			if (!box) continue;
@@ -69,6 +70,7 @@ export function drawOverlay(g, view, scene) {
 			stroke(g, "#fff", 1.25, [4, 3], 0.45);
 		}
 		g.globalAlpha = scene.opacity;
+		drawErrors(g, view, scene);
 	}
 	if (layers.measurements) {
 		for (const { box } of view.measurements) {
@@ -83,7 +85,7 @@ export function drawOverlay(g, view, scene) {
 		}
 		if (view.gates.length && roomy) drawGates(g, view, scene);
 	}
-	if (layers.boxes) drawTracks(g, visibleTracks(view), scene, roomy);
+	if (layers.boxes) drawTracks(g, shown(view, scene), scene, roomy);
 	g.globalAlpha = 1;
 }
 
@@ -95,6 +97,31 @@ export function drawOverlay(g, view, scene) {
 export function visibleTracks(view) {
 	const tracks = /** @type {(TrackInView & {box: Box})[]} */ (view.tracks.filter((track) => track.visible && track.box));
 	return tracks.sort((a, b) => a.box[1] + a.box[3] - b.box[1] - b.box[3]);
+}
+
+/** @param {CameraStep} view @param {Scene} scene */
+const shown = (view, { alone, selection }) => visibleTracks(view).filter(({ id }) => !alone || id === selection);
+
+/** The way of the feet: what was is drawn, what comes is hinted at. @param {Brush} g @param {TrackInView[]} tracks @param {Scene} scene */
+function drawTrails(g, tracks, { scale, ink, selection }) {
+	for (const { id, trail } of tracks) {
+		for (const [points, width] of /** @type {[[number, number, number][], number][]} */ ([[trail.filter(([step]) => step >= 0), 1], [trail.filter(([step]) => step <= 0), id === selection ? 2.5 : 1.75]])) {
+			g.beginPath();
+			for (const [, x, y] of points) g.lineTo(x * scale, y * scale);
+			stroke(g, ink.id(id), width, [], 0.4);
+		}
+	}
+}
+
+/** From where somebody is to where he was put: the colour says how far. @param {Brush} g @param {CameraStep} view @param {Scene} scene */
+function drawErrors(g, { truth, tracks }, { scale, ink, people }) {
+	for (const { id, track, error } of people) {
+		const [from, to] = [truth.find((t) => t.id === id)?.box, tracks.find((t) => t.id === track)?.box];
+		if (!from || !to || error === null) continue;
+		g.beginPath();
+		for (const [left, top, width, height] of [from, to]) g.lineTo((left + width / 2) * scale, (top + height / 2) * scale);
+		stroke(g, `color-mix(in srgb, ${ink.get("worse")} ${Math.min(100, 100 * error)}%, ${ink.get("better")})`, 2.5, [], 0.5);
+	}
 }
 
 /** @param {Brush} g @param {[number, number, number][]} samples @param {number} scale */
@@ -116,8 +143,12 @@ function drawSamples(g, samples, scale) {
 /** @param {Brush} g @param {(TrackInView & {box: Box})[]} tracks @param {Scene} scene @param {boolean} roomy */
 function drawTracks(g, tracks, { scale, selection, hover, ink, width }, roomy) {
 	const huge = width > 800 ? 1.4 : 1;
-	for (const { id, box, seen } of tracks) {
+	for (const { id, box, seen, fed_by: fed } of tracks) {
 		const marked = id === selection || id === hover;
+		if (marked && fed) {
+			trace(g, fed.box, scale);
+			stroke(g, WHITE, 2, [], 0.6);
+		}
 		const colour = ink.id(id);
 		trace(g, box, scale);
 		if (marked) {

@@ -3,7 +3,7 @@
 import { fill, h, icon, idTag, parts, show, write } from "../dom.js";
 import { prepare } from "../draw/canvas.js";
 import { drawEmptyPicture, drawOverlay, visibleTracks } from "../draw/overlay.js";
-import { viewWords } from "../events.js";
+import { isAlone, viewWords } from "../events.js";
 import { mosaic } from "../mosaic.js";
 import { pictureInk } from "../palette.js";
 
@@ -99,7 +99,9 @@ export function mountCameras(root, { store, actions, playback }) {
 				g.imageSmoothingQuality = "medium";
 				g.drawImage(bitmap, 0, 0, width, height);
 			} else drawEmptyPicture(g, width, height);
-			if (view) drawOverlay(g, view, { scale: width / cameras()[index].width, width, height, layers, selection, hover: hover?.id ?? null, opacity: next.stale ? 0.45 : 1, ink });
+			for (const map of next.maps[index] ?? []) if (map.bitmap) g.drawImage(map.bitmap, 0, 0, width, height);
+			const scale = width / cameras()[index].width;
+			if (view) drawOverlay(g, view, { scale, width, height, layers, selection, hover: hover?.id ?? null, alone: isAlone(store.get()), people: next.result?.truth ?? [], opacity: next.stale ? 0.45 : 1, ink });
 			write(words, wordsOf(next, index, width > 260));
 		});
 		placeCards();
@@ -144,7 +146,9 @@ export function mountCameras(root, { store, actions, playback }) {
 	function placeCards() {
 		const { hover } = store.get();
 		cells.forEach(({ card }, index) => {
-			const track = hover?.camera === index ? frame?.result?.cameras[index].tracks.find((t) => t.id === hover.id) : undefined;
+			// What is pointed at elsewhere is explained in the large picture.
+			const here = hover && (hover.camera < 0 ? store.get().large ?? 0 : hover.camera) === index;
+			const track = here ? frame?.result?.cameras[index].tracks.find((t) => t.id === hover.id) : undefined;
 			card.hidden = !track?.box;
 			if (!track?.box) return;
 			fillCard(card, track);
@@ -158,7 +162,7 @@ export function mountCameras(root, { store, actions, playback }) {
 	}
 
 	/** @param {HTMLElement} card @param {TrackInView} track */
-	function fillCard(card, { id, seen, detection_probability: p, hidden_by: front, source }) {
+	function fillCard(card, { id, seen, detection_probability: p, hidden_by: front, reason, source, fed_by: fed }) {
 		const whole = frame?.result?.tracks.find((t) => t.id === id);
 		const row = (/** @type {Child | Child[]} */ word, /** @type {Child[]} */ ...value) => [h("dt", {}, word), h("dd", {}, ...value)];
 		fill(
@@ -168,8 +172,8 @@ export function mountCameras(root, { store, actions, playback }) {
 				"dl",
 				{},
 				whole && row("existence", whole.existence.toFixed(2)),
-				p !== null && row([h("i", {}, "p"), h("sub", {}, "D")], show(Number(p.toFixed(3))), front !== null && h("small", {}, ` hidden by ${front}`)),
-				row("fed by", seen ? `box ${(source ?? 0) + 1}` : "no box here"),
+				p !== null && row([h("i", {}, "p"), h("sub", {}, "D")], show(Number(p.toFixed(3))), h("small", {}, front !== null ? ` hidden by ${front}` : reason ? ` ${reason}` : "")),
+				row("fed by", ...(seen && fed ? [`box ${source + 1}`, h("small", {}, ` of weight ${fed.weight.toFixed(2)}, its own by ${Math.round(100 * fed.share)} %`)] : ["no box here"])),
 				whole && row("at", whole.position.map((v) => v.toFixed(2).replace("-", "−")).join("  "), h("small", {}, " m")),
 			),
 		);
@@ -180,7 +184,7 @@ export function mountCameras(root, { store, actions, playback }) {
 		for (const chip of /** @type {NodeListOf<HTMLElement>} */ (root.querySelectorAll("[data-layer2d]"))) {
 			const layer = chip.dataset.layer2d ?? "";
 			chip.setAttribute("aria-pressed", String(Boolean(layers2d[layer])));
-			chip.toggleAttribute("disabled", (layer === "truth" && !server?.sequence?.has_truth) || (layer === "samples" && server?.methods.single_view === "none"));
+			chip.toggleAttribute("disabled", (layer === "truth" && !server?.sequence?.has_truth) || (layer !== "truth" && layer !== "boxes" && layer !== "trails" && !server?.sequence));
 		}
 		blank.hidden = Boolean(server?.sequence);
 		if (server?.sequence) return;
@@ -208,7 +212,7 @@ export function mountCameras(root, { store, actions, playback }) {
 		playback.repaint();
 	});
 	store.on(["large"], arrange);
-	store.on(["selection", "hover"], playback.repaint);
+	store.on(["selection", "hover", "layers3d"], playback.repaint);
 	new ResizeObserver(arrange).observe(root);
 	addEventListener("panes", arrange);
 	header();

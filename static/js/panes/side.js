@@ -3,15 +3,18 @@
 import { parts } from "../dom.js";
 import { mountChanges } from "./changes.js";
 import { mountCompare } from "./compare.js";
+import { isAlone } from "../events.js";
+import { mountEvents } from "./events.js";
 import { mountRuns } from "./runs.js";
+import { mountStep } from "./step.js";
 import { mountTracks } from "./tracks.js";
 
-const MOUNT = { tracks: mountTracks, changes: mountChanges, compare: mountCompare, runs: mountRuns };
+const MOUNT = { tracks: mountTracks, step: mountStep, events: mountEvents, changes: mountChanges, compare: mountCompare, runs: mountRuns };
 
 /** @type {Pane} */
 export function mountSide(root, context) {
 	const { store } = context;
-	const { count } = parts(root);
+	const { count, only } = parts(root);
 	const tabs = /** @type {HTMLElement[]} */ ([...root.querySelectorAll("[role=tab]")]);
 	const nameOf = (/** @type {HTMLElement} */ tab) => /** @type {PageState["tab"]} */ (tab.id.replace("tab-", ""));
 	const panelOf = (/** @type {HTMLElement} */ tab) => /** @type {HTMLElement} */ (root.querySelector(`#panel-${nameOf(tab)}`));
@@ -38,6 +41,10 @@ export function mountSide(root, context) {
 		}
 	}
 	store.on(["tab"], choose);
+	store.on(["layers3d", "selection"], (state) => {
+		only.setAttribute("aria-pressed", String(isAlone(state)));
+		only.disabled = state.selection === null;
+	});
 	store.on(["server"], ({ server }) => {
 		const changes = server?.changed.length ?? 0;
 		count.hidden = changes === 0;

@@ -5,7 +5,7 @@ import { fill, h, idTag, parts, write } from "../dom.js";
 import { hatch, prepare } from "../draw/canvas.js";
 import { drawLanes, drawRange, drawRuler } from "../draw/lanes.js";
 import { drawCardinality, drawErrors, drawParts, meanOf, scaleOf } from "../draw/strips.js";
-import { ordered, scoresOf } from "../events.js";
+import { isAlone, ordered, scoresOf } from "../events.js";
 import { faded, palette } from "../palette.js";
 import { shownDone } from "../playback.js";
 import { mountTransport } from "./transport.js";
@@ -57,11 +57,11 @@ export function mountTimeline(root, context) {
 	let sorted = { of: null, by: "", tracks: [] };
 	/** @returns {TrackLane[]} */
 	function shownTracks() {
-		const { timeline, laneOrder } = store.get();
+		const { timeline, laneOrder, selection } = store.get();
 		if (timeline !== sorted.of || laneOrder !== sorted.by) {
 			sorted = { of: timeline, by: laneOrder, tracks: ordered(timeline?.tracks ?? [], laneOrder) };
 		}
-		return sorted.tracks;
+		return isAlone(store.get()) ? sorted.tracks.filter(({ id }) => id === selection) : sorted.tracks;
 	}
 
 	/** What is plotted of the scores, made once for each of them. */
@@ -254,7 +254,7 @@ export function mountTimeline(root, context) {
 		seekBar.max = String(Math.max(0, frames - 1));
 		resize();
 	});
-	store.on(["timeline", "run", "basis", "laneOrder", "scores", "measure"], () => {
+	store.on(["timeline", "run", "basis", "laneOrder", "scores", "measure", "layers3d"], () => {
 		listLanes();
 		draw();
 		placeHead();

@@ -1,7 +1,7 @@
 // @ts-check
 /** The table of tracks: sorted by any column, walked by keyboard, alive at the shown step. */
 import { fill, h, idTag, parts, write } from "../dom.js";
-import { eventsNow, nextEvent, scoresOf, stateAt } from "../events.js";
+import { eventsNow, isAlone, nextEvent, scoresOf, stateAt } from "../events.js";
 import { grid } from "../grid.js";
 
 /** Rows beyond this are counted, not drawn. */
@@ -57,7 +57,7 @@ export function mountTracks(root, { store, actions, playback }) {
 		const { timeline, server, run } = store.get();
 		scored = new Map(scoresOf(store.get())?.evaluation.per_track.map((track) => [track.id, track]));
 		table.element.classList.toggle("plain", !server?.sequence?.has_truth);
-		const tracks = timeline?.tracks ?? [];
+		const tracks = (timeline?.tracks ?? []).filter(({ id }) => !isAlone(store.get()) || id === store.get().selection);
 		table.show(tracks.slice(0, MOST_ROWS));
 		blank.hidden = tracks.length > 0;
 		if (!tracks.length) {
@@ -91,8 +91,9 @@ export function mountTracks(root, { store, actions, playback }) {
 		fill(upcoming, event ? ["next: ", h("b", {}, `${event.kind} of ${event.id}, step ${event.step}`)] : "no later event");
 	}
 
-	store.on(["timeline", "server", "scores"], list);
-	store.on(["shown", "result", "selection"], now);
+	store.on(["timeline", "server", "scores", "layers3d"], list);
+	store.on(["shown", "result", "eventKind"], now);
+	store.on(["selection"], () => (isAlone(store.get()) ? list() : now()));
 	store.on(["selection"], ({ selection }) => table.each(({ id }, row) => id === selection && row.scrollIntoView({ block: "nearest" })));
 	list();
 }

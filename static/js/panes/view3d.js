@@ -43,26 +43,22 @@ export function mountView3d(root, { store, actions, retry, press }) {
 	}
 
 	function header() {
-		const { server, layers3d, view3d, link } = store.get();
+		const { server, layers3d, link } = store.get();
 		const sequence = server?.sequence;
 		for (const chip of /** @type {NodeListOf<HTMLElement>} */ (root.querySelectorAll("[data-layer3d]"))) {
 			const layer = chip.dataset.layer3d ?? "";
 			chip.setAttribute("aria-pressed", String(Boolean(layers3d[layer])));
 			chip.toggleAttribute("disabled", link !== "open" || (layer === "truth" && !sequence?.has_truth));
+			chip.hidden = layer === "pinned" && !server?.pinned;
 		}
-		const names = ["free", ...(sequence?.cameras ?? []).map((_, index) => `C${index + 1}`)];
-		if (views.childElementCount !== names.length) {
-			fill(
-				views,
-				names.map((name, index) => {
-					const tip = index ? `Look through ${sequence?.cameras[index - 1].name}` : "Free view";
-					return h("button", { class: "start", "data-tip": tip, "data-key": index ? "" : "0", onclick: () => actions.lookThrough(index - 1) }, name);
-				}),
-			);
+		/** @type {[string, number | "top" | null, string, string][]} */
+		const points = [["free", null, "Free view", "0"], ["top", "top", "From above", "U"], ...(sequence?.cameras ?? []).map(({ name }, index) => /** @type {[string, number, string, string]} */ ([`C${index + 1}`, index, `Look through ${name}`, ""]))];
+		if (views.childElementCount !== points.length) {
+			fill(views, points.map(([name, view, tip, key]) => h("button", { class: "start", "data-tip": tip, "data-key": key, onclick: () => actions.lookThrough(view) }, name)));
 		}
-		[...views.children].forEach((button, index) => {
-			button.setAttribute("aria-pressed", String(index - 1 === view3d));
-			button.toggleAttribute("disabled", link !== "open");
+		points.forEach(([, view], index) => {
+			views.children[index].setAttribute("aria-pressed", String(view === (server?.view ?? null)));
+			views.children[index].toggleAttribute("disabled", link !== "open");
 		});
 	}
 
@@ -83,7 +79,7 @@ export function mountView3d(root, { store, actions, retry, press }) {
 		wasLost = link === "lost" || (wasLost && link !== "open");
 		cover();
 	});
-	store.on(["layers3d", "view3d", "link"], header);
+	store.on(["layers3d", "link"], header);
 	header();
 	cover();
 }
