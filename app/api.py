@@ -240,7 +240,8 @@ def timeline(request: Request, bench: Bench, part: Part) -> models.Timeline:
     if snapshot.sequence is None:
         raise nothing_open()
     timelines: Timelines = request.app.state.timelines
-    return timelines.of(snapshot.sequence, snapshot.run, part.window(snapshot.sequence.frames))
+    window = part.window(snapshot.sequence.frames)
+    return timelines.of(snapshot.sequence, snapshot.run, window, snapshot.scores.pinned)
 
 
 @router.get(

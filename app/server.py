@@ -18,13 +18,14 @@ from fastapi.staticfiles import StaticFiles
 from fastapi_offline import FastAPIOffline
 from starlette.types import Scope
 
-from app import api, errors, foreground, gateway, stream
+from app import api, errors, foreground, gateway, likelihood_routes, stream
 from app.compiling import Compiling
 from app.errors import sentence
 from app.evaluation import routes as evaluation
 from app.evaluation.worker import Evaluator
 from app.gateway import Gateway
 from app.jobs import Jobs, in_background
+from app.likelihood import Likelihoods
 from app.paths import static_folder
 from app.pictures import Pictures
 from app.security import CONTENT_POLICY, Guard, allowed_hosts, is_loopback
@@ -82,6 +83,7 @@ def create_app(settings: Settings) -> FastAPI:
     errors.install(app)
     app.include_router(api.router)
     app.include_router(foreground.router)
+    app.include_router(likelihood_routes.router)
     app.include_router(evaluation.router)
     app.include_router(stream.router)
     app.include_router(gateway.router)
@@ -120,6 +122,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     )
     pictures = app.state.pictures = Pictures(workbench)
     app.state.timelines = Timelines()
+    app.state.likelihoods = Likelihoods()
     evaluator = app.state.evaluator = Evaluator(workbench)
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()

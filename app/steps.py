@@ -6,6 +6,7 @@ import numpy as np
 from numpy import ndarray
 
 from app import models
+from app.likelihood import key_of
 from app.pairs import pairs_at
 from app.scene_geometry import FUTURE_SECONDS, TRAIL_SECONDS
 from tracker.fusion.protocol import FusionResult
@@ -38,11 +39,20 @@ def step_of(
         with_trails: Whether to tell where tracks come from and go to in each picture.
     """
     computed = run is not None and step < run.done
+    likelihood = None
+    if run is not None and sequence.templates:
+        likelihood = key_of(sequence, run.parameters.colour_phd)
     cameras = [
         models.CameraStep(
-            name=camera.name, measurements=[], estimates=[], tracks=[], truth=[], information={}
+            name=view.camera.name,
+            measurements=[],
+            estimates=[],
+            likelihood=likelihood if view.has_pictures else None,
+            tracks=[],
+            truth=[],
+            information={},
         )
-        for camera in sequence.cameras
+        for view in sequence.views
     ]
     message = models.Step(
         run=run.key if run is not None else "",

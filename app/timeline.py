@@ -6,15 +6,18 @@ the highest and the mean of as many steps as share one place of its axis.
 
 from __future__ import annotations
 
+import math
 import threading
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from app import models
+from app.evaluation.scores import Scored
+from app.pairs import alike
 from tracker.pipeline import Run
 from tracker.sequences.sequence import Sequence
 from tracker.trajectories import Trajectories
@@ -24,6 +27,13 @@ BUCKETS = 4096
 
 MOST_TRACKS = 400
 """Lanes told at once; the rest is a number."""
+
+
+MOST_EVENTS = 4000
+"""Events told at most: the first ones."""
+
+LONG_MISS = 1.5
+"""Seconds without a box from any camera that make a miss long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,19 +136,32 @@ class Timelines:
         self._counted: tuple[int, _Spans, Int[ndarray, " D"]] | None = None
         self._sequence: Sequence | None = None
         self._truth: Int[ndarray, " S"] | None = None
+        self._alike: tuple[tuple[str, str, int], dict[int, int]] = (("", "", 0), {})
 
-    def of(self, sequence: Sequence, run: Run | None, window: Window) -> models.Timeline:
-        """The shown run over time, as far as it is computed and as the window shows it."""
+    def of(
+        self, sequence: Sequence, run: Run | None, window: Window, pinned: Scored | None = None
+    ) -> models.Timeline:
+        """The shown run over time, as far as it is computed and as the window shows it.
+
+        Args:
+            sequence: That is open.
+            run: That is shown.
+            window: The part that somebody looks at.
+            pinned: The run that it is compared with, if there is one.
+        """
         with self._lock:
-            return self._of(sequence, run, window)
+            return self._of(sequence, run, window, pinned)
 
-    def _of(self, sequence: Sequence, run: Run | None, window: Window) -> models.Timeline:
+    def _of(
+        self, sequence: Sequence, run: Run | None, window: Window, pinned: Scored | None
+    ) -> models.Timeline:
         if run is not self._run:
             self._run, self._cardinality, self._counted = run, [], None
         if sequence is not self._sequence:
             self._sequence, self._truth = sequence, _truth_counts(sequence)
         done, count = 0, np.zeros(0, dtype=np.int64)
         lives: list[models.TrackLife] = []
+        events: list[models.LaneEvent] = []
         left_out = 0
         if run is not None:
             done = run.done
@@ -152,7 +175,9 @@ class Timelines:
                     done, _Spans.of(run.tracks, done), np.bincount(frames, minlength=done)
                 )  # fmt: skip
             _, spans, count = self._counted
-            lives, left_out = _lives(spans, window)
+            shortest = math.ceil(LONG_MISS * sequence.fps)
+            lives, left_out = _lives(spans, window, shortest)
+            events = _events(spans, done, shortest)
         return models.Timeline(
             run=run.key if run is not None else "",
             done=done,
@@ -163,7 +188,30 @@ class Timelines:
             count=counts(count, window),
             truth=None if self._truth is None else counts(self._truth, window),
             tracks=lives,
+            pinned=self._pinned(sequence, run, window, pinned),
+            events=events,
             left_out=left_out,
+        )
+
+    def _pinned(
+        self, sequence: Sequence, run: Run | None, window: Window, pinned: Scored | None
+    ) -> models.PinnedTimeline | None:
+        if pinned is None or run is None or pinned.key == run.key:
+            return None
+        done = min(run.done, pinned.steps)
+        key = (pinned.key, run.key, done)
+        if key != self._alike[0]:
+            self._alike = (key, alike(pinned.tracks, run.tracks, done))
+        like = self._alike[1]
+        spans = _Spans.of(pinned.tracks, pinned.steps)
+        lives, _ = _lives(spans, window, math.ceil(LONG_MISS * sequence.fps))
+        count = np.bincount(pinned.tracks.frames, minlength=pinned.steps)[: pinned.steps]
+        return models.PinnedTimeline(
+            run=pinned.key,
+            count=counts(count, window),
+            tracks=[
+                models.PinnedLife(**life.model_dump(), like=like.get(life.id)) for life in lives
+            ],
         )
 
 
@@ -174,7 +222,24 @@ def _truth_counts(sequence: Sequence) -> Int[ndarray, " S"] | None:
     return np.bincount(truth.frames, minlength=sequence.frames)[: sequence.frames]
 
 
-def _lives(spans: _Spans, window: Window) -> tuple[list[models.TrackLife], int]:
+def _events(spans: _Spans, done: int, shortest: int) -> list[models.LaneEvent]:
+    """Births after the first step, deaths before the newest one, and long misses, by step."""
+    if not len(spans.ids):
+        return []
+    heads = np.flatnonzero(np.diff(spans.ids, prepend=-1))
+    tails = np.append(heads[1:], len(spans.ids)) - 1
+    born = heads[spans.first[heads] > 0]
+    dead = tails[spans.last[tails] < done - 1]
+    lost = np.flatnonzero(~spans.seen & (spans.last - spans.first + 1 >= shortest))
+    kinds: tuple[Literal["birth", "death", "long miss"], ...] = ("birth", "death", "long miss")
+    steps = np.concatenate([spans.first[born], spans.last[dead], spans.first[lost]])
+    ids = np.concatenate([spans.ids[born], spans.ids[dead], spans.ids[lost]])
+    which = np.repeat(np.arange(3), [len(born), len(dead), len(lost)])
+    order = np.lexsort((ids, steps))[:MOST_EVENTS]
+    return [(int(steps[i]), int(ids[i]), kinds[which[i]]) for i in order]
+
+
+def _lives(spans: _Spans, window: Window, shortest: int) -> tuple[list[models.TrackLife], int]:
     """The tracks that live in the window, and how many more there are."""
     heads = np.flatnonzero(np.diff(spans.ids, prepend=-1))
     tails = np.append(heads[1:], len(spans.ids))[: len(heads)]
@@ -193,33 +258,35 @@ def _lives(spans: _Spans, window: Window) -> tuple[list[models.TrackLife], int]:
                 first=int(spans.first[heads[i]]),
                 last=int(spans.last[tails[i] - 1]),
                 seen=round(float(steps.sum() / lengths[i]), 4),
-                spans=_spans_of(spans, rows, window),
+                spans=_spans_of(spans, rows, window, shortest),
             )
         )
     return lives, int(inside.sum()) - len(chosen)
 
 
-def _spans_of(spans: _Spans, rows: slice, window: Window) -> list[models.Span]:
+def _spans_of(spans: _Spans, rows: slice, window: Window, shortest: int) -> list[models.Span]:
     """A track's spans within the window; what is shorter than a bucket joins its neighbour.
 
     A joined span is what most of its steps are. So a lane has at most as many spans as
     there are buckets, and none is lost where it is as long as a bucket.
     """
-    shown: list[list[Any]] = []  # first, last, steps seen
-    firsts, lasts = spans.first[rows], spans.last[rows]
+    shown: list[list[Any]] = []  # first, last, steps seen, whether a long miss is in it
+    firsts, lasts, sights = spans.first[rows], spans.last[rows], spans.seen[rows]
+    long = ~sights & (lasts - firsts + 1 >= shortest)
     there = np.flatnonzero((lasts >= window.first) & (firsts < window.end))
     for i in there.tolist():
         first = max(int(firsts[i]), window.first)
         last = min(int(lasts[i]), window.end - 1)
-        seen = last - first + 1 if spans.seen[rows][i] else 0
+        seen = last - first + 1 if sights[i] else 0
         before = shown[-1] if shown else None
         if before is not None and first - before[1] <= window.stride:
             is_short = last - first + 1 < window.stride
             if is_short or before[1] - before[0] + 1 < window.stride:
-                before[1], before[2] = last, before[2] + seen
+                before[1:] = last, before[2] + seen, before[3] or bool(long[i])
                 continue
-        shown.append([first, last, seen])
+        shown.append([first, last, seen, bool(long[i])])
+    kind: dict[bool, Literal["coasting", "long miss"]] = {False: "coasting", True: "long miss"}
     return [
-        (first, last, "seen" if 2 * seen > last - first + 1 else "coasting")
-        for first, last, seen in shown
+        (first, last, "seen" if 2 * seen > last - first + 1 else kind[is_long])
+        for first, last, seen, is_long in shown
     ]

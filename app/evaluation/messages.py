@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Literal
 
 import numpy as np
@@ -80,6 +81,12 @@ def series_of(
     names = set(type(series).__slots__) & set(models.EvaluationSeries.model_fields)
     rows = {name: window.worst(getattr(series, name)) for name in ("ospa", "ospa2", "gospa")}
     pairs = evaluation.pairs
+    tracks = {track: _of_track(evaluation, track) for track in np.unique(pairs.tracks).tolist()}
+    shown = {
+        name: getattr(series, name)[rows.get(name.partition("_")[0], rows["ospa"])]
+        for name in names
+    }
+    mean = _mean(tracks, window, len(series.ospa))
     return models.EvaluationSeries(
         run=scored.key,
         of=of,
@@ -95,17 +102,51 @@ def series_of(
             for person, values in evaluation.errors.items()
         ],
         track_errors=[
-            models.TrackError(track=track, **_trimmed(_of_track(evaluation, track), window))
-            for track in np.unique(pairs.tracks).tolist()
+            models.TrackError(track=track, **_trimmed(values, window))
+            for track, values in tracks.items()
         ],
         switches=_switches(evaluation),
-        **{
-            name: getattr(series, name)[rows.get(name.partition("_")[0], rows["ospa"])]
-            .round(DECIMALS)
-            .tolist()
-            for name in names
+        ospa_share=_share(shown["ospa_localisation"], shown["ospa_cardinality"]),
+        gospa_share=_share(
+            shown["gospa_localisation"], shown["gospa_missed"] + shown["gospa_false"]
+        ),
+        mean_error=[value if value == value else None for value in mean.round(DECIMALS).tolist()],
+        axes={
+            "ospa": axis_end(series.ospa),
+            "gospa": axis_end(series.gospa),
+            "error": axis_end(pairs.distances),
         },
+        **{name: values.round(DECIMALS).tolist() for name, values in shown.items()},
     )
+
+
+def _share(part: ndarray, rest: ndarray) -> list[float]:
+    whole = part + rest
+    share = np.divide(part, whole, out=np.zeros_like(whole), where=whole > 0.0)
+    return [float(value) for value in share.round(3)]
+
+
+def _mean(tracks: dict[int, ndarray], window: Window, steps: int) -> ndarray:
+    """Over the tracks that are paired, of each bucket each track's worst."""
+    starts = window.starts(steps)
+    values = [values[window.worst(values)] for values in tracks.values()]
+    table = np.array(values).reshape(len(values), len(starts))
+    count = np.isfinite(table).sum(axis=0)
+    sums = np.nansum(table, axis=0)
+    mean: ndarray = np.divide(sums, count, out=np.full(len(starts), np.nan), where=count > 0)
+    return mean
+
+
+def axis_end(values: ndarray) -> float:
+    """A round number that all but the largest two in a hundred values stay below: 0.1, 0.2, 0.5, …
+
+    Args:
+        values: None below 0; those that are not numbers do not count.
+    """
+    known = np.sort(values[np.isfinite(values)])
+    most = max(float(known[math.ceil(0.98 * len(known)) - 1]) if len(known) else 0.0, 0.1)
+    ten = 10.0 ** math.floor(math.log10(most) + 1e-9)
+    return round(ten * next((k for k in (1, 2, 5) if k * ten >= most - 1e-9), 10), 9)
 
 
 def _of_track(evaluation: Evaluation, track: int) -> ndarray:

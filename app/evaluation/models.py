@@ -164,6 +164,13 @@ class EvaluationSeries(Model):
     gospa_missed: list[float]
     gospa_false: list[float]
     """The parts of GOSPA are p-th powers and sum to its p-th power."""
+    ospa_share: list[float]
+    gospa_share: list[float]
+    """How much of each is location, 0 … 1; of GOSPA by its powers."""
+    mean_error: list[float | None]
+    """Metres, over the tracks; null where there is no pair."""
+    axes: dict[Literal["ospa", "gospa", "error"], float]
+    """Round upper ends for plots; a few spikes leave them."""
     truth: list[int]
     estimates: list[int]
     misses: list[int]

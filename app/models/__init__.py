@@ -59,7 +59,10 @@ from app.models.step import (
 )
 from app.models.timeline import (
     Counts,
+    LaneEvent,
     Numbers,
+    PinnedLife,
+    PinnedTimeline,
     Span,
     Timeline,
     TrackLife,
@@ -78,6 +81,7 @@ __all__ = [
     "Feeding",
     "Gate",
     "GroupInfo",
+    "LaneEvent",
     "LayerChanges",
     "Measurement",
     "MethodsInfo",
@@ -88,6 +92,8 @@ __all__ = [
     "ParameterChanges",
     "ParameterInfo",
     "PinnedInfo",
+    "PinnedLife",
+    "PinnedTimeline",
     "PresetRequest",
     "Reason",
     "ResetRequest",

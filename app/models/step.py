@@ -94,6 +94,8 @@ class CameraStep(Model):
     """Where the method expects its targets, in pixels."""
     foreground: str | None = None
     """``?run=`` of the foreground's address; null where the method has none."""
+    likelihood: str | None = None
+    """``?run=`` of the likelihood map's address; null without pictures or templates."""
     tracks: list[CameraTrack]
     truth: list[CameraTruth]
     information: dict[str, float]

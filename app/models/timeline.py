@@ -6,8 +6,11 @@ from typing import Literal
 
 from app.models.base import Model
 
-Span = tuple[int, int, Literal["seen", "coasting"]]
-"""First step, last step, and whether any camera saw the target."""
+Span = tuple[int, int, Literal["seen", "coasting", "long miss"]]
+"""First step, last step, and whether any camera saw the target; a long miss is coasting too."""
+
+LaneEvent = tuple[int, int, Literal["birth", "death", "long miss"]]
+"""Step, track and what happened to it."""
 
 
 class TrackLife(Model):
@@ -39,6 +42,21 @@ class Numbers(Model):
     mean: list[float]
 
 
+class PinnedLife(TrackLife):
+    """A track of the pinned run."""
+
+    like: int | None
+    """The track of the shown run that it is most often paired with."""
+
+
+class PinnedTimeline(Model):
+    """The pinned run, in the same buckets."""
+
+    run: str
+    count: Counts
+    tracks: list[PinnedLife]
+
+
 class Timeline(Model):
     """The shown run over time, as far as it is computed, summed up in buckets of steps."""
 
@@ -56,5 +74,9 @@ class Timeline(Model):
     """People really there, over all steps asked for."""
     tracks: list[TrackLife]
     """Those that live in the steps asked for, by id."""
+    pinned: PinnedTimeline | None
+    """Where a run is pinned that is not the shown one."""
+    events: list[LaneEvent]
+    """Of all steps, also of those not asked for, in their order."""
     left_out: int
     """How many more live there: the shorter ones, where they are very many."""

@@ -363,6 +363,7 @@ def test_every_route_is_documented(client: TestClient) -> None:
         ("POST", "/api/run/cancel"),
         ("GET", "/api/picture/{sequence_key}/{camera}/{step}.jpg"),
         ("GET", "/api/foreground/{sequence_key}/{camera}/{step}.png"),
+        ("GET", "/api/likelihood/{sequence_key}/{camera}/{step}.png"),
         ("GET", "/api/step/{step}"),
         ("GET", "/api/timeline"),
         ("GET", "/api/export/tracks.csv"),

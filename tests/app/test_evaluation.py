@@ -15,6 +15,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.evaluation import worker
+from app.evaluation.messages import axis_end
 from app.evaluation.scores import Scored, Scores
 from app.evaluation.worker import Evaluator
 from app.server import Settings, create_app
@@ -83,11 +84,36 @@ def test_series_are_the_engines(client: TestClient, crossing: Path) -> None:
         values = np.full(FRAMES, np.nan)
         values[row["first"] : row["first"] + len(row["values"])] = np.array(row["values"], float)
         np.testing.assert_allclose(values, expected.errors[row["person"]], atol=6e-5)
+    total = expected.series.ospa_localisation + expected.series.ospa_cardinality
+    share = np.where(total > 0, expected.series.ospa_localisation / np.maximum(total, 1e-12), 0)
+    np.testing.assert_allclose(found["ospa_share"], share, atol=6e-4)
+    assert all(0.0 <= value <= 1.0 for value in found["gospa_share"])
+    sums, counts = np.zeros(FRAMES), np.zeros(FRAMES)
+    for row in found["track_errors"]:
+        for k, value in enumerate(row["values"], row["first"]):
+            if value is not None:
+                sums[k] += value
+                counts[k] += 1
+    mean = [None if not count else total / count for total, count in zip(sums, counts, strict=True)]
+    for value, wanted in zip(found["mean_error"], mean, strict=True):
+        assert value == (None if wanted is None else pytest.approx(wanted, abs=2e-4))
     pairs = sum(v is not None for row in found["track_errors"] for v in row["values"])
     assert pairs == len(expected.pairs.steps)
     assert len(found["switches"]) == expected["id_switches"]
     for switch in found["switches"]:
         assert switch["before"] != switch["track"]
+
+
+def test_an_axis_ends_at_a_round_number_above_nearly_all() -> None:
+    rng = np.random.default_rng(4)
+    for scale in (0.01, 0.3, 1.0, 7.0, 60.0):
+        values = rng.uniform(0.0, scale, 500)
+        end = axis_end(values)
+        assert float(f"{end:.0e}") == end
+        assert f"{end:.0e}"[0] in "125"
+        assert (values > end).mean() <= 0.02
+        assert end == 0.1 or end < 2.6 * np.sort(values)[489]
+    assert axis_end(np.zeros(0)) == axis_end(np.array([np.nan])) == 0.1
 
 
 def test_a_run_is_set_against_the_one_before_it(client: TestClient, crossing: Path) -> None:

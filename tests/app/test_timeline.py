@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from starlette.testclient import TestClient
 
+from app.evaluation.scores import Scored
 from app.timeline import MOST_TRACKS, Timelines, Window, counts, numbers
 from tests.app.folders import FRAMES
 from tests.engine.synthetic import crossing, sequence
@@ -89,7 +91,7 @@ def test_a_lane_keeps_what_is_long_enough_to_be_seen() -> None:
     coarse = Timelines().of(run.sequence, run, Window.of(500, buckets=25))
     assert (coarse.stride, coarse.tracks[0].seen) == (20, 250 / 500)
     kinds = [kind for _, _, kind in coarse.tracks[0].spans]
-    assert kinds[-3:] == ["coasting", "seen", "seen"]
+    assert kinds[-3:] == ["long miss", "seen", "seen"]
     spans = coarse.tracks[0].spans
     assert len(spans) <= 25
     assert spans[-1][0] - spans[-2][1] > 1, "a long absence stays one"
@@ -183,3 +185,48 @@ def test_the_routes_take_a_part_and_a_width(client: TestClient) -> None:
     for wrong in ("first=-1", "buckets=0", "buckets=x"):
         assert client.get(f"/api/timeline?{wrong}").status_code == 422
     json.dumps(part, allow_nan=False)
+
+
+def test_events_are_those_of_the_whole_recording_whatever_is_looked_at() -> None:
+    seen = [(k, 1, True) for k in range(20)] + [(k, 2, True) for k in range(5, 200)]
+    miss = [(k, 3, not 60 <= k < 140) for k in range(30, 160)]
+    short = [(k, 4, k not in (100, 101)) for k in range(0, 200)]
+    run = run_of(200, seen + miss + short)
+    assert run.sequence.fps * 1.5 < 80
+    told = Timelines().of(run.sequence, run, Window.of(200)).events
+    assert told == [
+        (5, 2, "birth"),
+        (19, 1, "death"),
+        (30, 3, "birth"),
+        (60, 3, "long miss"),
+        (159, 3, "death"),
+    ]
+    part = Timelines().of(run.sequence, run, Window.of(200, 100, 120))
+    assert part.events == told
+    lane = next(track for track in part.tracks if track.id == 3)
+    assert lane.spans == [(100, 120, "long miss")], "a part of it is one too"
+    whole = Timelines().of(run.sequence, run, Window.of(200))
+    kinds = [kind for _, _, kind in next(t for t in whole.tracks if t.id == 3).spans]
+    assert kinds == ["seen", "long miss", "seen"]
+
+
+def test_the_pinned_run_beside_the_shown_one() -> None:
+    whole = sequence(crossing(120), 120)
+    run = pipeline.compute(whole, RunParameters(single_view="none"))
+    other = pipeline.compute(whole, RunParameters(single_view="none"), seed=1)
+    swapped = run.tracks.take(run.tracks.ids <= 2)
+    swapped = replace(swapped, ids=3 - swapped.ids)
+    other.tracks, other.keys = swapped, {**other.keys, "tracks": "another"}
+    window = Window.of(120)
+    assert Timelines().of(whole, run, window).pinned is None
+    assert Timelines().of(whole, run, window, Scored.of(run)).pinned is None
+    told = Timelines().of(whole, run, window, Scored.of(other)).pinned
+    assert told is not None
+    assert {track.id: track.like for track in told.tracks} == {1: 2, 2: 1}
+    both = np.bincount(swapped.frames, minlength=120)
+    assert told.count.low == both.tolist()
+    far = replace(swapped, positions=swapped.positions + 50.0)
+    other.tracks, other.keys = far, {**other.keys, "tracks": "a third"}
+    told = Timelines().of(whole, run, window, Scored.of(other)).pinned
+    assert told is not None
+    assert [track.like for track in told.tracks] == [None, None]

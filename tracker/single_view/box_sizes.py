@@ -144,6 +144,20 @@ class BoxSizes:
         table[there] = ordered[ranks[there]]
         return table, there
 
+    def typical(
+        self, centres: Float[ndarray, "N 2"]
+    ) -> tuple[Float[ndarray, "N 2"], Bool[ndarray, " N"]]:
+        """The middle size at each place, and whether there is one (else NaN)."""
+        places = _cells(centres, self.cell, self.columns, self.rows)
+        cells, owners = np.unique(places, return_inverse=True)
+        middles = np.full((len(cells), 2), np.nan)
+        for i, cell in enumerate(cells):
+            there = self.sizes[self.starts[cell] : self.starts[cell + 1]]
+            if len(there):
+                middles[i] = np.median(there, axis=0)
+        sizes = middles[owners.reshape(-1)]
+        return sizes, np.isfinite(sizes[:, 0])
+
     def draw(
         self, centres: Float[ndarray, "N 2"], rng: np.random.Generator
     ) -> tuple[Float[ndarray, "N 2"], Bool[ndarray, " N"]]:
