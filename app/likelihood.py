@@ -24,7 +24,7 @@ LOW, HIGH = (35, 119, 224), (190, 244, 255)
 """Blue, green, red of a small and of the largest likelihood."""
 
 OPAQUE = 225
-"""Opacity of 255 where the likelihood is 1; the picture is seen through what is less."""
+"""Opacity of 255 where the colours are just a template's; what looks less like one is clearer."""
 
 
 def key_of(sequence: Sequence, parameters: ColourPhdParams) -> str:
@@ -34,6 +34,7 @@ def key_of(sequence: Sequence, parameters: ColourPhdParams) -> str:
         parameters.colour_space,
         parameters.histogram_kernel,
         parameters.likelihood_sigma,
+        parameters.acceptance_distance,
     )
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
@@ -68,7 +69,9 @@ class Likelihoods:
             raise missing(f'Camera "{name}" has no picture of step {step}.')
         parameters = shown_colours(snapshot)
         model, sizes = self._prepared(sequence, reader, parameters, camera)
-        return heat(likelihood_map(picture, model, sizes, parameters.likelihood_sigma))
+        sigma = parameters.likelihood_sigma
+        least = -0.5 * (parameters.acceptance_distance / sigma) ** 2
+        return heat(likelihood_map(picture, model, sizes, sigma), least)
 
     def _prepared(
         self, sequence: Sequence, reader: FrameReader, parameters: ColourPhdParams, camera: int
@@ -89,12 +92,17 @@ class Likelihoods:
             return self._model, self._sizes[camera]
 
 
-def heat(values: Float[ndarray, "rows columns"]) -> bytes:
-    """Likelihoods, 0 … 1, as a transparent PNG: the likelier, the brighter and the denser."""
-    share = np.clip(values, 0.0, 1.0)[:, :, None]
+def heat(values: Float[ndarray, "rows columns"], least: float) -> bytes:
+    """Log-likelihoods as a transparent PNG: the likelier, the brighter and the denser.
+
+    Args:
+        values: 0 at most.
+        least: What is at least so likely is seen; below 0.
+    """
+    share = np.clip(1.0 - values / least, 0.0, 1.0)[:, :, None]
     picture = np.empty((*values.shape, 4), dtype=np.uint8)
     picture[:, :, :3] = np.rint(np.array(LOW) * (1.0 - share) + np.array(HIGH) * share)
-    picture[:, :, 3] = np.rint(OPAQUE * np.sqrt(share[:, :, 0]))
+    picture[:, :, 3] = np.rint(OPAQUE * share[:, :, 0])
     done, data = cv2.imencode(".png", picture)
     assert done, "a picture of four channels can be written as PNG"
     return bytes(data)

@@ -18,7 +18,7 @@ from fastapi.staticfiles import StaticFiles
 from fastapi_offline import FastAPIOffline
 from starlette.types import Scope
 
-from app import api, errors, foreground, gateway, likelihood_routes, stream
+from app import api, errors, foreground, gateway, likelihood_routes, stream, tables
 from app.compiling import Compiling
 from app.errors import sentence
 from app.evaluation import routes as evaluation
@@ -84,6 +84,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.include_router(api.router)
     app.include_router(foreground.router)
     app.include_router(likelihood_routes.router)
+    app.include_router(tables.router)
     app.include_router(evaluation.router)
     app.include_router(stream.router)
     app.include_router(gateway.router)

@@ -193,6 +193,10 @@ class Timelines:
             left_out=left_out,
         )
 
+    def events(self, sequence: Sequence, run: Run) -> list[models.LaneEvent]:
+        """What happens to the tracks of the shown run, as far as it is computed."""
+        return self.of(sequence, run, Window.of(sequence.frames, 0, 0)).events
+
     def _pinned(
         self, sequence: Sequence, run: Run | None, window: Window, pinned: Scored | None
     ) -> models.PinnedTimeline | None:

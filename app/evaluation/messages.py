@@ -105,7 +105,7 @@ def series_of(
             models.TrackError(track=track, **_trimmed(values, window))
             for track, values in tracks.items()
         ],
-        switches=_switches(evaluation),
+        switches=switches_of(evaluation),
         ospa_share=_share(shown["ospa_localisation"], shown["ospa_cardinality"]),
         gospa_share=_share(
             shown["gospa_localisation"], shown["gospa_missed"] + shown["gospa_false"]
@@ -170,7 +170,8 @@ def _trimmed(values: ndarray, window: Window) -> dict[str, Any]:
     }
 
 
-def _switches(evaluation: Evaluation) -> list[models.Switch]:
+def switches_of(evaluation: Evaluation) -> list[models.Switch]:
+    """Where a person's identity went from one track to another."""
     pairs = evaluation.pairs
     switches = []
     for i in np.flatnonzero(pairs.switch).tolist():
@@ -184,6 +185,13 @@ def _switches(evaluation: Evaluation) -> list[models.Switch]:
             )
         )
     return switches
+
+
+def stated_of(evaluation: Evaluation) -> str:
+    """The settings behind the figures, in words."""
+    settings = evaluation.settings
+    gate, cost = settings.stated(("distance", "gate")), settings.stated(("cutoff", "order"))
+    return f"{gate} · {cost}"
 
 
 def comparison_of(

@@ -37,7 +37,7 @@ export function createActions({ store, seek, send, receive }) {
 	const [past, future] = [[], []];
 	let rememberedAt = -Infinity;
 	let undoing = 0;
-	const frames = () => store.get().server?.sequence?.frames ?? 0;
+	const frames = () => store.get().frames;
 
 	/** @param {unknown} error */
 	function tell(error) {
@@ -83,7 +83,7 @@ export function createActions({ store, seek, send, receive }) {
 			store.set({ playing: 0 });
 			seek(store.get().step + steps);
 		},
-		secondsBy: (seconds) => actions.stepBy(Math.round(seconds * (store.get().server?.sequence?.fps ?? 25))),
+		secondsBy: (seconds) => actions.stepBy(Math.round(seconds * store.get().fps)),
 		changeSpeed(direction) {
 			const index = SPEEDS.indexOf(store.get().speed) + direction;
 			store.set({ speed: SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, index))] });
@@ -100,10 +100,7 @@ export function createActions({ store, seek, send, receive }) {
 		},
 		toEvent(direction) {
 			const event = nextEvent(eventsNow(store.get()), store.get().step, direction);
-			if (!event) return;
-			store.set({ playing: 0 });
-			seek(event.step);
-			actions.select(event.id);
+			if (event) actions.go(`${event.step} ${event.id}`);
 		},
 
 		// tracks
@@ -118,6 +115,12 @@ export function createActions({ store, seek, send, receive }) {
 			const index = ids.indexOf(selection ?? -1);
 			if (ids.length) actions.select(ids[index < 0 ? (direction > 0 ? 0 : ids.length - 1) : (index + direction + ids.length) % ids.length]);
 		},
+		go(place) {
+			const [step, id] = place.split(" ").map(Number);
+			store.set({ playing: 0 });
+			seek(step);
+			actions.select(id);
+		},
 		clear() {
 			if (store.get().layout.max) actions.maximise(store.get().layout.max ?? null);
 			else actions.select(null);
@@ -126,8 +129,8 @@ export function createActions({ store, seek, send, receive }) {
 
 		// cameras and 3D
 		chooseCamera(index) {
-			const count = store.get().server?.sequence?.cameras.length ?? 0;
-			if (index < count) store.set({ large: store.get().large === index ? null : index });
+			const { cameras, large } = store.get();
+			if (index < cameras.length) store.set({ large: large === index ? null : index });
 		},
 		lookThrough: (view) => void actions.ask("POST", "view", { camera: view }),
 		freeView() {

@@ -7,21 +7,10 @@
 /** Speeds that can be chosen, slowest first. */
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
 
-/**
- * @param {number} step
- * @param {number} frames
- * @returns {number} a whole step of the sequence, 0 for an empty one
- */
-export function clampStep(step, frames) {
-	return Math.max(0, Math.min(frames - 1, Math.round(step)));
-}
+/** A whole step of the sequence, 0 for an empty one. @param {number} step @param {number} frames */
+export const clampStep = (step, frames) => Math.max(0, Math.min(frames - 1, Math.round(step)));
 
-/**
- * The part of the sequence that is played.
- * @param {[number | null, number | null]} range  in and out points
- * @param {number} frames
- * @returns {[number, number]} first and last step
- */
+/** First and last step that are played. @param {[number | null, number | null]} range  in and out points @param {number} frames @returns {[number, number]} */
 export function playedRange([from, to], frames) {
 	const first = clampStep(from ?? 0, frames);
 	return [first, Math.max(first, clampStep(to ?? frames - 1, frames))];
@@ -41,50 +30,35 @@ export function advance({ step, rest }, seconds, { fps, speed, direction, first,
 	const due = rest + Math.max(0, seconds) * fps * speed;
 	const whole = Math.floor(due + 1e-9);
 	if (whole === 0) return { step, rest: due, ended: false };
-	const limit = speed <= 1 ? 1 : Math.max(1, Math.ceil(speed * 2));
-	const stride = Math.min(whole, limit);
+	const stride = Math.min(whole, speed <= 1 ? 1 : Math.max(1, Math.ceil(speed * 2)));
 	// Up to a step of lateness is caught up; more is forgotten: play is late, it does not race afterwards.
 	const left = Math.min(1, due - stride);
 	const next = step + direction * stride;
 	if (next >= first && next <= last) return { step: next, rest: left, ended: false };
-	const end = direction > 0 ? last : first;
-	if (loop) {
-		const start = direction > 0 ? first : last;
-		return { step: step === end || step < first || step > last ? start : end, rest: left, ended: false };
-	}
-	return { step: end, rest: 0, ended: true };
+	const [start, end] = direction > 0 ? [first, last] : [last, first];
+	if (!loop) return { step: end, rest: 0, ended: true };
+	return { step: step === end || step < first || step > last ? start : end, rest: left, ended: false };
 }
 
 /**
  * The steps to have ready, nearest first: the step itself, then ahead in the direction of
  * play, then a few behind.
  * @param {number} step
- * @param {{frames: number, fps: number, speed: number, direction: 0 | 1 | -1, most: number, seconds?: number}} how
- *   `most` is the number of steps that the memory holds
+ * @param {{frames: number, fps: number, speed: number, direction: 0 | 1 | -1, most: number, seconds?: number}} how  `most` is what the memory holds
  */
 export function prefetchWindow(step, { frames, fps, speed, direction, most, seconds = 1.5 }) {
-	const stride = direction && speed > 1 ? Math.max(1, Math.floor(speed * fps / 60)) : 1;
+	const stride = direction && speed > 1 ? Math.max(1, Math.floor((speed * fps) / 60)) : 1;
 	const ahead = direction ? Math.ceil(Math.max(8, speed * fps * seconds) / stride) : 12;
 	const behind = direction ? 0 : 6;
-	const sign = direction || 1;
-	/** @type {number[]} */
-	const steps = [];
-	const add = (/** @type {number} */ candidate) => {
-		if (candidate >= 0 && candidate < frames && steps.length < Math.max(1, most)) steps.push(candidate);
-	};
-	add(step);
+	const steps = [step];
 	for (let k = 1; k <= Math.max(ahead, behind); k += 1) {
-		if (k <= ahead) add(step + sign * k * stride);
-		if (k <= behind) add(step - sign * k);
+		if (k <= ahead) steps.push(step + (direction || 1) * k * stride);
+		if (k <= behind) steps.push(step - (direction || 1) * k);
 	}
-	return steps;
+	return steps.filter((k) => k >= 0 && k < frames).slice(0, Math.max(1, most));
 }
 
-/**
- * Neighbouring steps joined into ranges.
- * @param {Iterable<number>} steps
- * @returns {[number, number][]} ascending, inclusive
- */
+/** Neighbouring steps joined into ranges, ascending and inclusive. @param {Iterable<number>} steps */
 export function rangesOf(steps) {
 	/** @type {[number, number][]} */
 	const ranges = [];
@@ -96,68 +70,35 @@ export function rangesOf(steps) {
 	return ranges;
 }
 
-/**
- * @param {number} step  may lie between two steps
- * @param {View} view
- * @returns {number} CSS pixels from the left end of the axis
- */
-export function xOf(step, { first, last, width }) {
-	return last > first ? ((step - first) / (last - first)) * width : 0;
-}
+/** CSS pixels from the left end of the axis. @param {number} step  may lie between two steps @param {View} view */
+export const xOf = (step, { first, last, width }) => (last > first ? ((step - first) / (last - first)) * width : 0);
 
-/**
- * Where a step is among values of which each stands for some steps.
- * @param {number} step
- * @param {Buckets} buckets
- */
-export function bucketOf(step, { first, stride }) {
-	return Math.floor((step - first) / stride);
-}
+/** Where a step is among values of which each stands for some steps. @param {number} step @param {Buckets} buckets */
+export const bucketOf = (step, { first, stride }) => Math.floor((step - first) / stride);
 
-/**
- * Step at a pointer position.
- * @param {number} x  CSS pixels from the left end of the axis
- * @param {View} view
- * @returns {number} a whole step, clamped to the view
- */
+/** The whole step at CSS pixels from the left end, inside the view. @param {number} x @param {View} view */
 export function stepAt(x, { first, last, width }) {
 	const step = width > 0 ? first + (x / width) * (last - first) : first;
 	return Math.round(Math.max(first, Math.min(last, step)));
 }
 
-/**
- * The view after zooming at a point, which keeps its place.
- * @param {View} view
- * @param {number} factor  below 1 shows fewer steps
- * @param {number} x  CSS pixels
- * @param {number} frames
- */
+/** The view after zooming at CSS pixels x, which keep their step. @param {View} view @param {number} factor  below 1 shows fewer steps @param {number} x @param {number} frames */
 export function zoomed(view, factor, x, frames) {
 	const whole = Math.max(1, frames - 1);
 	const span = Math.max(Math.min(20, whole), Math.min(whole, (view.last - view.first) * factor));
-	const at = view.first + (x / Math.max(1, view.width)) * (view.last - view.first);
-	const first = at - (x / Math.max(1, view.width)) * span;
+	const share = x / Math.max(1, view.width);
+	const first = view.first + share * (view.last - view.first - span);
 	return panned({ ...view, first, last: first + span }, 0, frames);
 }
 
-/**
- * The view moved by some steps, kept inside the sequence.
- * @param {View} view
- * @param {number} steps
- * @param {number} frames
- */
+/** The view moved by some steps, inside the sequence. @param {View} view @param {number} steps @param {number} frames */
 export function panned(view, steps, frames) {
 	const span = view.last - view.first;
 	const first = Math.max(0, Math.min(frames - 1 - span, view.first + steps));
 	return { ...view, first, last: first + span };
 }
 
-/**
- * Distance of labelled and of small ticks: 1, 2 or 5 times a power of ten.
- * @param {View} view
- * @param {number} [pixels]  wanted distance of two labels
- * @returns {{major: number, minor: number}}
- */
+/** Distance of labelled and of small ticks: 1, 2 or 5 times a power of ten. @param {View} view @param {number} [pixels]  of two labels, at least */
 export function tickSteps({ first, last, width }, pixels = 80) {
 	const raw = Math.max(1, ((last - first) / Math.max(1, width)) * pixels);
 	const power = 10 ** Math.floor(Math.log10(raw));
@@ -165,22 +106,10 @@ export function tickSteps({ first, last, width }, pixels = 80) {
 	return { major, minor: Math.max(1, major / (String(major)[0] === "2" ? 4 : 5)) };
 }
 
-/**
- * @param {number} step
- * @param {number} fps
- * @returns {string} seconds with two decimals
- */
-export function secondsOf(step, fps) {
-	return (step / fps).toFixed(2);
-}
+/** Seconds with two decimals. @param {number} step @param {number} fps */
+export const secondsOf = (step, fps) => (step / fps).toFixed(2);
 
-/**
- * A step from what a person typed: `264` is a step, `10.56 s` or `10.56s` is a time.
- * @param {string} text
- * @param {number} fps
- * @param {number} frames
- * @returns {number | null} null where it is neither
- */
+/** What a person typed: `264` is a step, `10.56 s` or `10,56s` a time, null neither. @param {string} text @param {number} fps @param {number} frames */
 export function parseStep(text, fps, frames) {
 	const match = /^\s*(\d+(?:[.,]\d+)?)\s*(s?)\s*$/.exec(text);
 	if (!match) return null;

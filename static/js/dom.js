@@ -81,26 +81,10 @@ export function idTag(id) {
 	return h("span", { class: "id", "--c": `var(--id-${n})`, "--on-id": `var(--on-${n})` }, id);
 }
 
-/** A symbol such as `p_S` with its index lowered.  @param {string} symbol */
-export function symbolNodes(symbol) {
-	const [base, index] = symbol.split("_");
-	return [h("i", {}, base), ...(index ? [h("sub", {}, index)] : [])];
-}
-
 /** @param {unknown} value  @returns {string} as short as it stays readable */
 export function show(value) {
 	if (typeof value === "boolean") return value ? "on" : "off";
 	if (typeof value !== "number") return value === null || value === undefined ? "–" : String(value).replaceAll("_", " ");
 	if (Number.isInteger(value)) return String(value);
 	return Math.abs(value) < 1e-3 ? value.toExponential().replace("e-", "e−") : String(Number(value.toPrecision(5)));
-}
-
-/**
- * A number with a fixed count of digits and a true minus.
- * @param {number | null | undefined} value  @param {number} digits  @param {boolean} [signed]
- */
-export function fixed(value, digits, signed = false) {
-	if (value === null || value === undefined) return "–";
-	const text = Math.abs(value).toFixed(digits);
-	return (Number(text) === 0 ? "" : value < 0 ? "−" : signed ? "+" : "") + text;
 }

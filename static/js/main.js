@@ -38,6 +38,10 @@ const store = createStore(
 		server: null,
 		run: null,
 		schema: null,
+		sequence: null,
+		frames: 0,
+		fps: 25,
+		cameras: [],
 		sequences: [],
 		basis: "",
 		timeline: null,
@@ -56,6 +60,7 @@ const store = createStore(
 		large: start.place.camera,
 		tab: "tracks",
 		eventKind: "",
+		every: false,
 		scores: null,
 		measure: "ospa",
 		laneOrder: "longest",
@@ -154,6 +159,9 @@ function receiveState(told, streamed = false) {
 		// Whoever looks through a camera in 3D wants to see its picture.
 		if (before.view !== server.view && typeof server.view === "number") store.set({ large: server.view });
 	}
+	const { sequence } = server;
+	const same = sequence && JSON.stringify(sequence) === JSON.stringify(before?.sequence);
+	if (!same) store.set({ sequence, frames: sequence?.frames ?? 0, fps: sequence?.fps ?? 25, cameras: sequence?.cameras ?? [] });
 	store.set({ server, run: server.run, layers3d: server.layers });
 	// The first word on the theme is this browser's, later ones are everybody's.
 	if (before) store.set({ theme: server.theme });
@@ -181,19 +189,19 @@ function part() {
 }
 
 const fetchTimeline = fetcher(async () => {
-	if (!store.get().server?.sequence) return;
+	if (!store.get().sequence) return;
 	const timeline = await getJson(`/api/timeline?${part()}`);
 	// Lanes of another run than the one that is shown would mix the two; its own news is on the way.
 	if (timeline.run === store.get().basis) store.set({ timeline });
 });
 
 const fetchScores = fetcher(async () => {
-	const sequence = store.get().server?.sequence;
+	const { sequence } = store.get();
 	if (!sequence?.has_truth) return;
 	const told = (/** @type {string} */ what) => getJson(`/api/evaluation${what}`);
 	const [evaluation, series, comparison] = await Promise.all([told(""), told(`/series?${part()}`), told("/comparison")]);
-	const reference = comparison && (await told(`/series?of=${comparison.against}&${part()}`).catch(() => null));
-	if (store.get().server?.sequence?.key === sequence.key) store.set({ scores: { evaluation, series, comparison, reference } });
+	const reference = comparison && (await told(`/series?of=${comparison.against}&${part()}`));
+	if (store.get().sequence?.key === sequence.key) store.set({ scores: { evaluation, series, reference } });
 });
 
 const fetchSequences = fetcher(async () => store.set({ sequences: (await getJson("/api/sequences")).sequences }));
@@ -209,7 +217,7 @@ function receive(message) {
 			if (message.run.key === store.get().server?.run.key) store.set({ run: message.run });
 			break;
 		case "playhead":
-			if (message.origin !== origin && store.get().server?.sequence) playback.follow(message.step);
+			if (message.origin !== origin && store.get().sequence) playback.follow(message.step);
 			break;
 		case "step":
 			showRun(message.run);

@@ -86,8 +86,7 @@ export function createPlayback(store, sendSeek) {
 	/** @param {PageState} state */
 	function refreshWindow(state) {
 		windowDirty = false;
-		const { server, basis, step, speed, playing, layers2d } = state;
-		const sequence = server?.sequence;
+		const { sequence, basis, step, speed, playing, layers2d } = state;
 		if (!sequence) {
 			pictures.want([]);
 			results.want([]);
@@ -115,7 +114,7 @@ export function createPlayback(store, sendSeek) {
 	 * @returns {Frame | null} null while something that will come is missing
 	 */
 	function assemble(state, step) {
-		const sequence = state.server?.sequence;
+		const { sequence } = state;
 		if (!sequence) return null;
 		const lost = state.link === "lost";
 		const found = sequence.cameras.map((camera, index) =>
@@ -143,7 +142,7 @@ export function createPlayback(store, sendSeek) {
 	function tick(now) {
 		frameAsked = false;
 		let state = store.get();
-		const sequence = state.server?.sequence;
+		const { sequence } = state;
 		if (!sequence) return;
 		if (state.playing && state.step === state.shown) {
 			const [first, last] = playedRange(state.range, sequence.frames);
@@ -215,7 +214,7 @@ export function createPlayback(store, sendSeek) {
 		},
 		/** @param {number} step */
 		seek(step) {
-			const frames = store.get().server?.sequence?.frames ?? 0;
+			const { frames } = store.get();
 			if (frames > 0) store.set({ step: clampStep(step, frames) });
 		},
 		/**
@@ -237,9 +236,7 @@ export function createPlayback(store, sendSeek) {
 		},
 		/** @returns {number[]} steps with the pictures of all cameras */
 		loadedSteps() {
-			const sequence = store.get().server?.sequence;
-			if (!sequence) return [];
-			const cameras = sequence.cameras.filter((camera) => camera.has_pictures).length;
+			const cameras = store.get().cameras.filter((camera) => camera.has_pictures).length;
 			/** @type {Map<number, number>} */
 			const counts = new Map();
 			for (const name of pictures.names()) {

@@ -91,7 +91,7 @@
  * @property {number} components
  * @property {number} cardinality
  *
- * @typedef {[number, number, "seen" | "coasting"]} Span  from and to are inclusive
+ * @typedef {[number, number, "seen" | "coasting" | "long miss"]} Span  from and to are inclusive
  * @typedef {{id: number, first: number, last: number, seen: number, spans: Span[]}} TrackLane  seen: share of its life
  * @typedef {{first: number, stride: number}} Buckets  each value stands for `stride` steps, the first from step `first` on
  * @typedef {{low: number[], high: number[], mean: number[]}} Summary  of each bucket
@@ -106,6 +106,8 @@
  * @property {Summary} count
  * @property {Summary | null} truth
  * @property {TrackLane[]} tracks
+ * @property {{run: string, count: Summary, tracks: (TrackLane & {like: number | null})[]} | null} pinned  like: the shown run's track
+ * @property {[number, number, "birth" | "death" | "long miss"][]} events  step and track
  * @property {number} left_out
  *
  * @typedef {object} Parameter
@@ -143,6 +145,10 @@
  * @property {ServerState | null} server
  * @property {RunState | null} run  the newest progress, also between two states
  * @property {Schema | null} schema
+ * @property {SequenceInfo | null} sequence  that is open, and of it:
+ * @property {number} frames
+ * @property {number} fps
+ * @property {CameraInfo[]} cameras
  * @property {SequenceEntry[]} sequences
  * @property {string} basis  key of the run that the server shows: that in `run`, or while that has no step yet, one before
  * @property {Timeline | null} timeline  always of the run `basis`
@@ -162,6 +168,7 @@
  * @property {number | null} large  the camera that is shown large; null: all alike
  * @property {"tracks" | "step" | "events" | "changes" | "compare" | "runs"} tab
  * @property {"" | LaneEvent["kind"]} eventKind  the events that are listed and gone to; all where empty
+ * @property {boolean} every  whether all figures are compared, or the headlines
  * @property {Scores | null} scores  of the run that was set against the truth last
  * @property {"ospa" | "gospa"} measure  what the timeline plots
  * @property {"longest" | "born"} laneOrder
@@ -170,14 +177,8 @@
  * @property {boolean} singleKeys
  * @property {Note[]} notes
  *
- * @typedef {"better" | "worse" | "same" | "different" | "undefined"} Verdict
- * @typedef {{name: string, label: string, unit: string, digits: number, headline: boolean, settings: string}} FigureHead
- * @typedef {FigureHead & {value: number | null, help: string}} Figure
- * @typedef {FigureHead & {a: number | null, b: number | null, difference: number | null, verdict: Verdict, comparable: boolean}} Difference
  * @typedef {{id: number, kind: string, person: number | null, mean_error: number | null, switches: number}} ScoredTrack
- * @typedef {{run: string, steps: number, partial: boolean, figures: Figure[], per_track: ScoredTrack[], notes: string[]}} Evaluation
- * @typedef {{run: string, partial: boolean, changed: Record<string, any>}} ComparedRun
- * @typedef {{against: "pinned" | "previous", steps: number, a: ComparedRun, b: ComparedRun, parameters: {key: string, a: any, b: any}[], rows: Difference[]}} Comparison
+ * @typedef {{run: string, steps: number, partial: boolean, per_track: ScoredTrack[]}} Evaluation
  * @typedef {{first: number, values: (number | null)[]}} Course  metres over the steps; null where there is no pair
  * @typedef {{step: number, before: number, track: number}} Switch  of a person's identity, from one track to another
  *
@@ -195,22 +196,14 @@
  * @property {number[]} gospa_localisation
  * @property {number[]} gospa_missed
  * @property {number[]} gospa_false
+ * @property {number[]} ospa_share  how much of it is location, 0 … 1
+ * @property {number[]} gospa_share
  * @property {(Course & {track: number})[]} track_errors
+ * @property {(number | null)[]} mean_error
+ * @property {{ospa: number, gospa: number, error: number}} axes  upper ends for plots
  * @property {Switch[]} switches
  *
- * @typedef {object} Plots  what the strips draw of the scores
- * @property {Scores | null} of
- * @property {"ospa" | "gospa"} by
- * @property {number[]} total
- * @property {ScoreSeries | null} reference
- * @property {number[]} place  share of the total that is distance, 0 … 1
- * @property {number} top  value at the upper edge
- * @property {Buckets} buckets
- * @property {(Course & {track: number})[]} courses
- * @property {(number | null)[]} mean  of all courses
- * @property {number} most  error at the upper edge
- *
- * @typedef {{evaluation: Evaluation, series: ScoreSeries, comparison: Comparison | null, reference: ScoreSeries | null}} Scores
+ * @typedef {{evaluation: Evaluation, series: ScoreSeries, reference: ScoreSeries | null}} Scores
  *
  * @typedef {"view" | "cams" | "side" | "time"} PaneName
  *
@@ -235,6 +228,7 @@
  * @property {(direction: -1 | 1) => void} toEvent
  * @property {(id: number | null) => void} select
  * @property {(direction: -1 | 1) => void} nextTrack
+ * @property {(place: string) => void} go  to an event: its step and track
  * @property {() => void} clear
  * @property {() => void} exportTracks
  * @property {(index: number) => void} chooseCamera  as the large picture
@@ -277,6 +271,18 @@
  * @typedef {(root: HTMLElement, context: Context) => void} Pane  fills its part of the page and keeps it current
  *
  * @typedef {{y: number, height: number}} Row  of the timeline, CSS pixels
+ * @typedef {{g: Brush, row: Row, view: View, ink: Palette}} Pen  what a row is drawn with
+ *
+ * @typedef {object} Lanes
+ * @property {TrackLane[]} tracks  in the order of the lanes
+ * @property {(TrackLane & {like: number | null})[]} pinned
+ * @property {number} scroll  pixels
+ * @property {number} laneHeight
+ * @property {number} done
+ * @property {number | null} selection
+ * @property {number | null} hover
+ * @property {Switch[]} switches
+ *
  * @typedef {{first: number, last: number, width: number}} View  the steps an axis of `width` CSS pixels shows
  * @typedef {{step: number, id: number, kind: "birth" | "death" | "long miss" | "switch"}} LaneEvent
  * @typedef {{x: number, y: number, width: number, height: number}} Cell  of the mosaic of pictures

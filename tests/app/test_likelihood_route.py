@@ -32,7 +32,7 @@ def decoded(content: bytes) -> ndarray:
 
 
 def test_the_likelier_the_denser() -> None:
-    shown = decoded(heat(np.array([[0.0, 0.25, 1.0]])))
+    shown = decoded(heat(np.array([[-np.inf, -10.0, -2.0]]), -20.0))
     assert shown.shape == (1, 3, 4)
     assert shown[0, 0, 3] == 0
     assert 0 < shown[0, 1, 3] < shown[0, 2, 3]

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { createCache } from "../../static/js/cache.js";
-import { eventsOf, longMisses, nextEvent, ordered, stateAt, viewWords } from "../../static/js/events.js";
+import { eventsNow, isAlone, nextEvent, ordered, resultOf, stateAt, viewWords } from "../../static/js/events.js";
 import { mosaic } from "../../static/js/mosaic.js";
 import { createStore } from "../../static/js/store.js";
 import { commandLine, readPlace, writePlace } from "../../static/js/url.js";
@@ -113,22 +113,35 @@ test("the budget is kept; what is wanted stays, what was used last stays longest
   assert.equal(disposed.length, 4);
 });
 
-const TRACK = { id: 3, first: 10, last: 99, spans: [[10, 39, "seen"], [40, 79, "coasting"], [80, 89, "seen"], [90, 99, "coasting"]] };
+const TRACK = { id: 3, first: 10, last: 99, seen: 0.5, spans: [[10, 39, "seen"], [40, 79, "long miss"], [80, 89, "seen"], [90, 99, "coasting"]] };
 
-test("events: births, deaths and long misses, in order", () => {
-  const events = eventsOf([TRACK, { id: 1, first: 0, last: 199, spans: [[0, 199, "seen"]] }], { fps: 25, done: 200 });
-  assert.deepEqual(events.map((e) => [e.step, e.kind]), [[10, "birth"], [40, "long miss"], [99, "death"]]);
+test("events: those of the timeline and the switches of the shown run, in order, by kind", () => {
+  const timeline = { events: [[10, 3, "birth"], [40, 3, "long miss"], [99, 3, "death"]] };
+  const scores = { series: { run: "r", switches: [{ step: 40, before: 3, track: 1 }] } };
+  const state = { timeline, scores, basis: "r", eventKind: "" };
+  const events = eventsNow(state);
+  assert.deepEqual(events.map((e) => [e.step, e.id, e.kind]), [[10, 3, "birth"], [40, 1, "switch"], [40, 3, "long miss"], [99, 3, "death"]]);
   assert.equal(nextEvent(events, 10, 1).step, 40);
   assert.equal(nextEvent(events, 10, -1), undefined);
   assert.equal(nextEvent(events, 200, -1).step, 99);
-  assert.deepEqual(eventsOf([], { fps: 25, done: 0 }), []);
-  assert.equal(eventsOf([TRACK], { fps: 25, done: 100 }).some((e) => e.kind === "death"), false);
+  assert.deepEqual(eventsNow({ ...state, eventKind: "death" }).map((e) => e.step), [99]);
+  assert.equal(eventsNow({ ...state, basis: "another" }).length, 3);
+  assert.deepEqual(eventsNow({ timeline: null, scores: null, basis: "", eventKind: "" }), []);
+});
+
+test("a result counts where it is of the shown run, a filter where somebody is selected", () => {
+  const result = { run: "r", computed: true };
+  assert.equal(resultOf({ result, basis: "r" }), result);
+  assert.equal(resultOf({ result, basis: "s" }), null);
+  assert.equal(resultOf({ result: { run: "r", computed: false }, basis: "r" }), null);
+  assert.equal(isAlone({ selection: 2, layers3d: { others: false } }), true);
+  assert.equal(isAlone({ selection: null, layers3d: { others: false } }), false);
+  assert.equal(isAlone({ selection: 2, layers3d: {} }), false);
 });
 
 test("what a track is at a step", () => {
   assert.deepEqual([5, 10, 40, 99, 100].map((step) => stateAt(TRACK, step)), ["not yet", "seen", "coasting", "coasting", "ended"]);
   assert.equal(stateAt({ id: 1, first: 0, last: 9, spans: [[0, 3, "seen"], [6, 9, "seen"]] }, 5), "lost");
-  assert.deepEqual(longMisses(TRACK, 25), [[40, 79]]);
 });
 
 test("lanes are ordered by length or birth, and the tracks stay as they were", () => {

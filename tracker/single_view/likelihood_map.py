@@ -25,11 +25,11 @@ def likelihood_map(
     sigma: float,
     columns: int = COLUMNS,
 ) -> Float[ndarray, "rows columns"]:
-    """exp(−D² / 2σ²) of the box that a target centred in each cell would have.
+    """ln l = −D² / 2σ² of the box that a target centred in each cell would have.
 
-    It is 1 where the colours are just a template's; D is the distance to the nearest
+    It is 0 where the colours are just a template's; D is the distance to the nearest
     template, as in :meth:`ColourModel.distances`. A box's size is the middle one that
-    the calibrated camera allows there; where no target can be centred the value is 0.
+    the calibrated camera allows there; where no target can be centred l is 0.
 
     Args:
         picture: BGR.
@@ -46,9 +46,9 @@ def likelihood_map(
     ).reshape(-1, 2)
     boxes, possible = sizes.typical(centres)
     bins = colour.bin_map(picture, model.space)
-    values = np.zeros(len(centres))
+    values = np.full(len(centres), -np.inf)
     if possible.any():
         there = np.concatenate([centres, boxes], axis=1)[possible]
         distances = model.distances(bins, there).min(axis=1)
-        values[possible] = np.exp(-0.5 * (distances / sigma) ** 2)
+        values[possible] = -0.5 * (distances / sigma) ** 2
     return values.reshape(rows, columns)

@@ -1,33 +1,27 @@
 // @ts-check
 /** What all canvases share. */
 
-/**
- * Fit a canvas to its element and the screen's pixels, and clear it.
- * @param {HTMLCanvasElement} canvas
- * @param {number} width  CSS pixels
- * @param {number} height  CSS pixels
- */
+/** Fit a canvas to its element, in CSS pixels, and to the screen's pixels; clear it. @param {HTMLCanvasElement} canvas @param {number} width @param {number} height */
 export function prepare(canvas, width, height) {
 	const ratio = devicePixelRatio || 1;
-	const w = Math.max(1, Math.round(width * ratio));
-	const hgt = Math.max(1, Math.round(height * ratio));
-	if (canvas.width !== w || canvas.height !== hgt) {
-		canvas.width = w;
-		canvas.height = hgt;
-	}
+	const [w, hgt] = [width, height].map((side) => Math.max(1, Math.round(side * ratio)));
+	if (canvas.width !== w || canvas.height !== hgt) Object.assign(canvas, { width: w, height: hgt });
 	const g = /** @type {Brush} */ (canvas.getContext("2d"));
 	g.setTransform(ratio, 0, 0, ratio, 0, 0);
 	g.clearRect(0, 0, width, height);
 	return g;
 }
 
+/** A path through points. @param {Brush} g @param {number[][]} points  x and y of each */
+export function trace(g, points) {
+	g.beginPath();
+	for (const [x, y] of points) g.lineTo(x, y);
+	return g;
+}
+
 /**
  * Stroke the current path, with a dark halo under it where it lies on a picture.
- * @param {Brush} g
- * @param {string} colour
- * @param {number} width
- * @param {number[]} [dash]
- * @param {number} [halo]  opacity of the halo, 0 for none
+ * @param {Brush} g @param {string} colour @param {number} width @param {number[]} [dash] @param {number} [halo]  its opacity
  */
 export function stroke(g, colour, width, dash = [], halo = 0) {
 	g.setLineDash(dash);
@@ -42,17 +36,8 @@ export function stroke(g, colour, width, dash = [], halo = 0) {
 	g.setLineDash([]);
 }
 
-/**
- * Slanted lines: not computed, or missed for long.
- * @param {Brush} g
- * @param {number} x
- * @param {number} y
- * @param {number} width
- * @param {number} height
- * @param {string} colour
- * @param {number} [gap]
- */
-export function hatch(g, x, y, width, height, colour, gap = 4) {
+/** Slanted lines: not computed, or missed for long. @param {Brush} g @param {Cell} cell @param {string} colour @param {number} [gap] */
+export function hatch(g, { x, y, width, height }, colour, gap = 4) {
 	if (width <= 0 || height <= 0) return;
 	g.save();
 	g.beginPath();

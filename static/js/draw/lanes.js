@@ -1,37 +1,25 @@
 // @ts-check
 /** Range bar, ruler and track lanes of the timeline. */
 import { rangesOf, tickSteps, xOf } from "../clock.js";
-import { longMisses } from "../events.js";
 import { faded } from "../palette.js";
-import { hatch, stroke } from "./canvas.js";
+import { hatch, stroke, trace } from "./canvas.js";
 
-/**
- * Loaded pictures thin and grey, the computed part in the accent's colour on top.
- * @param {Brush} g @param {Row} row @param {View} view
- * @param {{loaded: Iterable<number>, done: number, frames: number}} state
- * @param {Palette} ink
- */
-export function drawRange(g, row, view, { loaded, done, frames }, ink) {
+/** Loaded pictures thin and grey, the computed part in the accent's colour on top. @param {Pen} pen @param {Iterable<number>} loaded @param {number} done @param {number} frames */
+export function drawRange({ g, row, view, ink }, loaded, done, frames) {
 	const y = row.y + Math.round(row.height / 2) - 2;
-	const bar = (/** @type {number} */ from, /** @type {number} */ to, /** @type {number} */ top, /** @type {number} */ height) => {
-		const x0 = Math.max(0, xOf(from, view));
-		const x1 = Math.min(view.width, xOf(to, view));
+	/** @param {string} colour @param {number} from @param {number} to @param {number} top @param {number} height */
+	const bar = (colour, from, to, top, height) => {
+		const [x0, x1] = [Math.max(0, xOf(from, view)), Math.min(view.width, xOf(to, view))];
+		g.fillStyle = ink.get(colour);
 		if (x1 >= x0) g.fillRect(x0, top, Math.max(1.5, x1 - x0), height);
 	};
-	g.fillStyle = ink.get("bg-3");
-	bar(0, frames - 1, y, 6);
-	g.fillStyle = ink.get("loaded");
-	for (const [from, to] of rangesOf(loaded)) bar(from, to, y, 6);
-	g.fillStyle = ink.get("accent");
-	if (done > 0) bar(0, done - 1, y + 3, 3);
+	bar("bg-3", 0, frames - 1, y, 6);
+	for (const [from, to] of rangesOf(loaded)) bar("loaded", from, to, y, 6);
+	if (done > 0) bar("accent", 0, done - 1, y + 3, 3);
 }
 
-/**
- * @param {Brush} g @param {Row} row @param {View} view
- * @param {{range: [number | null, number | null]}} state
- * @param {Palette} ink
- */
-export function drawRuler(g, row, view, { range }, ink) {
+/** @param {Pen} pen @param {[number | null, number | null]} range */
+export function drawRuler({ g, row, view, ink }, range) {
 	const bottom = row.y + row.height;
 	const { major, minor } = tickSteps(view);
 	g.font = `${ink.get("fs-0")} ${ink.font}`;
@@ -39,10 +27,7 @@ export function drawRuler(g, row, view, { range }, ink) {
 	for (let step = Math.ceil(view.first / minor) * minor; step <= view.last; step += minor) {
 		const x = Math.round(xOf(step, view)) + 0.5;
 		const labelled = Math.round(step % major) === 0;
-		g.beginPath();
-		g.moveTo(x, bottom - (labelled ? 5 : 3));
-		g.lineTo(x, bottom);
-		stroke(g, ink.get(labelled ? "ink-3" : "bg-4"), 1);
+		stroke(trace(g, [[x, bottom - (labelled ? 5 : 3)], [x, bottom]]), ink.get(labelled ? "ink-3" : "bg-4"), 1);
 		if (!labelled) continue;
 		const text = String(Math.round(step));
 		const half = g.measureText(text).width / 2;
@@ -50,73 +35,51 @@ export function drawRuler(g, row, view, { range }, ink) {
 		g.textAlign = x < half ? "left" : x > view.width - half ? "right" : "center";
 		g.fillText(text, x, row.y + (row.height - 4) / 2);
 	}
+	g.fillStyle = ink.get("accent");
 	range.forEach((step, end) => {
 		if (step === null || step < view.first || step > view.last) return;
 		const x = Math.round(xOf(step, view));
-		g.fillStyle = ink.get("accent");
-		g.beginPath();
-		g.moveTo(x, bottom);
-		g.lineTo(x, bottom - 7);
-		g.lineTo(x + (end ? -5 : 5), bottom - 7);
-		g.closePath();
-		g.fill();
+		trace(g, [[x, bottom], [x, bottom - 7], [x + (end ? -5 : 5), bottom - 7]]).fill();
 	});
-	g.beginPath();
-	g.moveTo(0, bottom - 0.5);
-	g.lineTo(view.width + 20, bottom - 0.5);
-	stroke(g, ink.get("line"), 1);
+	stroke(trace(g, [[0, bottom - 0.5], [view.width + 20, bottom - 0.5]]), ink.get("line"), 1);
 }
 
-/**
- * @param {Brush} g
- * @param {Row} block  where lanes may be drawn
- * @param {View} view
- * @param {object} state
- * @param {TrackLane[]} state.tracks  in the order of the lanes
- * @param {number} state.scroll  pixels that the lanes are scrolled by
- * @param {number} state.laneHeight
- * @param {number} state.done
- * @param {number} state.fps
- * @param {number | null} state.selection
- * @param {number | null} state.hover
- * @param {Switch[]} state.switches
- * @param {Palette} ink
- */
-export function drawLanes(g, block, view, { tracks, scroll, laneHeight, done, fps, selection, hover, switches }, ink) {
+/** @param {Pen} pen @param {Lanes} lanes */
+export function drawLanes(pen, { tracks, pinned, scroll, laneHeight, done, selection, hover, switches }) {
+	const { g, row, view, ink } = pen;
 	g.save();
 	g.beginPath();
-	g.rect(0, block.y, view.width + 20, block.height);
+	g.rect(0, row.y, view.width + 20, row.height);
 	g.clip();
-	const first = Math.max(0, Math.floor(scroll / laneHeight));
-	const last = Math.min(tracks.length, Math.ceil((scroll + block.height) / laneHeight));
-	for (let index = first; index < last; index += 1) {
+	const topOf = (/** @type {number} */ index) => row.y + index * laneHeight - scroll;
+	const last = Math.min(tracks.length, Math.ceil((scroll + row.height) / laneHeight));
+	for (let index = Math.max(0, Math.floor(scroll / laneHeight)); index < last; index += 1) {
 		const track = tracks[index];
-		const y = block.y + index * laneHeight - scroll;
 		if (track.id === selection || track.id === hover) {
-			g.fillStyle = track.id === selection ? ink.get("sel") : ink.get("bg-2");
-			g.fillRect(0, y, view.width + 20, laneHeight);
+			g.fillStyle = ink.get(track.id === selection ? "sel" : "bg-2");
+			g.fillRect(0, topOf(index), view.width + 20, laneHeight);
 		}
-		if (track.last < view.first || track.first > view.last) continue;
-		drawLane(g, y + Math.round(laneHeight / 2), view, { track, done, fps, thick: Math.max(6, Math.round(laneHeight * 0.42)) }, ink);
+		const middle = topOf(index) + Math.round(laneHeight / 2);
+		const below = topOf(index) + laneHeight - 1.5;
+		for (const { like, spans } of pinned) {
+			if (like !== track.id) continue;
+			for (const [from, to] of spans) stroke(trace(g, [[xOf(from, view), below], [xOf(to + 1, view), below]]), ink.get("ink-2"), 1, [4, 2]);
+		}
+		if (track.last >= view.first && track.first <= view.last) drawLane(pen, track, middle, done, Math.max(5, Math.round(laneHeight * 0.42)));
 	}
-	const rows = new Map(tracks.map(({ id }, index) => [id, block.y + (index + 0.5) * laneHeight - scroll]));
+	const rows = new Map(tracks.map(({ id }, index) => [id, topOf(index + 0.5)]));
 	for (const { step, before, track } of switches) {
 		if (step < view.first || step > view.last) continue;
 		const x = xOf(step, view);
 		const ends = [before, track].flatMap((id) => rows.get(id) ?? []);
 		// A cross in both lanes and a line that joins them: here the identity went over.
+		stroke(trace(g, ends.map((y) => [x, y])), ink.get("ink-3"), 1);
 		g.beginPath();
 		for (const y of ends) {
-			g.moveTo(x, ends[0]);
-			g.lineTo(x, y);
-		}
-		stroke(g, ink.get("ink-3"), 1);
-		g.beginPath();
-		for (const y of ends) {
-			g.moveTo(x - 3.5, y - 3.5);
-			g.lineTo(x + 3.5, y + 3.5);
-			g.moveTo(x - 3.5, y + 3.5);
-			g.lineTo(x + 3.5, y - 3.5);
+			for (const sign of [1, -1]) {
+				g.moveTo(x - 3.5, y - 3.5 * sign);
+				g.lineTo(x + 3.5, y + 3.5 * sign);
+			}
 		}
 		stroke(g, ink.get("bg-1"), 4.5);
 		stroke(g, ink.get("ink-1"), 1.5);
@@ -124,47 +87,27 @@ export function drawLanes(g, block, view, { tracks, scroll, laneHeight, done, fp
 	g.restore();
 }
 
-/**
- * @param {Brush} g
- * @param {number} middle
- * @param {View} view
- * @param {{track: TrackLane, done: number, fps: number, thick: number}} lane
- * @param {Palette} ink
- */
-function drawLane(g, middle, view, { track, done, fps, thick }, ink) {
+/** @param {Pen} pen @param {TrackLane} track @param {number} middle @param {number} done @param {number} thick */
+function drawLane({ g, view, ink }, track, middle, done, thick) {
 	const colour = ink.id(track.id);
 	const top = middle - Math.round(thick / 2);
-	const misses = new Set(longMisses(track, fps).map(([from]) => from));
+	const centre = top + thick / 2;
 	for (const [from, to, kind] of track.spans) {
 		if (to < view.first || from > view.last) continue;
-		const x0 = Math.max(-4, xOf(from, view));
-		const x1 = Math.min(view.width + 4, xOf(Math.min(to + 1, view.last), view));
-		const wide = Math.max(1.5, x1 - x0);
+		const x = Math.max(-4, xOf(from, view));
+		const width = Math.max(1.5, Math.min(view.width + 4, xOf(Math.min(to + 1, view.last), view)) - x);
 		if (kind === "seen") {
 			g.fillStyle = colour;
-			g.fillRect(x0, top, wide, thick);
-		} else if (misses.has(from) && wide > 6) {
-			hatch(g, x0, top, wide, thick, faded(colour, 0.75));
+			g.fillRect(x, top, width, thick);
+		} else if (kind === "long miss" && width > 6) {
+			hatch(g, { x, y: top, width, height: thick }, faded(colour, 0.75));
 			g.beginPath();
-			g.rect(x0 + 0.5, top + 0.5, wide - 1, thick - 1);
+			g.rect(x + 0.5, top + 0.5, width - 1, thick - 1);
 			stroke(g, colour, 1);
-		} else {
-			g.beginPath();
-			g.moveTo(x0, top + thick / 2);
-			g.lineTo(x0 + wide, top + thick / 2);
-			stroke(g, colour, 2, [2.5, 2]);
-		}
+		} else stroke(trace(g, [[x, centre], [x + width, centre]]), colour, 2, [2.5, 2]);
 	}
-	const centre = top + thick / 2;
 	g.fillStyle = ink.get("ink-1");
-	if (track.first > 0 && track.first >= view.first) {
-		const x = xOf(track.first, view);
-		g.beginPath();
-		g.moveTo(x - 5.5, centre - 4);
-		g.lineTo(x - 0.5, centre);
-		g.lineTo(x - 5.5, centre + 4);
-		g.closePath();
-		g.fill();
-	}
+	const x = xOf(track.first, view);
+	if (track.first > 0 && track.first >= view.first) trace(g, [[x - 5.5, centre - 4], [x - 0.5, centre], [x - 5.5, centre + 4]]).fill();
 	if (track.last < done - 1 && track.last < view.last) g.fillRect(xOf(track.last + 1, view) + 2, centre - 2.5, 5, 5);
 }

@@ -4,24 +4,24 @@
  * coasting. Colour is the id's; the number is always printed as well.
  */
 import { faded } from "../palette.js";
-import { stroke } from "./canvas.js";
+import { stroke, trace } from "./canvas.js";
 
 const WHITE = "#f4f4f4";
 
-/** A box on whole pixels, so that thin lines stay thin. @param {Brush} g @param {Box} box @param {number} scale */
-function trace(g, [left, top, width, height], scale) {
-	const x = Math.round(left * scale);
-	const y = Math.round(top * scale);
+/** @param {Box} box @param {number} scale  @returns {number[]} left, top, right, bottom on whole pixels, so that thin lines stay thin */
+const edges = ([left, top, width, height], scale) => [left, top, left + width, top + height].map((v) => Math.round(v * scale) + 0.5);
+
+/** @param {Brush} g @param {Box} box @param {number} scale */
+function outline(g, box, scale) {
+	const [x0, y0, x1, y1] = edges(box, scale);
 	g.beginPath();
-	g.rect(x + 0.5, y + 0.5, Math.round((left + width) * scale) - x, Math.round((top + height) * scale) - y);
+	g.rect(x0, y0, x1 - x0, y1 - y0);
+	return g;
 }
 
 /** The corners of a box: a 2D estimate. @param {Brush} g @param {Box} box @param {number} scale */
-function corners(g, [left, top, width, height], scale) {
-	const x0 = Math.round(left * scale) + 0.5;
-	const y0 = Math.round(top * scale) + 0.5;
-	const x1 = Math.round((left + width) * scale) + 0.5;
-	const y1 = Math.round((top + height) * scale) + 0.5;
+function corners(g, box, scale) {
+	const [x0, y0, x1, y1] = edges(box, scale);
 	const arm = Math.max(3, Math.min(10, (x1 - x0) * 0.3, (y1 - y0) * 0.3));
 	g.beginPath();
 	for (const [x, y, sx, sy] of [[x0, y0, 1, 1], [x1, y0, -1, 1], [x1, y1, -1, -1], [x0, y1, 1, -1]]) {
@@ -29,98 +29,76 @@ function corners(g, [left, top, width, height], scale) {
 		g.lineTo(x, y);
 		g.lineTo(x, y + sy * arm);
 	}
+	return g;
+}
+
+/** Tracks whose box is in the picture, far to near. @param {CameraStep} view @param {number | null} [only]  their id */
+export function visibleTracks({ tracks }, only = null) {
+	const shown = /** @type {(TrackInView & {box: Box})[]} */ (tracks.filter(({ id, visible, box }) => visible && box && (only === null || id === only)));
+	return shown.sort((a, b) => a.box[1] + a.box[3] - b.box[1] - b.box[3]);
+}
+
+/** @param {Brush} g @param {CameraStep} view @param {Scene} scene */
+export function drawOverlay(g, view, scene) {
+	const { layers, width, scale, opacity, alone, selection } = scene;
+	const roomy = width > 260;
+	const tracks = visibleTracks(view, alone ? selection : null);
+	g.globalAlpha = opacity;
+	g.lineJoin = "miter";
+	if (layers.samples && view.samples) drawSamples(g, view.samples, scale);
+	if (layers.trails) drawTrails(g, tracks, scene);
+	if (layers.truth && roomy) {
+		for (const { box, valid } of view.truth) {
+			g.globalAlpha = opacity * (valid ? 1 : 0.5);
+			if (box) stroke(outline(g, box, scale), "#fff", 1.25, [4, 3], 0.45);
+		}
+		g.globalAlpha = opacity;
+		drawErrors(g, view, scene);
+	}
+	if (layers.measurements) for (const { box } of view.measurements) stroke(outline(g, box, scale), WHITE, 1, [], 0.4);
+	if (layers.estimates) {
+		for (const { box } of view.estimates) stroke(corners(g, box, scale), WHITE, 1.75, [], 0.5);
+		if (view.gates.length && roomy) drawGates(g, view, scene);
+	}
+	if (layers.boxes) drawTracks(g, tracks, scene, roomy);
+	g.globalAlpha = 1;
 }
 
 /** Gates, and the labels that the camera's events speak of. @param {Brush} g @param {CameraStep} view @param {Scene} scene */
 function drawGates(g, { gates, estimates }, { scale, ink }) {
 	for (const [x, y, xx, xy, yy] of gates) {
 		const reach = Math.hypot((xx - yy) / 2, xy);
-		// eigenvalues
-		const axes = [reach, -reach].map((r) => Math.sqrt(Math.max(0, (xx + yy) / 2 + r)) * scale);
+		// half axes: the roots of the matrix's eigenvalues
+		const [long, short] = [reach, -reach].map((r) => Math.sqrt(Math.max(0, (xx + yy) / 2 + r)) * scale);
 		g.beginPath();
-		g.ellipse(x * scale, y * scale, axes[0], axes[1], Math.atan2(2 * xy, xx - yy) / 2, 0, 7);
+		g.ellipse(x * scale, y * scale, long, short, Math.atan2(2 * xy, xx - yy) / 2, 0, 7);
 		stroke(g, WHITE, 1, [1, 3], 0.3);
 	}
-	g.font = `600 10px ${ink.font}`;
-	g.textAlign = "left";
-	g.textBaseline = "alphabetic";
-	g.fillStyle = WHITE;
-	g.strokeStyle = "rgb(0 0 0 / .6)";
-	g.lineWidth = 3;
+	Object.assign(g, { font: `600 10px ${ink.font}`, textAlign: "left", textBaseline: "alphabetic", fillStyle: WHITE, strokeStyle: "rgb(0 0 0 / .6)", lineWidth: 3 });
 	for (const { box, label } of estimates) {
-		const y = (box[1] + box[3]) * scale - 4;
-		g.strokeText(`${label}`, box[0] * scale + 3, y);
-		g.fillText(`${label}`, box[0] * scale + 3, y);
+		const [x, y] = [box[0] * scale + 3, (box[1] + box[3]) * scale - 4];
+		g.strokeText(`${label}`, x, y);
+		g.fillText(`${label}`, x, y);
 	}
 }
-
-/** @param {Brush} g @param {CameraStep} view @param {Scene} scene */
-export function drawOverlay(g, view, scene) {
-	const { layers, width, scale } = scene;
-	const roomy = width > 260;
-	g.globalAlpha = scene.opacity;
-	g.lineJoin = "miter";
-	if (layers.samples && view.samples) drawSamples(g, view.samples, scale);
-	if (layers.trails) drawTrails(g, shown(view, scene), scene);
-	if (layers.truth && roomy) {
-		for (const { box, valid } of view.truth) {
-			if (!box) continue;
-			g.globalAlpha = scene.opacity * (valid ? 1 : 0.5);
-			trace(g, box, scale);
-			stroke(g, "#fff", 1.25, [4, 3], 0.45);
-		}
-		g.globalAlpha = scene.opacity;
-		drawErrors(g, view, scene);
-	}
-	if (layers.measurements) {
-		for (const { box } of view.measurements) {
-			trace(g, box, scale);
-			stroke(g, WHITE, 1, [], 0.4);
-		}
-	}
-	if (layers.estimates) {
-		for (const { box } of view.estimates) {
-			corners(g, box, scale);
-			stroke(g, WHITE, 1.75, [], 0.5);
-		}
-		if (view.gates.length && roomy) drawGates(g, view, scene);
-	}
-	if (layers.boxes) drawTracks(g, shown(view, scene), scene, roomy);
-	g.globalAlpha = 1;
-}
-
-/**
- * Tracks whose box is in the picture, far to near.
- * @param {CameraStep} view
- * @returns {(TrackInView & {box: Box})[]}
- */
-export function visibleTracks(view) {
-	const tracks = /** @type {(TrackInView & {box: Box})[]} */ (view.tracks.filter((track) => track.visible && track.box));
-	return tracks.sort((a, b) => a.box[1] + a.box[3] - b.box[1] - b.box[3]);
-}
-
-/** @param {CameraStep} view @param {Scene} scene */
-const shown = (view, { alone, selection }) => visibleTracks(view).filter(({ id }) => !alone || id === selection);
 
 /** The way of the feet: what was is drawn, what comes is hinted at. @param {Brush} g @param {TrackInView[]} tracks @param {Scene} scene */
 function drawTrails(g, tracks, { scale, ink, selection }) {
 	for (const { id, trail } of tracks) {
-		for (const [points, width] of /** @type {[[number, number, number][], number][]} */ ([[trail.filter(([step]) => step >= 0), 1], [trail.filter(([step]) => step <= 0), id === selection ? 2.5 : 1.75]])) {
-			g.beginPath();
-			for (const [, x, y] of points) g.lineTo(x * scale, y * scale);
-			stroke(g, ink.id(id), width, [], 0.4);
-		}
+		const points = trail.map(([, x, y]) => [x * scale, y * scale]);
+		const now = trail.findIndex(([step]) => step >= 0);
+		stroke(trace(g, points.slice(Math.max(0, now))), ink.id(id), 1, [], 0.3);
+		stroke(trace(g, points.slice(0, now < 0 ? undefined : now + 1)), ink.id(id), id === selection ? 2.5 : 1.75, [], 0.4);
 	}
 }
 
 /** From where somebody is to where he was put: the colour says how far. @param {Brush} g @param {CameraStep} view @param {Scene} scene */
 function drawErrors(g, { truth, tracks }, { scale, ink, people }) {
 	for (const { id, track, error } of people) {
-		const [from, to] = [truth.find((t) => t.id === id)?.box, tracks.find((t) => t.id === track)?.box];
-		if (!from || !to || error === null) continue;
-		g.beginPath();
-		for (const [left, top, width, height] of [from, to]) g.lineTo((left + width / 2) * scale, (top + height / 2) * scale);
-		stroke(g, `color-mix(in srgb, ${ink.get("worse")} ${Math.min(100, 100 * error)}%, ${ink.get("better")})`, 2.5, [], 0.5);
+		const ends = [truth.find((t) => t.id === id)?.box, tracks.find((t) => t.id === track)?.box];
+		if (!ends[0] || !ends[1] || error === null) continue;
+		const middles = ends.flatMap((box) => (box ? [[(box[0] + box[2] / 2) * scale, (box[1] + box[3] / 2) * scale]] : []));
+		stroke(trace(g, middles), `color-mix(in srgb, ${ink.get("worse")} ${Math.min(100, 100 * error)}%, ${ink.get("better")})`, 2.5, [], 0.5);
 	}
 }
 
@@ -129,13 +107,11 @@ function drawSamples(g, samples, scale) {
 	const heaviest = samples.reduce((most, [, , weight]) => Math.max(most, weight), 1e-12);
 	const opacity = g.globalAlpha;
 	for (const [x, y, weight] of samples) {
-		const px = Math.round(x * scale);
-		const py = Math.round(y * scale);
 		g.globalAlpha = opacity * (0.25 + 0.75 * Math.sqrt(Math.max(0, weight) / heaviest));
-		g.fillStyle = "rgb(0 0 0 / .5)";
-		g.fillRect(px - 1.5, py - 1.5, 3, 3);
-		g.fillStyle = WHITE;
-		g.fillRect(px - 0.75, py - 0.75, 1.5, 1.5);
+		for (const [colour, size] of /** @type {[string, number][]} */ ([["rgb(0 0 0 / .5)", 3], [WHITE, 1.5]])) {
+			g.fillStyle = colour;
+			g.fillRect(Math.round(x * scale) - size / 2, Math.round(y * scale) - size / 2, size, size);
+		}
 	}
 	g.globalAlpha = opacity;
 }
@@ -145,29 +121,23 @@ function drawTracks(g, tracks, { scale, selection, hover, ink, width }, roomy) {
 	const huge = width > 800 ? 1.4 : 1;
 	for (const { id, box, seen, fed_by: fed } of tracks) {
 		const marked = id === selection || id === hover;
-		if (marked && fed) {
-			trace(g, fed.box, scale);
-			stroke(g, WHITE, 2, [], 0.6);
-		}
-		const colour = ink.id(id);
-		trace(g, box, scale);
+		if (marked && fed) stroke(outline(g, fed.box, scale), WHITE, 2, [], 0.6);
+		outline(g, box, scale);
 		if (marked) {
-			g.fillStyle = faded(colour, 0.16);
+			g.fillStyle = faded(ink.id(id), 0.16);
 			g.fill();
 		}
-		stroke(g, colour, (roomy ? 2.5 : 2) * huge + (marked ? 0.5 : 0), seen ? [] : [7, 4], 0.55);
+		stroke(g, ink.id(id), (roomy ? 2.5 : 2) * huge + (marked ? 0.5 : 0), seen ? [] : [7, 4], 0.55);
 	}
 	const size = Math.round((roomy ? 15 : 13) * huge);
-	g.font = `600 ${Math.round((roomy ? 11 : 10) * huge)}px ${ink.font}`;
-	g.textAlign = "center";
-	g.textBaseline = "middle";
+	Object.assign(g, { font: `600 ${Math.round((roomy ? 11 : 10) * huge)}px ${ink.font}`, textAlign: "center", textBaseline: "middle" });
 	/** @type {[number, number, number][]} */
 	const placed = [];
 	for (const { id, box } of [...tracks].reverse()) {
 		const text = String(id);
 		const wide = Math.max(size + 1, Math.ceil(g.measureText(text).width) + 6);
-		const above = Math.round(box[1] * scale) - size - 1;
-		const y = above < 2 ? Math.max(2, Math.round(box[1] * scale) + 2) : above;
+		const top = Math.round(box[1] * scale);
+		const y = top - size - 1 < 2 ? Math.max(2, top + 2) : top - size - 1;
 		let x = Math.max(1, Math.min(width - wide - 1, Math.round(box[0] * scale) - 1));
 		// The nearest person's tag keeps its corner; the others step aside.
 		for (let k = 0; k < placed.length; k += 1) {
@@ -178,10 +148,10 @@ function drawTracks(g, tracks, { scale, selection, hover, ink, width }, roomy) {
 			}
 		}
 		placed.push([x, y, wide]);
-		g.fillStyle = "rgb(0 0 0 / .55)";
-		g.fillRect(x - 1, y - 1, wide + 2, size + 2);
-		g.fillStyle = ink.id(id);
-		g.fillRect(x, y, wide, size);
+		for (const [colour, rim] of /** @type {[string, number][]} */ ([["rgb(0 0 0 / .55)", 1], [ink.id(id), 0]])) {
+			g.fillStyle = colour;
+			g.fillRect(x - rim, y - rim, wide + 2 * rim, size + 2 * rim);
+		}
 		g.fillStyle = ink.on(id);
 		g.fillText(text, x + wide / 2, y + size / 2 + 0.5);
 	}

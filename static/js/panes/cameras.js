@@ -22,10 +22,10 @@ export function mountCameras(root, { store, actions, playback }) {
 	let sequenceKey = "";
 	/** @type {ReturnType<typeof setTimeout> | undefined} */
 	let clicked;
-	const cameras = () => store.get().server?.sequence?.cameras ?? [];
+	const cameras = () => store.get().cameras;
 
 	function build() {
-		sequenceKey = store.get().server?.sequence?.key ?? "";
+		sequenceKey = store.get().sequence?.key ?? "";
 		frame = null;
 		cells = cameras().map((camera, index) => {
 			const canvas = h("canvas");
@@ -84,8 +84,8 @@ export function mountCameras(root, { store, actions, playback }) {
 	/** @param {Frame} next */
 	function paint(next) {
 		frame = next;
-		const { server, layers2d: layers, selection, hover } = store.get();
-		if (server?.sequence?.key !== sequenceKey) return;
+		const { sequence, layers2d: layers, selection, hover } = store.get();
+		if (sequence?.key !== sequenceKey) return;
 		const ink = pictureInk();
 		cells.forEach(({ element, canvas, words }, index) => {
 			// what is drawn says which step it is of, so that a test can hold them against each other
@@ -180,14 +180,14 @@ export function mountCameras(root, { store, actions, playback }) {
 	}
 
 	function header() {
-		const { server, layers2d, sequences } = store.get();
+		const { server, sequence, layers2d, sequences } = store.get();
 		for (const chip of /** @type {NodeListOf<HTMLElement>} */ (root.querySelectorAll("[data-layer2d]"))) {
 			const layer = chip.dataset.layer2d ?? "";
 			chip.setAttribute("aria-pressed", String(Boolean(layers2d[layer])));
-			chip.toggleAttribute("disabled", (layer === "truth" && !server?.sequence?.has_truth) || (layer !== "truth" && layer !== "boxes" && layer !== "trails" && !server?.sequence));
+			chip.toggleAttribute("disabled", !sequence || (layer === "truth" && !sequence.has_truth));
 		}
-		blank.hidden = Boolean(server?.sequence);
-		if (server?.sequence) return;
+		blank.hidden = Boolean(sequence);
+		if (sequence) return;
 		const opening = server?.opening;
 		const sample = opening ? undefined : sequences.find((entry) => entry.kind === "rendered");
 		fill(
@@ -202,11 +202,8 @@ export function mountCameras(root, { store, actions, playback }) {
 
 	playback.onPaint(paint);
 	build();
-	store.on(["server"], ({ server }) => {
-		if ((server?.sequence?.key ?? "") !== sequenceKey) build();
-		header();
-	});
-	store.on(["sequences"], header);
+	store.on(["sequence"], ({ sequence }) => (sequence?.key ?? "") !== sequenceKey && build());
+	store.on(["server", "sequences"], header);
 	store.on(["layers2d"], () => {
 		header();
 		playback.repaint();

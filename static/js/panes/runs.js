@@ -13,9 +13,9 @@ export function mountRuns(root, { store, actions }) {
 	let past = [];
 	let counted = 0;
 	const again = (/** @type {PastRun} */ { key, sequence, parameters }) => {
-		const { run, server, link } = store.get();
+		const { run, sequence: open, link } = store.get();
 		if (key === run?.key) return h("span", { class: "q" }, "current");
-		const same = sequence === server?.sequence?.name;
+		const same = sequence === open?.name;
 		const tip = same ? "Set all parameters to those of this run" : "Open its sequence first";
 		return h("button", { class: "btn", disabled: !same || link !== "open", title: tip, onclick: () => actions.change(parameters) }, "use again");
 	};

@@ -1,15 +1,10 @@
 // @ts-check
 /** The side panel: tabs with a panel each. */
 import { parts } from "../dom.js";
-import { mountChanges } from "./changes.js";
-import { mountCompare } from "./compare.js";
 import { isAlone } from "../events.js";
-import { mountEvents } from "./events.js";
 import { mountRuns } from "./runs.js";
-import { mountStep } from "./step.js";
+import { mountTables } from "./tables.js";
 import { mountTracks } from "./tracks.js";
-
-const MOUNT = { tracks: mountTracks, step: mountStep, events: mountEvents, changes: mountChanges, compare: mountCompare, runs: mountRuns };
 
 /** @type {Pane} */
 export function mountSide(root, context) {
@@ -17,7 +12,6 @@ export function mountSide(root, context) {
 	const { count, only } = parts(root);
 	const tabs = /** @type {HTMLElement[]} */ ([...root.querySelectorAll("[role=tab]")]);
 	const nameOf = (/** @type {HTMLElement} */ tab) => /** @type {PageState["tab"]} */ (tab.id.replace("tab-", ""));
-	const panelOf = (/** @type {HTMLElement} */ tab) => /** @type {HTMLElement} */ (root.querySelector(`#panel-${nameOf(tab)}`));
 	tabs.forEach((tab, index) => {
 		tab.addEventListener("click", () => store.set({ tab: nameOf(tab) }));
 		tab.addEventListener("keydown", (event) => {
@@ -29,15 +23,18 @@ export function mountSide(root, context) {
 			store.set({ tab: nameOf(next) });
 			next.focus();
 		});
-		MOUNT[nameOf(tab)](panelOf(tab), context);
 	});
+	const panel = (/** @type {string} */ name) => /** @type {HTMLElement} */ (root.querySelector(`#panel-${name}`));
+	mountTracks(panel("tracks"), context);
+	mountRuns(panel("runs"), context);
+	mountTables(root, context);
 
 	function choose() {
 		for (const tab of tabs) {
 			const chosen = nameOf(tab) === store.get().tab;
 			tab.setAttribute("aria-selected", String(chosen));
 			tab.tabIndex = chosen ? 0 : -1;
-			panelOf(tab).hidden = !chosen;
+			panel(nameOf(tab)).hidden = !chosen;
 		}
 	}
 	store.on(["tab"], choose);

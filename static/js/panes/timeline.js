@@ -4,8 +4,8 @@ import { bucketOf, panned, secondsOf, stepAt, xOf, zoomed } from "../clock.js";
 import { fill, h, idTag, parts, write } from "../dom.js";
 import { hatch, prepare } from "../draw/canvas.js";
 import { drawLanes, drawRange, drawRuler } from "../draw/lanes.js";
-import { drawCardinality, drawErrors, drawParts, meanOf, scaleOf } from "../draw/strips.js";
-import { isAlone, ordered, scoresOf } from "../events.js";
+import { drawCardinality, drawErrors, drawParts } from "../draw/strips.js";
+import { isAlone, ordered, resultOf, scoresOf } from "../events.js";
 import { faded, palette } from "../palette.js";
 import { shownDone } from "../playback.js";
 import { mountTransport } from "./transport.js";
@@ -13,14 +13,13 @@ import { mountTransport } from "./transport.js";
 /** @type {Pane} */
 export function mountTimeline(root, context) {
 	const { store, actions, playback } = context;
-	const { lanes, order, people, truthSign, parts: strip2, measure, value, countSign, referenceSign, axis, errors, error, whose, plot, fixed, empty, seek: seekBar, wanted, head, label: readout } = parts(root);
+	const { lanes, order, people, truthSign, scored, measure, value, countSign, referenceSign, axis, errors, error, whose, plot, fixed, empty, seek: seekBar, wanted, head, label: readout } = parts(root);
 	mountTransport(root, context);
 	order.addEventListener("click", () => store.set({ laneOrder: store.get().laneOrder === "longest" ? "born" : "longest" }));
 	measure.addEventListener("click", () => store.set({ measure: store.get().measure === "ospa" ? "gospa" : "ospa" }));
 
 	/** @type {View} */
 	let view = { first: 0, last: 1, width: 1 };
-	let frames = 0;
 	let asked = false;
 	let spoken = 0;
 
@@ -35,11 +34,12 @@ export function mountTimeline(root, context) {
 		placeHead();
 	}
 
-	/** Another part is shown: of a long recording its values are fetched. */
-	function look() {
+	/** Another part is shown: of a long recording its values are fetched. @param {View} next */
+	function look(next) {
+		view = next;
+		const { timeline, span, frames } = store.get();
 		const whole = view.last - view.first >= frames - 1;
-		const { timeline } = store.get();
-		if (timeline && (timeline.stride > 1 || store.get().span)) store.set({ span: whole ? null : [view.first, view.last] });
+		if (timeline && (timeline.stride > 1 || span)) store.set({ span: whole ? null : [view.first, view.last] });
 		draw();
 		placeHead();
 	}
@@ -64,81 +64,61 @@ export function mountTimeline(root, context) {
 		return isAlone(store.get()) ? sorted.tracks.filter(({ id }) => id === selection) : sorted.tracks;
 	}
 
-	/** What is plotted of the scores, made once for each of them. */
-	function plotted() {
-		const { measure: name } = store.get();
-		const scores = scoresOf(store.get());
-		if (scores !== plots.of || name !== plots.by) {
-			const series = scores?.series;
-			const total = series?.[name] ?? [];
-			const reference = scores?.reference ?? null;
-			const buckets = series ?? { first: 0, stride: 1 };
-			// The parts are of powers in GOSPA and of roots in OSPA: drawn are their shares of the whole.
-			const place = series ? series[`${name}_localisation`].map((part, k) => part / Math.max(1e-12, part + (name === "ospa" ? series.ospa_cardinality[k] : series.gospa_missed[k] + series.gospa_false[k]))) : [];
-			const courses = series?.track_errors ?? [];
-			const top = scaleOf([...total, ...(reference?.[name] ?? [])]);
-			plots = { of: scores, by: name, total, reference, place, courses, buckets, top, mean: meanOf(courses, total.length, buckets), most: scaleOf(courses.flatMap((course) => course.values)) };
-		}
-		return plots;
-	}
-	/** @type {Plots} */
-	let plots = { of: null, by: "ospa", total: [], reference: null, place: [], top: 1, buckets: { first: 0, stride: 1 }, courses: [], mean: [], most: 1 };
-
 	/** The values at the playhead, beside their plots. */
 	function writeScores() {
 		const { shown, selection, measure: name } = store.get();
-		const { of, total, reference, top, buckets, courses, mean, most } = plotted();
-		const at = bucketOf(Math.max(0, shown), buckets);
-		const unit = of?.series.unit ?? "";
+		const { series, reference } = scoresOf(store.get()) ?? {};
 		const text = (/** @type {number | null | undefined} */ number) => number?.toFixed(2) ?? "–";
-		write(value, reference ? `A ${text(reference[name][at])} · B ${text(total[at])} ${unit}` : `${text(total[at])} ${unit}`);
-		write(axis, `0–${top}`);
+		const valueOf = (/** @type {ScoreSeries | null | undefined} */ of) => text(of?.[name][bucketOf(Math.max(0, shown), of)]);
+		const unit = series?.unit ?? "";
+		write(value, `${reference ? `A ${valueOf(reference)} · B ` : ""}${valueOf(series)} ${unit}`);
+		write(axis, `0–${Math.max(series?.axes[name] ?? 0, reference?.axes[name] ?? 0)}`);
 		write(measure, name.toUpperCase());
-		measure.dataset.tip = `${of?.series.cost ?? "not scored yet"}; press for ${name === "ospa" ? "GOSPA" : "OSPA"}`;
+		measure.dataset.tip = `${series?.cost ?? "not scored yet"}; press for ${name === "ospa" ? "GOSPA" : "OSPA"}`;
 		countSign.dataset.tip = name === "ospa" ? "number of people" : "missed and false people";
 		referenceSign.hidden = !reference;
-		const course = courses.find(({ track }) => track === selection);
-		write(error, `${text(course ? course.values[at - bucketOf(course.first, buckets)] : mean[at])} ${unit}`);
-		write(whose, `${course ? `track ${course.track}` : "mean"} in front · 0–${most} ${unit}`);
+		const course = series?.track_errors.find(({ track }) => track === selection) ?? (series && { first: series.first, values: series.mean_error, track: null });
+		write(error, `${text(course && series && course.values[bucketOf(Math.max(0, shown), { ...course, stride: series.stride })])} ${unit}`);
+		write(whose, `${course?.track ? `track ${course.track}` : "mean"} in front · 0–${series?.axes.error ?? 0} ${unit}`);
 	}
 
 	function paint() {
-		const { timeline, range, selection, hover, server, loop } = store.get();
+		const { timeline, range, selection, hover, loop, frames, measure: name } = store.get();
+		if (frames < 1) return;
 		const ink = palette();
 		const height = plot.clientHeight;
 		const g = prepare(fixed, plot.clientWidth, height);
-		const over = { y: 0, height: token("h-over") };
-		const ruler = { y: over.height, height: token("h-ruler") };
-		const laneHeight = token("h-lane");
-		const block = { y: ruler.y + ruler.height, height: lanes.offsetHeight };
-		const strip = { y: block.y + block.height, height: token("h-strip") };
-		if (frames < 1) return;
+		let y = 0;
+		/** The next row down. @param {number} height @returns {Pen} */
+		const row = (height) => ({ g, view, ink, row: { y: (y += height) - height, height } });
+		const [over, ruler] = [row(token("h-over")), row(token("h-ruler"))];
+		const lanesRow = row(lanes.offsetHeight);
+		const top = lanesRow.row.y;
 		if (loop && (range[0] !== null || range[1] !== null)) {
-			const x0 = xOf(Math.max(view.first, range[0] ?? 0), view);
-			const x1 = xOf(Math.min(view.last, range[1] ?? frames - 1), view);
+			const [x0, x1] = [xOf(Math.max(view.first, range[0] ?? 0), view), xOf(Math.min(view.last, range[1] ?? frames - 1), view)];
 			g.fillStyle = faded(ink.get("accent"), 0.07);
-			if (x1 > x0) g.fillRect(x0, ruler.y, x1 - x0, height - ruler.y);
+			if (x1 > x0) g.fillRect(x0, ruler.row.y, x1 - x0, height - ruler.row.y);
 		}
 		const done = shownDone(store.get());
-		const fps = server?.sequence?.fps ?? 25;
-		drawLanes(g, block, view, { tracks: shownTracks(), scroll: lanes.scrollTop, laneHeight, done: timeline?.done ?? 0, fps, selection, hover: hover?.id ?? null, switches: scoresOf(store.get())?.series.switches ?? [] }, ink);
-		drawRange(g, over, view, { loaded: playback.loadedSteps(), done, frames }, ink);
-		drawRuler(g, ruler, view, { range }, ink);
-		if (timeline) drawCardinality(g, strip, view, timeline, ink);
-		if (!strip2.hidden) {
-			const plots = plotted();
-			drawParts(g, { ...strip, y: strip.y + strip.height }, view, plots, ink);
-			if (errors.offsetHeight) drawErrors(g, { ...strip, y: strip.y + 2 * strip.height }, view, plots, selection, ink);
+		const { series, reference } = scoresOf(store.get()) ?? {};
+		drawLanes(lanesRow, { tracks: shownTracks(), pinned: timeline?.pinned?.tracks ?? [], scroll: lanes.scrollTop, laneHeight: token("h-lane"), done: timeline?.done ?? 0, selection, hover: hover?.id ?? null, switches: series?.switches ?? [] });
+		drawRange(over, playback.loadedSteps(), done, frames);
+		drawRuler(ruler, range);
+		if (timeline) drawCardinality(row(token("h-strip")), timeline);
+		if (series && !scored.hidden) {
+			drawParts(row(token("h-strip")), series, reference ?? null, name);
+			if (errors.offsetHeight) drawErrors(row(token("h-strip")), series, selection);
 		}
 		if (done < frames) {
 			const x = Math.max(0, xOf(done, view));
-			hatch(g, x, block.y, view.width - x, height - block.y - 2, ink.get("line"), 6);
+			hatch(g, { x, y: top, width: view.width - x, height: height - top - 2 }, ink.get("line"), 6);
 		}
 	}
 
 	/** The playhead moves by transform alone; nothing is drawn again while it plays. */
 	function placeHead() {
-		const { shown, step, server, result, basis, playing } = store.get();
+		const { shown, step, sequence, frames, fps, playing } = store.get();
+		const result = resultOf(store.get());
 		const at = Math.max(0, shown);
 		const x = xOf(at, view);
 		head.hidden = frames < 1 || x < -1 || x > view.width + 1;
@@ -151,60 +131,43 @@ export function mountTimeline(root, context) {
 		const now = performance.now();
 		if (!playing || now - spoken > 1000) {
 			spoken = now;
-			const fps = server?.sequence?.fps ?? 25;
-			const count = result?.computed ? `, ${result.tracks.length} people` : "";
+			const count = result ? `, ${result.tracks.length} people` : "";
 			seekBar.setAttribute("aria-valuetext", `step ${at} of ${frames}, ${secondsOf(at, fps)} s${count}`);
 		}
-		const current = result?.run === basis && result.computed ? result : null;
-		const truth = server?.sequence?.has_truth ? current?.truth.length : undefined;
-		fill(people, current?.tracks.length ?? "–", truth !== undefined && h("span", { class: "sub" }, ` of ${truth}`));
-		if (!strip2.hidden) writeScores();
+		fill(people, result?.tracks.length ?? "–", result && sequence?.has_truth && h("span", { class: "sub" }, ` of ${result.truth.length}`));
+		if (!scored.hidden) writeScores();
 	}
 
-	/** @type {Map<number, {element: HTMLElement, share: HTMLElement}>} */
+	/** @type {Map<number, HTMLElement>} */
 	const labels = new Map();
 	function listLanes() {
 		const tracks = shownTracks();
 		const ids = new Set(tracks.map((track) => track.id));
-		for (const [id, { element }] of labels) {
-			if (!ids.has(id)) {
-				element.remove();
-				labels.delete(id);
-			}
-		}
-		const selection = store.get().selection;
-		tracks.forEach((track, index) => {
-			let label = labels.get(track.id);
-			if (!label) {
-				const share = h("span", { class: "r" });
-				const element = h(
+		for (const [id, label] of labels) if (!ids.has(id)) label.remove(), labels.delete(id);
+		const { selection } = store.get();
+		tracks.forEach(({ id, seen }, index) => {
+			const label =
+				labels.get(id) ??
+				h(
 					"button",
-					{
-						class: "gr lane",
-						"aria-label": `Track ${track.id}`,
-						onclick: () => actions.select(track.id),
-						onpointerenter: () => store.set({ hover: { id: track.id, camera: -1 } }),
-						onpointerleave: () => store.set({ hover: null }),
-					},
-					idTag(track.id),
-					share,
+					{ class: "gr lane", "aria-label": `Track ${id}`, onclick: () => actions.select(id), onpointerenter: () => store.set({ hover: { id, camera: -1 } }), onpointerleave: () => store.set({ hover: null }) },
+					idTag(id),
+					h("span", { class: "r" }),
 				);
-				label = { element, share };
-				labels.set(track.id, label);
-			}
-			label.element.setAttribute("aria-pressed", String(track.id === selection));
-			write(label.share, `${Math.round(track.seen * 100)} %`);
-			if (lanes.children[index] !== label.element) lanes.insertBefore(label.element, lanes.children[index] ?? null);
+			labels.set(id, label);
+			label.setAttribute("aria-pressed", String(id === selection));
+			write(/** @type {Node} */ (label.lastChild), `${Math.round(seen * 100)} %`);
+			if (lanes.children[index] !== label) lanes.insertBefore(label, lanes.children[index] ?? null);
 		});
-		const { run, server, laneOrder } = store.get();
+		const { run, sequence, laneOrder } = store.get();
 		write(order, laneOrder === "longest" ? "tracks, longest first" : "tracks, first born first");
-		const idle = tracks.length === 0 && Boolean(server?.sequence);
-		write(empty, !idle ? "" : run?.state === "computing" ? "" : run?.state === "failed" ? "The run failed before a track was found." : "No track was found with these parameters.");
+		const idle = tracks.length === 0 && sequence && run?.state !== "computing";
+		write(empty, !idle ? "" : run?.state === "failed" ? "The run failed before a track was found." : "No track was found with these parameters.");
 		empty.style.top = `${above() + 8}px`;
 	}
 
 	plot.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
-		if (event.button !== 0 || frames < 1) return;
+		if (event.button !== 0 || !store.get().sequence) return;
 		event.preventDefault();
 		plot.setPointerCapture(event.pointerId);
 		const box = plot.getBoundingClientRect();
@@ -225,31 +188,21 @@ export function mountTimeline(root, context) {
 		(/** @type {WheelEvent} */ event) => {
 			event.preventDefault();
 			const box = plot.getBoundingClientRect();
+			const { frames } = store.get();
 			const overLanes = event.clientY - box.top > above() && lanes.scrollHeight > lanes.clientHeight;
 			if (overLanes && !event.ctrlKey && !event.shiftKey) lanes.scrollTop += event.deltaY;
-			else if (event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY)) {
-				const pixels = event.deltaX || event.deltaY;
-				view = panned(view, (pixels / view.width) * (view.last - view.first), frames);
-			} else view = zoomed(view, Math.exp(event.deltaY * 0.0015), event.clientX - box.left, frames);
-			look();
+			else if (event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY)) look(panned(view, ((event.deltaX || event.deltaY) / view.width) * (view.last - view.first), frames));
+			else look(zoomed(view, Math.exp(event.deltaY * 0.0015), event.clientX - box.left, frames));
 		},
 		{ passive: false },
 	);
-	/** @param {number} factor */
-	actions.zoom = (factor) => {
-		const x = Math.max(0, Math.min(view.width, xOf(Math.max(0, store.get().shown), view)));
-		view = zoomed(view, factor, x, frames);
-		look();
-	};
+	actions.zoom = (factor) => look(zoomed(view, factor, Math.max(0, Math.min(view.width, xOf(Math.max(0, store.get().shown), view))), store.get().frames));
 	plot.addEventListener("dblclick", () => actions.zoom(1e9));
 	seekBar.addEventListener("input", () => playback.seek(seekBar.valueAsNumber));
 	lanes.addEventListener("scroll", draw);
 
-	store.on(["server"], ({ server }) => {
-		const now = server?.sequence?.frames ?? 0;
-		truthSign.hidden = strip2.hidden = errors.hidden = !server?.sequence?.has_truth;
-		if (now === frames) return;
-		frames = now;
+	store.on(["sequence"], ({ sequence, frames }) => {
+		truthSign.hidden = scored.hidden = errors.hidden = !sequence?.has_truth;
 		view = { ...view, first: 0, last: Math.max(1, frames - 1) };
 		seekBar.max = String(Math.max(0, frames - 1));
 		resize();
@@ -262,12 +215,17 @@ export function mountTimeline(root, context) {
 	store.on(["selection"], () => {
 		listLanes();
 		const { selection } = store.get();
-		if (selection !== null) labels.get(selection)?.element.scrollIntoView({ block: "nearest" });
+		if (selection !== null) labels.get(selection)?.scrollIntoView({ block: "nearest" });
 		draw();
 		placeHead();
 	});
 	store.on(["range", "loop", "hover", "theme"], draw);
 	store.on(["shown", "step", "result"], placeHead);
+	store.on(["shown"], ({ shown, frames }) => {
+		// Of a part that is shown, the page is turned when the playhead leaves it.
+		if (shown > view.last) look(panned(view, shown - view.first, frames));
+		else if (shown >= 0 && shown < view.first) look(panned(view, shown - view.last, frames));
+	});
 	let waiting = false;
 	store.on(["loaded"], () => {
 		// Pictures arrive many times a second; the bar needs a few of them only.

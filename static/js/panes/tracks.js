@@ -1,7 +1,7 @@
 // @ts-check
 /** The table of tracks: sorted by any column, walked by keyboard, alive at the shown step. */
 import { fill, h, idTag, parts, write } from "../dom.js";
-import { eventsNow, isAlone, nextEvent, scoresOf, stateAt } from "../events.js";
+import { eventsNow, isAlone, nextEvent, resultOf, scoresOf, stateAt } from "../events.js";
 import { grid } from "../grid.js";
 
 /** Rows beyond this are counted, not drawn. */
@@ -15,14 +15,10 @@ export function mountTracks(root, { store, actions, playback }) {
 	let scored = new Map();
 	const step = () => Math.max(0, store.get().shown);
 	const done = () => store.get().timeline?.done ?? 0;
-	const fps = () => store.get().server?.sequence?.fps ?? 25;
 	const state = (/** @type {TrackLane} */ track) => (step() < done() ? stateAt(track, step()) : null);
 	const ended = (/** @type {TrackLane} */ track) => track.last < done() - 1;
 	const duration = (/** @type {number} */ seconds) => `${seconds.toFixed(seconds < 1 ? 2 : 1)} s`;
-	const here = (/** @type {TrackLane} */ { id }) => {
-		const { result, basis } = store.get();
-		return result?.run === basis ? result.tracks.find((track) => track.id === id) : undefined;
-	};
+	const here = (/** @type {TrackLane} */ { id }) => resultOf(store.get())?.tracks.find((track) => track.id === id);
 
 	/** @type {Column<TrackLane>[]} */
 	const columns = [
@@ -30,7 +26,7 @@ export function mountTracks(root, { store, actions, playback }) {
 		{ word: "State", cell: (t) => state(t) ?? "–", by: (t) => ORDER[state(t) ?? "ended"], live: true },
 		{ word: "Born", kind: "num", cell: (t) => t.first, by: (t) => t.first },
 		{ word: "Died", kind: "num", cell: (t) => (ended(t) ? t.last : "–"), by: (t) => (ended(t) ? t.last : 1e9) },
-		{ word: "Length", kind: "num", cell: (t) => duration((t.last - t.first + 1) / fps()), by: (t) => t.last - t.first },
+		{ word: "Length", kind: "num", cell: (t) => duration((t.last - t.first + 1) / store.get().fps), by: (t) => t.last - t.first },
 		{ word: "Seen", kind: "num", cell: (t) => `${Math.round(t.seen * 100)} %`, by: (t) => t.seen },
 		{ word: "Weight", kind: "num", cell: (t) => here(t)?.existence.toFixed(2) ?? "–", live: true },
 		{ word: "x, y, z  m", kind: "num opt-1", cell: (t) => here(t)?.position.map((v) => v.toFixed(2).replace("-", "−")).join("  ") ?? "–", live: true },
@@ -54,14 +50,14 @@ export function mountTracks(root, { store, actions, playback }) {
 	root.prepend(table.element);
 
 	function list() {
-		const { timeline, server, run } = store.get();
+		const { timeline, sequence, run } = store.get();
 		scored = new Map(scoresOf(store.get())?.evaluation.per_track.map((track) => [track.id, track]));
-		table.element.classList.toggle("plain", !server?.sequence?.has_truth);
+		table.element.classList.toggle("plain", !sequence?.has_truth);
 		const tracks = (timeline?.tracks ?? []).filter(({ id }) => !isAlone(store.get()) || id === store.get().selection);
 		table.show(tracks.slice(0, MOST_ROWS));
 		blank.hidden = tracks.length > 0;
 		if (!tracks.length) {
-			const [title, text] = !server?.sequence
+			const [title, text] = !sequence
 				? ["Tracks appear here", "once a sequence is open."]
 				: run?.state === "computing"
 					? ["No track yet", "The run goes on; tracks appear as they are found."]
@@ -73,25 +69,22 @@ export function mountTracks(root, { store, actions, playback }) {
 
 	/** What changes with the playhead: written only where it differs. */
 	function now() {
-		const { timeline, selection, server } = store.get();
+		const { timeline, selection, sequence } = store.get();
 		table.live();
 		table.each((track, row) => {
 			row.classList.toggle("gone", !["seen", "coasting"].includes(state(track) ?? ""));
 			row.setAttribute("aria-selected", String(track.id === selection));
 		});
-		const { result, basis } = store.get();
-		const current = result?.run === basis && result.computed ? result : null;
-		const count = current?.tracks.length;
-		const truth = server?.sequence?.has_truth ? current?.truth.length : undefined;
+		const result = resultOf(store.get());
 		const more = Math.max(0, (timeline?.tracks.length ?? 0) - MOST_ROWS) + (timeline?.left_out ?? 0);
-		const of = truth === undefined ? "" : ` of ${truth}`;
-		const words = `${count}${of} people at step ${step()}${more > 0 ? ` · ${more} more tracks` : ""}`;
-		write(summary, count !== undefined ? words : server?.sequence ? "not computed at this step" : "");
+		const of = sequence?.has_truth ? ` of ${result?.truth.length}` : "";
+		const words = `${result?.tracks.length}${of} people at step ${step()}${more > 0 ? ` · ${more} more tracks` : ""}`;
+		write(summary, result ? words : sequence ? "not computed at this step" : "");
 		const event = nextEvent(eventsNow(store.get()), step(), 1);
 		fill(upcoming, event ? ["next: ", h("b", {}, `${event.kind} of ${event.id}, step ${event.step}`)] : "no later event");
 	}
 
-	store.on(["timeline", "server", "scores", "layers3d"], list);
+	store.on(["timeline", "sequence", "run", "scores", "layers3d"], list);
 	store.on(["shown", "result", "eventKind"], now);
 	store.on(["selection"], () => (isAlone(store.get()) ? list() : now()));
 	store.on(["selection"], ({ selection }) => table.each(({ id }, row) => id === selection && row.scrollIntoView({ block: "nearest" })));

@@ -19,8 +19,8 @@ export function mountTransport(root, { store, playback }) {
 	typed.addEventListener("blur", close);
 	typed.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
 		event.stopPropagation();
-		const sequence = store.get().server?.sequence;
-		const wanted = event.key === "Enter" && sequence ? parseStep(typed.value, sequence.fps, sequence.frames) : null;
+		const { fps, frames } = store.get();
+		const wanted = event.key === "Enter" ? parseStep(typed.value, fps, frames) : null;
 		if (wanted !== null) playback.seek(wanted);
 		if (event.key === "Enter" || event.key === "Escape") close();
 	});
@@ -30,8 +30,7 @@ export function mountTransport(root, { store, playback }) {
 		speed.blur();
 	});
 
-	store.on(["shown", "server"], ({ shown, server }) => {
-		const { frames = 0, fps = 25 } = server?.sequence ?? {};
+	store.on(["shown", "sequence"], ({ shown, frames, fps }) => {
 		write(step, String(Math.max(0, shown)));
 		write(of, `/ ${frames}`);
 		write(seconds, secondsOf(Math.max(0, shown), fps));
@@ -44,12 +43,12 @@ export function mountTransport(root, { store, playback }) {
 		play.setAttribute("aria-label", playing ? "Pause" : "Play");
 	});
 	const marks = () => {
-		const { loop: on, range: [from, to], server, speed: now } = store.get();
-		for (const control of root.querySelectorAll("button:not(.end), select")) control.toggleAttribute("disabled", !server?.sequence);
+		const { loop: on, range: [from, to], frames, speed: now } = store.get();
+		for (const control of root.querySelectorAll("button:not(.end), select")) control.toggleAttribute("disabled", !frames);
 		loop.setAttribute("aria-pressed", String(on));
-		write(range, from === null && to === null ? "all" : `${from ?? 0} – ${to ?? (server?.sequence?.frames ?? 1) - 1}`);
+		write(range, from === null && to === null ? "all" : `${from ?? 0} – ${to ?? frames - 1}`);
 		speed.value = String(now);
 	};
-	store.on(["loop", "range", "server", "speed"], marks);
+	store.on(["loop", "range", "sequence", "speed"], marks);
 	marks();
 }

@@ -43,8 +43,7 @@ export function mountView3d(root, { store, actions, retry, press }) {
 	}
 
 	function header() {
-		const { server, layers3d, link } = store.get();
-		const sequence = server?.sequence;
+		const { server, sequence, cameras, layers3d, link } = store.get();
 		for (const chip of /** @type {NodeListOf<HTMLElement>} */ (root.querySelectorAll("[data-layer3d]"))) {
 			const layer = chip.dataset.layer3d ?? "";
 			chip.setAttribute("aria-pressed", String(Boolean(layers3d[layer])));
@@ -52,7 +51,7 @@ export function mountView3d(root, { store, actions, retry, press }) {
 			chip.hidden = layer === "pinned" && !server?.pinned;
 		}
 		/** @type {[string, number | "top" | null, string, string][]} */
-		const points = [["free", null, "Free view", "0"], ["top", "top", "From above", "U"], ...(sequence?.cameras ?? []).map(({ name }, index) => /** @type {[string, number, string, string]} */ ([`C${index + 1}`, index, `Look through ${name}`, ""]))];
+		const points = [["free", null, "Free view", "0"], ["top", "top", "From above", "U"], ...cameras.map(({ name }, index) => /** @type {[string, number, string, string]} */ ([`C${index + 1}`, index, `Look through ${name}`, ""]))];
 		if (views.childElementCount !== points.length) {
 			fill(views, points.map(([name, view, tip, key]) => h("button", { class: "start", "data-tip": tip, "data-key": key, onclick: () => actions.lookThrough(view) }, name)));
 		}

@@ -1,0 +1,68 @@
+// @ts-check
+/**
+ * The panels whose tables the server writes: they are fetched while they are looked at, when
+ * something that they tell of is new. Their buttons name an action and its value.
+ */
+import { fetcher, request } from "../api.js";
+import { choices, parts, write } from "../dom.js";
+import { commandLine } from "../url.js";
+
+/** What a panel tells of, and where it comes from. @type {Record<string, {keys: (keyof PageState)[], path: (state: Readonly<PageState>) => string}>} */
+const TABLES = {
+	step: { keys: ["result", "scores"], path: ({ shown }) => `step/${Math.max(0, shown)}` },
+	events: { keys: ["timeline", "scores", "eventKind"], path: ({ eventKind }) => `events${eventKind && `?kind=${eventKind}`}` },
+	changes: { keys: ["server"], path: () => "changes" },
+	compare: { keys: ["scores", "basis"], path: ({ every }) => `compare?every=${every}` },
+};
+/** @type {[string, string][]} */
+const KINDS = [["", "all"], ["birth", "births"], ["death", "deaths"], ["switch", "switches"], ["long miss", "long misses"]];
+
+/** @type {Pane} */
+export function mountTables(root, { store, actions }) {
+	const { kind, presets, code, pin, unpin, more, resetAll } = parts(root);
+	for (const [name, { keys, path }] of Object.entries(TABLES)) {
+		const body = /** @type {HTMLElement} */ (root.querySelector(`#panel-${name} [data-fill]`));
+		let told = "";
+		const refresh = fetcher(async () => {
+			const { tab, sequence } = store.get();
+			if (tab !== name || !sequence) return;
+			const text = await (await request(`/api/tables/${path(store.get())}`)).text();
+			if (text === told) return;
+			told = text;
+			// Where the focus was on a button, it is on the same one again.
+			const { do: act, value } = /** @type {HTMLElement} */ (document.activeElement)?.dataset ?? {};
+			const inside = body.contains(document.activeElement);
+			body.innerHTML = text;
+			if (inside) /** @type {HTMLElement} */ (body.querySelector(`[data-do="${act}"][data-value="${value}"]`) ?? body).focus();
+		});
+		store.on([...keys, "tab", "sequence", "every"], refresh);
+	}
+	root.addEventListener("click", ({ target }) => {
+		const { do: act, value } = /** @type {HTMLElement} */ (/** @type {Element} */ (target).closest("[data-do]") ?? root).dataset;
+		if (act) /** @type {any} */ (actions)[act](value);
+	});
+
+	choices(kind, KINDS, "");
+	kind.addEventListener("change", () => store.set({ eventKind: kind.value }));
+	more.addEventListener("click", () => store.set({ every: !store.get().every }));
+	presets.addEventListener("change", () => actions.preset(presets.value));
+
+	function controls() {
+		const { server, sequence, schema, run, link, every } = store.get();
+		const changed = server?.changed ?? [];
+		const locked = link !== "open" || !sequence;
+		const fits = Object.entries(schema?.presets ?? {}).find(
+			([, values]) => Object.entries(values).every(([key, value]) => server?.parameters[key] === value) && changed.every((key) => key in values || !key.includes(".")),
+		);
+		const names = Object.keys(schema?.presets ?? {});
+		choices(presets, [...(fits ? [] : [""]), ...names].map((name) => [name, name || "own values"]), fits?.[0] ?? "");
+		presets.disabled = locked;
+		resetAll.disabled = locked || changed.length === 0;
+		write(code, sequence && server ? commandLine(sequence.name, server.parameters, changed) : "");
+		unpin.hidden = !server?.pinned;
+		pin.disabled = locked || run?.state !== "done" || server?.pinned?.key === run.key;
+		write(more, every ? "Headlines" : "All figures");
+	}
+	store.on(["server", "schema", "link", "run", "every", "sequence"], controls);
+	controls();
+}
