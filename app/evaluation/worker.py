@@ -20,6 +20,10 @@ logger = logging.getLogger("app")
 SECONDS_BETWEEN = 1.0
 """A run under way is scored at most this often."""
 
+SETTLED_SECONDS = 0.25
+"""A finished run is scored when no other one has taken its place for so long: whoever drags a
+slider wants the next run, and scoring would take the interpreter from it."""
+
 SHARE = 0.1
 """And with at most this share of one core: scoring a long run is not free."""
 
@@ -36,6 +40,8 @@ class Evaluator:
         self._condition = threading.Condition()
         self._closed = False
         self._not_before = 0.0
+        self._newest: tuple[str, bool] = ("", False)
+        self._newest_since = 0.0
         self._failed: set[tuple[str, int]] = set()
         self._beginnings: OrderedDict[tuple[str, int], Evaluation] = OrderedDict()
         self._unsubscribe = workbench.subscribe(self._on_change)
@@ -91,10 +97,17 @@ class Evaluator:
             scored, shown = Scored.of(run), scores.shown
             is_new = shown is None or (shown.key, shown.steps) != (scored.key, scored.steps)
             if is_new and (scored.key, scored.steps) not in self._failed:
-                wait = self._not_before - time.monotonic()
-                if scored.complete or snapshot.run_state.state != "computing" or wait <= 0.0:
-                    return scored, None
-                return None, wait
+                over = scored.complete or snapshot.run_state.state != "computing"
+                if self._newest != (scored.key, over):
+                    self._newest, self._newest_since = (scored.key, over), time.monotonic()
+                since = self._newest_since
+                ready = (
+                    since + SETTLED_SECONDS
+                    if over
+                    else max(self._not_before, since + SECONDS_BETWEEN)
+                )
+                wait = ready - time.monotonic()
+                return (scored, None) if wait <= 0.0 else (None, wait)
         return None, None
 
     def _work(self) -> None:

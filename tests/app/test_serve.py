@@ -58,7 +58,9 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     yield server
     server.process.send_signal(signal.SIGINT)
     out, err = server.process.communicate(timeout=20)
-    assert (out, err) == ("", "")
+    # on a new machine it says that it compiles, and when that is done
+    others = [line for line in err.splitlines() if "kernels" not in line]
+    assert (out, others) == ("", [])
     assert server.process.returncode == 0
 
 
