@@ -69,7 +69,7 @@ class AssociationMatrixParams(Params):
 
     centre_sigma: Annotated[
         float, Field(ge=0.02, le=3.0), ui("σ_x", unit="half sizes", step=0.01, log=True)
-    ] = 0.2
+    ] = 0.25
     """Standard deviation of a box's centre."""
 
     size_sigma: Annotated[

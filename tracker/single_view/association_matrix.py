@@ -21,8 +21,9 @@ from tracker.parameters import AssociationMatrixParams, ForegroundParams
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.following import follow, object_histograms
+from tracker.single_view.handing_over import advance
 from tracker.single_view.joining import join
-from tracker.single_view.moving_objects import MovingObject, Situation, advance
+from tracker.single_view.moving_objects import MovingObject, Situation
 from tracker.single_view.protocol import ViewEvent, ViewResult
 from tracker.single_view.silhouettes import Fits, Silhouettes
 
@@ -155,7 +156,7 @@ class AssociationMatrix:
         else:
             boxes, labels = _apart(situation)
             weights = np.ones(len(boxes))
-        estimates, estimate_labels = _estimates(situation)
+        estimates, estimate_labels = _estimates(situation, p.confirmation_steps)
         return ViewResult(
             boxes=boxes,
             weights=weights,
@@ -181,7 +182,7 @@ class AssociationMatrix:
 
     def _nothing(self, situation: Situation) -> ViewResult:
         """Without a picture."""
-        estimates, labels = _estimates(situation)
+        estimates, labels = _estimates(situation, self._parameters.confirmation_steps)
         none = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
         return replace(
             none,
@@ -203,9 +204,12 @@ class AssociationMatrix:
         return gates
 
 
-def _estimates(situation: Situation) -> tuple[Float[ndarray, "E 4"], Int[ndarray, " E"]]:
-    """Every track that has an object: alone his own box, in a merged object that one's."""
-    labels = sorted(label for one in situation.objects for label in one.labels)
+def _estimates(
+    situation: Situation, confirmation: int
+) -> tuple[Float[ndarray, "E 4"], Int[ndarray, " E"]]:
+    """Every confirmed track that has an object: his own box if alone, else the merged object's."""
+    held = sorted(label for one in situation.objects for label in one.labels)
+    labels = [label for label in held if situation.tracks[label].age >= confirmation]
     boxes = np.array([situation.tracks[label].box for label in labels]).reshape(-1, 4)
     return boxes, np.array(labels, dtype=np.int64)
 
