@@ -285,3 +285,28 @@ def test_real_recording_against_plain_decoding(data_folder: Path, camera: int) -
         steps = [0, 499, 498, 1, 248, 249, 250, *random.Random(camera).sample(range(500), 40)]
         for step in [*steps, *range(300, 330), *range(330, 300, -1)]:
             np.testing.assert_array_equal(reader.picture(camera, step), plain[step])
+
+
+def test_what_follows_from_the_pictures_is_made_once(tmp_path: Path) -> None:
+    sequence = read_sequence(write_sequence(tmp_path / "s", frames=4))
+    made: list[int] = []
+
+    def make() -> object:
+        made.append(1)
+        time.sleep(0.05)
+        return object()
+
+    with FrameReader(sequence) as reader:
+        found: list[object] = []
+        threads = [
+            threading.Thread(target=lambda: found.append(reader.once("a", make))) for _ in range(4)
+        ]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert len(made) == 1
+        assert len(found) == 4
+        assert all(one is found[0] for one in found)
+        assert reader.once("b", make) is not found[0]
+        assert reader.once("nothing", lambda: None) is None

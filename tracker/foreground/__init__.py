@@ -8,6 +8,8 @@ the pictures (:mod:`~tracker.foreground.adaptive`).
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import UInt8
+from numpy import ndarray
 
 from tracker.foreground.adaptive import AdaptiveForeground
 from tracker.foreground.exposure import BackgroundModel, LearntForeground, tone_curve
@@ -47,13 +49,18 @@ def learn(
         reader: Of its pictures.
         parameters: Which model, and its numbers.
     """
-    count = min(BACKGROUND_PICTURES, sequence.frames)
-    steps = np.linspace(0, sequence.frames - 1, count).astype(int)
-    pictures = [reader.picture(camera_index, int(step)) for step in steps]
-    there = [picture for picture in pictures if picture is not None]
-    if not there:
-        return None
+
+    def pictures() -> list[UInt8[ndarray, "h w 3"]]:
+        count = min(BACKGROUND_PICTURES, sequence.frames)
+        steps = np.linspace(0, sequence.frames - 1, count).astype(int)
+        found = (reader.picture(camera_index, int(step)) for step in steps)
+        return [picture for picture in found if picture is not None]
+
     if parameters.model == "adaptive":
-        return AdaptiveForeground(there, parameters)
-    background = BackgroundModel.learn(there)
+        there = pictures()
+        return AdaptiveForeground(there, parameters) if there else None
+    # no parameter has a say in it, so that a moved slider does not wait for it again
+    background = reader.once(
+        ("background", camera_index), lambda: BackgroundModel.learn(pictures())
+    )
     return None if background is None else LearntForeground(background, parameters.threshold)

@@ -9,14 +9,17 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
 from jaxtyping import UInt8
 from numpy import ndarray
 
 from tracker.sequences.sequence import Sequence, View
 from tracker.sequences.video import VideoDecoder, VideoError, index_video, read_image
+
+_Made = TypeVar("_Made")
 
 Picture = UInt8[ndarray, "h w 3"]
 
@@ -52,6 +55,9 @@ class FrameReader:
         self._ahead = min(AHEAD, cache_bytes // (2 * max(1, len(sequence.views)) * largest))
         self._wanted = threading.Condition()
         self._closed = False
+        self._once_lock = threading.Lock()
+        self._once_locks: dict[Hashable, threading.Lock] = {}
+        self._made: dict[Hashable, Any] = {}
         self._thread: threading.Thread | None = None
 
     def __enter__(self) -> FrameReader:
@@ -115,6 +121,21 @@ class FrameReader:
                 yield source.read(step)
         finally:
             source.close()
+
+    def once(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
+        """What follows from the pictures alone, made when it is first asked for.
+
+        Args:
+            name: Of what is made; whoever asks for the same name gets the same object.
+            make: Makes it. Others who ask for the name meanwhile wait.
+        """
+        with self._once_lock:
+            lock = self._once_locks.setdefault(name, threading.Lock())
+        with lock:
+            if name not in self._made:
+                self._made[name] = make()
+            made: _Made = self._made[name]
+            return made
 
     def close(self) -> None:
         """Release files, memory and thread. Closing twice does no harm."""
