@@ -54,7 +54,10 @@ def first_load(folder: Path) -> dict[str, int]:
 def compare(short: dict[str, int], long: dict[str, int]) -> None:
     """No answer grows with the recording, but for numbers that have more digits."""
     for path, size in long.items():
-        assert size <= 1.3 * short[path] + 300, path
+        if path == "/api/step/0":  # as large as what happens at that step
+            assert size < 20_000
+        else:
+            assert size <= 1.3 * short[path] + 300, path
 
 
 def test_a_recording_opens_without_its_video_in_memory(tmp_path: Path) -> None:
