@@ -6,6 +6,7 @@ import json
 import random
 import statistics
 import tempfile
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -39,6 +40,7 @@ def run(short: bool) -> Iterator[Measurement]:
             if not short:
                 server.wait_for_run(seconds=600.0)
             yield from _scrub(server, "idle", 40 if short else 150)
+            yield from _play(server, 2.0 if short else 8.0)
             if not short:
                 change = {"changes": {"colour_phd.detection_probability": 0.79}}
                 httpx2.patch(server.address + "api/parameters", json=change)
@@ -71,3 +73,47 @@ def _scrub(server: Server, when: str, seeks: int) -> Iterator[Measurement]:
     for what, times in (("results", data), ("results and pictures", pictures)):
         p95 = statistics.quantiles(times, n=20)[-1] * 1000.0
         yield Measurement(f"scrub at random, {when}: {what}, 95 %", p95, "ms", "≤ 100 ms")
+
+
+PAGES = 4
+STEPS_A_SECOND = 25.0
+
+
+def _play(server: Server, seconds: float) -> Iterator[Measurement]:
+    """One page plays and three look on: how many of the steps each is told of, and how late."""
+    frames = server.get("/api/state").json()["sequence"]["frames"]
+    sent: dict[int, float] = {}
+    late: list[list[float]] = [[] for _ in range(PAGES)]
+    ends = threading.Event()
+    address = server.address.replace("http", "ws") + "api/stream"
+
+    def look(page: int) -> None:
+        with connect(address, max_size=None) as socket:
+            while not ends.is_set():
+                try:
+                    message = json.loads(socket.recv(timeout=0.2))
+                except TimeoutError:
+                    continue
+                if message["type"] == "step" and message["step"] in sent:
+                    late[page].append(time.perf_counter() - sent[message["step"]])
+
+    looking = [threading.Thread(target=look, args=(page,)) for page in range(PAGES)]
+    for thread in looking:
+        thread.start()
+    count = min(int(seconds * STEPS_A_SECOND), frames - 1)
+    with connect(address, max_size=None) as player:
+        time.sleep(0.5)
+        begin = time.perf_counter()
+        for number in range(count):
+            time.sleep(max(0.0, begin + number / STEPS_A_SECOND - time.perf_counter()))
+            sent[number + 1] = time.perf_counter()
+            player.send(json.dumps({"type": "seek", "step": number + 1, "origin": "benchmark"}))
+        time.sleep(0.5)
+    ends.set()
+    for thread in looking:
+        thread.join()
+    dropped = 1.0 - min(len(times) for times in late) / count
+    words = f"play at {STEPS_A_SECOND:g} steps/s, {PAGES} pages"
+    yield Measurement(f"{words}: steps dropped by the worst", 100.0 * dropped, "%", "0 %")
+    p95 = statistics.quantiles([value for times in late for value in times], n=20)[-1]
+    yield Measurement(f"{words}: a step is told after, 95 %", 1000.0 * p95, "ms", "≤ 40 ms")
