@@ -1,0 +1,84 @@
+"""The experiment on data association: its clip, its errors, what is said of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tracker.experiments import EXPERIMENTS, Context, jpda
+from tracker.experiments.jpda import CLASSICAL, DEFAULTS, PUBLISHED, STEPS, centre_errors
+from tracker.single_view.protocol import ViewResult
+
+
+def result(*estimates: tuple[int, float, float]) -> ViewResult:
+    """Estimates by label and place."""
+    boxes = np.array([[x, y, 4.0, 9.0] for _, x, y in estimates]).reshape(-1, 4)
+    found = ViewResult.of_boxes(boxes, np.ones(len(boxes)), np.ones((len(boxes), 4)))
+    return replace(found, estimate_labels=np.array([name for name, *_ in estimates], dtype=int))
+
+
+def test_errors_are_those_of_the_assignment_of_least_distance() -> None:
+    truth = np.array([[[0.0, 0.0], [10.0, 0.0]]] * 4)
+    errors, switches = centre_errors(
+        truth,
+        [
+            result((1, 1.0, 0.0), (2, 13.0, 4.0)),
+            result((1, 10.0, 0.0)),  # one for both
+            result(),
+            result((2, 0.0, 2.0), (1, 10.0, 1.0), (9, 300.0, 0.0)),
+        ],
+    )
+    np.testing.assert_allclose(errors, [[1.0, 5.0], [10.0, 0.0], [np.nan] * 2, [2.0, 1.0]])
+    assert switches == 2
+
+
+def test_the_two_cross_walk_together_and_part() -> None:
+    scene = jpda.clip(3)
+    places = np.array([scene.boxes(step)[:, :2] for step in range(STEPS)])
+    apart = np.linalg.norm(places[:, 0] - places[:, 1], axis=1)
+    assert np.isfinite(places).all()
+    assert apart[:30].min() > 40.0
+    assert (apart < 2.0 * jpda.HALF_SIZES[0]).sum() > 30
+    assert apart[-1] > 40.0
+    side = np.sign(places[:, 0, 0] - places[:, 1, 0])
+    assert (np.diff(side[side != 0]) != 0).sum() >= 3, "they cross more than once"
+    first, second = scene.actors
+    assert first.colours == second.colours
+    assert first.seed == second.seed, "nothing but their paths tells them apart"
+
+
+def test_all_filters_look_at_the_same_foreground() -> None:
+    compared = jpda.methods()
+    assert {p.jpda.measurements for p in compared.values()} == {"foreground"}
+    assert len({p.foreground for p in compared.values()}) == 1
+    assert not compared[CLASSICAL].jpda.five_cases
+    assert compared[PUBLISHED].jpda.association == "simplified_murty"
+    assert compared[PUBLISHED].jpda.gate_volume == 9.5
+
+
+def figures(largest: float, speed: float = 50.0) -> dict[str, Any]:
+    return {"largest": largest, "median_largest": largest, "mean": 1.0, "frames_per_second": speed}
+
+
+def test_the_verdicts_follow_the_figures() -> None:
+    good = jpda._findings({CLASSICAL: figures(20.0), PUBLISHED: figures(3.0), DEFAULTS: figures(3)})
+    assert [finding.verdict for finding in good] == ["better"] * 4
+    bad = jpda._findings(
+        {CLASSICAL: figures(6.0), PUBLISHED: figures(5.0, 8.0), DEFAULTS: figures(4.0)}
+    )
+    assert [finding.verdict for finding in bad] == ["worse"] * 4
+
+
+@pytest.mark.long
+def test_the_short_form_shows_the_direction() -> None:
+    found = EXPERIMENTS["jpda"].run(Context(quick=True))
+    assert [row[0] for row in found.rows] == list(jpda.methods())
+    assert {len(row) for row in found.rows} == {len(found.head)}
+    clips = found.numbers["clips"]
+    assert clips[CLASSICAL]["largest"] > 2.0 * clips[PUBLISHED]["largest"]
+    assert clips[DEFAULTS]["mean"] < 2.0
+    assert any(note.startswith("Left out: the real recording") for note in found.notes)
+    assert found.figure is not None
