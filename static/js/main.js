@@ -166,7 +166,7 @@ function receiveState(told, streamed = false) {
 	// The first word on the theme is this browser's, later ones are everybody's.
 	if (before) store.set({ theme: server.theme });
 	else if (server.theme !== store.get().theme) void actions.ask("POST", "theme", { theme: store.get().theme });
-	if (changed) arrive(server);
+	if (changed || (place.sequence && place.sequence === sequence?.name)) arrive(server);
 	if (changed || before?.pinned?.key !== server.pinned?.key) void fetchScores();
 	if (before === null || before.opening?.name !== server.opening?.name) void fetchSequences();
 }
@@ -250,7 +250,9 @@ const stream = openStream("/api/stream", {
 		void fetchScores();
 	},
 	lost(retryAt) {
-		const { link, lostAt } = store.get();
+		const { link, lostAt, server, shown, selection, large } = store.get();
+		// A server that was started anew stands at its own first step: go back to where we are.
+		if (link === "open" && server?.sequence) place = { sequence: server.sequence.name, step: Math.max(0, shown), selection, camera: large, values: valuesOf(server) };
 		store.set({ link: "lost", retryAt, playing: 0, lostAt: link === "lost" ? lostAt : Date.now() });
 	},
 	message: receive,
