@@ -61,7 +61,7 @@ class AssociationMatrixParams(Params):
     acceptance: Annotated[float, Field(ge=-10.0, le=0.0), ui("s_min", step=0.1)] = -2.0
     """Targets: an object's best box is not taken if the outline fits it worse than this."""
 
-    further_acceptance: Annotated[float, Field(ge=-10.0, le=0.0), ui("s_2", step=0.1)] = -1.4
+    further_acceptance: Annotated[float, Field(ge=-10.0, le=0.0), ui("s_2", step=0.1)] = -1.7
     """Targets: nor are the other boxes of a merged object if they fit worse than this."""
 
     spare_acceptance: Annotated[float, Field(ge=-10.0, le=0.0), ui("s_+", step=0.1)] = -0.7
