@@ -8,7 +8,8 @@ import numpy as np
 
 from tests.benchmarks.measure import Measurement, ratio, seconds
 from tests.engine.mixtures import random_mixture, reference_merge, reference_update
-from tracker import colour, gaussian_mixture, phd
+from tests.engine.test_particles import reference_climb
+from tracker import colour, gaussian_mixture, particles, phd
 
 
 def run(short: bool) -> Iterator[Measurement]:
@@ -63,6 +64,31 @@ def run(short: bool) -> Iterator[Measurement]:
         5.0,
     )
     yield from _colour(rng)
+    yield from _clusters(rng, pairs)
+
+
+def _clusters(rng: np.random.Generator, pairs: int) -> Iterator[Measurement]:
+    """Mean shift of the particles that a resampling left of 400 on three people."""
+    centres = np.array([[60.0, 50.0, 10.0, 15.0], [110.0, 52, 12, 16], [62.0, 140, 8, 12]])
+    boxes = np.repeat(centres, 50, axis=0)
+    boxes[:, :2] += rng.normal(0.0, 5.0, (150, 2))
+    counts = rng.multinomial(400, np.full(150, 1 / 150))
+    groups = np.repeat([0, 1, 2], 50)
+
+    def compiled() -> object:
+        return particles.clusters(boxes, counts, groups, bandwidth=1.0, merge_distance=1.0)
+
+    def reference() -> object:
+        weights = counts.astype(float)
+        return [reference_climb(boxes, weights, start, 1.0) for start in boxes[counts > 0]]
+
+    yield Measurement(
+        "mean-shift clusters of 400 particles, kernel against NumPy",
+        ratio(compiled, reference, pairs=pairs),
+        "×",
+        "≥ 5",
+        5.0,
+    )
 
 
 def _colour(rng: np.random.Generator) -> Iterator[Measurement]:

@@ -261,7 +261,8 @@ def test_a_frozen_camera_is_survived(one_person: Sequence, variant: str) -> None
     frozen = replace(one_person, views=(replace(view, images=(view.images[0],) * STEPS),))
     frozen = with_templates(frozen, Template("p", "left", 3, np.array([100.0, 100.0, 20.0, 30.0])))
     with FrameReader(frozen) as reader:
-        results = run(method_of(frozen, reader, **VARIANTS[variant]), film(reader, 8))
+        # for a hundred steps and more there is no foreground
+        results = run(method_of(frozen, reader, **VARIANTS[variant]), film(reader, 8) * 13)
     assert all(np.isfinite(result.estimates).all() for result in results)
     if variant == "default":
         # all is background, whatever the templates show

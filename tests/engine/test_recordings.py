@@ -129,6 +129,31 @@ def test_the_fusion_is_fast_enough(data_folder: Path, method: str, least: float)
     assert fastest > least
 
 
+def particles_on_video(folder: Path, seed: int, steps: int) -> Evaluation:
+    """The particle filter's clusters as boxes, fused with the default parameters."""
+    sequence = read_sequence(folder / "av163-seq30-2p-1101")
+    chosen = with_values(
+        pipeline.default_parameters(sequence), {"single_view": "pseudo_particle"}
+    )
+    run = pipeline.compute(sequence, chosen, seed=seed, steps=steps)
+    return evaluate_sequence(sequence, run.tracks, EvaluationSettings(gate=0.3), steps=steps)
+
+
+def test_heads_on_the_beginning_of_real_video_by_particles(data_folder: Path) -> None:
+    found = particles_on_video(data_folder, seed=0, steps=120)
+    assert number(found, "found_share") >= 0.85
+    assert number(found, "position_error") <= 0.12
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(3))
+def test_heads_on_real_video_by_particles(data_folder: Path, seed: int) -> None:
+    found = particles_on_video(data_folder, seed, steps=500)
+    assert number(found, "found_share") >= 0.9
+    assert number(found, "position_error") <= 0.1
+    assert number(found, "false_per_step") <= 0.15
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(5))
 def test_heads_on_real_video(data_folder: Path, seed: int) -> None:
