@@ -132,9 +132,7 @@ def test_the_fusion_is_fast_enough(data_folder: Path, method: str, least: float)
 def particles_on_video(folder: Path, seed: int, steps: int) -> Evaluation:
     """The particle filter's clusters as boxes, fused with the default parameters."""
     sequence = read_sequence(folder / "av163-seq30-2p-1101")
-    chosen = with_values(
-        pipeline.default_parameters(sequence), {"single_view": "pseudo_particle"}
-    )
+    chosen = with_values(pipeline.default_parameters(sequence), {"single_view": "pseudo_particle"})
     run = pipeline.compute(sequence, chosen, seed=seed, steps=steps)
     return evaluate_sequence(sequence, run.tracks, EvaluationSettings(gate=0.3), steps=steps)
 
