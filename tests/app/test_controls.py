@@ -217,6 +217,29 @@ def test_only_what_the_methods_read_is_shown(panel: Controls, workbench: Workben
     assert "detection_boxes" not in shown()
 
 
+def test_of_a_shared_group_only_the_numbers_that_are_read_are_shown(
+    panel: Controls, workbench: Workbench
+) -> None:
+    def shown(key: str) -> bool:
+        group = panel._groups[key.split(".")[0]]
+        return bool(panel._inputs[key].visible) and any(folder.visible for folder in group)
+
+    assert not shown("jpda.gate_probability")
+    move(panel, "single_view", "jpda")
+    assert panel.wait(SECONDS)
+    assert shown("jpda.gate_probability")
+    assert shown("foreground.threshold")
+    assert not shown("colour_phd.bandwidth")
+    move(panel, "jpda.measurements", "colour")
+    assert panel.wait(SECONDS)
+    assert shown("colour_phd.bandwidth")
+    assert not shown("colour_phd.survival_probability")
+    move(panel, "jpda.measurements", "detections")
+    assert panel.wait(SECONDS)
+    assert shown("detection_boxes.pixel_sigma")
+    assert not shown("foreground.threshold")
+
+
 def test_changed_values_are_marked_and_can_be_reset(panel: Controls, workbench: Workbench) -> None:
     key = "fusion.survival_probability"
     assert not panel._reset_all.visible

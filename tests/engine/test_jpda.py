@@ -6,10 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
-from tracker import single_view
+from tracker import pipeline, single_view
 from tracker.experiments.clips import Actor, Clip, constant_size, plane_camera, through, wall, write
 from tracker.parameters import PRESETS, RunParameters, stage_values, with_values
 from tracker.sequences.frames import FrameReader
@@ -330,6 +331,38 @@ def test_fifty_in_one_place_raise_nothing() -> None:
     for association in ("exact", "murty", "simplified_murty"):
         results = track(from_boxes(steps), BOXES | {"jpda.association": association})
         assert all(np.isfinite(result.estimates).all() for result in results)
+
+
+def two_cameras(folder: Path, spoilt: str) -> Sequence:
+    """The same pictures by two cameras, of which the second's are spoilt half way through."""
+    clip = crossing_clip(24)
+    one = write(clip, folder / "one")
+    other = write(clip, folder / "other")
+    for step in range(10, clip.steps):
+        path = other.views[0].images[step]
+        if spoilt == "missing":
+            path.unlink()
+        else:
+            source = clip.picture(3) if spoilt == "frozen" else np.zeros_like(clip.picture(3))
+            cv2.imwrite(str(path), source)
+    second = replace(other.views[0], camera=replace(other.views[0].camera, name="second"))
+    return replace(one, views=(one.views[0], second))
+
+
+@pytest.mark.parametrize("spoilt", ["missing", "frozen", "black"])
+def test_a_spoilt_camera_takes_nothing_from_the_others(tmp_path: Path, spoilt: str) -> None:
+    both = two_cameras(tmp_path, spoilt)
+    alone = replace(both, views=both.views[:1])
+    parameters = RunParameters(single_view="jpda")
+    together = pipeline.compute(both, parameters)
+    expected = pipeline.compute(alone, parameters)
+    assert together.complete
+    for step in range(both.frames):
+        ours, theirs = together.views[step][0], expected.views[step][0]
+        np.testing.assert_array_equal(ours.boxes, theirs.boxes)
+        np.testing.assert_array_equal(ours.labels, theirs.labels)
+        assert ours.events == theirs.events
+    assert len(together.views[-1][0].boxes) == 2
 
 
 def test_a_camera_without_pictures_is_told_what_to_do() -> None:
