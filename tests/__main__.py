@@ -62,6 +62,8 @@ def commands(pytest_arguments: list[str]) -> dict[str, list[list[str]]]:
         "imports": [[str(BIN / "lint-imports")]],
         "page": [[node, "--test", *page_tests]] if node else [],
         "page types": [[tsc, "--project", str(ROOT / "static" / "jsconfig.json")]] if tsc else [],
+        # at once for all processes that the tests start
+        "kernels": [[str(PYTHON), "-m", "tracker.warm_up"]],
         "tests": [[str(PYTHON), "-m", "pytest", *pytest_arguments]],
         "benchmarks": [[str(PYTHON), "-m", "tests.benchmarks", "--short"]],
     }

@@ -21,8 +21,8 @@ Runs = Callable[..., tuple[int, str, str]]
 ADDRESS = "http://127.0.0.1:8000"
 
 
-def wait_until(holds: Callable[[], bool], seconds: float = 30.0) -> None:
-    """Wait for something that another thread brings about."""
+def wait_until(holds: Callable[[], bool], seconds: float = 120.0) -> None:
+    """Wait for something that another thread brings about; it may compile kernels first."""
     deadline = time.monotonic() + seconds
     while not holds():
         assert time.monotonic() < deadline, "it did not come about in time"

@@ -60,7 +60,7 @@ class Server:
         """One answer."""
         return httpx2.get(self.address.rstrip("/") + path, timeout=30.0)
 
-    def wait(self, condition: Callable[[dict], bool], seconds: float = 60.0) -> dict:
+    def wait(self, condition: Callable[[dict], bool], seconds: float = 180.0) -> dict:
         """The state, once it is as wished."""
         deadline = time.monotonic() + seconds
         state: dict = {}
@@ -74,7 +74,7 @@ class Server:
             time.sleep(0.1)
         raise AssertionError(f"the server did not get there within {seconds} s: {state}")
 
-    def wait_for_run(self, seconds: float = 60.0) -> dict:
+    def wait_for_run(self, seconds: float = 180.0) -> dict:
         """The state with a finished run of the parameters that hold now."""
         return self.wait(lambda state: state["run"]["state"] == "done", seconds)
 

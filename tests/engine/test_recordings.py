@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from tracker import fusion, pipeline
+from tracker import pipeline
 from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
 from tracker.parameters import RunParameters, with_values
 from tracker.pipeline import Run
@@ -109,24 +108,6 @@ def test_the_published_scheme_stays_behind(data_folder: Path) -> None:
     published = with_values(parameters("sequential_phd"), PRESETS["published"])
     run = pipeline.compute(sequence, published)
     assert 0.3 < number(scored(sequence, run), "mota") < 0.9
-
-
-@pytest.mark.parametrize(
-    ("method", "least"), [("multi_bernoulli", 500.0), ("sequential_phd", 300.0)]
-)
-def test_the_fusion_is_fast_enough(data_folder: Path, method: str, least: float) -> None:
-    # less than half of what an idle core does; the time of this process on its core counts
-    sequence = read_sequence(data_folder / "cmc2")
-    chosen = parameters(method)
-    views = pipeline.compute(sequence, chosen).views
-    fused = fusion.create(sequence, chosen)
-    fastest = 0.0
-    for _ in range(3):
-        state, begin = fused.start(), time.process_time()
-        for step in views:
-            state, _ = fused.step(state, step)
-        fastest = max(fastest, len(views) / (time.process_time() - begin))
-    assert fastest > least
 
 
 def particles_on_video(folder: Path, seed: int, steps: int) -> Evaluation:

@@ -60,7 +60,7 @@ def _describe(group: str, name: str, field: FieldInfo) -> Parameter:
         group=group,
         name=name,
         label=name.replace("_", " ").capitalize(),
-        help=field.description or "",
+        help=" ".join((field.description or "").split()),
         symbol=extra["symbol"],
         unit=extra["unit"],
         stage=extra["stage"] or _group_stage(group),
