@@ -88,6 +88,8 @@ def test_two_tabs_stay_in_step(page: Page, server: Server) -> None:
 
 
 def test_the_palette_does_what_its_words_say(page: Page) -> None:
+    expect(page.locator(".lane").first).to_be_visible()  # whoever presses keys sees the page
+    page.frame_locator("section.view iframe").locator("canvas").first.wait_for()
     page.keyboard.press("Control+k")
     page.keyboard.type("cameras alone")
     page.keyboard.press("Enter")

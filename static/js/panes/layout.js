@@ -68,6 +68,9 @@ export function mountLayout({ store, actions }) {
 			else app.style.removeProperty(size);
 		}
 		app.dataset.max = layout.max ?? "";
+		// A 3D view that had the keys and is now hidden would keep them.
+		const held = /** @type {HTMLElement | null} */ (document.activeElement);
+		if (held && !held.checkVisibility()) held.blur();
 		for (const button of document.querySelectorAll("[data-command^=maximise]")) {
 			button.setAttribute("aria-pressed", String(button.getAttribute("data-command") === `maximise-${layout.max}`));
 		}
