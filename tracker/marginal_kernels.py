@@ -8,7 +8,7 @@ import numpy as np
 from numpy import ndarray
 
 from tracker.kernels import _kernel, group_labels, merge_moments
-from tracker.update_kernels import kalman_pairs
+from tracker.update_kernels import all_pairs
 
 
 @_kernel
@@ -92,6 +92,11 @@ def bernoulli_update(
     detection_probabilities: ndarray,
     unexplained: ndarray,
     gate: float,
+    other_expected: ndarray,
+    other_jacobians: ndarray,
+    other_spreads: ndarray,
+    other_drift: ndarray,
+    other_share: float,
     tolerance: float,
     iterations: int,
 ) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
@@ -103,6 +108,7 @@ def bernoulli_update(
         detection_probabilities: (n,).
         unexplained: (M,), intensity of clutter and newcomers at each measurement, > 0.
         gate: Squared Mahalanobis distance.
+        other_expected: As the further ones, of :func:`tracker.update_kernels.all_pairs`.
         tolerance: As ``iterations``, of :func:`belief_propagation`.
 
     Returns:
@@ -111,8 +117,20 @@ def bernoulli_update(
     """
     size, dimension = means.shape
     count = len(measurements)
-    track, measured, log_likelihood, pair_means, pair_covariances = kalman_pairs(
-        means, covariances, expected, jacobians, measurements, noises, spreads, gate
+    track, measured, log_likelihood, pair_means, pair_covariances = all_pairs(
+        means,
+        covariances,
+        expected,
+        jacobians,
+        measurements,
+        noises,
+        spreads,
+        gate,
+        other_expected,
+        other_jacobians,
+        other_spreads,
+        other_drift,
+        other_share,
     )
     pairs = len(track)
     missed = np.empty(size)
@@ -121,11 +139,11 @@ def bernoulli_update(
         survived[i] = existences[i] * (1.0 - detection_probabilities[i])
         missed[i] = 1.0 - existences[i] + survived[i]
     detected = np.zeros((size, count))
+    terms = np.empty(pairs)
     for pair in range(pairs):
         i = track[pair]
-        detected[i, measured[pair]] = (
-            existences[i] * detection_probabilities[i] * math.exp(log_likelihood[pair])
-        )
+        terms[pair] = existences[i] * detection_probabilities[i] * math.exp(log_likelihood[pair])
+        detected[i, measured[pair]] += terms[pair]
     rows, columns = belief_propagation(missed, detected, unexplained, tolerance, iterations)
 
     weights = np.empty(size + pairs)
@@ -138,7 +156,8 @@ def bernoulli_update(
         group[i] = i
     parts[:size], spread[:size] = means, covariances
     for pair in range(pairs):
-        weights[size + pair] = rows[track[pair], 1 + measured[pair]]
+        i, z = track[pair], measured[pair]
+        weights[size + pair] = rows[i, 1 + z] * terms[pair] / max(detected[i, z], 1e-300)
         group[size + pair] = track[pair]
     parts[size:], spread[size:] = pair_means, pair_covariances
     new_existences, new_means, new_covariances = merge_moments(weights, parts, spread, group, size)

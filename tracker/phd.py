@@ -18,6 +18,7 @@ from numpy import ndarray
 
 from tracker import extraction_kernels, kernels, update_kernels
 from tracker.gaussian_mixture import GaussianMixture, concatenate
+from tracker.update_kernels import Alternative
 
 SPARE = 0.25
 """How much more than one target, or than its weight, a component may stand for: weights are
@@ -51,6 +52,7 @@ def update(
     detection_probability: float | Float[ndarray, " J"],
     clutter_intensity: float | Float[ndarray, " M"],
     gate: float = np.inf,
+    other: Alternative | None = None,
 ) -> PhdUpdate:
     """Update an intensity by one set of measurements, eq. (28)–(33) of [VM06].
 
@@ -74,6 +76,7 @@ def update(
             0 the component is left as it is.
         clutter_intensity: κ(z) per unit of the measurement space.
         gate: Squared Mahalanobis distance beyond which a pair is left out.
+        other: What else a measurement may be; nothing, if none.
 
     Raises:
         numpy.linalg.LinAlgError: If H P Hᵀ + R is not positive definite.
@@ -91,6 +94,7 @@ def update(
         _filled(detection_probability, size),
         _filled(clutter_intensity, count),
         gate,
+        *(other or Alternative.none(noise.shape[1], predicted.dimension)),
     )
     posterior = GaussianMixture(weights, means, covariances, predicted.labels[parents])
     return PhdUpdate(posterior, parents, sources, log_odds, sums)

@@ -154,6 +154,7 @@ class _Telling:
             rule=p.extraction if sequential else "components",
             room=run.sequence.room,
             margin=p.room_margin,
+            below=float(run.sequence.target_half_extents[2]) / 2.0,
             first_frame=run.done,
             ids=self._ids,
         )

@@ -16,6 +16,7 @@ from numpy import ndarray
 from tracker import association, marginal_kernels
 from tracker.association import Marginals
 from tracker.gaussian_mixture import GaussianMixture
+from tracker.update_kernels import Alternative
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +39,7 @@ def update(
     detection_probability: Float[ndarray, " n"],
     unexplained_intensity: Float[ndarray, " M"],
     gate: float,
+    other: Alternative | None = None,
 ) -> PmbUpdate:
     """Update every track by the measurements that may be its own ([W15] TOMB/P).
 
@@ -59,6 +61,7 @@ def update(
         detection_probability: p_i of each track.
         unexplained_intensity: ρ_j = κ(z_j) + e_j, clutter and newborns at each measurement.
         gate: Squared Mahalanobis distance beyond which a pair is left out.
+        other: What else a measurement may be; nothing, if none.
     """
     existences, means, covariances, rows, unexplained = marginal_kernels.bernoulli_update(
         tracks.weights,
@@ -72,6 +75,7 @@ def update(
         detection_probability,
         unexplained_intensity,
         gate,
+        *(other or Alternative.none(noise.shape[1], tracks.dimension)),
         association.TOLERANCE,
         association.ITERATIONS,
     )

@@ -74,6 +74,7 @@ def extract(
     rule: Rule = "components",
     room: Room | None = None,
     margin: float = np.inf,
+    below: float = 0.0,
     first_frame: int = 0,
     ids: dict[int, int] | None = None,
 ) -> Trajectories:
@@ -90,6 +91,8 @@ def extract(
         rule: Whether the components that one box made count by themselves or together.
         room: Where people are tracked; None for everywhere.
         margin: Metres beyond the room's volume within which a target still counts.
+        below: Metres more under its floor, where the middle of nobody can be: a person who
+            lies there has an error of height.
         first_frame: The step of the first result.
         ids: Label → id so far; new labels are added. To go on from an earlier
             piece, pass the same one again.
@@ -102,7 +105,7 @@ def extract(
             targets, leaders = by_boxes(result)
         chosen = phd.extract(targets, extraction_threshold)
         if room is not None:
-            chosen = chosen[room.contains(targets.means[chosen, :3], margin)]
+            chosen = chosen[room.contains(targets.means[chosen, :3], margin, below)]
         if not len(chosen):
             continue
         labels, first = np.unique(targets.labels[chosen], return_index=True)

@@ -3,11 +3,38 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy import ndarray
 
 from tracker.kernels import _kernel
+
+
+class Alternative(NamedTuple):
+    """What else a measurement of J components may be: that of a target in another posture."""
+
+    expected: ndarray
+    """(J, m), or (0, m) where there is no other posture; as the next two."""
+    jacobians: ndarray
+    """(J, m, d)."""
+    spreads: ndarray
+    """(J, m, m), what the posture adds to the noise."""
+    drift: ndarray
+    """(d, d), how far a state may have moved with the change of posture: a covariance."""
+    share: float
+    """Of the measurements, above 0 and below 1."""
+
+    @staticmethod
+    def none(size: int, dimension: int) -> Alternative:
+        """There is no other posture."""
+        return Alternative(
+            np.zeros((0, size)),
+            np.zeros((0, size, dimension)),
+            np.zeros((0, size, size)),
+            np.zeros((dimension, dimension)),
+            0.0,
+        )
 
 
 @_kernel
@@ -264,6 +291,57 @@ def kalman_pairs(
 
 
 @_kernel
+def all_pairs(
+    means: ndarray,
+    covariances: ndarray,
+    expected: ndarray,
+    jacobians: ndarray,
+    measurements: ndarray,
+    noises: ndarray,
+    spreads: ndarray,
+    gate: float,
+    other_expected: ndarray,
+    other_jacobians: ndarray,
+    other_spreads: ndarray,
+    other_drift: ndarray,
+    other_share: float,
+) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
+    """:func:`kalman_pairs` of a measurement that is of one of two kinds.
+
+        g(z|x) = (1 − ε) N(z; h(x), R + Ω) + ε N(z; h'(x'), R + Ω'),  x' = x + N(0, D)
+
+    Args:
+        means: As the further ones, of :func:`kalman_pairs`.
+        other_expected: h' and, in the further ones, H', Ω', D and ε: :class:`Alternative`.
+
+    Returns:
+        The pairs of the first kind and then those of the other.
+    """
+    component, measured, likelihood, new_means, new_covariances = kalman_pairs(
+        means, covariances, expected, jacobians, measurements, noises, spreads, gate
+    )
+    if len(other_expected) == 0:
+        return component, measured, likelihood, new_means, new_covariances
+    more = kalman_pairs(
+        means,
+        covariances + other_drift,
+        other_expected,
+        other_jacobians,
+        measurements,
+        noises,
+        other_spreads,
+        gate,
+    )
+    return (
+        np.concatenate((component, more[0])),
+        np.concatenate((measured, more[1])),
+        np.concatenate((likelihood + math.log(1.0 - other_share), more[2] + math.log(other_share))),
+        np.concatenate((new_means, more[3])),
+        np.concatenate((new_covariances, more[4])),
+    )
+
+
+@_kernel
 def phd_weights(
     log_terms: ndarray, measured: ndarray, log_clutter: ndarray
 ) -> tuple[ndarray, ndarray, ndarray]:
@@ -315,6 +393,11 @@ def phd_update(
     detection_probabilities: ndarray,
     clutter: ndarray,
     gate: float,
+    other_expected: ndarray,
+    other_jacobians: ndarray,
+    other_spreads: ndarray,
+    other_drift: ndarray,
+    other_share: float,
 ) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray, ndarray, ndarray]:
     """The GM-PHD update: every component as missed, then one for every gated pair.
 
@@ -326,6 +409,7 @@ def phd_update(
         detection_probabilities: (J,).
         clutter: (M,), κ(z).
         gate: Squared Mahalanobis distance.
+        other_expected: As the further ones, of :func:`all_pairs`.
 
     Returns:
         (K,) weights, (K, d) means, (K, d, d) covariances, (K,) parent and (K,)
@@ -335,7 +419,8 @@ def phd_update(
     size, dimension = means.shape
     detectable = np.flatnonzero(detection_probabilities * weights > 0.0)
     spread = spreads[detectable] if len(spreads) else spreads
-    parent, measured, log_likelihood, new_means, new_covariances = kalman_pairs(
+    there = detectable if len(other_expected) else detectable[:0]
+    parent, measured, log_likelihood, new_means, new_covariances = all_pairs(
         means[detectable],
         covariances[detectable],
         expected[detectable],
@@ -344,6 +429,11 @@ def phd_update(
         noises,
         spread,
         gate,
+        other_expected[there],
+        other_jacobians[there],
+        other_spreads[there],
+        other_drift,
+        other_share,
     )
     pairs = len(parent)
     log_clutter = np.empty(len(clutter))

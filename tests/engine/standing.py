@@ -77,6 +77,7 @@ def watch(
     miss_rate: float = 0.02,
     clutter_rate: float = 0.5,
     noise: float = 0.04,
+    half_extents: ndarray = HALF_EXTENTS,
     seed: int = 0,
 ) -> list[tuple[ViewResult, ...]]:
     """The boxes of every camera and step, with the trust of the default parameters.
@@ -88,10 +89,11 @@ def watch(
         miss_rate: Of anybody, by chance.
         clutter_rate: Expected false boxes a camera and step.
         noise: Of each edge, as a share of the half height.
+        half_extents: Of the people, metres.
         seed: Of all of it.
     """
     rng = np.random.default_rng(seed)
-    model = TargetModel(HALF_EXTENTS, "box")
+    model = TargetModel(half_extents, "box")
     steps = []
     for step, people in enumerate(places):
         views = []
@@ -136,6 +138,7 @@ def fuse(
         extraction_threshold=parameters.extraction_threshold,
         room=ROOM,
         margin=parameters.room_margin,
+        below=HALF_EXTENTS[2] / 2.0,
     )
     return results, tracks
 

@@ -104,9 +104,9 @@ def test_who_is_hidden_is_told_by_whom(method: Method) -> None:
     assert len(components) == 2
     chances = results[29].detection_probabilities[:, components]
     assert chances[0, 1] < 0.55, "the one behind is hardly detected by the first camera"
-    assert chances[0, 0] > 0.97
+    assert chances[0, 0] > 0.94
     assert_array_equal(results[29].hidden_by[0, components], [-1, labels[0]])
-    assert_allclose(chances[[1, 3]], 0.98, atol=0.01)
+    assert_allclose(chances[[1, 3]], 0.95, atol=0.01)
 
 
 @both_methods

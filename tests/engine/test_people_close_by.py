@@ -139,3 +139,31 @@ def test_double_boxes_make_no_second_person(method: Method) -> None:
     assert counts.max() > 0.85 * len(path)
     assert np.sort(counts)[:-1].max(initial=0) <= 10, "a second label lives for a second at most"
     assert len(names) <= 6
+
+
+def lying_down(fps: float) -> tuple[ndarray, list[tuple[ViewResult, ...]], slice]:
+    """A person walks, falls, lies for three seconds and gets up: path, boxes, when he lies."""
+    path = line([(-1.8, -1.8), (0.3, 0.2), (0.3, 0.2), (1.5, 0.8)], [0, 4, 9, 12], fps)
+    falls, lies, rises, stands = (round(seconds * fps) for seconds in (4.5, 5.2, 8.0, 9.0))
+    path[falls:lies, 2] = np.linspace(0.85, 0.25, lies - falls)
+    path[lies:rises, 2] = 0.25
+    path[rises:stands, 2] = np.linspace(0.25, 0.85, stands - rises)
+    upright = watch(path[:, None], seed=8)
+    flat = watch(path[:, None], half_extents=np.array([0.55, 0.55, 0.4]), seed=8)
+    views = upright[:lies] + flat[lies:rises] + upright[rises:]
+    return path, views, slice(lies, rises)
+
+
+@both_methods
+@both_rates
+def test_who_falls_and_lies_is_followed_and_keeps_his_id(method: Method, fps: float) -> None:
+    path, views, lying = lying_down(fps)
+    _, tracks = fuse(method, views, fps=fps)
+    ids = ids_of(tracks, path, 0.6)
+    one_id(ids[round(2.0 * fps) :])
+    heights = [tracks.positions[tracks.at(step)][0, 2] for step in range(lying.stop)[lying]]
+    assert np.mean(heights) < 0.45
+    # who may only stand is lost
+    stiff = RECOMMENDED.model_copy(update={"low_share": 0.0})
+    _, tracks = fuse(method, views, fps=fps, parameters=stiff)
+    assert (ids_of(tracks, path, 0.6)[lying] > 0).mean() < 0.5

@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 from tests.engine.test_association import exact
 from tracker import pmb
 from tracker.gaussian_mixture import GaussianMixture
+from tracker.update_kernels import Alternative
 
 H = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
 R = 0.3 * np.eye(2)
@@ -165,3 +166,40 @@ def test_what_a_component_adds_to_the_noise_counts_as_noise() -> None:
     assert_allclose(spread.tracks.means, noisy.tracks.means)
     assert_allclose(spread.tracks.covariances, noisy.tracks.covariances)
     assert_allclose(spread.tracks.weights, noisy.tracks.weights)
+
+
+def test_a_box_of_two_kinds_is_bayes_over_both() -> None:
+    rng = np.random.default_rng(5)
+    before, box = tracks([0.7], 3), rng.normal(0.0, 0.5, (1, 2))
+    share, drift, more = 0.3, np.diag([0.2, 0.0, 0.0, 0.0]), 0.4 * np.eye(2)
+    shifted = before.means @ H.T + [0.3, -0.2]
+    found = pmb.update(
+        before,
+        box,
+        expected=before.means @ H.T,
+        jacobians=H[None],
+        noise=R[None],
+        detection_probability=np.array([0.9]),
+        unexplained_intensity=np.array([0.05]),
+        gate=np.inf,
+        other=Alternative(shifted, 2.0 * H[None], more[None], drift, share),
+    ).tracks
+    parts, weights = [(before.means[0], before.covariances[0])], [0.7 * 0.1]
+    for expected, slope, noise, spread, part in (
+        (before.means[0] @ H.T, H, R, before.covariances[0], 1.0 - share),
+        (shifted[0], 2.0 * H, R + more, before.covariances[0] + drift, share),
+    ):
+        s = slope @ spread @ slope.T + noise
+        offset = box[0] - expected
+        density = np.exp(-offset @ np.linalg.inv(s) @ offset / 2.0)
+        weights.append(0.7 * 0.9 * part * density / np.sqrt(np.linalg.det(2.0 * np.pi * s)) / 0.05)
+        gain = spread @ slope.T @ np.linalg.inv(s)
+        parts.append((before.means[0] + gain @ offset, spread - gain @ s @ gain.T))
+    total = sum(weights)
+    assert found.weights[0] == pytest.approx(total / (0.3 + total), rel=1e-6)
+    mean = sum(w * m for w, (m, _) in zip(weights, parts, strict=True)) / total
+    second = sum(
+        w * (c + np.outer(m - mean, m - mean)) for w, (m, c) in zip(weights, parts, strict=True)
+    )
+    assert_allclose(found.means[0], mean, atol=1e-9)
+    assert_allclose(found.covariances[0], second / total, atol=1e-9)

@@ -29,7 +29,9 @@ class FusionModel:
         self.room = sequence.room
         self.cameras = sequence.cameras
         self.step_time = sequence.step_time
-        self.target = TargetModel(sequence.target_half_extents, p.measurement, p.update)
+        self.target = TargetModel(
+            sequence.target_half_extents, p.measurement, p.update, p.low_share
+        )
         self.motion = models.Motion.of(p, sequence.step_time)
         self.births = self.motion.at_rest(
             models.entrance_births(sequence.room, p.birth_rate * sequence.step_time)

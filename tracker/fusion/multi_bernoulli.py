@@ -124,6 +124,7 @@ class MultiBernoulli:
             detection_probability=seen.detection_probabilities,
             unexplained_intensity=model.clutter[index] / (1.0 - newcomer),  # κ + e
             gate=model.gate,
+            other=expected.other,
         )
         marginals = updated.marginals
         work.tracks = updated.tracks
@@ -167,6 +168,7 @@ class MultiBernoulli:
             detection_probability=model.chances(index, expected, intensity),
             clutter_intensity=model.clutter[index],
             gate=model.gate,
+            other=expected.other,
         )
         posterior = updated.posterior
         work.undetected = posterior.take(slice(intensity.size))

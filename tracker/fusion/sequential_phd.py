@@ -124,6 +124,7 @@ class SequentialPhd:
             detection_probability=seen.detection_probabilities,
             clutter_intensity=model.clutter[index],
             gate=model.gate,
+            other=expected.other,
         )
         owners = None
         if p.misses == "per_person":

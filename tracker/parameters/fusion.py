@@ -19,7 +19,9 @@ class FusionParams(Params):
     survival_probability: Annotated[float, Field(ge=0.5, le=1.0), ui("p_S", step=0.001)] = 0.99
     """Probability that a person in the room is still there a step later."""
 
-    detection_probability: Annotated[float, Field(ge=0.05, le=1.0), ui("p_D", step=0.01)] = 0.98
+    detection_probability: Annotated[
+        float, Field(ge=0.05, le=1.0), ui("p_D", step=0.01, published=0.98)
+    ] = 0.95
     """Probability that a camera's boxes include a person that its picture holds."""
 
     clutter_rate: Annotated[
@@ -38,6 +40,9 @@ class FusionParams(Params):
         Literal["centre", "box", "box_and_width"], ui("z", published="centre")
     ] = "box"
     """What is used of a box: its centre; its horizontal centre, top and bottom; and its width."""
+
+    low_share: Annotated[float, Field(ge=0.0, le=0.5), ui("ε", step=0.01, published=0.0)] = 0.1
+    """Share of the boxes that show a person lying, crouching or bent; 0: everybody stands."""
 
     update: Annotated[Literal["extended", "unscented"], ui("h(x)")] = "extended"
     """How the bend of the projection is met: a straight line at the mean, or unscented points."""

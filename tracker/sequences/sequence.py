@@ -33,9 +33,16 @@ class Room:
     maximum: Float[ndarray, " 3"]
     entrances: tuple[Entrance, ...] = ()
 
-    def contains(self, points: Float[ndarray, "N 3"], margin: float = 0.0) -> Bool[ndarray, " N"]:
-        """Whether each point lies inside, or at most ``margin`` metres outside."""
-        inside = (points >= self.minimum - margin) & (points <= self.maximum + margin)
+    def contains(
+        self, points: Float[ndarray, "N 3"], margin: float = 0.0, below: float = 0.0
+    ) -> Bool[ndarray, " N"]:
+        """Whether each point lies inside, or at most ``margin`` metres outside.
+
+        ``below`` adds to the margin under the floor.
+        """
+        inside = (points >= self.minimum - [margin, margin, margin + below]) & (
+            points <= self.maximum + margin
+        )
         return np.asarray(inside.all(axis=1))
 
 
