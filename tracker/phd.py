@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker import extraction_kernels, kernels, update_kernels
+from tracker import extraction_kernels, kernels, phd_kernels
 from tracker.gaussian_mixture import GaussianMixture, concatenate
 from tracker.update_kernels import Alternative
 
@@ -82,7 +82,7 @@ def update(
         numpy.linalg.LinAlgError: If H P Hᵀ + R is not positive definite.
     """
     size, count = predicted.size, len(measurements)
-    weights, means, covariances, parents, sources, log_odds, sums = update_kernels.phd_update(
+    weights, means, covariances, parents, sources, log_odds, sums = phd_kernels.phd_update(
         predicted.weights,
         predicted.means,
         predicted.covariances,
