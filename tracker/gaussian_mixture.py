@@ -73,6 +73,11 @@ class GaussianMixture:
             self.labels[indices],
         )
 
+    def renamed(self, names: dict[int, int]) -> GaussianMixture:
+        """The same components; each label that is a key becomes what it stands for."""
+        labels = np.array([names.get(n, n) for n in self.labels.tolist()], dtype=np.int64)
+        return GaussianMixture(self.weights, self.means, self.covariances, labels)
+
 
 def concatenate(mixtures: Sequence[GaussianMixture]) -> GaussianMixture:
     """The sum of intensities over the same state: all their components, in order."""

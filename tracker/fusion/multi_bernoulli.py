@@ -15,10 +15,11 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker import gaussian_mixture, kernels, models, phd, pmb
-from tracker.fusion import memory
+from tracker.fusion import memory, names
 from tracker.fusion.measurement_births import CameraEvidence
 from tracker.fusion.memory import Memory
 from tracker.fusion.model import CONFIRMED, FusionModel
+from tracker.fusion.names import Names
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import Ledger, Record
 from tracker.gaussian_mixture import GaussianMixture
@@ -35,6 +36,7 @@ class MultiBernoulliState:
     undetected: GaussianMixture
     next_label: int
     memory: Memory
+    names: Names
 
 
 @dataclass(slots=True, eq=False)
@@ -81,7 +83,7 @@ class MultiBernoulli:
         """Nobody is in the room."""
         dimension = self._model.motion.dimension
         empty = GaussianMixture.empty(dimension)
-        return MultiBernoulliState(empty, empty, 1, Memory.start(dimension))
+        return MultiBernoulliState(empty, empty, 1, Memory.start(dimension), Names.none())
 
     def step(
         self, state: MultiBernoulliState, views: Many[ViewResult]
@@ -105,7 +107,7 @@ class MultiBernoulli:
             self._update(work, index, view)
         if p.birth != "entrances":
             self._add_newborns(work, state.next_label)
-        return self._finish(work, state)
+        return self._finish(work, state, views)
 
     def _update(self, work: _Work, index: int, view: ViewResult) -> None:
         """The update of all tracks, and of the undetected, by the boxes of one camera."""
@@ -221,7 +223,7 @@ class MultiBernoulli:
         work.record.detection_probabilities[:, first:] = self._parameters.detection_probability
 
     def _finish(
-        self, work: _Work, state: MultiBernoulliState
+        self, work: _Work, state: MultiBernoulliState, views: Many[ViewResult]
     ) -> tuple[MultiBernoulliState, FusionResult]:
         """Drop the faint, the strayed and the doubles; the rest is the step's posterior."""
         p, weights = self._parameters, work.tracks.weights
@@ -239,14 +241,21 @@ class MultiBernoulli:
         tracks = work.tracks
         labels, lost = memory.recall(state.memory, tracks, self._model, state.next_label)
         posterior = GaussianMixture(tracks.weights, tracks.means, tracks.covariances, labels)
+        associations = work.ledger.associations(tracks.labels)
+        found = state.names
+        if p.recognition:
+            renamed, found = names.recognise(
+                found, posterior, associations, views, lost.lost.labels, self._model.step_time
+            )
+            if renamed:
+                posterior, lost = posterior.renamed(renamed), lost.renamed(renamed)
         undetected, _ = gaussian_mixture.reduce(
             work.undetected,
             pruning_threshold=p.pruning_threshold,
             merging_threshold=p.merging_threshold,
             max_components=p.max_components,
         )
-        associations = work.ledger.associations(tracks.labels)
         return (
-            MultiBernoulliState(posterior, undetected, work.next_label, lost),
+            MultiBernoulliState(posterior, undetected, work.next_label, lost, found),
             work.record.result(posterior, associations),
         )

@@ -109,6 +109,9 @@ class FusionParams(Params):
     ] = 3.0
     """How long a person whom no camera sees may be gone and still come back under the same id."""
 
+    recognition: Annotated[bool, ui("π", published=False)] = True
+    """Multi-Bernoulli: whether the id is given back to who looks like a person with templates."""
+
     measurement_sigma: Annotated[float, Field(ge=0.1, le=10.0), ui("σ_v", step=0.1, log=True)] = 1.0
     """Factor on the noise that the single-view stage states for its boxes."""
 

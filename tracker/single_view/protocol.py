@@ -58,6 +58,9 @@ class ViewResult:
     foreground: UInt8[ndarray, " bytes"] | None = None
     """What of the picture the method took for foreground, as ``tracker.foreground.pack`` makes
     it; None where it asked for none or there was no picture."""
+    likenesses: Float[ndarray, "N P"] = field(default_factory=lambda: np.zeros((0, 0)))
+    """Probability that the colours of each box are those of each of P people with templates,
+    if they are one's; (0, 0) where the method does not tell."""
 
     @staticmethod
     def of_boxes(

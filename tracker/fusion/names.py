@@ -1,0 +1,175 @@
+"""Who looks like whom: people with templates keep their labels, however long they were away."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Many
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+from scipy.optimize import linear_sum_assignment
+
+from tracker.fusion.model import CONFIRMED
+from tracker.fusion.protocol import Associations
+from tracker.gaussian_mixture import GaussianMixture
+from tracker.single_view.protocol import ViewResult
+
+_DOUBT = 0.1
+"""Probability that a box's colours tell nothing of who it is."""
+
+_FRESH = 1.0
+"""Seconds after which a look counts as a new one: pictures of one moment agree, right or wrong."""
+
+_SWAP = 30.0
+"""Seconds in which a track may come to be of somebody else: no evidence lasts for ever."""
+
+_SURE = float(np.log(20.0))
+"""Log odds of the best naming against any without the pair, from which the pair holds."""
+
+_OWN = float(np.log(3.0))
+"""Log odds of a track's own looks, from which it may be named: nobody is by exclusion alone."""
+
+_NEVER = -1e3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Names:
+    """What the colours said of the tracks so far. G people have templates.
+
+    A track's looks are a categorical distribution over these people, which follows
+
+        π ← (1 − Δt/T) π + Δt/T · 1/G,   log π_g ← log π_g + Δt/τ Σ_c a_c log p_g(z_c)
+
+    for each box z_c with association probability a_c: the exponent Δt/τ makes of the
+    many alike pictures of a second one independent look. The first track that is
+    surely of a person owns the name, and whoever is surely of the same person later
+    gets that track's label: people are one each.
+    """
+
+    labels: Int[ndarray, " K"]
+    looks: Float[ndarray, "K G"]
+    """log π of each label, up to a constant."""
+    owners: Int[ndarray, " G"]
+    """The label of each person, -1 as long as nobody is surely that person."""
+
+    @staticmethod
+    def none() -> Names:
+        """Nobody was looked at."""
+        nothing = np.zeros(0, dtype=np.int64)
+        return Names(nothing, np.zeros((0, 0)), nothing)
+
+
+def recognise(
+    names: Names,
+    posterior: GaussianMixture,
+    associations: Associations,
+    views: Many[ViewResult],
+    waiting: Int[ndarray, " L"],
+    step_time: float,
+) -> tuple[dict[int, int], Names]:
+    """Look at this step's boxes, and say which labels change.
+
+    Args:
+        names: Of the step before.
+        posterior: Tracks, one component a label.
+        associations: Which box is whose.
+        views: The boxes with their likenesses; of less than two people nothing is told.
+        waiting: Labels of people lost from sight, whose looks are kept.
+        step_time: Δt, seconds.
+
+    Returns:
+        New label by old one, each at most once on either side; and the names after it.
+    """
+    people = max((view.likenesses.shape[1] for view in views), default=0)
+    if people < 2:
+        return {}, names
+    looks = _looked(names, posterior, associations, views, people, waiting, step_time)
+    owners = names.owners if len(names.owners) else np.full(people, -1, dtype=np.int64)
+    sure = np.flatnonzero(posterior.weights > CONFIRMED)
+    wanted: dict[int, int] = {}
+    owners = owners.copy()
+    for track, person in _named(np.array([looks[int(n)] for n in posterior.labels[sure]])):
+        label = int(posterior.labels[sure[track]])
+        if owners[person] < 0 and label not in owners:
+            owners[person] = label
+        elif owners[person] >= 0:
+            wanted[label] = int(owners[person])
+    renamed = _permuted(wanted, posterior.labels.tolist())
+    kept = {renamed.get(label, label): look for label, look in looks.items()}
+    # who takes over the label of somebody lost brings his own looks along
+    kept |= {renamed[label]: looks[label] for label in renamed}
+    order = sorted(kept)
+    rows = np.array([kept[label] for label in order]).reshape(-1, people)
+    return renamed, Names(np.array(order, dtype=np.int64), rows, owners)
+
+
+def _looked(
+    names: Names,
+    posterior: GaussianMixture,
+    associations: Associations,
+    views: Many[ViewResult],
+    people: int,
+    waiting: Int[ndarray, " L"],
+    step_time: float,
+) -> dict[int, ndarray]:
+    """log π of every label that is there or waited for, after this step's boxes."""
+    before = dict(zip(names.labels.tolist(), names.looks, strict=True))
+    leak = min(step_time / _SWAP, 1.0)
+    looks = {}
+    for label in {*posterior.labels.tolist(), *waiting.tolist()}:
+        chances = np.exp(before.get(label, np.zeros(people)))
+        looks[label] = np.log((1.0 - leak) * chances / chances.sum() + leak / people)
+    rows = zip(
+        associations.cameras.tolist(),
+        associations.components.tolist(),
+        associations.boxes.tolist(),
+        associations.probabilities.tolist(),
+        strict=True,
+    )
+    for camera, component, box, probability in rows:
+        likeness = views[camera].likenesses
+        if likeness.shape[1] != people:
+            continue
+        told = np.log((1.0 - _DOUBT) * likeness[box] + _DOUBT / people)
+        looks[int(posterior.labels[component])] += probability * min(step_time / _FRESH, 1.0) * told
+    return looks
+
+
+def _named(looks: Float[ndarray, "n G"]) -> list[tuple[int, int]]:
+    """The pairs of track and person that hold: one to one, with sure odds against any other."""
+    count = len(looks)
+    if not count:
+        return []
+    people = looks.shape[1]
+    scores = looks - looks.max(axis=1, keepdims=True)
+    # beside the people stands a place for each track that is none of them
+    table = np.concatenate([scores, np.full((count, count), _NEVER)], axis=1)
+    rows, columns = linear_sum_assignment(-table)
+    best = table[rows, columns].sum()
+    pairs = []
+    for track, person in zip(rows.tolist(), columns.tolist(), strict=True):
+        if (
+            person >= people
+            or scores[track, person] - np.delete(scores[track], person).max() < _OWN
+        ):
+            continue
+        without = table.copy()
+        without[track, person] = 2.0 * _NEVER
+        others = linear_sum_assignment(-without)
+        if best - without[others].sum() > _SURE:
+            pairs.append((track, person))
+    return pairs
+
+
+def _permuted(wanted: dict[int, int], present: list[int]) -> dict[int, int]:
+    """Renamings in which no label is there twice: who loses his label takes one that is free."""
+    renamed = {old: new for old, new in wanted.items() if old != new}
+    left = sorted(old for old in renamed if old not in renamed.values())
+    for new in list(renamed.values()):
+        # somebody else wears it and asks for no other
+        if new in present and new not in renamed:
+            renamed[new] = new if new in wanted else left.pop()
+    if len(set(renamed.values())) < len(renamed):
+        return {}
+    return {old: new for old, new in renamed.items() if old != new}
