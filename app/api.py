@@ -12,6 +12,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 
 from app import models, results, steps
 from app.errors import ApiError, ErrorBody, sentence
+from app.history import History
 from app.jobs import Jobs
 from app.pictures import Pictures
 from app.timeline import BUCKETS, Timelines, Window
@@ -155,6 +156,14 @@ async def cancel_run(bench: Bench, jobs: Work) -> models.State:
 async def run_again(bench: Bench, jobs: Work) -> models.State:
     """Go on with a run that was cancelled, or try a failed one again."""
     jobs.run_again()
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/run/again/{number}")
+async def use_again(request: Request, number: int, bench: Bench) -> models.State:
+    """Set all parameters to those of a run before, by its number in the table of runs."""
+    history: History = request.app.state.history
+    history.use_again(number)
     return results.state_of(bench.snapshot())
 
 

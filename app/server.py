@@ -24,6 +24,7 @@ from app.errors import sentence
 from app.evaluation import routes as evaluation
 from app.evaluation.worker import Evaluator
 from app.gateway import Gateway
+from app.history import History
 from app.jobs import Jobs, in_background
 from app.likelihood import Likelihoods
 from app.paths import static_folder
@@ -123,6 +124,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     )
     pictures = app.state.pictures = Pictures(workbench)
     app.state.timelines = Timelines()
+    app.state.history = History(workbench)
     app.state.likelihoods = Likelihoods()
     evaluator = app.state.evaluator = Evaluator(workbench)
     told = app.state.stream = Stream(workbench)

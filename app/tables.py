@@ -16,6 +16,7 @@ from app.evaluation import messages
 from app.evaluation.models import Comparison
 from app.evaluation.scores import Scored
 from app.evaluation.worker import Evaluator
+from app.history import History
 from app.markup import (
     Cell,
     Markup,
@@ -33,7 +34,7 @@ from app.markup import (
     vector,
 )
 from app.models import CameraTrack, LaneEvent, Step
-from app.snapshot import Snapshot
+from app.snapshot import RunPhase, RunState, Snapshot
 from app.timeline import Timelines
 from tracker import parameters as parameter_table
 from tracker.evaluation import Evaluation
@@ -46,6 +47,15 @@ MOST_EVENTS = 500
 
 SIGNS: dict[Verdict, str] = {"better": "▲ ", "worse": "▼ ", "same": "= ", "different": "≠ ",
                              "undefined": ""}  # fmt: skip
+
+PHASES: dict[RunPhase, str] = {
+    "idle": "ready",
+    "computing": "computing",
+    "done": "computed",
+    "failed": "failed",
+    "cancelled": "partial",
+}
+"""A run's state, as the page words it."""
 
 Kind = Literal["birth", "death", "switch", "long miss"]
 
@@ -273,6 +283,46 @@ def compare_tables(
         f" · {comparison.steps} steps",
     )
     return head + _differences(comparison, evaluation, every) + _differing(comparison) + notes
+
+
+@router.get("/runs")
+def run_table(request: Request, bench: Bench) -> str:
+    """The current run and those before it, each with the way back to it."""
+    history: History = request.app.state.history
+    snapshot = bench.snapshot()
+    runs = history.runs
+    if not runs:
+        return blank("No run yet", "What is computed is listed here, and can be taken up again.")
+    open_now = snapshot.sequence.name if snapshot.sequence is not None else ""
+    rows: list[tuple[Cell, ...]] = []
+    for run in runs:
+        state, methods = run.state, (run.parameters.single_view, run.parameters.fusion_method)
+        current = state.key == snapshot.run_state.key
+        again: Cell = quiet("another sequence")
+        if current:
+            again = quiet("current")
+        elif run.sequence == open_now:
+            label = f"Use the parameters of run {run.number} again"
+            again = button("use again", "useAgain", run.number, label=label)
+        rows.append(
+            (
+                run.number,
+                quiet(run.at),
+                run.sequence,
+                quiet(" · ".join(value_text(method) for method in methods)),
+                _phase(state, current),
+                f"{state.steps_per_second:.3g}" if state.steps_per_second else None,
+                run.changes,
+                again,
+            )
+        )
+    heads = ("Run", "At", "Sequence", "Methods", "State", "#Steps/s", "#Changes", "#")
+    return table("Runs", heads, rows)
+
+
+def _phase(state: RunState, current: bool) -> str:
+    words = "overtaken" if state.state == "computing" and not current else PHASES[state.state]
+    return words if state.done >= state.total else f"{words} {state.done}/{state.total}"
 
 
 def _figures(evaluation: Evaluation, every: bool) -> str:

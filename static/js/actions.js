@@ -1,4 +1,3 @@
-// @ts-check
 /** What a person can do: the page's own state at once, the server's by request. */
 import { ApiError, request, sendJson } from "./api.js";
 import { SPEEDS, clampStep } from "./clock.js";
@@ -8,11 +7,7 @@ import { commandLine } from "./url.js";
 /** Changes of one drag that follow each other within this time are undone together. */
 const SAME_DRAG = 1500;
 
-/**
- * Save what an address gives, once it is known that it gives it.
- * @param {string} path
- * @param {string} fallback  name of the file where the answer has none
- */
+/** Save what an address gives, once it is known that it gives it. @param {string} path @param {string} fallback  name of the file where the answer has none */
 async function download(path, fallback) {
 	const response = await request(path);
 	const named = /filename="?([^";]+)"?/.exec(response.headers.get("content-disposition") ?? "");
@@ -160,6 +155,7 @@ export function createActions({ store, seek, send, receive }) {
 		reset: (...keys) => void actions.ask("POST", "parameters/reset", keys.length ? { keys } : {}),
 		preset: (name) => void actions.ask("POST", "parameters/preset", { name }),
 		cancel: () => void actions.ask("POST", "run/cancel"),
+		useAgain: (number) => void actions.ask("POST", `run/again/${number}`),
 		runAgain: () => void actions.ask("POST", "run"),
 		pin: (on) => void actions.ask(on ? "POST" : "DELETE", "run/pin"),
 		remember(before, after) {

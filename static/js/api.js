@@ -1,12 +1,8 @@
-// @ts-check
 /** The way to the server: requests with one error shape, and a socket that comes back by itself. */
 
 /** A failure told by the server, or a server that cannot be reached. */
 export class ApiError extends Error {
-	/**
-	 * @param {number} status  0 where no answer came
-	 * @param {ApiFailure} failure
-	 */
+	/** @param {number} status  0 where no answer came @param {ApiFailure} failure */
 	constructor(status, failure) {
 		super(failure.message);
 		this.status = status;
@@ -16,9 +12,7 @@ export class ApiError extends Error {
 	}
 }
 
-/**
- * @param {Response} response
- */
+/** @param {Response} response */
 async function failureOf(response) {
 	try {
 		const body = await response.json();
@@ -34,10 +28,7 @@ async function failureOf(response) {
 	});
 }
 
-/**
- * @param {string} path
- * @param {RequestInit} [options]
- */
+/** @param {string} path @param {RequestInit} [options] */
 export async function request(path, options) {
 	/** @type {Response} */
 	let response;
@@ -51,28 +42,18 @@ export async function request(path, options) {
 	return response;
 }
 
-/**
- * @param {string} path
- * @param {RequestInit} [options]
- */
+/** @param {string} path @param {RequestInit} [options] */
 export async function getJson(path, options) {
 	return (await request(path, options)).json();
 }
 
-/**
- * @param {"POST" | "PATCH" | "DELETE"} method
- * @param {string} path
- * @param {object} [body]
- */
+/** @param {"POST" | "PATCH" | "DELETE"} method @param {string} path @param {object} [body] */
 export async function sendJson(method, path, body = {}) {
 	const headers = { "Content-Type": "application/json" };
 	return (await request(path, { method, headers, body: JSON.stringify(body) })).json();
 }
 
-/**
- * Fetch the newest: never twice at once, and once more where there was news meanwhile.
- * @param {() => Promise<void>} work
- */
+/** Fetch the newest: never twice at once, and once more where there was news meanwhile. @param {() => Promise<void>} work */
 export function fetcher(work) {
 	let busy = false;
 	let again = false;
@@ -93,11 +74,7 @@ export function fetcher(work) {
 	};
 }
 
-/**
- * How long to wait before the next try: quickly at first, then every few seconds.
- * @param {number} tries  failed so far
- * @returns {number} milliseconds
- */
+/** How long to wait before the next try: quickly at first, then every few seconds. @param {number} tries  failed so far @returns {number} milliseconds */
 export function backoff(tries) {
 	return Math.min(5000, 300 * 2 ** Math.min(10, tries));
 }

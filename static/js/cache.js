@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * Things that belong to a step, fetched ahead of the playhead, kept within a budget.
  * Used for pictures (by camera and step) and for results (by run and step).

@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * Arithmetic of the only clock, the step index, and of the axis it is drawn on.
  * Steps are 0-based and inclusive everywhere. Nothing here touches the page.

@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * Every command, once: `commands.json` lists them, and buttons, tooltips, keys, the help sheet,
  * the palette and the keys of the 3D view in a window of its own are made from that list.
@@ -38,10 +37,7 @@ export function keyOf({ key, ctrlKey, metaKey, altKey, shiftKey }) {
 /** @type {Record<string, string>} */
 const SIGNS = { ArrowLeft: "←", ArrowRight: "→", Escape: "Esc", PageUp: "Page ↑", PageDown: "Page ↓", "-": "−" };
 
-/**
- * @param {string} key  as `keyOf` names it
- * @returns {string} as a person reads it, for instance `Shift ←`
- */
+/** @param {string} key  as `keyOf` names it @returns {string} as a person reads it, for instance `Shift ←` */
 export function keyLabel(key) {
 	const parts = key === "+" ? [key] : key.split("+");
 	return parts.map((part) => SIGNS[part] ?? (part.length === 1 ? part.toUpperCase() : part)).join(" ");
@@ -54,33 +50,17 @@ export function commandOf(name) {
 	return found;
 }
 
-/**
- * The command of a key.
- * @param {string} key  as `keyOf` names it
- * @param {boolean} singleKeys  whether letters, digits and signs alone are on
- */
+/** The command of a key. @param {string} key  as `keyOf` names it @param {boolean} singleKeys  whether letters, digits and signs alone are on */
 export function commandFor(key, singleKeys = true) {
 	if (!key) return undefined;
 	if (!singleKeys && key !== "?" && key.replace("Shift+", "").length === 1) return undefined;
 	return COMMANDS.find((command) => command.keys.includes(key));
 }
 
-/**
- * Commands whose title has all words of a text, those that begin with it first.
- * @param {string} text
- */
+/** Commands whose title has all words of a text, those that begin with it first. @param {string} text */
 export function search(text) {
 	const words = text.toLowerCase().split(/\s+/).filter(Boolean);
 	const found = COMMANDS.filter(({ title, group }) => words.every((word) => `${title} ${group}`.toLowerCase().includes(word)));
 	const late = (/** @type {Command} */ { title }) => Number(!title.toLowerCase().startsWith(words[0] ?? ""));
 	return found.sort((a, b) => late(a) - late(b));
-}
-
-/**
- * Keys that more than one command claims.
- * @param {Command[]} commands
- */
-export function clashes(commands) {
-	const all = commands.flatMap((command) => command.keys);
-	return all.filter((key, index) => all.indexOf(key) !== index);
 }

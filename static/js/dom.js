@@ -1,4 +1,3 @@
-// @ts-check
 /** Building and filling elements. */
 
 /**
@@ -6,55 +5,42 @@
  * attributes; `true` sets an empty one, `false` and `null` none; `--x` is a style property.
  * @template {keyof HTMLElementTagNameMap} K
  * @param {K} tag
- * @param {Record<string, any>} [attributes]
+ * @param {Attributes} [attributes]
  * @param {...(Child | Child[])} children
  */
 export function h(tag, attributes = {}, ...children) {
 	const element = document.createElement(tag);
 	for (const [name, value] of Object.entries(attributes)) {
 		if (value === null || value === undefined || value === false) continue;
-		if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
-		else if (name.startsWith("--")) element.style.setProperty(name, value);
+		if (name.startsWith("on")) element.addEventListener(name.slice(2), /** @type {EventListener} */ (value));
+		else if (name.startsWith("--")) element.style.setProperty(name, String(value));
 		else element.setAttribute(name, value === true ? "" : String(value));
 	}
 	fill(element, ...children);
 	return element;
 }
 
-/**
- * Replace what an element holds.
- * @param {Element} element
- * @param {...(Child | Child[])} children
- */
+/** Replace what an element holds. @param {Element} element @param {...(Child | Child[])} children */
 export function fill(element, ...children) {
 	const nodes = children.flat().filter((child) => child !== null && child !== undefined && child !== false);
 	element.replaceChildren(.../** @type {(Node | string)[]} */ (nodes.map((n) => (typeof n === "number" ? String(n) : n))));
 }
 
-/**
- * Write a text only where it changed: cheap enough for every frame.
- * @param {Node} node
- * @param {string} text
- */
+/** Write a text only where it changed: cheap enough for every frame. @param {Node} node @param {string} text */
 export function write(node, text) {
 	if (node.textContent !== text) node.textContent = text;
 }
 
-/**
- * The elements that the page's markup names with `data-ref`, by that name.
- * @param {ParentNode} root
- * @returns {Record<string, any>}
- */
-export function parts(root) {
-	const named = /** @type {NodeListOf<HTMLElement>} */ (root.querySelectorAll("[data-ref]"));
-	return Object.fromEntries([...named].map((element) => [element.dataset.ref, element]));
-}
+/** The elements of the markup that a selector finds. @param {string} selector @param {ParentNode} [root] @returns {Part[]} */
+export const all = (selector, root = document) => [...root.querySelectorAll(selector)].map((element) => /** @type {any} */ (element));
 
-/**
- * @param {HTMLSelectElement} select
- * @param {[string | number, string][]} choices  values and words
- * @param {string | number} chosen
- */
+/** The one that there is. @param {string} selector @param {ParentNode} [root] */
+export const one = (selector, root) => all(selector, root)[0];
+
+/** Those that the markup names with `data-ref`, by that name. @param {ParentNode} root @returns {Record<string, Part>} */
+export const parts = (root) => Object.fromEntries(all("[data-ref]", root).map((element) => [element.dataset.ref, element]));
+
+/** @param {Part} select @param {[string | number, string][]} choices  values and words @param {string | number} chosen */
 export function choices(select, choices, chosen) {
 	fill(select, choices.map(([value, word]) => h("option", { value }, word)));
 	select.value = String(chosen);
@@ -70,10 +56,8 @@ export function icon(name, kind = "") {
 	return svg;
 }
 
-/** @param {number} id  @returns {number} 1 … 24; colour follows the id and never the rank */
-export function colourIndex(id) {
-	return ((((id - 1) % 24) + 24) % 24) + 1;
-}
+/** 1 … 24: colour follows the id and never the rank. @param {number} id */
+export const colourIndex = (id) => ((((id - 1) % 24) + 24) % 24) + 1;
 
 /** @param {number} id */
 export function idTag(id) {

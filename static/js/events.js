@@ -1,4 +1,3 @@
-// @ts-check
 /** Tracks and what happens to them, as the lanes, the tables and the keys need them. */
 
 /** The scores, where they are of the run that is shown. @param {Readonly<PageState>} state */
@@ -10,11 +9,7 @@ export const resultOf = ({ result, basis }) => (result?.run === basis && result.
 /** Whether only the selected track is shown. @param {Readonly<PageState>} state */
 export const isAlone = ({ selection, layers3d }) => selection !== null && layers3d.others === false;
 
-/**
- * Events of the shown run that somebody wants to see, by step and track; switches are among
- * them where there is truth.
- * @param {Readonly<PageState>} state
- */
+/** Events of the shown run that somebody wants to see, by step and track; switches are among them where there is truth. @param {Readonly<PageState>} state */
 export function eventsNow(state) {
 	const { timeline, eventKind } = state;
 	/** @type {LaneEvent[]} */

@@ -1,4 +1,3 @@
-// @ts-check
 /** Tables: sorted by their heads, walked by arrows, filled again without losing place or focus. */
 import { fill, h, write } from "./dom.js";
 
@@ -78,8 +77,7 @@ export function grid(label, columns, { key, by = "", down = false, choose, open,
 			if (body.rows[index] !== entry.element) body.insertBefore(entry.element, body.rows[index] ?? null);
 		});
 		heads.forEach((head, index) => {
-			if (value && columns[index].word === by) head.setAttribute("aria-sort", down ? "descending" : "ascending");
-			else head.removeAttribute("aria-sort");
+			head.ariaSort = value && columns[index].word === by ? (down ? "descending" : "ascending") : null;
 		});
 		if (choose && body.rows[0] && ![...body.rows].some((row) => row.tabIndex === 0)) body.rows[0].tabIndex = 0;
 	}

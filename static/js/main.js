@@ -1,7 +1,7 @@
-// @ts-check
 /** Wires the page: one store, one socket, one playback, and the panes that look at them. */
 import { createActions } from "./actions.js";
 import { fetcher, getJson, openStream } from "./api.js";
+import { all, one } from "./dom.js";
 import { commandFor, commandOf, keyLabel, keyOf, perform, register } from "./commands.js";
 import { mountCameras } from "./panes/cameras.js";
 import { mountLayout } from "./panes/layout.js";
@@ -77,30 +77,36 @@ const origin = Math.random().toString(36).slice(2);
 const playback = createPlayback(store, (step) => stream.send({ type: "seek", step, origin }));
 const actions = createActions({ store, seek: playback.seek, send: (message) => stream.send(message), receive: (state) => receiveState(state) });
 
-const element = (/** @type {string} */ selector) => /** @type {HTMLElement} */ (document.querySelector(selector));
 /** @type {Context} */
 const context = { store, playback, actions, retry: () => stream.retry(), press };
-mountTop(element(".top"), context);
-mountNotes(element(".notes"), context);
-mountView3d(element(".view"), context);
-mountCameras(element(".cams"), context);
-mountSide(element(".side"), context);
-mountTimeline(element(".time"), context);
+mountTop(one(".top"), context);
+mountNotes(one(".notes"), context);
+mountView3d(one(".view"), context);
+mountCameras(one(".cams"), context);
+mountSide(one(".side"), context);
+mountTimeline(one(".time"), context);
 mountSheets(context);
 mountLayout(context);
 
-for (const control of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-command], [data-command-key]"))) {
+for (const control of all("[data-command], [data-command-key]")) {
 	const { command: name, commandKey } = control.dataset;
 	const command = commandOf(name ?? commandKey ?? "");
 	control.dataset.key = command.keys.slice(0, 1).map(keyLabel).join();
 	if (!name) continue;
 	control.dataset.tip ??= command.title;
-	if (!control.textContent?.trim()) control.setAttribute("aria-label", command.title);
+	if (!control.textContent?.trim()) control.ariaLabel = command.title;
 	control.addEventListener("click", () => perform(command, actions));
 }
-for (const chip of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-layer2d], [data-layer3d]"))) {
+for (const chip of all("[data-layer2d], [data-layer3d]")) {
 	const { layer2d, layer3d } = chip.dataset;
-	chip.addEventListener("click", () => (layer2d ? actions.toggleLayer2d(layer2d) : actions.toggleLayer3d(layer3d ?? "")));
+	const name = layer2d ?? layer3d ?? "";
+	chip.addEventListener("click", () => (layer2d ? actions.toggleLayer2d(name) : actions.toggleLayer3d(name)));
+	store.watch(["server", "sequence", "layers2d", "layers3d", "link"], ({ server, sequence, layers2d, layers3d, link }) => {
+		chip.ariaPressed = String(Boolean((layer2d ? layers2d : layers3d)[name]));
+		chip.disabled = layer2d ? !sequence : link !== "open";
+		chip.disabled ||= name === "truth" && !sequence?.has_truth;
+		chip.hidden = name === "pinned" && !server?.pinned;
+	});
 }
 
 /** The place of the address is gone to once, when its sequence is open. */
@@ -130,10 +136,7 @@ async function restore(server, values) {
 	if (differing.length) await actions.change(Object.fromEntries(differing));
 }
 
-/**
- * @param {ServerState} told
- * @param {boolean} [streamed]  it came over the socket, in order
- */
+/** @param {ServerState} told @param {boolean} [streamed]  it came over the socket, in order */
 function receiveState(told, streamed = false) {
 	// A method is a choice like any other: it is listed, undone and taken up again with the values.
 	const server = { ...told, parameters: { ...told.parameters, ...told.methods } };
@@ -235,7 +238,7 @@ function receive(message) {
 			break;
 		case "command":
 			// Keys inside our own frame come here by themselves; this is for a 3D view in a window of its own.
-			if (document.hasFocus() && document.activeElement === element("iframe")) break;
+			if (document.hasFocus() && document.activeElement === one("iframe")) break;
 			perform(commandOf(message.name), actions);
 			break;
 	}
@@ -258,11 +261,7 @@ const stream = openStream("/api/stream", {
 	message: receive,
 });
 
-/**
- * Run the command of a key, unless somebody types.
- * @param {KeyboardEvent} event
- * @returns {boolean} whether there was one
- */
+/** Run the command of a key, unless somebody types. @param {KeyboardEvent} event @returns {boolean} whether there was one */
 function press(event) {
 	const key = keyOf(event);
 	const target = /** @type {Element} */ (event.target);

@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * Where the camera pictures go: one large and the others in a column beside it, or all alike.
  * Every picture keeps its own shape.
@@ -19,10 +18,7 @@ export function mosaic(aspects, large, { width, most, gap }) {
 		: oneLarge(aspects, large, inner, tall, gap);
 }
 
-/**
- * In the number of columns that makes the pictures largest.
- * @param {number[]} aspects @param {number} inner @param {number} tall @param {number} gap
- */
+/** In the number of columns that makes the pictures largest. @param {number[]} aspects @param {number} inner @param {number} tall @param {number} gap */
 function alike(aspects, inner, tall, gap) {
 	const widest = Math.max(...aspects);
 	const grids = aspects.map((_, index) => {
@@ -59,11 +55,7 @@ function oneLarge(aspects, large, inner, tall, gap) {
 	return { cells, height: Math.round(height + 2 * gap) };
 }
 
-/**
- * The largest picture of a shape in the middle of a frame, on whole pixels.
- * @param {number} aspect
- * @param {Cell} frame
- */
+/** The largest picture of a shape in the middle of a frame, on whole pixels. @param {number} aspect @param {Cell} frame */
 function fit(aspect, { x, y, width, height }) {
 	const w = Math.min(width, height * aspect);
 	const hgt = w / aspect;

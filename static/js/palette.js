@@ -1,11 +1,7 @@
-// @ts-check
 /** Colours for the canvases, read from the tokens once a theme. */
 import { colourIndex } from "./dom.js";
 
-/**
- * @param {Element} element  whose theme counts
- * @returns {Palette}
- */
+/** @param {Element} element  whose theme counts @returns {Palette} */
 function read(element) {
 	const style = getComputedStyle(element);
 	/** @type {Map<string, string>} */
@@ -42,10 +38,7 @@ export function pictureInk() {
 	return dark;
 }
 
-/**
- * @param {string} hex  #rrggbb
- * @param {number} alpha  0 … 1
- */
+/** @param {string} hex  #rrggbb @param {number} alpha  0 … 1 */
 export function faded(hex, alpha) {
 	return hex + Math.round(alpha * 255).toString(16).padStart(2, "0");
 }

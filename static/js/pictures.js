@@ -1,4 +1,3 @@
-// @ts-check
 /** Pictures of all cameras around the playhead, decoded, within a budget of bytes. */
 import { request } from "./api.js";
 import { createCache } from "./cache.js";
@@ -18,12 +17,7 @@ export const pictureName = (sequence, camera, step, kind = "picture") => `/api/$
 /** What can be laid over a picture. */
 const MAPS = /** @type {const} */ (["foreground", "likelihood"]);
 
-/**
- * The addresses of what is laid over the pictures of a step, by camera.
- * @param {string} sequence  its key
- * @param {StepResult} result
- * @param {Record<string, boolean>} layers
- */
+/** The addresses of what is laid over the pictures of a step, by camera. @param {string} sequence  its key @param {StepResult} result @param {Record<string, boolean>} layers */
 export const mapNames = (sequence, result, layers) =>
 	result.cameras.map((view, camera) => MAPS.flatMap((kind) => (layers[kind] && view[kind] ? [`${pictureName(sequence, camera, result.step, kind)}?run=${view[kind]}`] : [])));
 

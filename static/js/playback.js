@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * From the step that is asked for to the step that is painted.
  *
@@ -13,10 +12,7 @@ import { createPictures, mapNames, pictureName, PICTURE_BUDGET } from "./picture
 
 const RESULTS_KEPT = 600;
 
-/**
- * How many steps of the shown run are there.
- * @param {Readonly<PageState>} state
- */
+/** How many steps of the shown run are there. @param {Readonly<PageState>} state */
 export function shownDone({ basis, run, timeline }) {
 	return run && basis === run.key ? run.done : (timeline?.done ?? 0);
 }
@@ -108,11 +104,7 @@ export function createPlayback(store, sendSeek) {
 		results.want(useful.slice(0, RESULTS_KEPT / 2).map((k) => resultName(basis, k, queryNow())));
 	}
 
-	/**
-	 * @param {PageState} state
-	 * @param {number} step
-	 * @returns {Frame | null} null while something that will come is missing
-	 */
+	/** @param {PageState} state @param {number} step @returns {Frame | null} null while something that will come is missing */
 	function assemble(state, step) {
 		const { sequence } = state;
 		if (!sequence) return null;
@@ -203,10 +195,7 @@ export function createPlayback(store, sendSeek) {
 			dirty = true;
 			ask();
 		},
-		/**
-		 * A result that came by itself.
-		 * @param {StepResult} result
-		 */
+		/** A result that came by itself. @param {StepResult} result */
 		receive(result) {
 			results.put(resultName(result.run, result.step, ""), result);
 			if (result.step === store.get().step) dirty = true;
@@ -217,10 +206,7 @@ export function createPlayback(store, sendSeek) {
 			const { frames } = store.get();
 			if (frames > 0) store.set({ step: clampStep(step, frames) });
 		},
-		/**
-		 * Another tab or the 3D view moved the playhead.
-		 * @param {number} step
-		 */
+		/** Another tab or the 3D view moved the playhead. @param {number} step */
 		follow(step) {
 			lastSent = step;
 			store.set({ step, playing: 0 });

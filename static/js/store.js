@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * One plain object, changed by `set`, read by everyone. Listeners name the keys they
  * depend on and are told once a turn, however many changes that turn brought.
@@ -14,20 +13,13 @@ export function createStore(initial, schedule = queueMicrotask) {
 	let state = { ...initial };
 	/** @type {Set<keyof T>} */
 	let pending = new Set();
-	/** @type {Set<{keys: Set<keyof T>, listener: (state: Readonly<T>) => void}>} */
+	/** @type {Set<{keys: (keyof T)[], listener: (state: Readonly<T>) => void}>} */
 	const listeners = new Set();
 
 	function flush() {
 		const changed = pending;
 		pending = new Set();
-		for (const { keys, listener } of [...listeners]) {
-			for (const key of changed) {
-				if (keys.has(key)) {
-					listener(state);
-					break;
-				}
-			}
-		}
+		for (const { keys, listener } of [...listeners]) if (keys.some((key) => changed.has(key))) listener(state);
 	}
 
 	return {
@@ -42,9 +34,13 @@ export function createStore(initial, schedule = queueMicrotask) {
 			if (wasIdle && pending.size > 0) schedule(flush);
 		},
 		on(keys, listener) {
-			const entry = { keys: new Set(keys), listener };
+			const entry = { keys, listener };
 			listeners.add(entry);
 			return () => listeners.delete(entry);
+		},
+		watch(keys, listener) {
+			listener(state);
+			return this.on(keys, listener);
 		},
 	};
 }

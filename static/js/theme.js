@@ -1,4 +1,3 @@
-// @ts-check
 // Runs before the first paint, so that the page never flashes in the other theme.
 {
 	/** @type {string | null} */

@@ -1,12 +1,8 @@
-// @ts-check
 /** A place as text: the address that shows a colleague the same, the command that computes it. */
 
 const KNOWN = ["seq", "step", "sel", "cam"];
 
-/**
- * @param {string} search  with or without the question mark
- * @returns {{place: Place, unknown: string[]}} keys that mean nothing here are named, not fatal
- */
+/** @param {string} search  with or without the question mark @returns {{place: Place, unknown: string[]}} keys that mean nothing here are named, not fatal */
 export function readPlace(search) {
 	const query = new URLSearchParams(search);
 	const whole = (/** @type {string} */ key) => {
@@ -27,10 +23,7 @@ export function readPlace(search) {
 	};
 }
 
-/**
- * @param {Place} place  the camera is an index; the address counts from 1, as the page does
- * @returns {string} beginning with a question mark, or empty
- */
+/** @param {Place} place  the camera is an index; the address counts from 1, as the page does @returns {string} beginning with a question mark, or empty */
 export function writePlace({ sequence, step, selection, camera, values }) {
 	const query = new URLSearchParams();
 	if (sequence) query.set("seq", sequence);
@@ -42,12 +35,7 @@ export function writePlace({ sequence, step, selection, camera, values }) {
 	return text ? `?${text}` : "";
 }
 
-/**
- * The command line that makes the same run.
- * @param {string} sequence
- * @param {Record<string, any>} parameters
- * @param {string[]} changed
- */
+/** The command line that makes the same run. @param {string} sequence @param {Record<string, any>} parameters @param {string[]} changed */
 export function commandLine(sequence, parameters, changed) {
 	const quote = (/** @type {any} */ value) => (/^[\w./+-]+$/.test(value) ? value : `'${String(value).replaceAll("'", "'\\''")}'`);
 	const methods = [["single-view", parameters.single_view], ["fusion", parameters.fusion_method]];

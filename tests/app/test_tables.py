@@ -135,9 +135,30 @@ def test_the_comparison_is_the_evaluations(client: TestClient) -> None:
     assert "pinned run, default parameters" in html
 
 
+def test_runs_are_listed_and_can_be_taken_up_again(client: TestClient) -> None:
+    before = client.get("/api/state").json()
+    client.patch("/api/parameters", json={"changes": {"fusion.detection_probability": 0.6}})
+    client.patch("/api/parameters", json={"changes": {"fusion_method": "sequential_phd"}})
+    wait_until(run_is(client, "done"))
+    html = get(client, "runs")
+    rows = cells(html, "Runs")
+    assert [row[0] for row in rows] == sorted((row[0] for row in rows), key=int, reverse=True)
+    assert rows[0][3].endswith("sequential phd")
+    assert rows[0][4] == rows[-1][4] == "computed"
+    assert (rows[0][6], rows[-1][6]) == ("2", "0")
+    assert (rows[0][7], rows[-1][7]) == ("current", "use again")
+    assert 'data-do="useAgain" data-value="1"' in html
+    after = client.post("/api/run/again/1").json()
+    assert after["parameters"] == before["parameters"]
+    assert after["methods"] == before["methods"]
+    assert client.post("/api/run/again/99").status_code == 422
+    wait_until(run_is(client, "done"))
+
+
 @pytest.mark.parametrize("path", ["step/0", "events"])
 def test_nothing_open(path: str) -> None:
     with TestClient(create_app(Settings(with_viser=False)), base_url=ADDRESS) as client:
         assert client.get(f"/api/tables/{path}").status_code == 409
         assert "once a sequence" in get(client, "compare")
         assert "at their defaults" in get(client, "changes")
+        assert "No run yet" in get(client, "runs")

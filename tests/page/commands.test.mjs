@@ -2,12 +2,18 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { clashes, COMMANDS, commandFor, commandOf, keyLabel, keyOf, perform, register, search } from "../../static/js/commands.js";
+import { COMMANDS, commandFor, commandOf, keyLabel, keyOf, perform, register, search } from "../../static/js/commands.js";
 
 const read = (name) => readFileSync(new URL(`../../static/${name}`, import.meta.url), "utf8");
 register(JSON.parse(read("commands.json")));
 
 const event = (key, modifiers = {}) => ({ key, ctrlKey: false, metaKey: false, altKey: false, shiftKey: false, ...modifiers });
+
+/** Keys that more than one command claims. */
+function clashes(commands) {
+  const all = commands.flatMap((command) => command.keys);
+  return all.filter((key, index) => all.indexOf(key) !== index);
+}
 
 test("no key belongs to two commands and no name to two", () => {
   assert.deepEqual(clashes(COMMANDS), []);

@@ -8,13 +8,11 @@ import { fileURLToPath } from "node:url";
 const ROOT = fileURLToPath(new URL("../../static/", import.meta.url));
 const files = readdirSync(ROOT, { recursive: true }).map(String).filter((name) => statSync(join(ROOT, name)).isFile());
 const scripts = files.filter((name) => name.endsWith(".js"));
-/** Types only: no browser loads it. */
-const loaded = scripts.filter((name) => name !== join("js", "types.js"));
 
 test("every module is loaded at once, and none that is not there", () => {
   const html = readFileSync(join(ROOT, "index.html"), "utf8");
   const named = [...html.matchAll(/(?:href|src)="\/static\/([^"]+\.js)"/g)].map((match) => match[1]);
-  assert.deepEqual([...named].sort(), loaded.map((name) => name.replaceAll("\\", "/")).sort());
+  assert.deepEqual([...named].sort(), scripts.map((name) => name.replaceAll("\\", "/")).sort());
 });
 
 test("every import is a file of the page", () => {
@@ -35,13 +33,13 @@ test("nothing comes from another host", () => {
 });
 
 test("the page stays light: at most 150 kB of JavaScript", () => {
-  const bytes = loaded.reduce((sum, name) => sum + statSync(join(ROOT, name)).size, 0);
+  const bytes = scripts.reduce((sum, name) => sum + statSync(join(ROOT, name)).size, 0);
   assert.ok(bytes <= 150_000, `${bytes} bytes`);
 });
 
 test("every part that a module asks for is in the page", () => {
   const html = readFileSync(join(ROOT, "index.html"), "utf8");
-  for (const name of loaded) {
+  for (const name of scripts) {
     const text = readFileSync(join(ROOT, name), "utf8");
     for (const [, list] of text.matchAll(/const \{([^}]+)\} = parts\(/g)) {
       for (const part of list.split(",")) assert.ok(html.includes(`data-ref="${part.split(":")[0].trim()}"`), `${name} asks for ${part}`);
@@ -52,7 +50,7 @@ test("every part that a module asks for is in the page", () => {
 test("every symbol that is used is in the page", () => {
   const html = readFileSync(join(ROOT, "index.html"), "utf8");
   const known = new Set([...html.matchAll(/symbol id="([^"]+)"/g)].map((match) => match[1]));
-  for (const name of loaded) {
+  for (const name of scripts) {
     const text = readFileSync(join(ROOT, name), "utf8");
     for (const [, symbol] of text.matchAll(/"#?((?:i|l)-[a-z]+)"/g)) assert.ok(known.has(symbol), `${name} uses ${symbol}`);
   }

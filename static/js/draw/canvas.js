@@ -1,4 +1,3 @@
-// @ts-check
 /** What all canvases share. */
 
 /** Fit a canvas to its element, in CSS pixels, and to the screen's pixels; clear it. @param {HTMLCanvasElement} canvas @param {number} width @param {number} height */

@@ -1,4 +1,3 @@
-// @ts-check
 /** Range bar, ruler and track lanes of the timeline. */
 import { rangesOf, tickSteps, xOf } from "../clock.js";
 import { faded } from "../palette.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * What is drawn over a picture. Dashed means "not seen by the current run here": truth and
  * coasting. Colour is the id's; the number is always printed as well.

@@ -1,4 +1,3 @@
-// @ts-check
 /** Plots over the steps, under the lanes and on the same axis. */
 import { bucketOf, xOf } from "../clock.js";
 import { faded } from "../palette.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** The cameras: pictures and what is drawn over them, painted together. */
 import { fill, h, icon, idTag, parts, show, write } from "../dom.js";
 import { prepare } from "../draw/canvas.js";
@@ -42,14 +41,14 @@ export function mountCameras(root, { store, actions, playback }) {
 					tabindex: 0,
 					role: "button",
 					"aria-label": `Camera ${camera.name}: Enter makes it large, Shift and Enter look through it in 3D`,
-					onclick: (/** @type {MouseEvent} */ event) => {
+					onclick: (event) => {
 						const id = store.get().hover?.id;
 						if (id !== undefined) actions.select(id);
 						else if (event.detail < 2) clicked = setTimeout(() => actions.chooseCamera(index), DOUBLE_CLICK);
 					},
 					ondblclick: through,
-					onkeydown: (/** @type {KeyboardEvent} */ event) => event.key === "Enter" && (event.shiftKey ? through() : actions.chooseCamera(index)),
-					onpointermove: (/** @type {PointerEvent} */ event) => point(index, event),
+					onkeydown: (event) => event.key === "Enter" && (event.shiftKey ? through() : actions.chooseCamera(index)),
+					onpointermove: (event) => point(index, event),
 					onpointerleave: () => store.set({ hover: null }),
 				},
 				canvas,
@@ -76,7 +75,7 @@ export function mountCameras(root, { store, actions, playback }) {
 		cells.forEach(({ element }, index) => {
 			const { x, y, width, height } = places[index];
 			Object.assign(element.style, { left: `${x}px`, top: `${y + above}px`, width: `${width}px`, height: `${height}px` });
-			element.setAttribute("aria-pressed", String(large === index));
+			element.ariaPressed = String(large === index);
 		});
 		if (frame) paint(frame);
 	}
@@ -107,12 +106,7 @@ export function mountCameras(root, { store, actions, playback }) {
 		placeCards();
 	}
 
-	/**
-	 * What a picture says of itself: what is missing, what is being computed, who is out of view.
-	 * @param {Frame} shown
-	 * @param {number} index
-	 * @param {boolean} roomy
-	 */
+	/** What a picture says of itself: what is missing, what is being computed, who is out of view. @param {Frame} shown @param {number} index @param {boolean} roomy */
 	function wordsOf({ pictures, result, step, stale }, index, roomy) {
 		/** @type {string[]} */
 		const words = [];
@@ -180,12 +174,7 @@ export function mountCameras(root, { store, actions, playback }) {
 	}
 
 	function header() {
-		const { server, sequence, layers2d, sequences } = store.get();
-		for (const chip of /** @type {NodeListOf<HTMLElement>} */ (root.querySelectorAll("[data-layer2d]"))) {
-			const layer = chip.dataset.layer2d ?? "";
-			chip.setAttribute("aria-pressed", String(Boolean(layers2d[layer])));
-			chip.toggleAttribute("disabled", !sequence || (layer === "truth" && !sequence.has_truth));
-		}
+		const { server, sequence, sequences } = store.get();
 		blank.hidden = Boolean(sequence);
 		if (sequence) return;
 		const opening = server?.opening;
@@ -203,14 +192,9 @@ export function mountCameras(root, { store, actions, playback }) {
 	playback.onPaint(paint);
 	build();
 	store.on(["sequence"], ({ sequence }) => (sequence?.key ?? "") !== sequenceKey && build());
-	store.on(["server", "sequences"], header);
-	store.on(["layers2d"], () => {
-		header();
-		playback.repaint();
-	});
+	store.watch(["server", "sequences"], header);
 	store.on(["large"], arrange);
-	store.on(["selection", "hover", "layers3d"], playback.repaint);
+	store.on(["selection", "hover", "layers2d", "layers3d"], playback.repaint);
 	new ResizeObserver(arrange).observe(root);
 	addEventListener("panes", arrange);
-	header();
 }

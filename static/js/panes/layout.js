@@ -1,5 +1,5 @@
-// @ts-check
 /** How much room each pane has: dragged or moved by key, one pane alone, remembered. */
+import { all, one } from "../dom.js";
 
 /** What a splitter sets, which way it grows, and its least and largest share of the window. */
 const SPLITS = {
@@ -10,14 +10,14 @@ const SPLITS = {
 
 /** @param {Context} context */
 export function mountLayout({ store, actions }) {
-	const app = /** @type {HTMLElement} */ (document.querySelector(".app"));
-	const splits = /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-split]"));
-	const nameOf = (/** @type {HTMLElement} */ split) => /** @type {keyof typeof SPLITS} */ (split.dataset.split);
+	const app = one(".app");
+	const splits = all("[data-split]");
+	const nameOf = (/** @type {Part} */ split) => /** @type {keyof typeof SPLITS} */ (split.dataset.split);
 	const windowOf = (/** @type {string} */ along) => (along === "x" ? innerWidth : innerHeight);
 
 	/** What a splitter stands at now, pixels. @param {keyof typeof SPLITS} name */
 	function now(name) {
-		const pane = /** @type {HTMLElement} */ (document.querySelector({ right: ".side", cams: ".cams", lanes: ".lanes" }[name] ?? ""));
+		const pane = one({ right: ".side", cams: ".cams", lanes: ".lanes" }[name]);
 		return SPLITS[name].along === "x" ? pane.offsetWidth : pane.offsetHeight;
 	}
 
@@ -69,19 +69,15 @@ export function mountLayout({ store, actions }) {
 		}
 		app.dataset.max = layout.max ?? "";
 		// A 3D view that had the keys and is now hidden would keep them.
-		const held = /** @type {HTMLElement | null} */ (document.activeElement);
-		if (held && !held.checkVisibility()) held.blur();
-		for (const button of document.querySelectorAll("[data-command^=maximise]")) {
-			button.setAttribute("aria-pressed", String(button.getAttribute("data-command") === `maximise-${layout.max}`));
-		}
+		if (!document.activeElement?.checkVisibility()) /** @type {HTMLElement | null} */ (document.activeElement)?.blur();
+		for (const button of all("[data-command^=maximise]")) button.ariaPressed = String(button.dataset.command === `maximise-${layout.max}`);
 		for (const split of splits) {
 			const name = nameOf(split);
-			split.setAttribute("aria-valuenow", String(Math.round((100 * now(name)) / windowOf(SPLITS[name].along))));
+			split.ariaValueNow = String(Math.round((100 * now(name)) / windowOf(SPLITS[name].along)));
 		}
 		// Canvases measure themselves anew.
 		dispatchEvent(new Event("panes"));
 	}
-	store.on(["layout"], arrange);
+	store.watch(["layout"], arrange);
 	addEventListener("resize", arrange);
-	arrange();
 }

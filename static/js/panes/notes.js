@@ -1,4 +1,3 @@
-// @ts-check
 /** Notes under the top bar: what happened, what still works, what to do next. */
 import { fill, h, icon } from "../dom.js";
 
@@ -46,6 +45,5 @@ export function mountNotes(root, { store, actions, retry }) {
 		if (link === "lost") ticking = setInterval(() => root.contains(document.activeElement) || render(), 1000);
 	}
 
-	store.on(["link", "retryAt", "run", "basis", "notes"], render);
-	render();
+	store.watch(["link", "retryAt", "run", "basis", "notes"], render);
 }

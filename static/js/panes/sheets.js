@@ -1,18 +1,17 @@
-// @ts-check
 /** The two dialogs made from the registry of commands: help with its keys, and the palette. */
 import { COMMANDS, keyLabel, perform, search } from "../commands.js";
-import { fill, h, parts } from "../dom.js";
+import { all, fill, h, parts } from "../dom.js";
 
 /** @param {string[]} keys */
 const signs = (keys) => keys.map((key) => h("kbd", {}, keyLabel(key)));
 
 /** @param {Context} context */
 export function mountSheets({ store, actions }) {
-	const [help, palette] = /** @type {HTMLDialogElement[]} */ (["help", "palette"].map((name) => document.querySelector(`dialog.${name}`)));
+	const [help, palette] = /** @type {any[]} */ (all("dialog"));
 	const { sheet, single } = parts(help);
 	const { input, list } = parts(palette);
 	for (const dialog of [help, palette]) {
-		dialog.addEventListener("click", (event) => event.target === dialog && dialog.close());
+		dialog.addEventListener("click", (/** @type {Event} */ event) => event.target === dialog && dialog.close());
 	}
 
 	const row = (/** @type {Command} */ { name, title, keys }) => {
@@ -48,7 +47,7 @@ export function mountSheets({ store, actions }) {
 	/** @param {number} index */
 	function choose(index) {
 		at = index;
-		[...list.children].forEach((element, k) => element.setAttribute("aria-selected", String(k === at)));
+		all("[role=option]", list).forEach((option, k) => (option.ariaSelected = String(k === at)));
 		input.setAttribute("aria-activedescendant", found.length ? `option-${at}` : "");
 		list.children[at]?.scrollIntoView({ block: "nearest" });
 	}
@@ -61,7 +60,7 @@ export function mountSheets({ store, actions }) {
 		at = 0;
 		offer();
 	});
-	input.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+	input.addEventListener("keydown", (event) => {
 		const turn = { ArrowDown: 1, ArrowUp: -1 }[event.key];
 		if (turn && found.length) choose((at + turn + found.length) % found.length);
 		else if (event.key === "Enter" && found[at]) run(found[at]);

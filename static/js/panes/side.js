@@ -1,8 +1,6 @@
-// @ts-check
 /** The side panel: tabs with a panel each. */
-import { parts } from "../dom.js";
+import { all, one, parts } from "../dom.js";
 import { isAlone } from "../events.js";
-import { mountRuns } from "./runs.js";
 import { mountTables } from "./tables.js";
 import { mountTracks } from "./tracks.js";
 
@@ -10,8 +8,8 @@ import { mountTracks } from "./tracks.js";
 export function mountSide(root, context) {
 	const { store } = context;
 	const { count, only } = parts(root);
-	const tabs = /** @type {HTMLElement[]} */ ([...root.querySelectorAll("[role=tab]")]);
-	const nameOf = (/** @type {HTMLElement} */ tab) => /** @type {PageState["tab"]} */ (tab.id.replace("tab-", ""));
+	const tabs = all("[role=tab]", root);
+	const nameOf = (/** @type {Part} */ tab) => /** @type {PageState["tab"]} */ (tab.id.replace("tab-", ""));
 	tabs.forEach((tab, index) => {
 		tab.addEventListener("click", () => store.set({ tab: nameOf(tab) }));
 		tab.addEventListener("keydown", (event) => {
@@ -24,22 +22,20 @@ export function mountSide(root, context) {
 			next.focus();
 		});
 	});
-	const panel = (/** @type {string} */ name) => /** @type {HTMLElement} */ (root.querySelector(`#panel-${name}`));
-	mountTracks(panel("tracks"), context);
-	mountRuns(panel("runs"), context);
+	mountTracks(one("#panel-tracks"), context);
 	mountTables(root, context);
 
 	function choose() {
 		for (const tab of tabs) {
 			const chosen = nameOf(tab) === store.get().tab;
-			tab.setAttribute("aria-selected", String(chosen));
+			tab.ariaSelected = String(chosen);
 			tab.tabIndex = chosen ? 0 : -1;
-			panel(nameOf(tab)).hidden = !chosen;
+			one(`#panel-${nameOf(tab)}`).hidden = !chosen;
 		}
 	}
-	store.on(["tab"], choose);
+	store.watch(["tab"], choose);
 	store.on(["layers3d", "selection"], (state) => {
-		only.setAttribute("aria-pressed", String(isAlone(state)));
+		only.ariaPressed = String(isAlone(state));
 		only.disabled = state.selection === null;
 	});
 	store.on(["server"], ({ server }) => {
@@ -47,5 +43,4 @@ export function mountSide(root, context) {
 		count.hidden = changes === 0;
 		count.textContent = String(changes);
 	});
-	choose();
 }

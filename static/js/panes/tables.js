@@ -1,10 +1,9 @@
-// @ts-check
 /**
  * The panels whose tables the server writes: they are fetched while they are looked at, when
  * something that they tell of is new. Their buttons name an action and its value.
  */
 import { fetcher, request } from "../api.js";
-import { choices, parts, write } from "../dom.js";
+import { all, choices, one, parts, write } from "../dom.js";
 import { commandLine } from "../url.js";
 
 /** What a panel tells of, and where it comes from. @type {Record<string, {keys: (keyof PageState)[], path: (state: Readonly<PageState>) => string}>} */
@@ -12,7 +11,8 @@ const TABLES = {
 	step: { keys: ["result", "scores"], path: ({ shown }) => `step/${Math.max(0, shown)}` },
 	events: { keys: ["timeline", "scores", "eventKind"], path: ({ eventKind }) => `events${eventKind && `?kind=${eventKind}`}` },
 	changes: { keys: ["server"], path: () => "changes" },
-	compare: { keys: ["scores", "basis"], path: ({ every }) => `compare?every=${every}` },
+	compare: { keys: ["scores", "basis", "every"], path: ({ every }) => `compare?every=${every}` },
+	runs: { keys: ["server", "run"], path: () => "runs" },
 };
 /** @type {[string, string][]} */
 const KINDS = [["", "all"], ["birth", "births"], ["death", "deaths"], ["switch", "switches"], ["long miss", "long misses"]];
@@ -21,7 +21,7 @@ const KINDS = [["", "all"], ["birth", "births"], ["death", "deaths"], ["switch",
 export function mountTables(root, { store, actions }) {
 	const { kind, presets, code, pin, unpin, more, resetAll } = parts(root);
 	for (const [name, { keys, path }] of Object.entries(TABLES)) {
-		const body = /** @type {HTMLElement} */ (root.querySelector(`#panel-${name} [data-fill]`));
+		const body = one(`#panel-${name} [data-fill]`, root);
 		let told = "";
 		const refresh = fetcher(async () => {
 			const { tab, sequence } = store.get();
@@ -29,21 +29,20 @@ export function mountTables(root, { store, actions }) {
 			const text = await (await request(`/api/tables/${path(store.get())}`)).text();
 			if (text === told) return;
 			told = text;
-			// Where the focus was on a button, it is on the same one again.
-			const { do: act, value } = /** @type {HTMLElement} */ (document.activeElement)?.dataset ?? {};
-			const inside = body.contains(document.activeElement);
+			// Where the focus was on a button, it is on the one in its place again.
+			const at = all("button", body).findIndex((button) => button === document.activeElement);
 			body.innerHTML = text;
-			if (inside) /** @type {HTMLElement} */ (body.querySelector(`[data-do="${act}"][data-value="${value}"]`) ?? body).focus();
+			if (at >= 0) (all("button", body)[at] ?? body).focus();
 		});
-		store.on([...keys, "tab", "sequence", "every"], refresh);
+		store.on([...keys, "tab", "sequence"], refresh);
 	}
 	root.addEventListener("click", ({ target }) => {
-		const { do: act, value } = /** @type {HTMLElement} */ (/** @type {Element} */ (target).closest("[data-do]") ?? root).dataset;
+		const { do: act, value = "" } = /** @type {Part} */ (/** @type {Part} */ (target).closest("[data-do]") ?? root).dataset;
 		if (act) /** @type {any} */ (actions)[act](value);
 	});
 
 	choices(kind, KINDS, "");
-	kind.addEventListener("change", () => store.set({ eventKind: kind.value }));
+	kind.addEventListener("change", () => store.set({ eventKind: /** @type {LaneEvent["kind"]} */ (kind.value) }));
 	more.addEventListener("click", () => store.set({ every: !store.get().every }));
 	presets.addEventListener("change", () => actions.preset(presets.value));
 
@@ -63,6 +62,5 @@ export function mountTables(root, { store, actions }) {
 		pin.disabled = locked || run?.state !== "done" || server?.pinned?.key === run.key;
 		write(more, every ? "Headlines" : "All figures");
 	}
-	store.on(["server", "schema", "link", "run", "every", "sequence"], controls);
-	controls();
+	store.watch(["server", "schema", "link", "run", "every", "sequence"], controls);
 }

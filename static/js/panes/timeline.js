@@ -1,4 +1,3 @@
-// @ts-check
 /** The timeline: one axis for range bar, ruler, lanes and strips, and one playhead over them. */
 import { bucketOf, panned, secondsOf, stepAt, xOf, zoomed } from "../clock.js";
 import { fill, h, idTag, parts, write } from "../dom.js";
@@ -87,7 +86,7 @@ export function mountTimeline(root, context) {
 		if (frames < 1) return;
 		const ink = palette();
 		const height = plot.clientHeight;
-		const g = prepare(fixed, plot.clientWidth, height);
+		const g = prepare(/** @type {any} */ (fixed), plot.clientWidth, height);
 		let y = 0;
 		/** The next row down. @param {number} height @returns {Pen} */
 		const row = (height) => ({ g, view, ink, row: { y: (y += height) - height, height } });
@@ -155,7 +154,7 @@ export function mountTimeline(root, context) {
 					h("span", { class: "r" }),
 				);
 			labels.set(id, label);
-			label.setAttribute("aria-pressed", String(id === selection));
+			label.ariaPressed = String(id === selection);
 			write(/** @type {Node} */ (label.lastChild), `${Math.round(seen * 100)} %`);
 			if (lanes.children[index] !== label) lanes.insertBefore(label, lanes.children[index] ?? null);
 		});
@@ -166,7 +165,7 @@ export function mountTimeline(root, context) {
 		empty.style.top = `${above() + 8}px`;
 	}
 
-	plot.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
+	plot.addEventListener("pointerdown", (event) => {
 		if (event.button !== 0 || !store.get().sequence) return;
 		event.preventDefault();
 		plot.setPointerCapture(event.pointerId);
@@ -179,13 +178,13 @@ export function mountTimeline(root, context) {
 		store.set({ playing: 0 });
 		playback.seek(at);
 	});
-	plot.addEventListener("pointermove", (/** @type {PointerEvent} */ event) => {
+	plot.addEventListener("pointermove", (event) => {
 		if (!plot.hasPointerCapture(event.pointerId)) return;
 		playback.seek(stepAt(event.clientX - plot.getBoundingClientRect().left, view));
 	});
 	plot.addEventListener(
 		"wheel",
-		(/** @type {WheelEvent} */ event) => {
+		(event) => {
 			event.preventDefault();
 			const box = plot.getBoundingClientRect();
 			const { frames } = store.get();

@@ -1,4 +1,3 @@
-// @ts-check
 /** The top bar: what is open, which methods run, how far they are. */
 import { fill, h, parts, write } from "../dom.js";
 
@@ -64,10 +63,8 @@ export function mountTop(root, { store, actions }) {
 		write(rate, opening ? opening.message : run ? rateText(run) : "");
 	}
 
-	store.on(["server", "sequences", "schema", "link"], lists);
-	store.on(["server", "run", "link"], status);
-	lists();
-	status();
+	store.watch(["server", "sequences", "schema", "link"], lists);
+	store.watch(["server", "run", "link"], status);
 }
 
 /** @type {Record<RunState["state"], [string, string]>} */

@@ -1,4 +1,3 @@
-// @ts-check
 /** The table of tracks: sorted by any column, walked by keyboard, alive at the shown step. */
 import { fill, h, idTag, parts, write } from "../dom.js";
 import { eventsNow, isAlone, nextEvent, resultOf, scoresOf, stateAt } from "../events.js";
@@ -73,7 +72,7 @@ export function mountTracks(root, { store, actions, playback }) {
 		table.live();
 		table.each((track, row) => {
 			row.classList.toggle("gone", !["seen", "coasting"].includes(state(track) ?? ""));
-			row.setAttribute("aria-selected", String(track.id === selection));
+			row.ariaSelected = String(track.id === selection);
 		});
 		const result = resultOf(store.get());
 		const more = Math.max(0, (timeline?.tracks.length ?? 0) - MOST_ROWS) + (timeline?.left_out ?? 0);
@@ -84,9 +83,8 @@ export function mountTracks(root, { store, actions, playback }) {
 		fill(upcoming, event ? ["next: ", h("b", {}, `${event.kind} of ${event.id}, step ${event.step}`)] : "no later event");
 	}
 
-	store.on(["timeline", "sequence", "run", "scores", "layers3d"], list);
+	store.watch(["timeline", "sequence", "run", "scores", "layers3d"], list);
 	store.on(["shown", "result", "eventKind"], now);
 	store.on(["selection"], () => (isAlone(store.get()) ? list() : now()));
 	store.on(["selection"], ({ selection }) => table.each(({ id }, row) => id === selection && row.scrollIntoView({ block: "nearest" })));
-	list();
 }

@@ -1,7 +1,6 @@
-// @ts-check
 /** Play, step, speed, loop and the readout. */
 import { SPEEDS, parseStep, secondsOf } from "../clock.js";
-import { choices, parts, write } from "../dom.js";
+import { all, choices, parts, write } from "../dom.js";
 
 /** @type {Pane} */
 export function mountTransport(root, { store, playback }) {
@@ -17,7 +16,7 @@ export function mountTransport(root, { store, playback }) {
 		typed.select();
 	});
 	typed.addEventListener("blur", close);
-	typed.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+	typed.addEventListener("keydown", (event) => {
 		event.stopPropagation();
 		const { fps, frames } = store.get();
 		const wanted = event.key === "Enter" ? parseStep(typed.value, fps, frames) : null;
@@ -39,16 +38,15 @@ export function mountTransport(root, { store, playback }) {
 		seconds.style.minWidth = `${secondsOf(frames, fps).length}ch`;
 	});
 	store.on(["playing"], ({ playing }) => {
-		play.querySelector("use").setAttribute("href", playing ? "#i-pause" : "#i-play");
-		play.setAttribute("aria-label", playing ? "Pause" : "Play");
+		play.querySelector("use")?.setAttribute("href", playing ? "#i-pause" : "#i-play");
+		play.ariaLabel = playing ? "Pause" : "Play";
 	});
 	const marks = () => {
 		const { loop: on, range: [from, to], frames, speed: now } = store.get();
-		for (const control of root.querySelectorAll("button:not(.end), select")) control.toggleAttribute("disabled", !frames);
-		loop.setAttribute("aria-pressed", String(on));
+		for (const control of all("button:not(.end), select", root)) control.disabled = !frames;
+		loop.ariaPressed = String(on);
 		write(range, from === null && to === null ? "all" : `${from ?? 0} – ${to ?? frames - 1}`);
 		speed.value = String(now);
 	};
-	store.on(["loop", "range", "sequence", "speed"], marks);
-	marks();
+	store.watch(["loop", "range", "sequence", "speed"], marks);
 }

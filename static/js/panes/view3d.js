@@ -1,6 +1,5 @@
-// @ts-check
 /** The 3D pane: viser's page inside ours, with its layers and view points. */
-import { fill, h, icon, parts } from "../dom.js";
+import { all, fill, h, icon, parts } from "../dom.js";
 
 /** @type {Pane} */
 export function mountView3d(root, { store, actions, retry, press }) {
@@ -26,7 +25,7 @@ export function mountView3d(root, { store, actions, retry, press }) {
 		cover();
 	}
 	// After a click into 3D its document has the keys; ours come first, but for those that move its camera.
-	frame.addEventListener("load", () => frame.contentWindow.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+	frame.addEventListener("load", () => frame.contentWindow?.addEventListener("keydown", (event) => {
 		if (/^(Arrow.*|[wasdqe])$/i.test(event.key) && !event.ctrlKey && !event.metaKey) return;
 		if (press(event)) event.stopImmediatePropagation();
 	}, true));
@@ -43,21 +42,15 @@ export function mountView3d(root, { store, actions, retry, press }) {
 	}
 
 	function header() {
-		const { server, sequence, cameras, layers3d, link } = store.get();
-		for (const chip of /** @type {NodeListOf<HTMLElement>} */ (root.querySelectorAll("[data-layer3d]"))) {
-			const layer = chip.dataset.layer3d ?? "";
-			chip.setAttribute("aria-pressed", String(Boolean(layers3d[layer])));
-			chip.toggleAttribute("disabled", link !== "open" || (layer === "truth" && !sequence?.has_truth));
-			chip.hidden = layer === "pinned" && !server?.pinned;
-		}
+		const { server, cameras, link } = store.get();
 		/** @type {[string, number | "top" | null, string, string][]} */
 		const points = [["free", null, "Free view", "0"], ["top", "top", "From above", "U"], ...cameras.map(({ name }, index) => /** @type {[string, number, string, string]} */ ([`C${index + 1}`, index, `Look through ${name}`, ""]))];
 		if (views.childElementCount !== points.length) {
 			fill(views, points.map(([name, view, tip, key]) => h("button", { class: "start", "data-tip": tip, "data-key": key, onclick: () => actions.lookThrough(view) }, name)));
 		}
-		points.forEach(([, view], index) => {
-			views.children[index].setAttribute("aria-pressed", String(view === (server?.view ?? null)));
-			views.children[index].toggleAttribute("disabled", link !== "open");
+		all("button", views).forEach((button, index) => {
+			button.ariaPressed = String(points[index][1] === (server?.view ?? null));
+			button.disabled = link !== "open";
 		});
 	}
 
@@ -78,7 +71,6 @@ export function mountView3d(root, { store, actions, retry, press }) {
 		wasLost = link === "lost" || (wasLost && link !== "open");
 		cover();
 	});
-	store.on(["layers3d", "link"], header);
-	header();
+	store.watch(["link"], header);
 	cover();
 }

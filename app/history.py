@@ -1,0 +1,81 @@
+"""The runs since the server was started: what each was made of, and the way back to it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import dataclass, replace
+
+from app.snapshot import Change, RunState
+from app.workbench import Workbench
+from tracker import parameters as table
+from tracker.parameters import ParameterError, RunParameters
+
+MOST_RUNS = 50
+"""Older ones are forgotten."""
+
+
+@dataclass(frozen=True, slots=True)
+class PastRun:
+    """One run, finished or not."""
+
+    number: int
+    """From 1 on."""
+    at: str
+    """When it began: the time of day."""
+    sequence: str
+    parameters: RunParameters
+    changes: int
+    """How many parameters were not at their defaults."""
+    state: RunState
+    """How far it was when it was last heard of."""
+
+
+class History:
+    """Writes down the runs of a workbench, newest first."""
+
+    def __init__(self, workbench: Workbench) -> None:
+        self._workbench = workbench
+        self._lock = threading.Lock()
+        self._runs: list[PastRun] = []
+        self._counted = 0
+        self.close = workbench.subscribe(self._note)
+
+    @property
+    def runs(self) -> list[PastRun]:
+        """All that are remembered, newest first."""
+        with self._lock:
+            return list(self._runs)
+
+    def use_again(self, number: int) -> RunParameters:
+        """Set all parameters to those of a run.
+
+        Raises:
+            ParameterError: If there is no such run.
+        """
+        run = next((run for run in self.runs if run.number == number), None)
+        if run is None:
+            raise ParameterError("number", f"expected the number of a listed run, got {number}")
+        keys = (*table.METHODS, *table.PARAMETERS)
+        values = {key: table.value(run.parameters, key) for key in keys}
+        return self._workbench.set_parameters(values, "api")
+
+    def _note(self, change: Change) -> None:
+        if change not in ("run", "progress"):
+            return
+        with self._lock:
+            now = self._workbench.snapshot()
+            state, sequence = now.run_state, now.sequence
+            if not state.key or sequence is None:
+                return
+            for index, run in enumerate(self._runs):
+                if run.state.key == state.key:
+                    self._runs[index] = replace(run, state=state)
+                    return
+            # one that was overtaken before it showed anything is not worth a row
+            earlier = [r for r in self._runs if r.state.state != "computing" or r.state.done]
+            self._counted += 1
+            changes = len(table.changed(now.parameters, now.defaults))
+            at = time.strftime("%H:%M:%S")
+            new = PastRun(self._counted, at, sequence.name, now.parameters, changes, state)
+            self._runs = [new, *earlier][:MOST_RUNS]
