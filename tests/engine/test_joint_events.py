@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.optimize import linear_sum_assignment
 
 from tests.engine.test_association import exact, problem
 from tracker import association
@@ -158,6 +159,22 @@ def test_the_second_simplified_event_is_the_best_without_the_pairs_of_the_first(
     assert_allclose(marginal.detected, np.array([[48.0, 12.0], [12.0, 48.0]]) / total)
     # of the events left out, one target's measurement and the other missed, nothing is left
     assert_allclose(marginal.missed, 1e-4 / total)
+
+
+@pytest.mark.parametrize(("size", "gated"), [(7, 0.0), (30, 0.0), (30, 0.7), (30, 0.97)])
+def test_each_simplified_event_is_the_heaviest_matching_of_what_is_left(
+    size: int, gated: float
+) -> None:
+    missed, detected, unexplained = problem(size, size, size + 2, gated=gated)
+    weights = np.log1p(detected / missed[:, None] / unexplained)
+    for sources in simplified_murty(missed, detected, unexplained).sources:
+        there = np.flatnonzero(sources >= 0)
+        rows, columns = linear_sum_assignment(weights, maximize=True)
+        assert_allclose(
+            weights[sources[there], there].sum(), weights[rows, columns].sum(), rtol=1e-9
+        )
+        weights[sources[there], there] = 0.0
+    assert not weights.any()
 
 
 def test_indicators_of_an_event() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.association import kernels
+from tracker.association import disjoint_kernels, kernels
 from tracker.association.belief_propagation import Marginals
 
 
@@ -88,7 +88,7 @@ def simplified_murty(
     weights = np.zeros((size, size))
     weights[:targets, :measurements] = np.log1p(detected / missed[:, None] / unexplained)
     most = max(1, targets + measurements) if count is None else count
-    columns = kernels.disjoint_matchings(weights, most)
+    columns = disjoint_kernels.disjoint_matchings(weights, most)
     columns[columns < 0] = measurements
     return JointEvents(_sources(columns, targets, measurements), targets)
 

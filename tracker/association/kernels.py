@@ -129,39 +129,6 @@ def assign(
 
 
 @_kernel
-def disjoint_matchings(weights: ndarray, count: int) -> ndarray:
-    """Matchings one after the other, each the heaviest without the pairs of those before.
-
-    Args:
-        weights: (N, N), 0 where there is no pair; changed: what was found becomes 0.
-        count: At most so many.
-
-    Returns:
-        (K, N) the column of each row, -1 where its pair has no weight; the last is the
-        only one that may be without pairs.
-    """
-    size = weights.shape[0]
-    found = np.empty((count, size), dtype=np.int64)
-    cost = -weights
-    row_duals, column_duals = np.zeros(size), np.zeros(size)
-    column_of = np.empty(size, dtype=np.int64)
-    row_of = np.empty(size, dtype=np.int64)
-    for k in range(count):
-        # dearer pairs leave the columns' duals feasible: each search starts from the last
-        assign(cost, row_duals, column_duals, column_of, row_of)
-        pairs = 0
-        for i in range(size):
-            found[k, i] = -1
-            if cost[i, column_of[i]] < 0.0:
-                found[k, i] = column_of[i]
-                cost[i, column_of[i]] = 0.0
-                pairs += 1
-        if pairs == 0:
-            return found[: k + 1].copy()
-    return found
-
-
-@_kernel
 def best_matchings(cost: ndarray, branching: int, count: int) -> ndarray:
     """The cheapest matchings of all rows to all columns that differ in the first rows ([M68]).
 
