@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from tracker import single_view
 from tracker.run import Cancelled, Run
 from tracker.sequences.frames import FrameReader
+from tracker.single_view.likeness import Likeness
 from tracker.single_view.protocol import SingleViewMethod, ViewResult
 
 BLOCK = 5
@@ -92,6 +94,7 @@ class _CameraWorker:
         self._seed = run.seed
         self._stopped = stopped
         self._pictures = reader.iterate(camera, self._frame) if method.needs_pictures else None
+        self._likeness = Likeness.of(run.sequence, reader) if method.needs_pictures else None
 
     def block(self) -> list[tuple[ViewResult, Any]]:
         """The next few steps: result and state of each; none at the end."""
@@ -100,6 +103,9 @@ class _CameraWorker:
             picture = next(self._pictures, None) if self._pictures is not None else None
             rng = np.random.default_rng((self._seed, self._camera, self._frame))
             self._state, result = self._method.step(self._state, self._frame, picture, rng)
+            if picture is not None and self._likeness is not None:
+                likenesses = self._likeness.of_boxes(picture, result.boxes)
+                result = replace(result, likenesses=likenesses)
             done.append((result, self._state))
             self._frame += 1
         return done

@@ -143,3 +143,4 @@ def test_heads_on_real_video(data_folder: Path, seed: int) -> None:
     assert number(found, "found_share") >= 0.9
     assert number(found, "position_error") <= 0.1
     assert number(found, "false_per_step") <= 0.1
+    assert number(found, "idf1") >= 0.7

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
-from scipy.special import softmax
 
 from tracker import mean_shift
 from tracker.gaussian_mixture import GaussianMixture
@@ -36,8 +35,6 @@ class Peaks:
     boxes: Float[ndarray, "M 4"]
     scores: Float[ndarray, " M"]
     """Likelihood of each relative to that of a template's own colours, 0 … 1."""
-    likenesses: Float[ndarray, "M P"]
-    """Probability that each is of each person with templates, by the colours alone."""
     samples: Float[ndarray, "S 4"]
     sample_weights: Float[ndarray, " S"]
     """Relative to the largest."""
@@ -120,7 +117,6 @@ class PeakFinder:
         return state, Peaks(
             boxes=boxes,
             scores=np.exp(-0.5 * (distances / self._parameters.likelihood_sigma) ** 2),
-            likenesses=self._likenesses(scene, boxes),
             samples=samples,
             sample_weights=(
                 np.exp(scores.max(axis=1) - scores.max()) if len(scores) else np.zeros(0)
@@ -195,12 +191,6 @@ class PeakFinder:
             )
             found.append(peaks)
         return np.concatenate(found)
-
-    def _likenesses(self, scene: Scene, boxes: Float[ndarray, "M 4"]) -> Float[ndarray, "M P"]:
-        """p_g ∝ exp(−D_g² / 2σ²)."""
-        distances = self._appearance.distances(scene, boxes)
-        scores = -0.5 * (distances / self._parameters.likelihood_sigma) ** 2
-        return np.asarray(softmax(scores, axis=1)) if len(boxes) else np.zeros(distances.shape)
 
     def _accept(
         self, scene: Scene, candidates: Float[ndarray, "M 4"]

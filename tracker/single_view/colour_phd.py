@@ -188,8 +188,5 @@ class ColourPhd:
             samples=samples.astype(np.float32),
             sample_weights=sample_weights.astype(np.float32),
             information={**information, "cardinality": mixture.cardinality},
-            likenesses=(
-                peaks.likenesses if peaks is not None and p.output == "peaks" else np.zeros((0, 0))
-            ),
             foreground=None if peaks is None or peaks.mask is None else pack(peaks.mask),
         )

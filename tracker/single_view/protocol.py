@@ -60,7 +60,8 @@ class ViewResult:
     it; None where it asked for none or there was no picture."""
     likenesses: Float[ndarray, "N P"] = field(default_factory=lambda: np.zeros((0, 0)))
     """Probability that the colours of each box are those of each of P people with templates,
-    if they are one's; (0, 0) where the method does not tell."""
+    if they are one's; (0, 0) where there was no picture, or fewer than two have templates. A
+    method leaves it: :mod:`tracker.single_view.likeness` tells it of all."""
 
     @staticmethod
     def of_boxes(
