@@ -66,11 +66,21 @@ class GaussianMixture:
 
     def take(self, indices: ndarray | slice) -> GaussianMixture:
         """The components at ``indices`` (integers, a mask or a slice), in that order."""
+        if isinstance(indices, slice):
+            return GaussianMixture(
+                self.weights[indices],
+                self.means[indices],
+                self.covariances[indices],
+                self.labels[indices],
+            )
+        if indices.dtype == np.bool_:
+            indices = indices.nonzero()[0]
+        # several times faster than brackets, which prepare for any kind of index
         return GaussianMixture(
-            self.weights[indices],
-            self.means[indices],
-            self.covariances[indices],
-            self.labels[indices],
+            self.weights.take(indices),
+            self.means.take(indices, 0),
+            self.covariances.take(indices, 0),
+            self.labels.take(indices),
         )
 
     def renamed(self, names: dict[int, int]) -> GaussianMixture:
@@ -118,7 +128,7 @@ def predict(
 
 def prune(mixture: GaussianMixture, threshold: float) -> Int[ndarray, " K"]:
     """Indices of the components whose weight is at least ``threshold``, in order."""
-    return np.flatnonzero(mixture.weights >= threshold)
+    return (mixture.weights >= threshold).nonzero()[0]
 
 
 def merge(
@@ -153,7 +163,7 @@ def merge(
         raise ValueError(f"threshold must be >= 0 (squared Mahalanobis distance), got {threshold}")
     if mixture.size == 0:
         return mixture, np.zeros(0, dtype=np.int64)
-    order = np.argsort(-mixture.weights, kind="stable")
+    order = mixture_kernels.heaviest_first(mixture.weights)
     if owners is None:
         owners = np.full(mixture.size, -1, dtype=np.int64)
     group, leaders = mixture_kernels.merge_groups(
@@ -162,7 +172,7 @@ def merge(
     weights, means, covariances = kernels.merge_moments(
         mixture.weights, mixture.means, mixture.covariances, group, len(leaders)
     )
-    return GaussianMixture(weights, means, covariances, mixture.labels[leaders]), leaders
+    return GaussianMixture(weights, means, covariances, mixture.labels.take(leaders)), leaders
 
 
 def reduce(
@@ -194,9 +204,9 @@ def reduce(
     merged, leaders = merge(
         mixture.take(kept), merging_threshold, None if owners is None else owners[kept]
     )
-    heaviest = np.argsort(-merged.weights, kind="stable")[:max_components]
+    heaviest = mixture_kernels.heaviest_first(merged.weights)[:max_components]
     reduced = merged.take(heaviest)
     if reduced.size < merged.size:
         weights = reduced.weights * (merged.cardinality / reduced.cardinality)
         reduced = GaussianMixture(weights, reduced.means, reduced.covariances, reduced.labels)
-    return reduced, kept[leaders[heaviest]]
+    return reduced, kept.take(leaders.take(heaviest))

@@ -23,6 +23,12 @@ _CLASSES = 16
 """Components whose reach agrees within a factor of two share a grid: a few very wide ones do
 not make the search wide for all."""
 
+_FEW = 48
+"""Up to so many weights are sorted by insertion."""
+
+_DIGIT = 11
+"""Bits that one pass of sorting looks at."""
+
 
 @_kernel
 def predict(
@@ -61,6 +67,57 @@ def predict(
                 spread[j, a, b] = total
                 spread[j, b, a] = total
     return moved, spread
+
+
+@_kernel
+def heaviest_first(weights: ndarray) -> ndarray:
+    """Indices of weights (J,), none negative, heaviest first; of equal ones the first comes first.
+
+    Few are sorted by insertion. Of many the bits are: those of a positive number are in the
+    order of the numbers, so a pass for each eleven of them, from the lowest, does it.
+    """
+    size = len(weights)
+    order = np.arange(size)
+    if size <= _FEW:
+        for k in range(1, size):
+            i = order[k]
+            place = k
+            while place > 0 and weights[order[place - 1]] < weights[i]:
+                order[place] = order[place - 1]
+                place -= 1
+            order[place] = i
+        return order
+    # a negative zero becomes a positive one; what is heavier becomes what is smaller
+    keys = ~((weights + 0.0).view(np.uint64))
+    other = np.empty(size, dtype=np.int64)
+    mask = np.uint64((1 << _DIGIT) - 1)
+    begins = np.empty((1 << _DIGIT) + 1, dtype=np.int64)
+    for shift in range(0, 64, _DIGIT):
+        places = np.uint64(shift)
+        begins[:] = 0
+        for i in range(size):
+            begins[np.int64((keys[i] >> places) & mask) + 1] += 1
+        if begins[np.int64((keys[0] >> places) & mask) + 1] == size:
+            continue  # all agree
+        for digit in range(1 << _DIGIT):
+            begins[digit + 1] += begins[digit]
+        for k in range(size):
+            own = np.int64((keys[order[k]] >> places) & mask)
+            other[begins[own]] = order[k]
+            begins[own] += 1
+        order, other = other, order
+    return order
+
+
+@_kernel
+def heaviest_of_groups(weights: ndarray, group: ndarray, count: int) -> ndarray:
+    """The heaviest of each group 0 … count - 1, of equal ones the last; -1 where it is empty."""
+    heaviest = np.full(count, -1, dtype=np.int64)
+    for i in range(len(weights)):
+        best = heaviest[group[i]]
+        if best < 0 or weights[i] >= weights[best]:
+            heaviest[group[i]] = i
+    return heaviest
 
 
 @_kernel

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker import extraction_kernels, kernels, phd_kernels
+from tracker import extraction_kernels, kernels, mixture_kernels, phd_kernels
 from tracker.gaussian_mixture import GaussianMixture, concatenate
 from tracker.update_kernels import Alternative
 
@@ -96,7 +96,7 @@ def update(
         gate,
         *(other or Alternative.none(noise.shape[1], predicted.dimension)),
     )
-    posterior = GaussianMixture(weights, means, covariances, predicted.labels[parents])
+    posterior = GaussianMixture(weights, means, covariances, predicted.labels.take(parents))
     return PhdUpdate(posterior, parents, sources, log_odds, sums)
 
 
@@ -107,8 +107,8 @@ def _filled(value: float | Float[ndarray, " N"], count: int) -> Float[ndarray, "
 
 def extract(mixture: GaussianMixture, threshold: float) -> Int[ndarray, " K"]:
     """Indices of the components heavier than ``threshold``, heaviest first ([ZW21] §2.4)."""
-    above = np.flatnonzero(mixture.weights > threshold)
-    return above[np.argsort(-mixture.weights[above], kind="stable")]
+    above = (mixture.weights > threshold).nonzero()[0]
+    return above.take(mixture_kernels.heaviest_first(mixture.weights.take(above)))
 
 
 def extract_measured(
@@ -146,18 +146,14 @@ def extract_measured(
         updated.measurement_weights,
         threshold,
     )
-    pairs = np.flatnonzero(group >= 0)
+    pairs = (group >= 0).nonzero()[0]
+    payers = updated.posterior.take(size + pairs)
+    group, spent = group.take(pairs), spent.take(pairs)
     weights, means, covariances = kernels.merge_moments(
-        spent[pairs],
-        updated.posterior.means[size + pairs],
-        updated.posterior.covariances[size + pairs],
-        group[pairs],
-        count,
+        spent, payers.means, payers.covariances, group, count
     )
-    labels = np.zeros(count, dtype=np.int64)
-    order = pairs[np.argsort(spent[pairs], kind="stable")]
-    labels[group[order]] = updated.posterior.labels[size + order]  # the heaviest stays
-    missed = np.flatnonzero(updated.posterior.weights[:size] > threshold)
+    labels = payers.labels.take(mixture_kernels.heaviest_of_groups(spent, group, count))
+    missed = (updated.posterior.weights[:size] > threshold).nonzero()[0]
     return concatenate(
         [GaussianMixture(weights, means, covariances, labels), updated.posterior.take(missed)]
     )

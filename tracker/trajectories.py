@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker import kernels, phd
+from tracker import kernels, mixture_kernels, phd
 from tracker.fusion.protocol import FusionResult
 from tracker.gaussian_mixture import GaussianMixture
 from tracker.sequences.sequence import Room
@@ -153,13 +153,11 @@ def by_boxes(result: FusionResult) -> tuple[GaussianMixture, Int[ndarray, " K"]]
     rest = np.flatnonzero(group < 0)
     group[rest] = count + np.arange(len(rest))
     count += len(rest)
-    order = np.argsort(posterior.weights, kind="stable")
-    leaders = np.zeros(count, dtype=np.int64)
-    leaders[group[order]] = order  # the heaviest comes last and stays
+    leaders = mixture_kernels.heaviest_of_groups(posterior.weights, group, count)
     weights, means, covariances = kernels.merge_moments(
         posterior.weights, posterior.means, posterior.covariances, group, count
     )
-    return GaussianMixture(weights, means, covariances, posterior.labels[leaders]), leaders
+    return GaussianMixture(weights, means, covariances, posterior.labels.take(leaders)), leaders
 
 
 def concatenate(parts: Iterable[Trajectories], cameras: int) -> Trajectories:

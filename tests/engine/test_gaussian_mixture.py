@@ -217,3 +217,18 @@ def test_shapes_that_do_not_fit_are_refused(
         GaussianMixture(
             np.zeros(weights), np.zeros(means), np.zeros(covariances), np.zeros(labels, int)
         )
+
+
+@pytest.mark.parametrize("size", [0, 1, 2, 48, 49, 700])
+def test_the_heaviest_come_first_and_equal_ones_in_order(size: int) -> None:
+    rng = np.random.default_rng(size)
+    spread = rng.choice([0.0, -0.0, 1e-300, 1e-9, 0.5, 0.5, 1.0, 3.0, np.inf], size)
+    for weights in (spread, rng.exponential(1.0, size), np.full(size, 0.25)):
+        order = mixture_kernels.heaviest_first(weights)
+        assert_array_equal(order, np.argsort(-weights, kind="stable"))
+
+
+def test_the_heaviest_of_each_group_and_of_equal_ones_the_last() -> None:
+    weights = np.array([0.2, 0.7, 0.7, 0.1, 0.0])
+    group = np.array([0, 2, 2, 0, 3])
+    assert_array_equal(mixture_kernels.heaviest_of_groups(weights, group, 5), [0, -1, 2, 4, -1])

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker import gaussian_mixture, kernels, models, phd
+from tracker import gaussian_mixture, kernels, mixture_kernels, models, phd
 from tracker.fusion import memory, one_person
 from tracker.fusion.measurement_births import CameraEvidence
 from tracker.fusion.memory import Memory
@@ -176,9 +176,7 @@ class SequentialPhd:
         labels, label = kernels.group_labels(mixture.labels)
         held = np.bincount(label, mixture.weights, len(labels))
         # the heaviest component of a label has the last word on where its person is
-        order = np.argsort(mixture.weights, kind="stable")
-        heaviest = np.zeros(len(labels), dtype=np.int64)
-        heaviest[label[order]] = order
+        heaviest = mixture_kernels.heaviest_of_groups(mixture.weights, label, len(labels))
         double = self._model.doubles(
             mixture.means[heaviest], held, labels, record.sources[:, heaviest]
         )
