@@ -108,6 +108,56 @@ def expected_boxes(
 
 
 @_kernel
+def low_boxes(
+    states: ndarray,
+    standing: ndarray,
+    noise: ndarray,
+    half_height: float,
+    half_width: float,
+    size: int,
+    image_size: tuple[int, int],
+    rotation: ndarray,
+    translation: ndarray,
+    intrinsics: ndarray,
+    distortion: ndarray,
+    nearest_depth: float,
+    largest_radius: float,
+) -> tuple[ndarray, ndarray, ndarray]:
+    """The box that a camera should give of each target if it is low, and how far it may be off.
+
+    Args:
+        states: (J, d), position first, world metres.
+        standing: (J, 4), the boxes of the same targets upright.
+        noise: (m, m), of a box one pixel high.
+        half_height: As the further ones, of :func:`expected_boxes`, of the low target.
+
+    Returns:
+        (J, m) values, infinite where there is nothing to see, (J, m, d) derivatives and
+        (J, m, m) noise, squared pixels.
+    """
+    values, jacobians, _, _, valid = expected_boxes(
+        states,
+        half_height,
+        half_width,
+        size,
+        image_size,
+        rotation,
+        translation,
+        intrinsics,
+        distortion,
+        nearest_depth,
+        largest_radius,
+    )
+    spreads = np.empty((len(states), size, size))
+    for j in range(len(states)):
+        if not valid[j]:
+            values[j] = np.inf  # beyond every gate
+        scale = max((standing[j, 3] - standing[j, 1]) / 2.0, 1.0)
+        spreads[j] = scale * scale * noise
+    return values, jacobians, spreads
+
+
+@_kernel
 def inside_probability(
     boxes: ndarray,
     jacobians: ndarray,

@@ -116,6 +116,51 @@ def group_labels(labels: ndarray) -> tuple[ndarray, ndarray]:
 
 
 @_kernel
+def doubles(
+    means: ndarray,
+    weights: ndarray,
+    labels: ndarray,
+    sources: ndarray,
+    near: float,
+    confirmed: float,
+) -> ndarray:
+    """Which of n people only repeat a surer or older one at the same place.
+
+    Args:
+        means: (n, d), position first.
+        weights: (n,).
+        labels: (n,); the smaller one is older.
+        sources: (C, n), the box that each camera gave each, -1 for none.
+        near: Two nearer than this are one, unless some camera gave each a box of its own; two
+            nearer than half of it even so.
+        confirmed: Whoever has more weight is sure, and is never displaced by an unsure one.
+    """
+    size, cameras = len(means), len(sources)
+    double = np.zeros(size, dtype=np.bool_)
+    for i in range(size):
+        for j in range(size):
+            if i == j:
+                continue
+            sure, other_sure = weights[i] > confirmed, weights[j] > confirmed
+            yields = labels[i] > labels[j] if sure == other_sure else other_sure
+            if not yields:
+                continue
+            distance = 0.0
+            for axis in range(3):
+                distance += (means[i, axis] - means[j, axis]) ** 2
+            if not distance < near * near:
+                continue
+            parted = False
+            for c in range(cameras):
+                if sources[c, i] >= 0 and sources[c, j] >= 0 and sources[c, i] != sources[c, j]:
+                    parted = True
+            if not parted or distance < (near / 2.0) * (near / 2.0):
+                double[i] = True
+                break
+    return double
+
+
+@_kernel
 def sum_pairs(
     labels: ndarray, cameras: ndarray, of_pairs: ndarray, boxes: ndarray, weights: ndarray
 ) -> tuple[ndarray, ndarray, ndarray, ndarray]:

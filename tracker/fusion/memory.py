@@ -72,31 +72,34 @@ def recall(
     labels = mixture.labels
     if model.parameters.memory == 0.0:
         return labels, memory
-    bearers = _first_of_each(labels, np.flatnonzero(mixture.weights > CONFIRMED))
+    bearers = _first_of_each(labels, (mixture.weights > CONFIRMED).nonzero()[0])
     missing = _missing(memory, labels[bearers], model, first_label)
     if missing.lost.size and len(bearers):
         labels, back = _returned(missing, mixture.take(bearers), labels)
         missing = missing.take(~back)
     known = GaussianMixture(
-        mixture.weights[bearers],
-        mixture.means[bearers],
-        mixture.covariances[bearers],
-        labels[bearers],
+        mixture.weights.take(bearers),
+        mixture.means.take(bearers, 0),
+        mixture.covariances.take(bearers, 0),
+        labels.take(bearers),
     )
     return labels, Memory(known, missing.lost, missing.ages, missing.newer)
 
 
 def _first_of_each(labels: Int[ndarray, " J"], among: Int[ndarray, " K"]) -> Int[ndarray, " L"]:
     """The first of some components of each label."""
-    _, first = np.unique(labels[among], return_index=True)
-    return among[first]
+    first: dict[int, int] = {}
+    for index, label in zip(among.tolist(), labels.take(among).tolist(), strict=True):
+        first.setdefault(label, index)
+    return np.array([first[label] for label in sorted(first)], dtype=np.int64)
 
 
 def _missing(
     memory: Memory, present: Int[ndarray, " L"], model: FusionModel, first_label: int
 ) -> Memory:
     """Who of the lost and of the known is not present, where he may be now: the new lost."""
-    away = ~np.isin(memory.known.labels, present)
+    there = set(present.tolist())
+    away = np.array([label not in there for label in memory.known.labels.tolist()], dtype=bool)
     count = int(away.sum())
     if not count and not memory.lost.size:
         return memory

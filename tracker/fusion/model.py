@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.stats import chi2
 
-from tracker import models
+from tracker import kernels, models
 from tracker.fusion import visibility
 from tracker.fusion.measurement_births import CameraEvidence, MeasurementBirths, Newborns
 from tracker.fusion.target_model import ExpectedBoxes, TargetModel
@@ -138,18 +138,7 @@ class FusionModel:
         around one person, and two people cannot stand in one place. Among sure ones
         the older label stays; an unsure one never displaces a sure one.
         """
-        if len(means) < 2:
-            return np.zeros(len(means), dtype=bool)
-        offsets = means[:, None, :3] - means[None, :, :3]
-        distances = (offsets**2).sum(axis=2)
-        np.fill_diagonal(distances, np.inf)
-        near = distances < self.near**2
-        if not near.any():
-            return np.zeros(len(means), dtype=bool)
-        both = (sources[:, :, None] >= 0) & (sources[:, None, :] >= 0)
-        parted = (both & (sources[:, :, None] != sources[:, None, :])).any(axis=0)
-        older = labels[:, None] > labels[None, :]
-        sure = weights > CONFIRMED
-        yields = np.where(sure[:, None] == sure[None, :], older, sure[None, :])
-        one = near & (~parted | (distances < (self.near / 2.0) ** 2))
-        return np.asarray((one & yields).any(axis=1))
+        found: ndarray = kernels.doubles(
+            means, weights, labels, np.ascontiguousarray(sources), self.near, CONFIRMED
+        )
+        return found

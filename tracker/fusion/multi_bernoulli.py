@@ -14,18 +14,19 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker import gaussian_mixture, kernels, models, phd, pmb
-from tracker.fusion import memory, names
+from tracker import association, bernoulli_kernels, gaussian_mixture, mixture_kernels, models
+from tracker.fusion import memory, names, visibility
 from tracker.fusion.measurement_births import CameraEvidence
 from tracker.fusion.memory import Memory
 from tracker.fusion.model import CONFIRMED, FusionModel
 from tracker.fusion.names import Names
 from tracker.fusion.protocol import FusionResult
-from tracker.fusion.record import Ledger, Record
+from tracker.fusion.record import WORTH_TELLING, Ledger, Record
 from tracker.gaussian_mixture import GaussianMixture
 from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
+from tracker.update_kernels import Alternative
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +64,7 @@ class _Work:
     def take(self, indices: ndarray) -> None:
         """Keep some tracks, in that order."""
         self.tracks, self.record = self.tracks.take(indices), self.record.take(indices)
-        self.occluders = self.occluders[indices]
+        self.occluders = self.occluders.take(indices)
 
 
 class MultiBernoulli:
@@ -111,100 +112,85 @@ class MultiBernoulli:
 
     def _update(self, work: _Work, index: int, view: ViewResult) -> None:
         """The update of all tracks, and of the undetected, by the boxes of one camera."""
-        model, tracks, record = self._model, work.tracks, work.record
-        values, noises = model.target.measured(view, self._parameters.measurement_sigma)
-        expected = model.expected(index, tracks)
-        seen = model.visible(index, expected, tracks, work.occluders)
-        newcomer, newborns = self._undetected(work, index, values, noises)
-        updated = pmb.update(
-            tracks,
-            values,
-            expected=expected.values,
-            jacobians=expected.jacobians,
-            noise=noises,
-            spread=expected.spreads,
-            detection_probability=seen.detection_probabilities,
-            unexplained_intensity=model.clutter[index] / (1.0 - newcomer),  # κ + e
-            gate=model.gate,
-            other=expected.other,
+        p, model, tracks, unseen = self._parameters, self._model, work.tracks, work.undetected
+        values, noises = model.target.measured(view, p.measurement_sigma)
+        expected = model.target.expected(
+            model.cameras[index],
+            np.concatenate([unseen.means, tracks.means]),
+            np.concatenate([unseen.covariances, tracks.covariances]),
         )
-        marginals = updated.marginals
-        work.tracks = updated.tracks
-        record.detection_probabilities[index] = seen.detection_probabilities
-        record.hidden_by[index] = seen.hidden_by
-        if len(values) and tracks.size:
-            best = marginals.detected.argmax(axis=1)
-            share = marginals.detected[np.arange(tracks.size), best]
-            found = share > marginals.missed
-            record.sources[index] = np.where(found, best, -1)
-            record.source_weights[index] = np.where(found, share, 0.0)
-            who, what = np.nonzero(marginals.detected)
-            work.ledger.add(index, tracks.labels[who], what, marginals.detected[who, what])
-        work.evidence.append(model.evidence(index, view, values, noises, marginals.unexplained))
-        self._begin_tracks(work, index, newborns, marginals.unexplained * newcomer)
+        (
+            existences, means, covariances, chances, hidden_by, best, shares,
+            left, newcomer, born_means, born_covariances, unexplained,
+            who, what, chance,
+        ) = bernoulli_kernels.update_by_camera(
+            unseen.weights,
+            unseen.means,
+            unseen.covariances,
+            tracks.weights,
+            tracks.means,
+            tracks.covariances,
+            tracks.labels,
+            work.occluders,
+            values,
+            noises,
+            model.clutter[index],
+            model.gate,
+            expected.values,
+            expected.jacobians,
+            expected.spreads,
+            expected.boxes,
+            expected.depths,
+            expected.valid,
+            *(expected.other or Alternative.none(values.shape[1], unseen.dimension)),
+            model.cameras[index].image_size,
+            p.edge == "soft",
+            p.detection_probability,
+            CONFIRMED,
+            p.occlusion,
+            model.near,
+            visibility.WORTH_TELLING,
+            association.TOLERANCE,
+            association.ITERATIONS,
+            WORTH_TELLING,
+        )  # fmt: skip
+        work.tracks = GaussianMixture(existences, means, covariances, tracks.labels)
+        work.undetected = GaussianMixture(left, unseen.means, unseen.covariances, unseen.labels)
+        record = work.record
+        record.detection_probabilities[index] = chances
+        record.hidden_by[index] = hidden_by
+        record.sources[index] = best
+        record.source_weights[index] = shares
+        work.ledger.add(index, tracks.labels.take(who), what, chance)
+        work.evidence.append(model.evidence(index, view, values, noises, unexplained))
+        self._begin_tracks(work, index, born_means, born_covariances, unexplained * newcomer)
 
-    def _undetected(
+    def _begin_tracks(
         self,
         work: _Work,
         index: int,
-        values: Float[ndarray, "M m"],
-        noises: Float[ndarray, "M m m"],
-    ) -> tuple[Float[ndarray, " M"], GaussianMixture]:
-        """Update the people not yet detected by one camera.
-
-        Returns:
-            e_j / (κ + e_j) for each box: the share of the unexplained that is a
-            newcomer; and where that newcomer would be, one Gaussian a box (nowhere, all 0,
-            where none can be).
-        """
-        intensity, model = work.undetected, self._model
-        count = len(values)
-        expected = model.expected(index, intensity)
-        updated = phd.update(
-            intensity,
-            values,
-            expected=expected.values,
-            jacobians=expected.jacobians,
-            noise=noises,
-            spread=expected.spreads,
-            detection_probability=model.chances(index, expected, intensity),
-            clutter_intensity=model.clutter[index],
-            gate=model.gate,
-            other=expected.other,
-        )
-        posterior = updated.posterior
-        work.undetected = posterior.take(slice(intensity.size))
-        pairs = slice(intensity.size, None)
-        newborns = GaussianMixture(
-            *kernels.merge_moments(
-                posterior.weights[pairs],
-                posterior.means[pairs],
-                posterior.covariances[pairs],
-                updated.measurements[pairs],
-                count,
-            ),
-            labels=np.zeros(count, dtype=np.int64),
-        )
-        return np.minimum(updated.measurement_weights, 1.0 - 1e-9), newborns
-
-    def _begin_tracks(
-        self, work: _Work, index: int, newborns: GaussianMixture, existences: Float[ndarray, " M"]
+        means: Float[ndarray, "M d"],
+        covariances: Float[ndarray, "M d d"],
+        existences: Float[ndarray, " M"],
     ) -> None:
         """A track for every box that may be a newcomer's, with its existence."""
-        chosen = np.flatnonzero(existences > self._parameters.pruning_threshold)
+        chosen = (existences > self._parameters.pruning_threshold).nonzero()[0]
         if not len(chosen):
             return
         first = work.tracks.size
-        newborns = newborns.take(chosen)
+        nameless = np.zeros(len(chosen), dtype=np.int64)
         work.add(
             GaussianMixture(
-                existences[chosen], newborns.means, newborns.covariances, newborns.labels
+                existences.take(chosen),
+                means.take(chosen, 0),
+                covariances.take(chosen, 0),
+                nameless,
             )
         )
         work.record.sources[index, first:] = chosen
         work.record.source_weights[index, first:] = 1.0
         work.record.detection_probabilities[index, first:] = self._parameters.detection_probability
-        work.ledger.add(index, work.tracks.labels[first:], chosen, existences[chosen])
+        work.ledger.add(index, work.tracks.labels[first:], chosen, existences.take(chosen))
 
     def _add_newborns(self, work: _Work, first_new_label: int) -> None:
         """Begin tracks where unexplained boxes of several cameras agree on a place."""
@@ -228,17 +214,16 @@ class MultiBernoulli:
         """Drop the faint, the strayed and the doubles; the rest is the step's posterior."""
         p, weights = self._parameters, work.tracks.weights
         alive = self._model.stays(work.tracks)
-        alive = alive[weights[alive] >= p.pruning_threshold]
-        work.take(alive[np.argsort(-weights[alive], kind="stable")][: p.max_components])
+        alive = alive.compress(weights.take(alive) >= p.pruning_threshold)
+        order = mixture_kernels.heaviest_first(weights.take(alive))[: p.max_components]
+        work.take(alive.take(order))
         tracks = work.tracks
-        work.take(
-            np.flatnonzero(
-                ~self._model.doubles(
-                    tracks.means, tracks.weights, tracks.labels, work.record.sources
-                )
-            )
+        double = self._model.doubles(
+            tracks.means, tracks.weights, tracks.labels, work.record.sources
         )
-        tracks = work.tracks
+        if double.any():
+            work.take((~double).nonzero()[0])
+            tracks = work.tracks
         labels, lost = memory.recall(state.memory, tracks, self._model, state.next_label)
         posterior = GaussianMixture(tracks.weights, tracks.means, tracks.covariances, labels)
         associations = work.ledger.associations(tracks.labels)

@@ -12,7 +12,7 @@ from tracker import kernels
 from tracker.fusion.protocol import Associations, FusionResult
 from tracker.gaussian_mixture import GaussianMixture
 
-_WORTH_TELLING = 0.01
+WORTH_TELLING = 0.01
 """Association probability below which a pair is not kept."""
 
 
@@ -34,10 +34,10 @@ class Record:
     def take(self, indices: ndarray) -> Record:
         """The columns of some components, in that order, as a copy."""
         return Record(
-            self.detection_probabilities[:, indices],
-            self.sources[:, indices],
-            self.source_weights[:, indices],
-            self.hidden_by[:, indices],
+            self.detection_probabilities.take(indices, 1),
+            self.sources.take(indices, 1),
+            self.source_weights.take(indices, 1),
+            self.hidden_by.take(indices, 1),
         )
 
     def extended(self, count: int) -> Record:
@@ -79,11 +79,13 @@ class Ledger:
         probabilities: Float[ndarray, " A"],
     ) -> None:
         """Note one camera's pairs of label and box; pairs not worth telling are left out."""
-        told = np.flatnonzero(probabilities >= _WORTH_TELLING)
+        told = (probabilities >= WORTH_TELLING).nonzero()[0]
+        if not len(told):
+            return
         self._cameras.append(np.full(len(told), camera, dtype=np.int64))
-        self._labels.append(labels[told])
-        self._boxes.append(boxes[told])
-        self._probabilities.append(probabilities[told])
+        self._labels.append(labels.take(told))
+        self._boxes.append(boxes.take(told))
+        self._probabilities.append(probabilities.take(told))
 
     def associations(self, labels: Int[ndarray, " J"]) -> Associations:
         """The pairs of those labels that lived on; several of one label and box are summed.

@@ -145,17 +145,20 @@ class TargetModel:
 
         ``boxes`` are theirs if they stood.
         """
-        values, jacobians, _, _, valid = self._project(
-            camera,
-            states,
+        values, jacobians, spreads = box_kernels.low_boxes(
+            np.ascontiguousarray(states, dtype=float),
+            boxes,
+            self._low_noise,
             _LOW_HALF_HEIGHT * self.half_height,
             _LOW_HALF_WIDTH * self.half_height,
+            self.size,
+            camera.image_size,
+            *camera.numbers,
+            NEAREST_DEPTH,
+            camera.largest_radius,
         )
-        values[~valid] = np.inf  # beyond every gate
-        scale = np.maximum((boxes[:, 3] - boxes[:, 1]) / 2.0, 1.0)
         drift = np.zeros((states.shape[1], states.shape[1]))
         drift[2, 2] = (_DROP * self.half_height) ** 2
-        spreads = scale[:, None, None] ** 2 * self._low_noise
         return Alternative(values, jacobians, spreads, drift, self._low_share)
 
     def _project(

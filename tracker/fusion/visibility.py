@@ -13,7 +13,7 @@ from tracker.camera import Camera
 from tracker.fusion.target_model import ExpectedBoxes
 from tracker.gaussian_mixture import GaussianMixture
 
-_WORTH_TELLING = 0.2
+WORTH_TELLING = 0.2
 """Share of a target's box that must be covered for its occluder to be named."""
 
 
@@ -97,6 +97,6 @@ def visibility(
             weights,
             near,
             strength,
-            _WORTH_TELLING,
+            WORTH_TELLING,
         )
     )
