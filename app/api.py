@@ -15,6 +15,7 @@ from app.errors import ApiError, ErrorBody, sentence
 from app.history import History
 from app.jobs import Jobs
 from app.pictures import Pictures
+from app.presets import OwnPresets
 from app.timeline import BUCKETS, Timelines, Window
 from app.workbench import Workbench
 from tracker import export
@@ -45,6 +46,11 @@ def _jobs(request: Request) -> Jobs:
     return jobs
 
 
+def _own_presets(request: Request) -> OwnPresets:
+    presets: OwnPresets = request.app.state.presets
+    return presets
+
+
 @dataclass(frozen=True, slots=True)
 class Shown:
     """The part of the steps that somebody looks at, and in how many values a curve."""
@@ -68,6 +74,7 @@ def _shown(
 
 Part = Annotated[Shown, Depends(_shown)]
 Bench = Annotated[Workbench, Depends(_workbench)]
+Own = Annotated[OwnPresets, Depends(_own_presets)]
 Work = Annotated[Jobs, Depends(_jobs)]
 
 
@@ -142,6 +149,27 @@ async def reset_parameters(bench: Bench, wish: models.ResetRequest | None = None
 async def apply_preset(wish: models.PresetRequest, bench: Bench) -> models.State:
     """Take a preset's values, and the defaults where it has none."""
     bench.apply_preset(wish.name, "api")
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/presets")
+def save_preset(wish: models.PresetName, own: Own, bench: Bench) -> models.State:
+    """Save what differs from the defaults now, under a name."""
+    own.save(wish.name)
+    return results.state_of(bench.snapshot())
+
+
+@router.patch("/presets/{name:path}")
+def rename_preset(name: str, wish: models.PresetName, own: Own, bench: Bench) -> models.State:
+    """Give a saved preset another name."""
+    own.rename(name, wish.name)
+    return results.state_of(bench.snapshot())
+
+
+@router.delete("/presets/{name:path}")
+def remove_preset(name: str, own: Own, bench: Bench) -> models.State:
+    """Forget a saved preset."""
+    own.remove(name)
     return results.state_of(bench.snapshot())
 
 

@@ -26,6 +26,8 @@ def state_of(snapshot: Snapshot) -> models.State:
         methods=models.MethodsInfo(
             single_view=parameters.single_view, fusion_method=parameters.fusion_method
         ),
+        presets=list(snapshot.presets),
+        preset=snapshot.preset,
         playhead=snapshot.playhead,
         selection=snapshot.selection,
         layers=dict(snapshot.layers),

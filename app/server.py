@@ -29,11 +29,13 @@ from app.jobs import Jobs, in_background
 from app.likelihood import Likelihoods
 from app.paths import static_folder
 from app.pictures import Pictures
+from app.presets import OwnPresets
 from app.security import CONTENT_POLICY, Guard, allowed_hosts, is_loopback
 from app.stream import Stream
 from app.timeline import Timelines
 from app.workbench import Workbench
 from tracker import __version__
+from tracker.folders import settings_folder
 from tracker.stage_cache import StageCache
 
 if TYPE_CHECKING:
@@ -125,6 +127,8 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     pictures = app.state.pictures = Pictures(workbench)
     app.state.timelines = Timelines()
     app.state.history = History(workbench)
+    own_presets = settings_folder() / "presets.json" if kept else None
+    app.state.presets = OwnPresets(workbench, own_presets)
     app.state.likelihoods = Likelihoods()
     evaluator = app.state.evaluator = Evaluator(workbench)
     told = app.state.stream = Stream(workbench)

@@ -11,14 +11,14 @@ from typing import Any, Literal
 from app.colours import Theme
 from app.evaluation.scores import Scores
 from tracker import parameters as table
-from tracker.parameters import RunParameters
+from tracker.parameters import ParameterError, RunParameters
 from tracker.pipeline import Run
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
 Change = Literal[
     "sequence", "opening", "parameters", "playhead", "selection", "layers", "view", "theme",
-    "run", "progress", "evaluation", "pinned",
+    "run", "progress", "evaluation", "pinned", "presets",
 ]  # fmt: skip
 """What is another now: ``run`` is a run's beginning and its end, ``progress`` its new steps."""
 
@@ -32,6 +32,9 @@ selected, while one is."""
 
 View = int | Literal["top"] | None
 """What the 3D view looks through: a camera by its index, from above, or freely."""
+
+Presets = Mapping[str, Mapping[str, Any]]
+"""A person's own presets: by name, the values by key that were not at their defaults."""
 
 CLAMPED_ORIGIN = "viser"
 """Whose numbers are moved into their range rather than refused: viser clamps nothing itself."""
@@ -97,6 +100,7 @@ class Snapshot:
     """The values that a reset returns to: of methods, those that fit the sequence."""
     parameters_origin: str = ""
     """Who changed the parameters last, so that nobody is told their own news."""
+    presets: Presets = field(default_factory=lambda: MappingProxyType({}))
     playhead: int = 0
     playhead_origin: str = ""
     selection: int | None = None
@@ -111,6 +115,19 @@ class Snapshot:
     view: View = None
     theme: Theme = "dark"
     """Of the 3D view."""
+
+    @property
+    def preset(self) -> str | None:
+        """The preset, built in or saved, whose values the parameters have."""
+        single_view = {"single_view": self.parameters.single_view}
+        for name, values in {**table.PRESETS, **self.presets}.items():
+            try:
+                meant = table.with_values(self.defaults, {**single_view, **values})
+            except ParameterError:  # saved by another version
+                continue
+            if meant == self.parameters:
+                return name
+        return None
 
     @property
     def step_is_computed(self) -> bool:

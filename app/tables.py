@@ -136,7 +136,7 @@ def _curves(snapshot: Snapshot, sequence: Sequence, message: Step) -> str:
         ("Components", message.components, None),
     ]
     if sequence.ground_truth is not None:
-        rows.insert(0, ("People, true", len(message.truth), None))
+        rows.insert(0, ("People, true", sum(person.valid for person in message.truth), None))
     scores = snapshot.scores
     shown = [scores.shown, scores.reference[1] if scores.reference is not None else None]
     for name, words in (

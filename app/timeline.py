@@ -110,20 +110,25 @@ class _Spans:
     first: Int[ndarray, " N"]
     last: Int[ndarray, " N"]
     seen: Bool[ndarray, " N"]
+    cameras: Int[ndarray, "N C"]
+    """In how many of the steps each camera saw it."""
 
     @staticmethod
     def of(tracks: Trajectories, done: int) -> _Spans:
         """Of the first ``done`` steps, sorted by track and step."""
         rows = slice(0, tracks.at(done).start)
         frames, ids = tracks.frames[rows], tracks.ids[rows]
-        seen = np.any(tracks.seen[rows], axis=1)
         order = np.lexsort((frames, ids))
-        frames, ids, seen = frames[order], ids[order], seen[order]
+        frames, ids, each = frames[order], ids[order], tracks.seen[rows][order]
+        seen = np.any(each, axis=1)
         begins = np.ones(len(frames), dtype=bool)
         begins[1:] = (np.diff(ids) != 0) | (np.diff(frames) != 1) | (seen[1:] != seen[:-1])
         starts = np.flatnonzero(begins)
-        ends = np.append(starts[1:], len(frames))[: len(starts)] - 1
-        return _Spans(ids[starts], frames[starts], frames[ends], seen[starts])
+        ends = np.append(starts[1:], len(frames))[: len(starts)]
+        before = np.zeros((len(frames) + 1, each.shape[1]), dtype=np.int64)
+        np.cumsum(each, axis=0, out=before[1:])
+        sights = before[ends] - before[starts]
+        return _Spans(ids[starts], frames[starts], frames[ends - 1], seen[starts], sights)
 
 
 class Timelines:
@@ -223,7 +228,8 @@ def _truth_counts(sequence: Sequence) -> Int[ndarray, " S"] | None:
     truth = sequence.ground_truth
     if truth is None:
         return None
-    return np.bincount(truth.frames, minlength=sequence.frames)[: sequence.frames]
+    counted = truth.frames[truth.valid]  # the others are neither missed nor false
+    return np.bincount(counted, minlength=sequence.frames)[: sequence.frames]
 
 
 def _events(spans: _Spans, done: int, shortest: int) -> list[models.LaneEvent]:
@@ -262,6 +268,7 @@ def _lives(spans: _Spans, window: Window, shortest: int) -> tuple[list[models.Tr
                 first=int(spans.first[heads[i]]),
                 last=int(spans.last[tails[i] - 1]),
                 seen=round(float(steps.sum() / lengths[i]), 4),
+                cameras=(spans.cameras[rows].sum(axis=0) / lengths[i]).round(4).tolist(),
                 spans=_spans_of(spans, rows, window, shortest),
             )
         )

@@ -26,6 +26,7 @@ from app.snapshot import (
     Level,
     Notice,
     Opening,
+    Presets,
     RunState,
     Snapshot,
     View,
@@ -108,17 +109,24 @@ class Workbench:
     def apply_preset(self, name: str, origin: str = "") -> RunParameters:
         """Take a preset's values, and the defaults where it has none.
 
-        The single-view method stays: it follows from what the sequence has.
+        The single-view method stays where the preset names none: it follows from what the
+        sequence has.
 
         Raises:
             ParameterError: If there is no such preset.
         """
-        if name not in table.PRESETS:
-            known = ", ".join(table.PRESETS)
-            raise ParameterError("preset", f"expected one of {known}, got {name!r}")
         with self._edit() as now:
-            changes = {"single_view": now.parameters.single_view, **table.PRESETS[name]}
+            presets = {**now.presets, **table.PRESETS}
+            if name not in presets:
+                known = ", ".join(presets)
+                raise ParameterError("preset", f"expected one of {known}, got {name!r}")
+            changes = {"single_view": now.parameters.single_view, **presets[name]}
             return self._put_parameters(table.with_values(now.defaults, changes), origin)
+
+    def set_presets(self, presets: Presets) -> None:
+        """Have these presets besides the built-in ones."""
+        with self._edit():
+            self._put("presets", presets=MappingProxyType(dict(presets)))
 
     def _put_parameters(self, parameters: RunParameters, origin: str) -> RunParameters:
         if parameters != self._snapshot.parameters:

@@ -1,4 +1,4 @@
-"""Where the program keeps what it can make again."""
+"""Where the program keeps what it can make again, and what a person has set."""
 
 from __future__ import annotations
 
@@ -23,4 +23,22 @@ def cache_folder() -> Path:
     else:
         given = Path(os.environ.get("XDG_CACHE_HOME", ""))
         base = given if given.is_absolute() else Path.home() / ".cache"
+    return base / "multiview-phd"
+
+
+def settings_folder() -> Path:
+    """``$MULTIVIEW_PHD_SETTINGS``, else the platform's place for what a person has set.
+
+    Unlike the caches, nothing in it can be made again.
+    """
+    own = os.environ.get("MULTIVIEW_PHD_SETTINGS")
+    if own:
+        return Path(own).expanduser().absolute()
+    if sys.platform == "darwin":
+        base = Path.home() / "Library" / "Application Support"
+    elif sys.platform == "win32":
+        base = Path(os.environ.get("APPDATA") or Path.home() / "AppData" / "Roaming")
+    else:
+        given = Path(os.environ.get("XDG_CONFIG_HOME", ""))
+        base = given if given.is_absolute() else Path.home() / ".config"
     return base / "multiview-phd"

@@ -36,6 +36,12 @@ class PresetRequest(Model):
     name: str
 
 
+class PresetName(Model):
+    """What a preset is to be called."""
+
+    name: str = Field(max_length=4096)
+
+
 class LayerChanges(Model):
     """Layers of the 3D view, by name."""
 

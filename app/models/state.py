@@ -119,6 +119,10 @@ class State(Model):
     changed: list[str]
     """Keys whose value is not the default."""
     methods: MethodsInfo
+    presets: list[str]
+    """Names of those that a person has saved."""
+    preset: str | None
+    """The one whose values the parameters have, built in or saved."""
     playhead: int
     selection: int | None
     layers: dict[str, bool]

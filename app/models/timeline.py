@@ -22,6 +22,8 @@ class TrackLife(Model):
     """Of its whole life."""
     seen: float
     """Share of its whole life in which a camera saw it."""
+    cameras: list[float]
+    """The same share for each camera by itself."""
     spans: list[Span]
     """Within the steps asked for; ones shorter than ``stride`` are joined with their neighbours."""
 

@@ -154,6 +154,9 @@ export function createActions({ store, seek, send, receive }) {
 		change: (changes) => actions.ask("PATCH", "parameters", { changes }),
 		reset: (...keys) => void actions.ask("POST", "parameters/reset", keys.length ? { keys } : {}),
 		preset: (name) => void actions.ask("POST", "parameters/preset", { name }),
+		savePreset: (name) => actions.ask("POST", "presets", { name }),
+		renamePreset: (name, to) => actions.ask("PATCH", `presets/${encodeURIComponent(name)}`, { name: to }),
+		removePreset: (name) => actions.ask("DELETE", `presets/${encodeURIComponent(name)}`),
 		cancel: () => void actions.ask("POST", "run/cancel"),
 		useAgain: (number) => void actions.ask("POST", `run/again/${number}`),
 		runAgain: () => void actions.ask("POST", "run"),
@@ -197,6 +200,11 @@ export function createActions({ store, seek, send, receive }) {
 		toggleTheme() {
 			const theme = store.get().theme === "dark" ? "light" : "dark";
 			store.set({ theme });
+			try {
+				localStorage.setItem("theme", theme);
+			} catch {
+				// Without storage the next start follows the system again.
+			}
 			void actions.ask("POST", "theme", { theme });
 		},
 		maximise(pane) {

@@ -6,6 +6,9 @@ export const scoresOf = ({ scores, basis }) => (scores?.series.run === basis ? s
 /** The shown step's result, where it is of the run that is shown and computed. @param {Readonly<PageState>} state */
 export const resultOf = ({ result, basis }) => (result?.run === basis && result.computed ? result : null);
 
+/** How many people the truth counts: those it does not ask for are neither missed nor false. @param {StepResult} result */
+export const trueCount = ({ truth }) => truth.filter(({ valid }) => valid).length;
+
 /** Whether only the selected track is shown. @param {Readonly<PageState>} state */
 export const isAlone = ({ selection, layers3d }) => selection !== null && layers3d.others === false;
 

@@ -19,8 +19,8 @@ export function grid(label, columns, { key, by = "", down = false, choose, open,
 	let rows = [];
 	/** @type {Map<string | number, {row: R, element: HTMLTableRowElement}>} */
 	const kept = new Map();
-	const heads = columns.map(({ word, kind = "", by: value }) =>
-		h("th", { scope: "col", class: kind }, value ? h("button", { onclick: () => sort(word) }, word) : word || h("span", { class: "vh" }, "Actions")),
+	const heads = columns.map(({ word, kind = "", help, by: value }) =>
+		h("th", { scope: "col", class: kind, title: help }, value ? h("button", { onclick: () => sort(word) }, word) : word || h("span", { class: "vh" }, "Actions")),
 	);
 	const body = h("tbody");
 

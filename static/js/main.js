@@ -16,7 +16,7 @@ import { createStore } from "./store.js";
 import { readPlace, writePlace } from "./url.js";
 
 /** What is remembered in this browser: how the page looks, never what it shows. */
-const KEPT = /** @type {const} */ (["theme", "tab", "layers2d", "laneOrder", "measure", "singleKeys", "layout"]);
+const KEPT = /** @type {const} */ (["tab", "layers2d", "laneOrder", "measure", "singleKeys", "layout"]);
 
 /** @returns {Partial<PageState>} */
 function remembered() {
@@ -74,7 +74,8 @@ const store = createStore(
 );
 
 const origin = Math.random().toString(36).slice(2);
-const playback = createPlayback(store, (step) => stream.send({ type: "seek", step, origin }));
+let seeks = 0;
+const playback = createPlayback(store, (step) => stream.send({ type: "seek", step, origin: `${origin}.${(seeks += 1)}` }));
 const actions = createActions({ store, seek: playback.seek, send: (message) => stream.send(message), receive: (state) => receiveState(state) });
 
 /** @type {Context} */
@@ -116,7 +117,8 @@ if (start.unknown.length) actions.note("warn", `The address has unknown parts: $
 /** Go to a place as far as the open sequence is the place's.  @param {ServerState} server */
 function arrive(server) {
 	const { sequence } = server;
-	if (!sequence || (place.sequence && place.sequence !== sequence.name)) return;
+	if (!sequence) return;
+	if (place.sequence && place.sequence !== sequence.name) return store.set({ step: server.playhead });
 	const { step, camera, selection, values } = place;
 	place = { sequence: null, step: null, selection: null, camera: null, values: null };
 	const cameras = sequence.cameras.length;
@@ -141,9 +143,10 @@ function receiveState(told, streamed = false) {
 	// A method is a choice like any other: it is listed, undone and taken up again with the values.
 	const server = { ...told, parameters: { ...told.parameters, ...told.methods } };
 	const before = store.get().server;
-	// An answer to a request may be older than what the socket has brought since.
-	if (!streamed && before && server.version < before.version) return;
 	const changed = before?.sequence?.key !== server.sequence?.key;
+	// An answer to a request may be older than what the socket has brought since, and another
+	// sequence comes with the socket's word on its playhead.
+	if (!streamed && (!before || changed || server.version < before.version)) return;
 	if (before?.sequence && !server.sequence) {
 		// The server was started anew: when the same sequence is open again, go where we were.
 		const { shown, selection, large } = store.get();
@@ -153,9 +156,10 @@ function receiveState(told, streamed = false) {
 		void actions.open(place.sequence);
 	}
 	if (changed) {
-		playback.clear();
+		playback.clear(server.playhead);
 		actions.forget();
-		store.set({ basis: "", timeline: null, span: null, scores: null, result: null, shown: -1, step: 0, playing: 0, range: [null, null], loop: false, hover: null, selection: server.selection });
+		// What went wrong before it was opened is over.
+		store.set({ notes: server.sequence ? [] : store.get().notes, basis: "", timeline: null, span: null, scores: null, result: null, shown: -1, step: 0, playing: 0, range: [null, null], loop: false, hover: null, selection: server.selection });
 	} else if (before) {
 		actions.remember(before.parameters, server.parameters);
 		if (before.selection !== server.selection) store.set({ selection: server.selection });
@@ -220,7 +224,8 @@ function receive(message) {
 			if (message.run.key === store.get().server?.run.key) store.set({ run: message.run });
 			break;
 		case "playhead":
-			if (message.origin !== origin && store.get().sequence) playback.follow(message.step);
+			// Of our own seeks the newest counts too: the server may have come to it after another's.
+			if (store.get().sequence && (!message.origin.startsWith(origin) || message.origin === `${origin}.${seeks}`)) playback.follow(message.step);
 			break;
 		case "step":
 			showRun(message.run);
@@ -295,7 +300,6 @@ store.on(["theme"], ({ theme }) => {
 });
 store.on([...KEPT], (state) => {
 	try {
-		localStorage.setItem("theme", state.theme);
 		localStorage.setItem("page", JSON.stringify(Object.fromEntries(KEPT.map((key) => [key, state[key]]))));
 	} catch {
 		// Without storage the page forgets; nothing else changes.

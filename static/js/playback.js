@@ -208,14 +208,15 @@ export function createPlayback(store, sendSeek) {
 		},
 		/** Another tab or the 3D view moved the playhead. @param {number} step */
 		follow(step) {
+			if (step === lastSent) return;
 			lastSent = step;
 			store.set({ step, playing: 0 });
 		},
-		/** Forget everything of the sequence before. */
-		clear() {
+		/** Forget everything of the sequence before. @param {number} step  where the server stands in the new one */
+		clear(step) {
 			pictures.clear();
 			results.clear();
-			lastSent = -1;
+			lastSent = step;
 			dirty = true;
 			windowDirty = true;
 			ask();

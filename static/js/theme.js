@@ -5,8 +5,7 @@
 	try {
 		chosen = localStorage.getItem("theme");
 	} catch {
-		// Storage may be switched off; the system's wish is a good default then.
+		// Storage may be switched off; the system's wish is a good default then, as at the first start.
 	}
-	// Dark until somebody chooses otherwise, as the 3D view is: pictures are judged best on it.
-	document.documentElement.dataset.theme = chosen ?? "dark";
+	document.documentElement.dataset.theme = chosen ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark");
 }

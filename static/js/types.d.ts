@@ -66,6 +66,10 @@ interface ServerState {
 	parameters: Record<string, any>;
 	changed: string[];
 	methods: {single_view: string, fusion_method: string};
+	/** Those that somebody has saved. */
+	presets: string[];
+	/** The one whose values the parameters have. */
+	preset: string | null;
 	playhead: number;
 	selection: number | null;
 	run: RunState;
@@ -130,7 +134,7 @@ interface StepResult {
 type Span = [number, number, "seen" | "coasting" | "long miss"];
 
 /** Seen: share of its life. */
-type TrackLane = {id: number, first: number, last: number, seen: number, spans: Span[]};
+type TrackLane = {id: number, first: number, last: number, seen: number, cameras: number[], spans: Span[]};
 
 /** Each value stands for `stride` steps, the first from step `first` on. */
 type Buckets = {first: number, stride: number};
@@ -326,6 +330,9 @@ interface Actions {
 	change: (changes: Record<string, any>) => Promise<any>;
 	reset: (...keys: string[]) => void;
 	preset: (name: string) => void;
+	savePreset: (name: string) => Promise<any>;
+	renamePreset: (name: string, to: string) => Promise<any>;
+	removePreset: (name: string) => Promise<any>;
 	cancel: () => void;
 	/** The parameters of a run before, by its number. */
 	useAgain: (number: string) => void;
@@ -445,6 +452,7 @@ interface Column<R> {
 	word: string;
 	/** Classes. */
 	kind?: string;
+	help?: string;
 	cell: (row: R) => string | number | Child | Child[];
 	/** Makes it sortable. */
 	by?: (row: R) => number;

@@ -14,6 +14,7 @@ from app import markup
 from app.server import Settings, create_app
 from tests.app.conftest import ADDRESS, is_evaluated, run_is, wait_until
 from tests.browser.walkers import write_walkers
+from tracker.parameters import PARAMETERS
 
 
 def cells(html: str, label: str) -> list[list[str]]:
@@ -131,7 +132,8 @@ def test_the_comparison_is_the_evaluations(client: TestClient) -> None:
         assert row[2] == markup.number(wanted["b"], wanted["digits"])
         assert row[3] == markup.number(wanted["difference"], wanted["digits"], signed=True)
         assert row[4].endswith(wanted["verdict"]) or wanted["verdict"] == "undefined"
-    assert cells(html, "Parameters that differ") == [["Detection probability pD", "0.98", "0.3"]]
+    default = markup.value_text(PARAMETERS["fusion.detection_probability"].default)
+    assert cells(html, "Parameters that differ") == [["Detection probability pD", default, "0.3"]]
     assert "pinned run, default parameters" in html
 
 

@@ -108,6 +108,7 @@ def test_spans_stay_in_the_window_and_do_not_overlap(rows: list[tuple[int, int, 
         for track in told.tracks:
             steps = [step for step, name in unique if name == track.id]
             assert (track.first, track.last) == (min(steps), max(steps))
+            assert track.cameras == [track.seen, 0.0, 0.0]
             before = window.first - 1
             for first, last, _ in track.spans:
                 assert before < first <= last < window.end

@@ -28,6 +28,7 @@ class Server:
         self._environment["NUMBA_CACHE_DIR"] = str(kernel_folder())
         if cache is not None:
             self._environment["MULTIVIEW_PHD_CACHE"] = str(cache)
+            self._environment["MULTIVIEW_PHD_SETTINGS"] = str(cache / "settings")
         self.port = 0
         self.start()
         if wait:

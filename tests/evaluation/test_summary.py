@@ -95,7 +95,13 @@ def test_compare():
     rows = {row.key: row for row in compare(rough, fine)}
     for key in ("mota", "idf1", "hota", "ospa", "gospa", "position_error", "misses"):
         assert rows[key].verdict == "better", key
-    assert rows["mota"].difference == pytest.approx(fine["mota"] - rough["mota"])
+    shown = round(fine["mota"], rows["mota"].digits) - round(rough["mota"], rows["mota"].digits)
+    assert rows["mota"].difference == pytest.approx(shown)
+    for row in (*rows.values(), *compare(fine, rough)):  # a difference that is shown has a word
+        if row.verdict in ("better", "worse") and row.direction != "zero":
+            assert abs(row.difference or 0.0) >= 0.99 * 10.0**-row.digits, row.key
+        elif row.verdict == "same":
+            assert not row.difference or row.direction == "zero", row.key
     assert {row.verdict for row in compare(fine, fine)} == {"same"}
     back = {row.key: row.verdict for row in compare(fine, rough)}
     assert back["mota"] == "worse"

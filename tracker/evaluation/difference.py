@@ -24,7 +24,8 @@ class Difference:
     a: float | int | None
     b: float | int | None
     difference: float | int | None
-    """B − A; None where one of them is undefined."""
+    """B − A of the values as they are shown, so that it is 0 where they look the same; None
+    where one of them is undefined."""
     verdict: Verdict
     """What B is. ``same`` where the two agree in all decimals that are shown;
     ``different`` where neither direction is better; ``undefined`` where one has no value."""
@@ -72,7 +73,10 @@ def compare(a: Evaluation, b: Evaluation) -> tuple[Difference, ...]:
 
 def _difference(a: Figure, b: Figure) -> Difference:
     definition = b.definition
-    both = a.value is not None and b.value is not None
+    before, after = (
+        None if figure.value is None else round(figure.value, definition.digits)
+        for figure in (a, b)
+    )
     return Difference(
         key=definition.key,
         name=definition.name,
@@ -82,7 +86,9 @@ def _difference(a: Figure, b: Figure) -> Difference:
         headline=definition.headline,
         a=a.value,
         b=b.value,
-        difference=b.value - a.value if both else None,  # type: ignore[operator]
+        difference=None
+        if before is None or after is None
+        else round(after - before, definition.digits),
         verdict=verdict(definition.direction, definition.digits, a.value, b.value),
         comparable=a.stated == b.stated,
         stated=b.stated,

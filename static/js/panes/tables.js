@@ -19,7 +19,7 @@ const KINDS = [["", "all"], ["birth", "births"], ["death", "deaths"], ["switch",
 
 /** @type {Pane} */
 export function mountTables(root, { store, actions }) {
-	const { kind, presets, code, pin, unpin, more, resetAll } = parts(root);
+	const { kind, presets, presetName, savePreset, renamePreset, removePreset, code, pin, unpin, more, resetAll } = parts(root);
 	for (const [name, { keys, path }] of Object.entries(TABLES)) {
 		const body = one(`#panel-${name} [data-fill]`, root);
 		let told = "";
@@ -45,17 +45,29 @@ export function mountTables(root, { store, actions }) {
 	kind.addEventListener("change", () => store.set({ eventKind: /** @type {LaneEvent["kind"]} */ (kind.value) }));
 	more.addEventListener("click", () => store.set({ every: !store.get().every }));
 	presets.addEventListener("change", () => actions.preset(presets.value));
+	for (const button of [savePreset, renamePreset]) {
+		button.addEventListener("click", () => {
+			const old = button === renamePreset ? presets.value : "";
+			Object.assign(presetName, { value: old, hidden: false });
+			presetName.select();
+			presetName.onkeydown = async (event) => {
+				event.stopPropagation();
+				if (event.key === "Enter" && !(await (old ? actions.renamePreset(old, presetName.value) : actions.savePreset(presetName.value)))) return;
+				if (event.key === "Enter" || event.key === "Escape") presets.focus();
+			};
+		});
+	}
+	presetName.addEventListener("blur", () => (presetName.hidden = true));
+	removePreset.addEventListener("click", () => actions.removePreset(presets.value));
 
 	function controls() {
 		const { server, sequence, schema, run, link, every } = store.get();
 		const changed = server?.changed ?? [];
 		const locked = link !== "open" || !sequence;
-		const fits = Object.entries(schema?.presets ?? {}).find(
-			([, values]) => Object.entries(values).every(([key, value]) => server?.parameters[key] === value) && changed.every((key) => key in values || !key.includes(".")),
-		);
-		const names = Object.keys(schema?.presets ?? {});
-		choices(presets, [...(fits ? [] : [""]), ...names].map((name) => [name, name || "own values"]), fits?.[0] ?? "");
-		presets.disabled = locked;
+		const [own, now] = [server?.presets ?? [], server?.preset ?? ""];
+		choices(presets, [...(now ? [] : [""]), ...Object.keys(schema?.presets ?? {}), ...own].map((name) => [name, name || "own values"]), now);
+		presets.disabled = savePreset.disabled = locked;
+		renamePreset.hidden = removePreset.hidden = !own.includes(now);
 		resetAll.disabled = locked || changed.length === 0;
 		write(code, sequence && server ? commandLine(sequence.name, server.parameters, changed) : "");
 		unpin.hidden = !server?.pinned;

@@ -4,7 +4,7 @@ import { fill, h, idTag, parts, write } from "../dom.js";
 import { hatch, prepare } from "../draw/canvas.js";
 import { drawLanes, drawRange, drawRuler } from "../draw/lanes.js";
 import { drawCardinality, drawErrors, drawParts } from "../draw/strips.js";
-import { isAlone, ordered, resultOf, scoresOf } from "../events.js";
+import { isAlone, ordered, resultOf, scoresOf, trueCount } from "../events.js";
 import { faded, palette } from "../palette.js";
 import { shownDone } from "../playback.js";
 import { mountTransport } from "./transport.js";
@@ -106,7 +106,7 @@ export function mountTimeline(root, context) {
 		if (timeline) drawCardinality(row(token("h-strip")), timeline);
 		if (series && !scored.hidden) {
 			drawParts(row(token("h-strip")), series, reference ?? null, name);
-			if (errors.offsetHeight) drawErrors(row(token("h-strip")), series, selection);
+			drawErrors(row(token("h-strip")), series, selection);
 		}
 		if (done < frames) {
 			const x = Math.max(0, xOf(done, view));
@@ -133,7 +133,7 @@ export function mountTimeline(root, context) {
 			const count = result ? `, ${result.tracks.length} people` : "";
 			seekBar.setAttribute("aria-valuetext", `step ${at} of ${frames}, ${secondsOf(at, fps)} s${count}`);
 		}
-		fill(people, result?.tracks.length ?? "–", result && sequence?.has_truth && h("span", { class: "sub" }, ` of ${result.truth.length}`));
+		fill(people, result?.tracks.length ?? "–", result && sequence?.has_truth && h("span", { class: "sub" }, ` of ${trueCount(result)}`));
 		if (!scored.hidden) writeScores();
 	}
 

@@ -1,6 +1,6 @@
 /** The table of tracks: sorted by any column, walked by keyboard, alive at the shown step. */
 import { fill, h, idTag, parts, write } from "../dom.js";
-import { eventsNow, isAlone, nextEvent, resultOf, scoresOf, stateAt } from "../events.js";
+import { eventsNow, isAlone, nextEvent, resultOf, scoresOf, stateAt, trueCount } from "../events.js";
 import { grid } from "../grid.js";
 
 /** Rows beyond this are counted, not drawn. */
@@ -18,6 +18,11 @@ export function mountTracks(root, { store, actions, playback }) {
 	const ended = (/** @type {TrackLane} */ track) => track.last < done() - 1;
 	const duration = (/** @type {number} */ seconds) => `${seconds.toFixed(seconds < 1 ? 2 : 1)} s`;
 	const here = (/** @type {TrackLane} */ { id }) => resultOf(store.get())?.tracks.find((track) => track.id === id);
+	const cameras = (/** @type {TrackLane} */ track) => {
+		const now = here(track)?.seen ?? [];
+		const list = (/** @type {boolean} */ seen) => track.cameras.flatMap((share, k) => (share && Boolean(now[k]) === seen ? [k + 1] : [])).join(" ");
+		return `${list(true)} ${list(false) && `(${list(false)})`}`.trim() || "–";
+	};
 
 	/** @type {Column<TrackLane>[]} */
 	const columns = [
@@ -27,8 +32,9 @@ export function mountTracks(root, { store, actions, playback }) {
 		{ word: "Died", kind: "num", cell: (t) => (ended(t) ? t.last : "–"), by: (t) => (ended(t) ? t.last : 1e9) },
 		{ word: "Length", kind: "num", cell: (t) => duration((t.last - t.first + 1) / store.get().fps), by: (t) => t.last - t.first },
 		{ word: "Seen", kind: "num", cell: (t) => `${Math.round(t.seen * 100)} %`, by: (t) => t.seen },
+		{ word: "Cameras", help: "That see it now, by number; in brackets those that saw it at other steps", cell: cameras, by: (t) => t.cameras.filter(Boolean).length, live: true },
 		{ word: "Weight", kind: "num", cell: (t) => here(t)?.existence.toFixed(2) ?? "–", live: true },
-		{ word: "x, y, z  m", kind: "num opt-1", cell: (t) => here(t)?.position.map((v) => v.toFixed(2).replace("-", "−")).join("  ") ?? "–", live: true },
+		{ word: "x, y, z  m", kind: "num", cell: (t) => here(t)?.position.map((v) => v.toFixed(2).replace("-", "−")).join("  ") ?? "–", live: true },
 		{ word: "Error  m", kind: "num truth", cell: ({ id }) => scored.get(id)?.mean_error?.toFixed(3) ?? "–", by: ({ id }) => scored.get(id)?.mean_error ?? 1e9 },
 		{ word: "Switches", kind: "num truth", cell: ({ id }) => scored.get(id)?.switches ?? "–", by: ({ id }) => scored.get(id)?.switches ?? -1 },
 	];
@@ -76,7 +82,7 @@ export function mountTracks(root, { store, actions, playback }) {
 		});
 		const result = resultOf(store.get());
 		const more = Math.max(0, (timeline?.tracks.length ?? 0) - MOST_ROWS) + (timeline?.left_out ?? 0);
-		const of = sequence?.has_truth ? ` of ${result?.truth.length}` : "";
+		const of = sequence?.has_truth && result ? ` of ${trueCount(result)}` : "";
 		const words = `${result?.tracks.length}${of} people at step ${step()}${more > 0 ? ` · ${more} more tracks` : ""}`;
 		write(summary, result ? words : sequence ? "not computed at this step" : "");
 		const event = nextEvent(eventsNow(store.get()), step(), 1);
