@@ -17,18 +17,16 @@ import numpy as np
 
 from tracker.sequences.calibration import POSE, check_sight, read_camera
 from tracker.sequences.csv_columns import Columns, read_columns
-from tracker.sequences.fields import Fields, did_you_mean, listed, shown
+from tracker.sequences.fields import Fields, did_you_mean, shown
 from tracker.sequences.media import check_pictures, find_images, locate
 from tracker.sequences.sequence import (
     Detections,
-    Entrance,
     GroundTruth,
-    Room,
     Sequence,
     SequenceError,
-    Template,
     View,
 )
+from tracker.sequences.taught_fields import read_room, read_templates
 
 FILE = "sequence.toml"
 FORMAT = 1
@@ -74,7 +72,7 @@ def read_sequence(folder: Path | str) -> Sequence:
     fields = _parse(folder, text)
     reading = _Reading(folder, fields.integer("frames", minimum=1, maximum=MOST_FRAMES))
     fps = fields.number("fps", above=0.0, at_most=1000.0)
-    room = _room(fields)
+    room = read_room(fields)
     target = fields.table("target", ("half_extents",))
     assert target is not None
     half_extents = target.vector(
@@ -83,12 +81,7 @@ def read_sequence(folder: Path | str) -> Sequence:
     views = _views(fields, reading)
     for view in views:
         reading.warnings += check_sight(view.camera, room)
-    templates = tuple(
-        _template(template, views, reading.frames)
-        for template in fields.tables(
-            "template", ("name", "camera", "frame", "box"), "[[template]]"
-        )
-    )
+    templates = read_templates(fields, views, reading.frames)
     ground_truth = _ground_truth(fields, reading)
     return Sequence(
         name=fields.text("name"),
@@ -174,26 +167,6 @@ def _parse(folder: Path, text: str) -> Fields:
     return fields
 
 
-def _room(fields: Fields) -> Room:
-    room = fields.table("room", ("min", "max", "entrances"))
-    assert room is not None
-    minimum = room.vector("min", 3, "x, y, z in metres")
-    maximum = room.vector("max", 3, "x, y, z in metres")
-    for axis, low, high in zip("xyz", minimum, maximum, strict=True):
-        if low >= high:
-            raise room.error(
-                "max", f"expected {axis} above that of min, {low:g}, found {high:g}; swap them"
-            )
-    entrances = tuple(
-        Entrance(
-            entrance.vector("position", 3, "x, y, z in metres"),
-            entrance.vector("sigma", 3, "standard deviations in metres", positive=True),
-        )
-        for entrance in room.tables("entrances", ("position", "sigma"))
-    )
-    return Room(minimum, maximum, entrances)
-
-
 def _views(fields: Fields, reading: _Reading) -> tuple[View, ...]:
     tables = fields.tables("camera", CAMERA, "[[camera]]")
     if not tables:
@@ -239,40 +212,6 @@ def _view(name: str, fields: Fields, reading: _Reading) -> View:
     reading.warnings += check_pictures(view, fields, reading.frames)
     reading.files += images if video is None else (video,)
     return view
-
-
-def _template(fields: Fields, views: tuple[View, ...], frames: int) -> Template:
-    name, camera = fields.text("name"), fields.text("camera")
-    by_name = {view.camera.name: view for view in views}
-    if camera not in by_name:
-        hint = did_you_mean(camera, by_name)
-        raise fields.error(
-            "camera", f"expected one of {listed(by_name)}, found {shown(camera)}{hint}"
-        )
-    if not by_name[camera].has_pictures:
-        raise fields.error(
-            "camera", f'camera "{camera}" has neither video nor images to take it from'
-        )
-    box = fields.vector("box", 4, "left, top, width, height in pixels")
-    left, top, width, height = box
-    if width <= 0.0 or height <= 0.0:
-        raise fields.error(
-            "box", f"expected width and height above 0, found {width:g} × {height:g}"
-        )
-    full_width, full_height = by_name[camera].camera.image_size
-    slack = 1.0  # a box drawn by hand may end on the border's outer edge
-    if (
-        min(left, top) < -slack
-        or left + width > full_width + slack
-        or top + height > full_height + slack
-    ):
-        raise fields.error(
-            "box",
-            f"expected a box inside the {full_width}×{full_height} picture, found x from {left:g} "
-            f"to {left + width:g} and y from {top:g} to {top + height:g}",
-        )
-    frame = fields.integer("frame", minimum=0, maximum=frames - 1)
-    return Template(name, camera, frame, box)
 
 
 def _detections(path: Path, reading: _Reading) -> Detections:

@@ -1,0 +1,84 @@
+"""The fields of a ``sequence.toml`` that a person teaches: the room, and boxes of colours.
+
+Whatever is wrong with them is told in the same words, whether a file brings them or
+somebody who draws them on a picture or drags them in the room.
+"""
+
+from __future__ import annotations
+
+from tracker.sequences.fields import Fields, did_you_mean, listed, shown
+from tracker.sequences.sequence import Entrance, Room, Template, View
+
+
+def read_room(fields: Fields) -> Room:
+    """The table ``[room]``.
+
+    Raises:
+        SequenceError: If it is missing, or something in it is wrong.
+    """
+    room = fields.table("room", ("min", "max", "entrances"))
+    assert room is not None
+    minimum = room.vector("min", 3, "x, y, z in metres")
+    maximum = room.vector("max", 3, "x, y, z in metres")
+    for axis, low, high in zip("xyz", minimum, maximum, strict=True):
+        if low >= high:
+            raise room.error(
+                "max", f"expected {axis} above that of min, {low:g}, found {high:g}; swap them"
+            )
+    entrances = tuple(
+        Entrance(
+            entrance.vector("position", 3, "x, y, z in metres"),
+            entrance.vector("sigma", 3, "standard deviations in metres", positive=True),
+        )
+        for entrance in room.tables("entrances", ("position", "sigma"))
+    )
+    return Room(minimum, maximum, entrances)
+
+
+def read_templates(fields: Fields, views: tuple[View, ...], frames: int) -> tuple[Template, ...]:
+    """The tables ``[[template]]``; none where there are none.
+
+    Args:
+        fields: The whole file.
+        views: Whose pictures the boxes lie in.
+        frames: Number of steps.
+
+    Raises:
+        SequenceError: If something in one of them is wrong.
+    """
+    tables = fields.tables("template", ("name", "camera", "frame", "box"), "[[template]]")
+    return tuple(_template(table, views, frames) for table in tables)
+
+
+def _template(fields: Fields, views: tuple[View, ...], frames: int) -> Template:
+    name, camera = fields.text("name"), fields.text("camera")
+    by_name = {view.camera.name: view for view in views}
+    if camera not in by_name:
+        hint = did_you_mean(camera, by_name)
+        raise fields.error(
+            "camera", f"expected one of {listed(by_name)}, found {shown(camera)}{hint}"
+        )
+    if not by_name[camera].has_pictures:
+        raise fields.error(
+            "camera", f'camera "{camera}" has neither video nor images to take it from'
+        )
+    box = fields.vector("box", 4, "left, top, width, height in pixels")
+    left, top, width, height = box
+    if width <= 0.0 or height <= 0.0:
+        raise fields.error(
+            "box", f"expected width and height above 0, found {width:g} × {height:g}"
+        )
+    full_width, full_height = by_name[camera].camera.image_size
+    slack = 1.0  # a box drawn by hand may end on the border's outer edge
+    if (
+        min(left, top) < -slack
+        or left + width > full_width + slack
+        or top + height > full_height + slack
+    ):
+        raise fields.error(
+            "box",
+            f"expected a box inside the {full_width}×{full_height} picture, found x from {left:g} "
+            f"to {left + width:g} and y from {top:g} to {top + height:g}",
+        )
+    frame = fields.integer("frame", minimum=0, maximum=frames - 1)
+    return Template(name, camera, frame, box)
