@@ -170,7 +170,7 @@ class Controls:
     # what happens: these return at once
 
     def _note(self, change: Change) -> None:
-        if change in ("parameters", "sequence"):
+        if change in ("parameters", "sequence", "taught"):
             self._worker.ask("refresh")
 
     def _relay(self, name: str, _: object) -> None:

@@ -204,7 +204,7 @@ class Jobs:
                     wanted.cancelled.set()
 
     def _on_change(self, change: Change) -> None:
-        if change in ("sequence", "parameters"):
+        if change in ("sequence", "parameters", "taught"):
             self._ask()
 
     def _ask(self, *, again: bool = False) -> None:

@@ -10,6 +10,7 @@ from app import models
 from app.snapshot import Snapshot
 from tracker import parameters as table
 from tracker.sequences.sequence import Sequence
+from tracker.sequences.teaching import changes, taught_values
 
 
 def state_of(snapshot: Snapshot) -> models.State:
@@ -35,6 +36,7 @@ def state_of(snapshot: Snapshot) -> models.State:
         theme=snapshot.theme,
         run=run_of(snapshot),
         pinned=_pinned_of(snapshot),
+        teaching=_teaching_of(snapshot),
         viser=models.ViserInfo(),
     )
 
@@ -42,6 +44,18 @@ def state_of(snapshot: Snapshot) -> models.State:
 def run_of(snapshot: Snapshot) -> models.RunInfo:
     """How far the run is."""
     return models.RunInfo(**asdict(snapshot.run_state))
+
+
+def _teaching_of(snapshot: Snapshot) -> models.TeachingInfo:
+    sequence, saved = snapshot.sequence, snapshot.saved
+    unsaved = 0
+    if sequence is not None and saved is not None and sequence is not saved:
+        unsaved = len(changes(taught_values(saved), taught_values(sequence)))
+    return models.TeachingInfo(
+        key=sequence.digest if sequence is not None else "",
+        unsaved=unsaved,
+        editing_room=snapshot.editing_room,
+    )
 
 
 def _pinned_of(snapshot: Snapshot) -> models.PinnedInfo | None:

@@ -96,11 +96,13 @@ class Scene:
         sequence = snapshot.sequence
         if sequence is None:
             return
-        another = sequence is not self._shown.sequence
+        before = self._shown.sequence
+        another = before is None or sequence.views is not before.views
+        taught = sequence is not before
         turned = snapshot.view != self._looking
         self._looking = snapshot.view
         self._shown = snapshot
-        if another or turned or themed or "layers" in topics:
+        if taught or turned or themed or "layers" in topics:
             palette, through = PALETTES[snapshot.theme], self._through
             with self._server.atomic():
                 self._room.show(
@@ -219,7 +221,9 @@ def shown_run(snapshot: Snapshot) -> Run | None:
     After a failure it is the last good one, which the page says too.
     """
     run = snapshot.run
-    if run is None or not snapshot.step_is_computed or run.sequence is not snapshot.sequence:
+    if run is None or not snapshot.step_is_computed or snapshot.sequence is None:
+        return None
+    if run.sequence.digest != snapshot.sequence.digest:
         return None
     if run.key != snapshot.run_state.key and snapshot.run_state.state != "failed":
         return None

@@ -18,7 +18,17 @@ from fastapi.staticfiles import StaticFiles
 from fastapi_offline import FastAPIOffline
 from starlette.types import Scope
 
-from app import api, errors, foreground, gateway, likelihood_routes, stream, tables
+from app import (
+    api,
+    errors,
+    foreground,
+    gateway,
+    likelihood_routes,
+    stream,
+    tables,
+    teaching_routes,
+    teaching_tables,
+)
 from app.compiling import Compiling
 from app.errors import sentence
 from app.evaluation import routes as evaluation
@@ -32,6 +42,8 @@ from app.pictures import Pictures
 from app.presets import OwnPresets
 from app.security import CONTENT_POLICY, Guard, allowed_hosts, is_loopback
 from app.stream import Stream
+from app.swatches import Swatches
+from app.teaching import Teaching
 from app.timeline import Timelines
 from app.workbench import Workbench
 from tracker import __version__
@@ -88,6 +100,8 @@ def create_app(settings: Settings) -> FastAPI:
     app.include_router(foreground.router)
     app.include_router(likelihood_routes.router)
     app.include_router(tables.router)
+    app.include_router(teaching_routes.router)
+    app.include_router(teaching_tables.router)
     app.include_router(evaluation.router)
     app.include_router(stream.router)
     app.include_router(gateway.router)
@@ -130,6 +144,8 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     own_presets = settings_folder() / "presets.json" if kept else None
     app.state.presets = OwnPresets(workbench, own_presets)
     app.state.likelihoods = Likelihoods()
+    app.state.swatches = Swatches()
+    teaching = app.state.teaching = Teaching(workbench, settings.data)
     evaluator = app.state.evaluator = Evaluator(workbench)
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
@@ -147,6 +163,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         if settings.with_viser:
             await asyncio.gather(starting, return_exceptions=True)
         told.stop()
+        teaching.close()
         pictures.close()
         await asyncio.gather(*(asyncio.to_thread(part.close) for part in (jobs, evaluator, room)))
 

@@ -18,9 +18,10 @@ from tracker.sequences.sequence import Sequence
 
 Change = Literal[
     "sequence", "opening", "parameters", "playhead", "selection", "layers", "view", "theme",
-    "run", "progress", "evaluation", "pinned", "presets",
+    "run", "progress", "evaluation", "pinned", "presets", "taught", "editing",
 ]  # fmt: skip
-"""What is another now: ``run`` is a run's beginning and its end, ``progress`` its new steps."""
+"""What is another now: ``run`` is a run's beginning and its end, ``progress`` its new steps,
+``taught`` another room or other templates of the same recording."""
 
 RunPhase = Literal["idle", "computing", "done", "failed", "cancelled"]
 
@@ -91,6 +92,11 @@ class Snapshot:
     version: int = 0
     """Grows with every change."""
     sequence: Sequence | None = None
+    """That is open, with what it was taught since."""
+    saved: Sequence | None = None
+    """The same as its file has it."""
+    editing_room: bool = False
+    """Whether the 3D view has handles on the room."""
     sequence_key: str = ""
     """Another for every content, so that pictures may be kept for ever."""
     reader: FrameReader | None = None

@@ -197,6 +197,37 @@ class Workbench:
             if view != now.view:
                 self._put("view", view=view)
 
+    def teach(self, sequence: Sequence, defaults: RunParameters | None = None) -> None:
+        """Have the open sequence with another room or other templates; its pictures stay.
+
+        Args:
+            sequence: Of the same recording; any other is refused silently, since the one it was
+                made of is not open any more.
+            defaults: Its default parameters; those before where none fit.
+        """
+        with self._edit() as now:
+            if now.sequence is None or sequence.views is not now.sequence.views:
+                return
+            if sequence is not now.sequence:
+                self._put("taught", sequence=sequence, defaults=defaults or now.defaults)
+
+    def mark_saved(self, saved: Sequence, shown: Sequence) -> None:
+        """What was taught is in a file now.
+
+        Args:
+            saved: As the file has it.
+            shown: What is open, in the folder that it was saved in.
+        """
+        with self._edit() as now:
+            if now.sequence is not None and shown.views is now.sequence.views:
+                self._put("taught", sequence=shown, saved=saved)
+
+    def edit_room(self, on: bool) -> None:
+        """Have the 3D view with handles on the room, or without."""
+        with self._edit() as now:
+            if on != now.editing_room:
+                self._put("editing", editing_room=on)
+
     def set_theme(self, theme: Theme) -> None:
         """Have the 3D view dark or light."""
         with self._edit() as now:
@@ -236,6 +267,8 @@ class Workbench:
             self._put(
                 "sequence",
                 sequence=sequence,
+                saved=sequence,
+                editing_room=False,
                 sequence_key=key,
                 reader=reader,
                 opening=None,
@@ -291,7 +324,7 @@ class Workbench:
     def scored(self, scored: Scored) -> None:
         """A run was scored against the truth."""
         with self._edit() as now:
-            if scored.sequence is not now.sequence:
+            if now.sequence is None or scored.sequence.views is not now.sequence.views:
                 return
             pinned = now.scores.pinned
             if now.run is not None and scored.key == now.run.key:

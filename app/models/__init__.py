@@ -42,6 +42,7 @@ from app.models.state import (
     SequenceList,
     State,
     TargetInfo,
+    TeachingInfo,
     ViserInfo,
 )
 from app.models.step import (
@@ -114,6 +115,7 @@ __all__ = [
     "StreamSeek",
     "StreamSelect",
     "TargetInfo",
+    "TeachingInfo",
     "ThemeChange",
     "Timeline",
     "Track",

@@ -102,6 +102,17 @@ class PinnedInfo(Model):
     """Keys whose value is not the one that the parameters have now."""
 
 
+class TeachingInfo(Model):
+    """What the sequence was taught since its file was read."""
+
+    key: str
+    """Names room and templates as they are; POST /api/teach/restore goes back to them."""
+    unsaved: int
+    """Changes that its file does not have."""
+    editing_room: bool
+    """Whether the 3D view has handles on the room."""
+
+
 class ViserInfo(Model):
     """Where the 3D view is."""
 
@@ -133,6 +144,7 @@ class State(Model):
     """Of the 3D view."""
     run: RunInfo
     pinned: PinnedInfo | None
+    teaching: TeachingInfo
     viser: ViserInfo
 
 

@@ -151,7 +151,10 @@ export function createActions({ store, seek, send, receive }) {
 
 		// runs and parameters
 		open: (name) => actions.ask("POST", "sequence", { name }),
-		change: (changes) => actions.ask("PATCH", "parameters", { changes }),
+		async change({ taught, ...changes }) {
+			if (taught) await actions.ask("POST", "teach/restore", { key: taught });
+			if (Object.keys(changes).length) await actions.ask("PATCH", "parameters", { changes });
+		},
 		reset: (...keys) => void actions.ask("POST", "parameters/reset", keys.length ? { keys } : {}),
 		preset: (name) => void actions.ask("POST", "parameters/preset", { name }),
 		savePreset: (name) => actions.ask("POST", "presets", { name }),
@@ -194,6 +197,10 @@ export function createActions({ store, seek, send, receive }) {
 				actions.note("warn", "The browser does not let the page use the clipboard", text);
 			}
 		},
+
+		drawTemplate() {},
+		editRoom: () => void actions.ask("POST", "teach/editing", { on: !store.get().server?.teaching.editing_room }),
+		saveTaught: () => void actions.ask("POST", "teach/save"),
 
 		// page
 		showTab: (tab) => store.set({ tab, layout: { ...store.get().layout, ...(store.get().layout.max && { max: "side" }) } }),

@@ -8,6 +8,7 @@ import { mountLayout } from "./panes/layout.js";
 import { mountNotes } from "./panes/notes.js";
 import { mountSheets } from "./panes/sheets.js";
 import { mountSide } from "./panes/side.js";
+import { mountTeach } from "./panes/teach.js";
 import { mountTimeline } from "./panes/timeline.js";
 import { mountTop } from "./panes/top.js";
 import { mountView3d } from "./panes/view3d.js";
@@ -86,6 +87,7 @@ mountView3d(one(".view"), context);
 mountCameras(one(".cams"), context);
 mountSide(one(".side"), context);
 mountTimeline(one(".time"), context);
+mountTeach(one(".mosaic"), context);
 mountSheets(context);
 mountLayout(context);
 
@@ -141,7 +143,7 @@ async function restore(server, values) {
 /** @param {ServerState} told @param {boolean} [streamed]  it came over the socket, in order */
 function receiveState(told, streamed = false) {
 	// A method is a choice like any other: it is listed, undone and taken up again with the values.
-	const server = { ...told, parameters: { ...told.parameters, ...told.methods } };
+	const server = { ...told, parameters: { ...told.parameters, ...told.methods, taught: told.teaching.key } };
 	const before = store.get().server;
 	const changed = before?.sequence?.key !== server.sequence?.key;
 	// An answer to a request may be older than what the socket has brought since, and another

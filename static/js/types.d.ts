@@ -74,6 +74,7 @@ interface ServerState {
 	selection: number | null;
 	run: RunState;
 	pinned: {key: string, changed: string[]} | null;
+	teaching: {key: string, unsaved: number, editing_room: boolean};
 	viser: {path: string};
 	/** Of the 3D view. */
 	layers: Record<string, boolean>;
@@ -231,7 +232,7 @@ interface PageState {
 	layers3d: Record<string, boolean>;
 	/** The camera that is shown large; null: all alike. */
 	large: number | null;
-	tab: "tracks" | "step" | "events" | "changes" | "compare" | "runs";
+	tab: "tracks" | "step" | "events" | "teach" | "changes" | "compare" | "runs";
 	/** The events that are listed and gone to; all where empty. */
 	eventKind: "" | LaneEvent["kind"];
 	/** Whether all figures are compared, or the headlines. */
@@ -290,7 +291,7 @@ type PaneName = "view" | "cams" | "side" | "time";
 interface Command {
 	name: string;
 	title: string;
-	group: "Play" | "Cameras and 3D" | "Tracks" | "Parameters" | "Page";
+	group: "Play" | "Cameras and 3D" | "Teach" | "Tracks" | "Parameters" | "Page";
 	keys: string[];
 	/** A name of `Actions`. */
 	action: string;
@@ -345,6 +346,11 @@ interface Actions {
 	/** Or redo. */
 	undo: (direction: -1 | 1) => void;
 	copyRun: (what: "command" | "json") => void;
+	/** Begin to drag boxes on pictures, or leave it. */
+	drawTemplate: () => void;
+	/** Handles in 3D, on or off. */
+	editRoom: () => void;
+	saveTaught: () => void;
 	showTab: (tab: PageState["tab"]) => void;
 	toggleTheme: () => void;
 	/** Null: all panes as they were at first. */

@@ -57,9 +57,10 @@ test("a key event finds its command", () => {
   assert.equal(find("?", { shiftKey: true }), "help");
   assert.equal(find("3"), "camera-3");
   assert.equal(find("z", { ctrlKey: true }), "undo");
+  assert.equal(find("s", { ctrlKey: true }), "save-taught");
   assert.equal(find("z", { metaKey: true }), "undo");
   assert.equal(find("ArrowLeft", { altKey: true }), undefined);
-  assert.equal(find("s", { ctrlKey: true }), undefined);
+  assert.equal(find("y", { ctrlKey: true }), undefined);
 });
 
 test("single-key shortcuts can be switched off, arrows and help stay", () => {

@@ -10,6 +10,7 @@ import { commandLine } from "../url.js";
 const TABLES = {
 	step: { keys: ["result", "scores"], path: ({ shown }) => `step/${Math.max(0, shown)}` },
 	events: { keys: ["timeline", "scores", "eventKind"], path: ({ eventKind }) => `events${eventKind && `?kind=${eventKind}`}` },
+	teach: { keys: ["server"], path: () => "teach" },
 	changes: { keys: ["server"], path: () => "changes" },
 	compare: { keys: ["scores", "basis", "every"], path: ({ every }) => `compare?every=${every}` },
 	runs: { keys: ["server", "run"], path: () => "runs" },
@@ -29,10 +30,13 @@ export function mountTables(root, { store, actions }) {
 			const text = await (await request(`/api/tables/${path(store.get())}`)).text();
 			if (text === told) return;
 			told = text;
-			// Where the focus was on a button, it is on the one in its place again.
-			const at = all("button", body).findIndex((button) => button === document.activeElement);
+			// Where the focus was, it is again, on the one in its place; what is being typed stays, but for what the server has taken.
+			const held = document.activeElement;
+			const at = all("button, input", body).findIndex((control) => control === held);
+			const typed = all("input", body).filter(({ value, defaultValue }) => value !== defaultValue);
 			body.innerHTML = text;
-			if (at >= 0) (all("button", body)[at] ?? body).focus();
+			for (const { id, value, defaultValue } of typed) for (const field of all(`#${id}`, body)) if (field.defaultValue === defaultValue) field.value = value;
+			if (at >= 0) ((held?.id && all(`#${held.id}`, body)[0]) || all("button, input", body)[at] || body).focus();
 		});
 		store.on([...keys, "tab", "sequence"], refresh);
 	}
