@@ -150,7 +150,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
     told.start()
-    room = _Room(workbench)
+    room = _Room(workbench, teaching)
     if settings.with_viser:
         door.prepare()
         # the page is served meanwhile; requests for the 3D view wait
@@ -192,18 +192,21 @@ async def _start_viser(room: _Room, door: Gateway, workbench: Workbench) -> None
 class _Room:
     """viser's server with what is in it."""
 
-    def __init__(self, workbench: Workbench) -> None:
+    def __init__(self, workbench: Workbench, teaching: Teaching) -> None:
         self._workbench = workbench
+        self._teaching = teaching
         self._parts: list[Callable[[], object]] = []
 
     def open(self) -> viser.ViserServer:
         """Start viser on a private loopback port and build scene and sliders in it."""
         from app.controls import Controls
         from app.scene import Scene
+        from app.scene_room_editing import RoomEditing
 
         server = gateway.start_viser()
         self._parts.append(server.stop)
         self._parts.append(Scene(server, self._workbench).close)
+        self._parts.append(RoomEditing(server, self._workbench, self._teaching).close)
         self._parts.append(Controls(server, self._workbench).close)
         return server
 

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 
 from app.api import ERRORS, Bench, nothing_open
-from app.markup import Cell, Markup, escaped, joined, line, quiet, table
+from app.markup import Cell, Markup, escaped, line, quiet, table
 from app.snapshot import Snapshot
 from app.teaching import Part, Side, Teaching
 from tracker.sequences.sequence import Sequence, Template
@@ -53,13 +53,12 @@ def _templates(snapshot: Snapshot, sequence: Sequence) -> str:
             _picture(snapshot, sequence, template, "histogram", "svg"),
             _send(f"{template.camera} · {template.frame}", "POST seek", {"step": template.frame},
                   label=f"Go to step {template.frame}, camera {template.camera}"),
-            quiet("  ".join(f"{side:.0f}" for side in template.box)),
             _send("remove", f"DELETE teach/templates/{index}",
                   label=f"Remove template {index + 1}, {template.name}"),
         )
         for index, template in enumerate(sequence.templates)
     ]  # fmt: skip
-    heads = ("Box", "Person", "Colours", "Seen by, at step", "Left, top, width, height", "#")
+    heads = ("Box", "Person", "Colours", "Seen at", "#")
     return table("Colour templates", heads, rows) + _method(snapshot)
 
 
@@ -86,7 +85,10 @@ def _picture(
     address = f"/api/teach/{what}/{snapshot.sequence_key}/{index}/{template.frame}/{box}.{ending}"
     words = "Box" if what == "swatch" else "Colours"
     label = f"{words} of {template.name}, {template.camera}, step {template.frame}"
-    return Markup(f'<img class="{what}" src="{escaped(address)}" alt="{escaped(label)}">')
+    size = "left, top, width, height: " + box.replace(",", ", ") + " px"
+    return Markup(
+        f'<img class="{what}" src="{escaped(address)}" alt="{escaped(label)}" title="{size}">'
+    )
 
 
 def _numbers(sequence: Sequence) -> str:
@@ -166,29 +168,33 @@ def _saving(snapshot: Snapshot, teaching: Teaching) -> str:
     assert saved is not None
     found = changes(taught_values(saved), taught_values(sequence))
     reason = teaching.why_not_in_place()
-    count = f"{len(found)} change{'s' if len(found) > 1 else ''} not saved"
-    state = joined(
-        Markup('<span class="dot warn"></span>'), Markup(f"<b>{count}</b>"), quiet("; ".join(found))
-    ).html
-    if not found:
-        state = quiet("All is as the file has it.").html
-    if reason and found:
-        state += quiet(f". {reason[:1].upper()}{reason[1:]}: save a copy.").html
+    state = quiet("All is as the file has it.").html
     buttons = ""
     if found:
+        count = f"{len(found)} change{'s' if len(found) > 1 else ''} not saved"
+        words = escaped("; ".join(found))
+        state = (
+            f'<span class="dot warn"></span><b>{count}</b>'
+            f'<span class="words" title="{words}">{words}</span>'
+        )
         buttons = _send("Discard", "POST teach/discard").html
         if not reason:
             place = f"{sequence.folder.name}/sequence.toml"
             buttons += _send("Save", "POST teach/save", label=f"Save in {place}", main=True).html
+    label = "Copy in"
+    if reason:
+        rendered = "rendered" in reason
+        label = f"{'A rendered room' if rendered else 'Read only'}: save a copy in"
     copy = (
-        '<form class="row" data-send="POST teach/copy"><label class="wide">Copy in'
+        '<form class="row" data-send="POST teach/copy">'
+        f'<label class="wide" title="{escaped(reason or "")}">{label}'
         f'<input name="folder" id="copy-folder" value="{escaped(teaching.copy_folder())}" required>'
         f'</label><button class="btn {"main" if reason and found else "box"}">Save a copy</button>'
         "</form>"
     )
     return (
-        f'<div class="saving"><p class="row" role="status">{state}<span class="grow"></span>'
-        f"{buttons}</p>{copy}</div>"
+        f'<div class="saving"><div class="row" role="status">{state}<span class="grow"></span>'
+        f"{buttons}</div>{copy}</div>"
     )
 
 
