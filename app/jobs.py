@@ -31,7 +31,8 @@ from tracker.stage_cache import StageCache
 logger = logging.getLogger("app")
 
 NICENESS = 5
-"""Work yields to whoever scrubs: the kernel gives its threads what the server leaves."""
+"""Work on pictures yields to whoever scrubs: the kernel gives its threads what the server
+leaves. The fusion does not: it is short, and whoever moves a slider waits for it."""
 
 OPENING_TELLS_SECONDS = 0.1
 """At most this often an opening tells how far it is."""
@@ -227,7 +228,6 @@ class Jobs:
             self._condition.notify_all()
 
     def _work(self) -> None:
-        be_nice()
         while True:
             with self._condition:
                 self._under_way = None
@@ -259,6 +259,7 @@ class Jobs:
                 wanted=lambda: workbench.snapshot().playhead,
                 on_progress=on_progress,
                 cancelled=wanted.cancelled.is_set,
+                thread_begins=be_nice,
             )
         except Cancelled:
             if wanted.stopped_by_person:

@@ -290,6 +290,7 @@ def mean_shift(
 def foreground_mask(
     picture: ndarray,
     background: ndarray,
+    curve: ndarray,
     spread: ndarray,
     threshold: float,
     darkest_shadow: float,
@@ -303,7 +304,8 @@ def foreground_mask(
 
     Args:
         picture: (h, w, 3) uint8.
-        background: (h, w, 3) uint8, at the picture's exposure.
+        background: (h, w, 3) uint8.
+        curve: (1, 256, 3) uint8, each of its levels at the picture's exposure.
         spread: (h, w), what a pixel varies by itself, in the same units as the threshold.
         threshold: On the scale 16 √level, which runs from 0 to 255.
         darkest_shadow: A shadow leaves at least this share of the light; 1 knows no shadow.
@@ -316,19 +318,55 @@ def foreground_mask(
     roots = np.empty(256)
     for level in range(256):
         roots[level] = 16.0 * math.sqrt(level)
+    expected = np.empty((256, 3))
+    for level in range(256):
+        for c in range(3):
+            expected[level, c] = roots[curve[0, level, c]]
     mask = np.zeros((height, width), dtype=np.uint8)
     for y in range(height):
         for x in range(width):
             largest = 0.0
             for c in range(3):
-                difference = abs(roots[picture[y, x, c]] - roots[background[y, x, c]])
+                difference = abs(roots[picture[y, x, c]] - expected[background[y, x, c], c])
                 largest = max(largest, difference)
             if largest <= threshold + spread[y, x]:
                 continue
             low, high = 1e9, 0.0
             for c in range(3):
-                share = (picture[y, x, c] + 4.0) / (background[y, x, c] + 4.0)
+                share = (picture[y, x, c] + 4.0) / (curve[0, background[y, x, c], c] + 4.0)
                 low, high = min(low, share), max(high, share)
             if low < darkest_shadow or high > 1.0 or high - low > shadow_tint:
                 mask[y, x] = 1
     return mask
+
+
+@_kernel
+def keep_apart(boxes: ndarray, densities: ndarray, order: ndarray, distance: float) -> ndarray:
+    """Which boxes stay, in the given order: none whose centre is near one that stays already.
+
+    Args:
+        boxes: (N, 4).
+        densities: (N,); from the first that is not positive on, none stays.
+        order: (N,) indices.
+        distance: In half sizes of the box that stays.
+
+    Returns:
+        Indices of those that stay.
+    """
+    kept = np.empty(len(order), dtype=np.int64)
+    count = 0
+    for i in order:
+        if not densities[i] > 0.0:
+            break
+        apart = True
+        for k in range(count):
+            j = kept[k]
+            u = (boxes[j, 0] - boxes[i, 0]) / boxes[j, 2]
+            v = (boxes[j, 1] - boxes[i, 1]) / boxes[j, 3]
+            if not u * u + v * v >= distance * distance:
+                apart = False
+                break
+        if apart:
+            kept[count] = i
+            count += 1
+    return kept[:count].copy()

@@ -75,11 +75,6 @@ def modes(
         ITERATIONS,
         TOLERANCE,
     )
-    kept: list[int] = []
-    for i in np.argsort(-densities, kind="stable"):
-        if not densities[i] > 0.0:
-            break
-        apart = (found[kept, :2] - found[i, :2]) / found[kept, 2:]
-        if np.all((apart**2).sum(axis=1) >= merge_distance**2):
-            kept.append(int(i))
-    return found[kept], densities[kept]
+    order = np.argsort(-densities, kind="stable")
+    kept = image_kernels.keep_apart(found, densities, order, merge_distance)
+    return found.take(kept, 0), densities.take(kept)

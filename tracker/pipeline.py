@@ -56,6 +56,7 @@ def compute(
     wanted: Callable[[], int] = lambda: 0,
     on_progress: Callable[[Run, Progress], None] | None = None,
     cancelled: Cancel = lambda: False,
+    thread_begins: Callable[[], None] = lambda: None,
 ) -> Run:
     """Run the three stages over a sequence.
 
@@ -73,7 +74,8 @@ def compute(
         wanted: The step that somebody looks at; it is told of the moment it is there.
         on_progress: Called from this thread every so often, and at the end, with the
             run so far: its steps below ``done`` may be read.
-        cancelled: Asked between steps, also by the threads of the cameras.
+        cancelled: Asked between steps and pictures, also by the threads of the cameras.
+        thread_begins: What each of these threads does first: give itself a priority, say.
 
     Returns:
         The run, complete unless ``steps`` says otherwise.
@@ -90,7 +92,7 @@ def compute(
     telling = _Telling(run, total, wanted, on_progress)
     sound = False
     try:
-        _fuse(run, total, reader, telling, cancelled)
+        _fuse(run, total, reader, telling, cancelled, thread_begins)
         sound = True
     except Cancelled:
         sound = True
@@ -161,7 +163,12 @@ class _Telling:
 
 
 def _fuse(
-    run: Run, total: int, reader: FrameReader | None, telling: _Telling, cancelled: Cancel
+    run: Run,
+    total: int,
+    reader: FrameReader | None,
+    telling: _Telling,
+    cancelled: Cancel,
+    thread_begins: Callable[[], None],
 ) -> None:
     """Compute what is missing of the first ``total`` steps."""
     telling.now()
@@ -172,7 +179,7 @@ def _fuse(
             if reader is None:
                 reader = FrameReader(run.sequence)
                 stack.callback(reader.close)
-            single_views = stack.enter_context(SingleViews(run, reader, cancelled))
+            single_views = stack.enter_context(SingleViews(run, reader, cancelled, thread_begins))
         for frame in range(len(run.fused), total):
             if cancelled():
                 raise Cancelled

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from tracker import single_view
 from tracker.run import Cancelled, Run
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.frames import FrameReader, Picture
 from tracker.single_view.likeness import Likeness
 from tracker.single_view.protocol import SingleViewMethod, ViewResult
 
@@ -21,24 +21,41 @@ BLOCK = 5
 
 Cancel = Callable[[], bool]
 
+_Made = TypeVar("_Made")
+
 
 class SingleViews:
     """Stage 1 from where a run's column ends, step by step: results and states, one a camera."""
 
-    def __init__(self, run: Run, reader: FrameReader, cancelled: Cancel) -> None:
+    def __init__(
+        self,
+        run: Run,
+        reader: FrameReader,
+        cancelled: Cancel,
+        thread_begins: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Prepare the threads.
+
+        Args:
+            run: Whose columns.
+            reader: Of the pictures.
+            cancelled: Asked before every picture, by the threads of the cameras.
+            thread_begins: What each of these does first.
+        """
         self._run = run
-        self._reader = reader
         self._cancelled = cancelled
         self._stopped = False
+        self._reader = _StoppingReader(reader, self._is_stopped)
         self._pools = [
-            ThreadPoolExecutor(1, f"single-view-{view.camera.name}") for view in run.sequence.views
+            ThreadPoolExecutor(1, f"single-view-{view.camera.name}", thread_begins)
+            for view in run.sequence.views
         ]
 
     def __enter__(self) -> Iterator[tuple[tuple[ViewResult, ...], tuple[Any, ...]]]:
         return self._iterate()
 
     def __exit__(self, *_: object) -> None:
-        self._stopped = True  # a block under way ends after its step
+        self._stopped = True  # what is under way ends before its next picture
         for pool in self._pools:
             pool.shutdown(wait=True, cancel_futures=True)
 
@@ -62,6 +79,9 @@ class SingleViews:
                 yield tuple(result for result, _ in step), tuple(state for _, state in step)
             left -= len(parts[0])
 
+    def _is_stopped(self) -> bool:
+        return self._stopped or self._cancelled()
+
     def _prepare(self, camera: int) -> _CameraWorker:
         run = self._run
         method = single_view.create(
@@ -69,9 +89,7 @@ class SingleViews:
         )
         run.costly = run.costly or method.needs_pictures
         state = run.view_states[camera] if run.view_states is not None else method.start()
-        return _CameraWorker(
-            method, state, camera, run, self._reader, lambda: self._stopped or self._cancelled()
-        )
+        return _CameraWorker(method, state, camera, run, self._reader, self._is_stopped)
 
 
 class _CameraWorker:
@@ -109,3 +127,33 @@ class _CameraWorker:
             done.append((result, self._state))
             self._frame += 1
         return done
+
+
+class _StoppingReader(FrameReader):
+    """The pictures of another reader, until the run is to stop: then :class:`Cancelled` is raised.
+
+    A background or the templates take many pictures before the first step: nobody waits for
+    the rest of them.
+    """
+
+    def __init__(self, reader: FrameReader, stopped: Cancel) -> None:
+        self._reader = reader
+        self._stopped = stopped
+
+    def picture(self, camera: int, step: int) -> Picture | None:
+        self.check()
+        return self._reader.picture(camera, step)
+
+    def iterate(self, camera: int, first: int = 0) -> Iterator[Picture | None]:
+        return self._reader.iterate(camera, first)
+
+    def once(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
+        self.check()
+        return self._reader.once(name, make)
+
+    def check(self) -> None:
+        if self._stopped():
+            raise Cancelled
+
+    def close(self) -> None:
+        """Whoever opened the other one closes it."""

@@ -9,10 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from numpy import ndarray
+from numpy.testing import assert_array_equal
 
 from tests.engine.rooms import SKIN, clip, empty_room, person_mask, photograph, with_person
 from tracker import foreground, image_kernels
-from tracker.foreground import BackgroundModel, LearntForeground, tone_curve
+from tracker.foreground import BackgroundModel, LearntForeground, kernels, tone_curve
 
 
 def learnt(gains: ndarray) -> BackgroundModel:
@@ -96,12 +97,15 @@ def test_shares_of_boxes_agree_with_counting() -> None:
 
 def test_the_mask_agrees_with_numpy() -> None:
     rng = np.random.default_rng(3)
-    background = rng.integers(0, 256, (20, 30, 3), dtype=np.uint8)
+    learnt = rng.integers(0, 256, (20, 30, 3), dtype=np.uint8)
+    curve = np.stack([np.arange(256) * part for part in (0.7, 0.85, 1.0)], axis=1)
+    curve = np.rint(curve)[None].astype(np.uint8)
+    background = cv2.LUT(learnt, curve)
     change = rng.normal(0.0, 25.0, background.shape) * (rng.random((20, 30, 1)) < 0.5)
     shade = np.where(rng.random((20, 30, 1)) < 0.3, 0.75, 1.0)
     picture = np.clip(background * shade + change, 0, 255).astype(np.uint8)
     spread = rng.integers(0, 20, (20, 30), dtype=np.uint8)
-    mask = image_kernels.foreground_mask(picture, background, spread, 15.0, 0.65, 0.08)
+    mask = image_kernels.foreground_mask(picture, learnt, curve, spread, 15.0, 0.65, 0.08)
     differs = np.abs(16 * np.sqrt(picture) - 16 * np.sqrt(background)).max(axis=2) > 15.0 + spread
     shares = (picture + 4.0) / (background + 4.0)
     low, high = shares.min(axis=2), shares.max(axis=2)
@@ -144,3 +148,41 @@ def test_a_mask_of_people_is_packed_into_little() -> None:
 def test_what_is_no_packed_mask_is_refused(size: int) -> None:
     with pytest.raises(ValueError, match=f"expected a packed mask, got {size} bytes"):
         foreground.unpack(np.full(size, 7, dtype=np.uint8))
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 32])
+def test_medians_agree_with_sorting(count: int) -> None:
+    rng = np.random.default_rng(count)
+    values = rng.choice(np.array([0, 3, 16, 17, 200, 255], dtype=np.uint8), (count, 2500))
+    values[:, 1000:] = rng.integers(0, 256, (count, 1500))
+    assert_array_equal(kernels.upper_medians(values), np.sort(values, axis=0)[count // 2])
+
+
+def test_medians_of_levels_agree_with_counting_one_by_one() -> None:
+    rng = np.random.default_rng(4)
+    source = rng.integers(0, 200, (900, 3), dtype=np.uint8)
+    target = rng.integers(0, 256, (900, 3), dtype=np.uint8)
+    totals, sums, medians = kernels.level_medians(source, target, 16)
+    for channel in range(3):
+        for group in range(16):
+            here = source[:, channel] // 16 == group
+            assert totals[channel, group] == here.sum()
+            assert sums[channel, group] == source[here, channel].sum()
+            values = np.sort(target[here, channel])
+            assert medians[channel, group] == (values[(len(values) - 1) // 2] if len(values) else 0)
+    assert (totals[:, 13:] == 0).all()
+
+
+def test_whoever_is_to_stop_stops_while_a_background_is_learnt() -> None:
+    class Stop(Exception):
+        pass
+
+    asked = []
+
+    def check() -> None:
+        asked.append(True)
+        raise Stop
+
+    with pytest.raises(Stop):
+        BackgroundModel.learn([np.zeros((4, 5, 3), dtype=np.uint8)] * 3, check)
+    assert len(asked) == 1

@@ -113,3 +113,18 @@ def test_one_step_of_the_kernel_is_the_formula() -> None:
     squared = (offsets**2).sum(axis=1)
     kernel = weights * np.exp(-0.5 * squared) * (squared <= 12.0)
     np.testing.assert_allclose(moved[0], kernel @ boxes / kernel.sum())
+
+
+def test_modes_kept_apart_are_those_of_a_plain_loop() -> None:
+    rng = np.random.default_rng(6)
+    for _ in range(30):
+        boxes = np.concatenate([rng.uniform(0, 60, (25, 2)), rng.uniform(5, 15, (25, 2))], axis=1)
+        densities = np.maximum(rng.normal(0.5, 0.5, 25), 0.0)
+        order = np.argsort(-densities, kind="stable")
+        kept: list[int] = []
+        for i in order:
+            apart = (boxes[kept, :2] - boxes[i, :2]) / boxes[kept, 2:]
+            if densities[i] > 0.0 and ((apart**2).sum(axis=1) >= 0.64).all():
+                kept.append(int(i))
+        assert image_kernels.keep_apart(boxes, densities, order, 0.8).tolist() == kept
+        assert 1 < len(kept) < 25

@@ -11,15 +11,19 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from tests.engine.painted import RED, painted_sequence
 from tests.engine.synthetic import CAMERAS, crossing, sequence
 from tracker import pipeline
 from tracker.parameters import RunParameters, with_values
 from tracker.pipeline import Cancelled, Progress, Run, compute, default_parameters, stage_keys
+from tracker.sequences.frames import FrameReader, Picture
 from tracker.sequences.sequence import Sequence, Template
 from tracker.single_view.protocol import ViewResult
+from tracker.stage_cache import StageCache
 from tracker.trajectories import Trajectories
 
 STEPS = 60
+COLOUR = with_values(RunParameters(), {"single_view": "colour_phd"})
 WHOLE = sequence(crossing(STEPS), STEPS, clutter_rate=0.5)
 BOXES = RunParameters(single_view="none")
 
@@ -227,6 +231,37 @@ def test_no_thread_outlives_a_run() -> None:
     assert threads() == []
     stopped(BOXES, 10)
     assert threads() == []
+
+
+def test_a_run_that_is_stopped_before_its_first_step_asks_for_no_more_pictures(
+    tmp_path: Path,
+) -> None:
+    class Counting(FrameReader):
+        asked = 0
+
+        def picture(self, camera: int, step: int) -> Picture | None:
+            self.asked += 1
+            return super().picture(camera, step)
+
+    path = np.linspace([-0.8, 0.2, 1.0], [0.8, 0.2, 1.0], 30)
+    painted = painted_sequence(tmp_path, [path], [RED])
+    kept = StageCache()
+    with Counting(painted) as reader:
+        with pytest.raises(Cancelled):
+            compute(painted, COLOUR, reader=reader, cache=kept, cancelled=lambda: reader.asked >= 3)
+        assert reader.asked == 3
+        # what was broken off is made whole by the next run
+        assert len(compute(painted, COLOUR, reader=reader, cache=kept, steps=2).views) >= 2
+        assert reader.asked > 3
+
+
+def test_threads_of_cameras_begin_as_they_are_told() -> None:
+    begun: list[str] = []
+    compute(
+        WHOLE, BOXES, steps=2, thread_begins=lambda: begun.append(threading.current_thread().name)
+    )
+    assert len(begun) == len(CAMERAS)
+    assert all(name.startswith("single-view") for name in begun)
 
 
 @pytest.mark.parametrize("raised_by", ["progress", "cancelled"])

@@ -61,6 +61,6 @@ def learn(
         return AdaptiveForeground(there, parameters) if there else None
     # no parameter has a say in it, so that a moved slider does not wait for it again
     background = reader.once(
-        ("background", camera_index), lambda: BackgroundModel.learn(pictures())
+        ("background", camera_index), lambda: BackgroundModel.learn(pictures(), reader.check)
     )
     return None if background is None else LearntForeground(background, parameters.threshold)

@@ -9,7 +9,7 @@ frame's exposure, never the frame to the background, whose colours it would spoi
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import cv2
@@ -19,6 +19,7 @@ from numpy import ndarray
 from scipy.optimize import isotonic_regression
 
 from tracker import image_kernels
+from tracker.foreground import kernels
 from tracker.foreground.segmentation import Segmentation
 
 LEVELS = 16
@@ -44,11 +45,14 @@ class BackgroundModel:
     scale of 16 √level."""
 
     @staticmethod
-    def learn(pictures: Iterable[UInt8[ndarray, "h w 3"]]) -> BackgroundModel | None:
+    def learn(
+        pictures: Iterable[UInt8[ndarray, "h w 3"]], check: Callable[[], None] = lambda: None
+    ) -> BackgroundModel | None:
         """The median of pictures spread over the clip, all brought to one exposure.
 
         Args:
             pictures: BGR, of one size; 15 to 40 are enough.
+            check: Called every so often; what it raises ends the work.
 
         Returns:
             None where there is no picture.
@@ -58,18 +62,14 @@ class BackgroundModel:
             return None
         # the first median is blurred by the exposures, but good enough to align them by
         reference = median(stack)
+        check()
         aligned = [cv2.LUT(picture, _inverse(tone_curve(reference, picture))) for picture in stack]
+        check()
         reference = median(aligned)
+        check()
         roots = cv2.LUT(reference, _ROOTS)
-        deviations = [
-            cv2.absdiff(cv2.LUT(picture, _ROOTS), roots).max(axis=2) for picture in aligned
-        ]
+        deviations = [_largest(cv2.absdiff(cv2.LUT(picture, _ROOTS), roots)) for picture in aligned]
         return BackgroundModel(reference, median(deviations))
-
-    def at_exposure_of(self, picture: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w 3"]:
-        """The background as it would look in a picture taken with this exposure."""
-        mapped: ndarray = cv2.LUT(self.picture, tone_curve(self.picture, picture))
-        return mapped
 
     def foreground(
         self, picture: UInt8[ndarray, "h w 3"], threshold: float
@@ -83,7 +83,8 @@ class BackgroundModel:
         """
         mask = image_kernels.foreground_mask(
             picture,
-            self.at_exposure_of(picture),
+            self.picture,
+            tone_curve(self.picture, picture),
             self.spread,
             threshold,
             DARKEST_SHADOW,
@@ -115,20 +116,15 @@ def tone_curve(
     levels = np.arange(256)
     curve = np.empty((1, 256, 3), dtype=np.uint8)
     enough = max(4, len(few) // 400)
+    totals, sums, medians = kernels.level_medians(few, other, LEVELS)
     for channel in range(3):
-        group = few[:, channel].astype(np.intp) * LEVELS // 256
-        joint = np.bincount(group * 256 + other[:, channel], minlength=LEVELS * 256)
-        joint = joint.reshape(LEVELS, 256)
-        total = joint.sum(axis=1)
-        used = np.flatnonzero(total >= enough)
+        total = totals[channel]
+        used = (total >= enough).nonzero()[0]
         if not len(used):
             curve[0, :, channel] = levels
             continue
-        halves = np.cumsum(joint[used], axis=1) >= 0.5 * total[used, None]
-        medians = halves.argmax(axis=1).astype(float)
-        sums = np.bincount(group, weights=few[:, channel], minlength=LEVELS)
-        centres = sums[used] / total[used]
-        rising = isotonic_regression(medians, weights=total[used]).x
+        centres = sums[channel, used] / total[used]
+        rising = isotonic_regression(medians[channel, used], weights=total[used]).x
         mapped = levels + np.interp(levels, centres, rising - centres)
         curve[0, :, channel] = np.clip(np.rint(mapped), 0, 255)
     return curve
@@ -148,9 +144,16 @@ def _inverse(curve: UInt8[ndarray, "1 256 3"]) -> UInt8[ndarray, "1 256 3"]:
 
 def median(pictures: list[ndarray]) -> UInt8[ndarray, "h w *c"]:
     """Each value's median over pictures of one size; of an even number the upper one."""
-    middle = len(pictures) // 2
-    result: ndarray = np.partition(np.stack(pictures), middle, axis=0)[middle]
-    return result
+    stack = np.stack(pictures)
+    result: ndarray = kernels.upper_medians(stack.reshape(len(stack), -1))
+    return result.reshape(stack.shape[1:])
+
+
+def _largest(picture: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w"]:
+    """The largest of each pixel's channels."""
+    blue, green, red = cv2.split(picture)
+    largest: ndarray = cv2.max(cv2.max(blue, green), red)
+    return largest
 
 
 class LearntForeground:

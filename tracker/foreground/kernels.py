@@ -193,3 +193,84 @@ def update_background(
             after[y, x, 1] = min(max(np.int64(after[y, x, 1]) + steps[d1 + limit], 0), 65280)
             after[y, x, 2] = min(max(np.int64(after[y, x, 2]) + steps[d2 + limit], 0), 65280)
     return after, counts
+
+
+@_kernel
+def level_medians(
+    source: ndarray, target: ndarray, groups: int
+) -> tuple[ndarray, ndarray, ndarray]:
+    """What a target shows at each of some levels of a source, channel by channel.
+
+    Args:
+        source: (N, 3) uint8.
+        target: (N, 3) uint8.
+        groups: The source's 256 levels are taken together into so many.
+
+    Returns:
+        For each channel and group (3, groups): its pixels, the sum of their levels in the source
+        and the lower median of those in the target, 0 where there is none.
+    """
+    totals = np.zeros((3, groups), dtype=np.int64)
+    sums = np.zeros((3, groups))
+    medians = np.zeros((3, groups))
+    for c in range(3):
+        joint = np.zeros((groups, 256), dtype=np.int64)
+        for i in range(len(source)):
+            level = int(source[i, c])
+            group = level * groups // 256
+            joint[group, target[i, c]] += 1
+            totals[c, group] += 1
+            sums[c, group] += level
+        for group in range(groups):
+            if totals[c, group] == 0:
+                continue
+            below = 0
+            for level in range(256):
+                below += joint[group, level]
+                if below >= 0.5 * totals[c, group]:
+                    medians[c, group] = level
+                    break
+    return totals, sums, medians
+
+
+@_kernel
+def upper_medians(values: ndarray) -> ndarray:
+    """The median of each column of (N, P) uint8, of an even number the upper one.
+
+    Two counts by four bits each find it: first of the upper half of a value, then, among those
+    that share it, of the lower one.
+    """
+    count, size = values.shape
+    rank = count // 2
+    medians = np.empty(size, dtype=np.uint8)
+    tile = 1024
+    upper = np.empty((tile, 16), dtype=np.int64)
+    lower = np.empty((tile, 16), dtype=np.int64)
+    chosen = np.empty(tile, dtype=np.int64)
+    left = np.empty(tile, dtype=np.int64)
+    for begin in range(0, size, tile):
+        width = min(tile, size - begin)
+        upper[:] = 0
+        lower[:] = 0
+        for n in range(count):
+            for k in range(width):
+                upper[k, values[n, begin + k] >> 4] += 1
+        for k in range(width):
+            left[k] = rank
+            half = 0
+            while left[k] >= upper[k, half]:
+                left[k] -= upper[k, half]
+                half += 1
+            chosen[k] = half
+        for n in range(count):
+            for k in range(width):
+                value = values[n, begin + k]
+                if value >> 4 == chosen[k]:
+                    lower[k, value & 15] += 1
+        for k in range(width):
+            half = 0
+            while left[k] >= lower[k, half]:
+                left[k] -= lower[k, half]
+                half += 1
+            medians[begin + k] = chosen[k] * 16 + half
+    return medians

@@ -137,6 +137,9 @@ class FrameReader:
             made: _Made = self._made[name]
             return made
 
+    def check(self) -> None:
+        """Asked between parts of a long work: whoever may be told to stop raises here."""
+
     def close(self) -> None:
         """Release files, memory and thread. Closing twice does no harm."""
         with self._wanted:
