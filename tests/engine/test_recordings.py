@@ -133,14 +133,29 @@ def test_heads_on_real_video_by_particles(data_folder: Path, seed: int) -> None:
     assert number(found, "false_per_step") <= 0.15
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("seed", range(5))
-def test_heads_on_real_video(data_folder: Path, seed: int) -> None:
-    sequence = read_sequence(data_folder / "av163-seq30-2p-1101")
-    run = pipeline.compute(sequence, pipeline.default_parameters(sequence), seed=seed)
-    found = scored(sequence, run, gate=0.3)
-    assert run.parameters.fusion_method == "multi_bernoulli"
-    assert number(found, "found_share") >= 0.9
+def heads(folder: Path, seed: int, steps: int | None = None) -> Evaluation:
+    """The defaults on real video, by a gate of 0.3 m."""
+    sequence = read_sequence(folder / "av163-seq30-2p-1101")
+    parameters = pipeline.default_parameters(sequence)
+    assert parameters.fusion_method == "multi_bernoulli"
+    run = pipeline.compute(sequence, parameters, seed=seed, steps=steps)
+    return scored(sequence, run, gate=0.3)
+
+
+def test_heads_on_the_beginning_of_a_real_video(data_folder: Path) -> None:
+    found = heads(data_folder, seed=0, steps=150)
     assert number(found, "position_error") <= 0.1
     assert number(found, "false_per_step") <= 0.1
-    assert number(found, "idf1") >= 0.7
+
+
+@pytest.mark.long
+def test_heads_on_real_video_over_five_seeds(data_folder: Path) -> None:
+    found = [heads(data_folder, seed) for seed in range(5)]
+
+    def mean(figure: str) -> float:
+        return sum(number(one, figure) for one in found) / len(found)
+
+    assert mean("found_share") >= 0.9
+    assert mean("position_error") <= 0.1
+    assert mean("false_per_step") <= 0.1
+    assert mean("idf1") >= 0.75
