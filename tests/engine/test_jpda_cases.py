@@ -57,6 +57,15 @@ def test_as_published_every_shared_row_is_an_occlusion() -> None:
     assert_array_equal(read([[0.5], [0.4]], [0, -1], every=True).shared, [0, 0])
 
 
+def test_as_published_two_in_one_place_part_to_two_measurements() -> None:
+    # the likeliest event may leave one of them without, and both come nearest to the first
+    cases = read([[0.5, 0.3], [0.5, 0.3]], [0, -1], every=True)
+    assert_array_equal(np.sort(cases.shared), [0, 1])
+    # whom no measurement is left for takes that of another
+    cases = read([[0.5, 0.2], [0.3, 0.4], [0.3, 0.0]], [0, 1, -1], every=True)
+    assert_array_equal(cases.shared, [0, 1, 0])
+
+
 def test_nobody_has_measurements_without_targets() -> None:
     cases = tell_apart(np.zeros((0, 3)), np.zeros(0, dtype=int), 0.1, every_shared_row=False)
     assert cases.new.all()

@@ -59,6 +59,16 @@ def test_all_filters_look_at_the_same_foreground() -> None:
     assert compared[PUBLISHED].jpda.gate_volume == 9.5
 
 
+def test_the_middle_of_two_is_half_their_distance_from_either() -> None:
+    scene = jpda.clip(0)
+    step = next(k for k in range(STEPS) if np.linalg.norm(np.diff(scene.boxes(k)[:, :2].T)) < 12.0)
+    # one measurement at that step alone
+    one, none = replace(result(), measurements=np.zeros((1, 4))), result()
+    results = [one if k == step else none for k in range(STEPS)]
+    half = np.linalg.norm(np.diff(scene.boxes(step)[:, :2], axis=0)) / 2.0
+    assert jpda.error_of_the_middle(scene, results) == pytest.approx(half)
+
+
 def figures(largest: float, speed: float = 50.0) -> dict[str, Any]:
     return {"largest": largest, "median_largest": largest, "mean": 1.0, "frames_per_second": speed}
 
@@ -80,5 +90,7 @@ def test_the_short_form_shows_the_direction() -> None:
     clips = found.numbers["clips"]
     assert clips[CLASSICAL]["largest"] > 2.0 * clips[PUBLISHED]["largest"]
     assert clips[DEFAULTS]["mean"] < 2.0
+    assert clips[DEFAULTS]["largest"] < jpda.LARGEST_ERROR
+    assert jpda.LARGEST_ERROR < found.numbers["error_of_the_middle"] <= clips[PUBLISHED]["largest"]
     assert any(note.startswith("Left out: the real recording") for note in found.notes)
     assert found.figure is not None

@@ -11,6 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
+from scipy.optimize import linear_sum_assignment
+
+UNREACHED = 1e6
+"""Instead of −ln β, where it is 0; more than those of all others together."""
 
 LEAP = 2.0
 """A measurement may be that of a target whose gate it missed if it is so many half sizes away."""
@@ -46,9 +50,9 @@ def tell_apart(
     * **New**: a measurement whose row is zero.
     * **Vanished**: a target whose column is zero.
     * **Occluded**: a row with several positive entries. Two targets close together with a
-      measurement each have such rows too: as published, each of them goes where the
-      likeliest joint event says; else only those count of which some have no measurement
-      of their own.
+      measurement each have such rows too: as published, they go to the measurements of
+      the greatest Π β_tj, one each as far as there are enough; else only those count of
+      which some have no measurement of their own.
     * **Split**: a column with several positive entries in rows of which it has the largest.
     * **Normal**: all others.
 
@@ -70,6 +74,7 @@ def tell_apart(
     wanted[missed] = -1
     if every_shared_row:
         together = (positive & (positive.sum(axis=0) > 1)).any(axis=1)
+        wanted = _one_each(np.where(positive & together[:, None], matrix, 0.0), wanted)
     else:
         together = np.bincount(wanted[~missed], minlength=count)[wanted] > 1
     shared = np.where(~missed & together, wanted, -1)
@@ -77,6 +82,17 @@ def tell_apart(
     largest[matrix.argmax(axis=0), np.arange(count)] = True
     split = ((positive & largest).sum(axis=1) > 1) & (shared < 0)
     return Cases(own, shared, split, missed, new)
+
+
+def _one_each(shared: Float[ndarray, "n M"], wanted: Int[ndarray, " n"]) -> Int[ndarray, " n"]:
+    """As many targets as possible at measurements of their own, of the greatest Π β_tj."""
+    possible = shared > 0.0
+    cost = np.where(possible, -np.log(np.where(possible, shared, 1.0)), UNREACHED)
+    targets, chosen = linear_sum_assignment(cost)
+    near = possible[targets, chosen]
+    result = wanted.copy()
+    result[targets[near]] = chosen[near]
+    return result
 
 
 def part_strangers(

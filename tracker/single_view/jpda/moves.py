@@ -5,17 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.parameters import JpdaParams
 from tracker.single_view.jpda import targets as kalman
 from tracker.single_view.jpda.cases import Cases
 from tracker.single_view.jpda.measurements import Measured
-from tracker.single_view.jpda.targets import Innovations, Targets, innovations
+from tracker.single_view.jpda.targets import Innovations, Targets, X, Y, innovations
 
 SAME_SIZE = 1.5
 """A measurement that differs from its target's box by more than this factor is not of it alone."""
+
+ONE_SIDE = 2.0
+"""An edge of a piece is left over if so much more is than of the edge across from it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,13 +55,19 @@ def move(
     if p.occlusion == "inside":
         hidden &= ~((cases.own == cases.shared) & _alike(targets, cases, seen))
     if p.occlusion == "inside":
-        matrix = _one_each(targets, cases, matrix)
+        matrix = _one_each(targets, cases, matrix, p.least_probability)
     # whom the update by all associations is not for
     matrix = np.where((hidden | cases.missed)[:, None], 0.0, matrix)
     moved = kalman.update(targets, found, matrix)
     moved = replace(moved, half_sizes=_sizes(targets, cases, hidden, matrix, seen, p))
     for t in np.flatnonzero(hidden):
-        moved = _put(moved, int(t), _behind(targets, int(t), int(cases.shared[t]), seen, p))
+        j = int(cases.shared[t])
+        if p.occlusion == "measurement":
+            one = _at_rest(targets, int(t), j, seen, p)
+        else:
+            alone = (hidden & (cases.shared >= 0) & _in_piece(cases.shared, j, seen)).sum() == 1
+            one = _behind(targets, int(t), j, seen, alone=bool(alone))
+        moved = _put(moved, int(t), one)
     # who is measured by himself is hidden by nobody, even if he stands still for it
     lost = hidden & ((cases.own != cases.shared) | (p.occlusion == "inside"))
     return Moved(
@@ -83,17 +92,20 @@ def _alike(targets: Targets, cases: Cases, seen: Measured) -> Bool[ndarray, " n"
 
 
 def _one_each(
-    targets: Targets, cases: Cases, matrix: Float[ndarray, "n M"]
+    targets: Targets, cases: Cases, matrix: Float[ndarray, "n M"], least_probability: float
 ) -> Float[ndarray, "n M"]:
     """The matrix with a single 1 in the rows of targets that take one measurement alone.
 
-    That are those in front of others, and those which come out of an occlusion: where
-    two were in one place the mean over all associations would keep both between the two.
-    And those whose measurement was found outside their gate.
+    That are those in front of others, those which come out of an occlusion, and those whose
+    measurement may as well be another's: where two are in one place the mean over all
+    associations would keep both between the two. And those whose measurement was found
+    outside their gate.
     """
     there = np.flatnonzero(cases.own >= 0)
     leapt = matrix[there, cases.own[there]] == 0.0
-    alone = there[leapt | (targets.hidden[there] > 0) | (cases.shared[there] >= 0)]
+    contested = ((matrix > least_probability).sum(axis=0) > 1)[cases.own[there]]
+    occluded = (targets.hidden[there] > 0) | (cases.shared[there] >= 0)
+    alone = there[leapt | contested | occluded]
     result = matrix.copy()
     result[alone] = 0.0
     result[alone, cases.own[alone]] = 1.0
@@ -116,20 +128,56 @@ def _sizes(
     return np.where(whole[:, None], followed, targets.half_sizes)
 
 
-def _behind(targets: Targets, t: int, j: int, seen: Measured, p: JpdaParams) -> Targets:
-    """One occluded target: at rest at the measurement, or going on inside its piece."""
+def _in_piece(shared: Int[ndarray, " n"], j: int, seen: Measured) -> Bool[ndarray, " n"]:
+    """Whether what each target is hidden by was found in the same piece as a measurement."""
+    return np.asarray((seen.pieces[shared] == seen.pieces[j]).all(axis=1))
+
+
+def _at_rest(targets: Targets, t: int, j: int, seen: Measured, p: JpdaParams) -> Targets:
+    """One occluded target at the measurement, of velocity 0."""
     one = targets.take(np.array([t]))
-    if p.occlusion == "measurement":
-        place = np.concatenate([seen.boxes[j, :2], one.half_sizes[0]])
-        rest = Targets.at_rest(place[None], seen.sigmas[[j]], p.velocity_sigma, one.labels)
-        return replace(one, means=rest.means, covariances=rest.covariances)
-    room = np.maximum(seen.pieces[j, 2:] - one.half_sizes[0], 0.0)
-    middle = seen.pieces[j, :2]
-    nearest = np.clip(one.positions[0], middle - room, middle + room)
+    place = np.concatenate([seen.boxes[j, :2], one.half_sizes[0]])
+    rest = Targets.at_rest(place[None], seen.sigmas[[j]], p.velocity_sigma, one.labels)
+    return replace(one, means=rest.means, covariances=rest.covariances)
+
+
+def _behind(targets: Targets, t: int, j: int, seen: Measured, *, alone: bool) -> Targets:
+    """One occluded target: it goes on inside its piece.
+
+    Where the boxes measured in a piece leave one of its edges over, and only one target is
+    hidden there, that edge is the target's.
+    """
+    one = targets.take(np.array([t]))
+    piece, half_sizes = seen.pieces[j], one.half_sizes[0]
+    room = np.maximum(piece[2:] - half_sizes, 0.0)
+    low, high = piece[:2] - room, piece[:2] + room
+    place = np.clip(one.positions[0], low, high)
     # no innovation while it is inside; how far it may be off, the piece tells
     unsure = np.hypot(room, seen.sigmas[j, :2])
-    found = innovations(one, nearest[None], unsure[None])
-    return kalman.update(one, found, np.ones((1, 1)))
+    if alone:
+        edges = _left_over(piece, seen.boxes[(seen.pieces == piece).all(axis=1)], half_sizes)
+        told = edges != 0
+        place = np.where(told, np.where(edges < 0, low, high), place)
+        unsure = np.where(told, seen.sigmas[j, :2], unsure)
+    moved = kalman.update(one, innovations(one, place[None], unsure[None]), np.ones((1, 1)))
+    means = moved.means.copy()
+    means[0, [X, Y]] = np.clip(moved.positions[0], low, high)
+    return replace(moved, means=means)
+
+
+def _left_over(
+    piece: Float[ndarray, " 4"], shown: Float[ndarray, "S 4"], half_sizes: Float[ndarray, " 2"]
+) -> Int[ndarray, " 2"]:
+    """Which edge of a piece the boxes shown in it do not reach, across and down.
+
+    −1 the lower one, 1 the upper one, 0 neither: where both are left over one target cannot
+    explain them, nor what it would have to be torn off from the others for.
+    """
+    before = (shown[:, :2] - shown[:, 2:]).min(axis=0) - (piece[:2] - piece[2:])
+    after = (piece[:2] + piece[2:]) - (shown[:, :2] + shown[:, 2:]).max(axis=0)
+    wider, narrower = np.maximum(before, after), np.minimum(before, after)
+    clear = (wider > ONE_SIDE * np.maximum(narrower, 0.0)) & (wider <= 2.0 * half_sizes)
+    return np.where(clear & (wider > 0.0), np.where(before > after, -1, 1), 0)
 
 
 def _put(targets: Targets, t: int, one: Targets) -> Targets:

@@ -1,0 +1,104 @@
+"""What targets do by their case: those hidden in a piece, those who come near each other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy import ndarray
+from numpy.testing import assert_allclose, assert_array_equal
+
+from tracker.parameters import JpdaParams
+from tracker.single_view.jpda.cases import Cases
+from tracker.single_view.jpda.measurements import Measured
+from tracker.single_view.jpda.moves import Moved, _left_over, move
+from tracker.single_view.jpda.targets import Targets, innovations
+
+HALF = (4.0, 9.0)
+
+
+def targets(*places: tuple[float, float], speeds: tuple[float, float] = (0.0, 0.0)) -> Targets:
+    """People of one size and one velocity."""
+    boxes = np.array([[*place, *HALF] for place in places])
+    labels = np.arange(1, len(boxes) + 1)
+    some = Targets.at_rest(boxes, np.full((len(boxes), 4), 1.5), 1.0, labels)
+    some.means[:, [1, 3]] = speeds
+    return some
+
+
+def measured(boxes: list[tuple[float, ...]], pieces: list[tuple[float, ...]]) -> Measured:
+    found = np.array(boxes, dtype=float)
+    ones = np.ones(len(found))
+    return Measured(found, ones, np.ones((len(found), 4)), np.array(pieces, dtype=float))
+
+
+def moved(
+    some: Targets,
+    seen: Measured,
+    matrix: list[list[float]],
+    own: list[int],
+    shared: list[int],
+    p: JpdaParams | None = None,
+) -> Moved:
+    """One step of targets whose cases are told."""
+    none = np.zeros(some.size, dtype=bool)
+    cases = Cases(np.array(own), np.array(shared), none, none, np.zeros(len(seen.boxes), bool))
+    found = innovations(some, seen.boxes[:, :2], seen.sigmas[:, :2])
+    return move(some, found, np.array(matrix), cases, seen, p or JpdaParams())
+
+
+def test_an_edge_that_who_is_in_front_leaves_over_is_of_who_is_behind() -> None:
+    # in front at (100, 100); the piece reaches 5 px further left, and 6 further down
+    front, piece = (100.0, 100.0, *HALF), (97.5, 103.0, 6.5, 12.0)
+    some, seen = targets((100, 100), (99, 102)), measured([front], [piece])
+    for _ in range(8):
+        some = moved(some, seen, [[1.0], [0.0]], [0, -1], [0, 0]).targets
+    assert_allclose(some.positions, [[100.0, 100.0], [95.0, 106.0]], atol=0.4)
+
+
+def test_who_is_hidden_never_leaves_the_piece() -> None:
+    some = targets((100, 100), (99, 100), speeds=(200.0, -100.0))
+    seen = measured([(100.0, 100.0, *HALF)], [(101.0, 101.0, 6.0, 11.0)])
+    result = moved(some.predict(0.2, 8.0), seen, [[1.0], [0.0]], [0, -1], [0, 0])
+    inside = np.abs(result.targets.positions[1] - [101.0, 101.0])
+    assert (inside <= [2.0 + 1e-9, 2.0 + 1e-9]).all()
+    assert_array_equal(result.hidden, [False, True])
+
+
+def test_two_hidden_in_one_piece_leave_its_edges_open() -> None:
+    some = targets((100, 100), (99, 100), (98, 101))
+    seen = measured([(100.0, 100.0, *HALF)], [(97.5, 103.0, 6.5, 12.0)])
+    result = moved(some, seen, [[1.0], [0.0], [0.0]], [0, -1, -1], [0, 0, 0])
+    assert_allclose(result.targets.positions[1:], some.positions[1:], atol=0.01)
+
+
+EDGES: list[tuple[str, tuple[float, ...], list[tuple[float, ...]], list[int]]] = [
+    ("left and below", (97.5, 103, 6.5, 12), [(100, 100, *HALF)], [-1, 1]),
+    ("nothing", (100, 100, *HALF), [(100, 100, *HALF)], [0, 0]),
+    ("both sides", (100, 100, 9, 9), [(100, 100, *HALF)], [0, 0]),
+    ("legs of somebody tall", (100, 130, 4, 39), [(100, 100, *HALF)], [0, 0]),
+    ("two in front", (103, 100, 8, 9), [(99, 100, *HALF), (104, 100, *HALF)], [1, 0]),
+]
+
+
+@pytest.mark.parametrize(
+    ("piece", "shown", "edges"), [row[1:] for row in EDGES], ids=[row[0] for row in EDGES]
+)
+def test_which_edges_are_left_over(
+    piece: tuple[float, ...], shown: list[tuple[float, ...]], edges: list[int]
+) -> None:
+    boxes: ndarray = np.array(shown, dtype=float)
+    found = _left_over(np.array(piece, dtype=float), boxes, np.array(HALF))
+    assert_array_equal(found, edges)
+
+
+def test_of_two_measurements_that_both_may_have_made_each_takes_its_own() -> None:
+    some = targets((100, 100), (103, 100))
+    seen = measured([(98.0, 100.0, *HALF), (105.0, 100.0, *HALF)], [(98.0, 100.0, *HALF)] * 2)
+    shares = [[0.55, 0.45], [0.45, 0.55]]
+    result = moved(some, seen, shares, [0, 1], [-1, -1])
+    assert_allclose(result.matrix, np.eye(2))
+    apart = result.targets.positions[1, 0] - result.targets.positions[0, 0]
+    assert apart > 5.0, "neither is drawn to the middle"
+    # by the mean over all associations they would have come closer
+    below = moved(some, seen, shares, [0, 1], [-1, -1], JpdaParams(least_probability=0.5))
+    assert below.targets.positions[1, 0] - below.targets.positions[0, 0] < 4.0
