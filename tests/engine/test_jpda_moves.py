@@ -102,3 +102,5 @@ def test_of_two_measurements_that_both_may_have_made_each_takes_its_own() -> Non
     # by the mean over all associations they would have come closer
     below = moved(some, seen, shares, [0, 1], [-1, -1], JpdaParams(least_probability=0.5))
     assert below.targets.positions[1, 0] - below.targets.positions[0, 0] < 4.0
+    classical = moved(some, seen, shares, [0, 1], [-1, -1], JpdaParams(five_cases=False))
+    assert_allclose(classical.matrix, shares)

@@ -54,7 +54,7 @@ def move(
     hidden = cases.shared >= 0
     if p.occlusion == "inside":
         hidden &= ~((cases.own == cases.shared) & _alike(targets, cases, seen))
-    if p.occlusion == "inside":
+    if p.five_cases and p.occlusion == "inside":
         matrix = _one_each(targets, cases, matrix, p.least_probability)
     # whom the update by all associations is not for
     matrix = np.where((hidden | cases.missed)[:, None], 0.0, matrix)
