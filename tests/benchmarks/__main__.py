@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-from tests.benchmarks import growth, jpda, kernels, live, pipeline, server, targets
+from tests.benchmarks import growth, jpda, kernels, live, pipeline, server, stage_one, targets
 from tests.benchmarks.measure import Measurement, machine
 
 SUITES = {
@@ -17,6 +17,7 @@ SUITES = {
     "pipeline": pipeline.run,
     "growth": growth.run,
     "live": live.run,
+    "stage_one": stage_one.run,
     "server": server.run,
 }
 
