@@ -39,7 +39,9 @@ class Scene:
     @property
     def foreground_share(self) -> float:
         """Of the picture; 0 where no background was learnt."""
-        return float(self.mask.mean()) if self.mask is not None else 0.0
+        if self.mask is None or self.sums is None:
+            return 0.0
+        return float(self.sums[-1, -1]) / self.mask.size
 
 
 class Appearance:
@@ -140,7 +142,7 @@ class Appearance:
         """
         if scene.mask is None or count == 0:
             return np.zeros((0, 4))
-        pixels = np.flatnonzero(scene.mask)
+        pixels = scene.mask.view(np.bool_).ravel().nonzero()[0]
         if not len(pixels):
             return np.zeros((0, 4))
         rows, columns = np.divmod(rng.choice(pixels, count), scene.mask.shape[1])
