@@ -108,6 +108,33 @@ def expected_boxes(
 
 
 @_kernel
+def measured_boxes(
+    boxes: ndarray, variances: ndarray, transform: ndarray, products: ndarray
+) -> tuple[ndarray, ndarray]:
+    """Boxes as measurements z = T b, and their noise T diag(σ²) Tᵀ.
+
+    Args:
+        boxes: b (M, 4).
+        variances: σ² (M, 4).
+        transform: T (m, 4).
+        products: (4, m²), what each variance adds to each entry of the noise.
+
+    Returns:
+        (M, m) and (M, m, m).
+    """
+    count, size = len(boxes), len(transform)
+    values = np.zeros((count, size))
+    noises = np.zeros((count, size, size))
+    for i in range(count):
+        for part in range(4):
+            for a in range(size):
+                values[i, a] += transform[a, part] * boxes[i, part]
+                for b in range(size):
+                    noises[i, a, b] += variances[i, part] * products[part, a * size + b]
+    return values, noises
+
+
+@_kernel
 def low_boxes(
     states: ndarray,
     standing: ndarray,

@@ -116,6 +116,21 @@ def group_labels(labels: ndarray) -> tuple[ndarray, ndarray]:
 
 
 @_kernel
+def inside_bounds(points: ndarray, low: ndarray, high: ndarray) -> ndarray:
+    """Indices of the points (N, d), of which the first coordinates count, within bounds."""
+    inside = np.empty(len(points), dtype=np.int64)
+    count = 0
+    for i in range(len(points)):
+        within = True
+        for axis in range(len(low)):
+            within &= low[axis] <= points[i, axis] <= high[axis]
+        if within:
+            inside[count] = i
+            count += 1
+    return inside[:count].copy()
+
+
+@_kernel
 def doubles(
     means: ndarray,
     weights: ndarray,

@@ -46,6 +46,9 @@ class FusionModel:
         """Squared Mahalanobis distance of the innovation."""
         self.near = p.duplicate_distance * 2.0 * float(np.mean(sequence.target_half_extents[:2]))
         """Metres within which two components may be one person."""
+        margin = p.followed_margin
+        self._followed = (self.room.minimum - margin, self.room.maximum + margin)
+        """The corners between which people are followed."""
         self._newborns = MeasurementBirths(
             self.cameras,
             sequence.room,
@@ -121,8 +124,8 @@ class FusionModel:
 
     def stays(self, mixture: GaussianMixture) -> Int[ndarray, " K"]:
         """Indices of the components that have not strayed from the room."""
-        margin = self.parameters.followed_margin
-        return np.flatnonzero(self.room.contains(mixture.means[:, :3], margin))
+        inside: ndarray = kernels.inside_bounds(mixture.means, *self._followed)
+        return inside
 
     def doubles(
         self,

@@ -225,5 +225,10 @@ class TargetModel:
             view: Boxes and how far each is to be trusted.
             factor: On the standard deviations.
         """
-        noise = ((factor * view.sigmas) ** 2 @ self._products).reshape(-1, self.size, self.size)
-        return view.boxes @ self._transform.T, noise
+        measured: tuple[ndarray, ndarray] = box_kernels.measured_boxes(
+            np.ascontiguousarray(view.boxes, dtype=float),
+            np.ascontiguousarray((factor * view.sigmas) ** 2, dtype=float),
+            self._transform,
+            self._products,
+        )
+        return measured
