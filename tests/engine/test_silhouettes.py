@@ -119,6 +119,13 @@ def test_quantiles_are_those_of_the_sizes_at_each_place() -> None:
         np.testing.assert_array_equal(table[cell, :, 1], heights[ranks])
 
 
+def test_the_middle_of_each_cell_lies_in_it() -> None:
+    sizes = BoxSizes.of(CAMERA, ROOM, HALF_EXTENTS)
+    places = sizes.places()
+    np.testing.assert_array_equal(sizes.cells(places), np.arange(sizes.rows * sizes.columns))
+    np.testing.assert_array_equal(sizes.typical(places)[1], sizes.contains(places))
+
+
 def stacked(gap: int, shift: int = 0) -> ndarray:
     mask = np.zeros((80, 60), np.uint8)
     mask[5:20, 20:30] = 1

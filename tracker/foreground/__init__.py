@@ -14,7 +14,7 @@ from numpy import ndarray
 from tracker.foreground.adaptive import AdaptiveForeground
 from tracker.foreground.exposure import BackgroundModel, LearntForeground, tone_curve
 from tracker.foreground.segmentation import ForegroundModel, Segmentation, pack, unpack
-from tracker.foreground.shares import box_shares, integral, shape_scores
+from tracker.foreground.shares import box_shares, integral, shape_scores, shape_shares
 from tracker.parameters.foreground import ForegroundParams
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
@@ -30,6 +30,7 @@ __all__ = [
     "learn",
     "pack",
     "shape_scores",
+    "shape_shares",
     "tone_curve",
     "unpack",
 ]

@@ -36,6 +36,20 @@ def box_shares(sums: Int[ndarray, "h1 w1"], edges: Float[ndarray, "N 4"]) -> Flo
     return shares
 
 
+def shape_shares(
+    sums: Int[ndarray, "h1 w1"], boxes: Float[ndarray, "N 4"]
+) -> tuple[Float[ndarray, " N"], Float[ndarray, " N"], Float[ndarray, " N"]]:
+    """The shares of foreground inside boxes, above them, and beside their upper parts.
+
+    Args:
+        sums: :func:`integral` of the mask.
+        boxes: Centre and half sizes, pixels.
+    """
+    middles, half_sizes = boxes[:, [0, 1, 0, 1]], boxes[:, [2, 3, 2, 3]]
+    inside, above, left, right = (box_shares(sums, middles + part * half_sizes) for part in _PARTS)
+    return inside, above, (left + right) / 2.0
+
+
 def shape_scores(
     sums: Int[ndarray, "h1 w1"],
     boxes: Float[ndarray, "N 4"],
@@ -46,7 +60,7 @@ def shape_scores(
     """What the foreground says of boxes: log factors of their likelihood, and shares inside.
 
     A box on a person is full of foreground, with background above and beside it:
-    a ln(inside + 0.02) - b (above + (left + right) / 2).
+    a ln(inside + 0.02) - b (above + beside), of :func:`shape_shares`.
 
     Args:
         sums: :func:`integral` of the mask.
@@ -54,7 +68,5 @@ def shape_scores(
         inside_weight: a.
         around_weight: b.
     """
-    middles, half_sizes = boxes[:, [0, 1, 0, 1]], boxes[:, [2, 3, 2, 3]]
-    inside, above, left, right = (box_shares(sums, middles + part * half_sizes) for part in _PARTS)
-    around = above + (left + right) / 2.0
-    return inside_weight * np.log(inside + 0.02) - around_weight * around, inside
+    inside, above, beside = shape_shares(sums, boxes)
+    return inside_weight * np.log(inside + 0.02) - around_weight * (above + beside), inside

@@ -126,6 +126,11 @@ class BoxSizes:
         """The cell of each place; places outside the picture go to the nearest one."""
         return _cells(centres, self.cell, self.columns, self.rows)
 
+    def places(self) -> Float[ndarray, "cells 2"]:
+        """The middle of each cell, pixels."""
+        rows, columns = np.indices((self.rows, self.columns)).reshape(2, -1)
+        return np.stack([columns, rows], axis=1) * self.cell + (self.cell - 1.0) / 2.0
+
     def quantiles(
         self, count: int
     ) -> tuple[Float[ndarray, "cells count 2"], Bool[ndarray, " cells"]]:

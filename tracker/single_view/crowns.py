@@ -1,8 +1,12 @@
-"""Targets in a foreground mask: the tops of its pieces, with a target's size under each.
+"""Targets in a foreground mask of whom nothing is known: the tops of its pieces.
 
 People stand; what a camera sees of them from the side has their crown on top, however
 many of them one piece of foreground shows and whatever hides their legs. Of a target
 whose height above the floor is roughly known the calibrated camera tells the size.
+
+Of pieces of which it is known how many people they show, :mod:`~tracker.single_view.silhouettes`
+finds as many: it takes poorer boxes of those who are expected, and no more than very good
+ones of others.
 
 Boxes are ``centre_x, centre_y, half_width, half_height`` in pixels.
 """
@@ -19,7 +23,7 @@ from scipy.ndimage import minimum_filter1d
 
 from tracker.blobs import Blobs, blobs
 from tracker.camera import Camera
-from tracker.foreground import box_shares, integral
+from tracker.foreground import integral, shape_shares
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BELOW_FLOOR, BoxSizes
 
@@ -37,10 +41,6 @@ LEAST_INSIDE, MOST_ABOVE, MOST_BESIDE = 0.4, 0.5, 0.8
 
 SAME_ACROSS, SAME_DOWN = 1.0, 1.5
 """A top so many half widths beside and half heights under another is that target's shoulder."""
-
-_ABOVE = np.array([-1.0, -2.0, 1.0, -1.3])
-_LEFT, _RIGHT = np.array([-2.2, -1.0, -1.4, 0.3]), np.array([1.4, -1.0, 2.2, 0.3])
-"""Left, top, right, bottom in half sizes from a box's centre."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,24 +67,16 @@ class TargetSizes:
             BoxSizes.of(camera, part, half_extents)
             for part in _walked(room, float(half_extents[2]))
         )
-        self._cell, self._shape = lower.cell, (lower.rows, lower.columns)
-        self._table = np.full((lower.rows * lower.columns, 2), np.nan)
-        for cell in range(len(self._table)):
-            for sizes in (upright, lower):
-                here = sizes.sizes[sizes.starts[cell] : sizes.starts[cell + 1]]
-                if len(here):
-                    self._table[cell] = np.median(here, axis=0)
-                    break
+        self._grid, places = lower, lower.places()
+        standing, there = upright.typical(places)
+        self._table = np.where(there[:, None], standing, lower.typical(places)[0])
         somewhere = np.isfinite(self._table[:, 0])
         self.middle = np.median(self._table[somewhere], axis=0) if somewhere.any() else np.ones(2)
         """Half width and half height in the middle of all places, pixels."""
 
     def at(self, centres: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
         """Half width and half height of a target there, NaN where none can be."""
-        rows, columns = self._shape
-        column = np.clip((centres[:, 0] + 0.5) // self._cell, 0, columns - 1).astype(np.int64)
-        row = np.clip((centres[:, 1] + 0.5) // self._cell, 0, rows - 1).astype(np.int64)
-        return np.asarray(self._table[row * columns + column])
+        return np.asarray(self._table[self._grid.cells(centres)])
 
     def under(self, tops: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
         """The sizes of targets whose crowns are there."""
@@ -130,14 +122,8 @@ def crowns(mask: UInt8[ndarray, "h w"], sizes: TargetSizes, minimum_area: int) -
     found = [_tops(pieces, piece, sizes) for piece in range(pieces.size)]
     boxes = np.concatenate([np.zeros((0, 4)), *found])
     owners = np.repeat(np.arange(pieces.size), [len(tops) for tops in found])
-    sums = integral(closed)
-    inside = _share(sums, boxes, np.array([-1.0, -1.0, 1.0, 1.0]))
-    beside = (_share(sums, boxes, _LEFT) + _share(sums, boxes, _RIGHT)) / 2.0
-    good = (
-        (inside >= LEAST_INSIDE)
-        & (_share(sums, boxes, _ABOVE) <= MOST_ABOVE)
-        & (beside <= MOST_BESIDE)
-    )
+    inside, above, beside = shape_shares(integral(closed), boxes)
+    good = (inside >= LEAST_INSIDE) & (above <= MOST_ABOVE) & (beside <= MOST_BESIDE)
     kept: list[int] = []
     for i in np.argsort(boxes[:, 1] - boxes[:, 3], kind="stable").tolist():
         apart = boxes[i, :2] - boxes[kept, :2]
@@ -177,9 +163,3 @@ def _runs(flags: ndarray) -> Int[ndarray, "R 2"]:
     """First and one past the last index of each run of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
     return edges.reshape(-1, 2)
-
-
-def _share(
-    sums: ndarray, boxes: Float[ndarray, "N 4"], part: Float[ndarray, " 4"]
-) -> Float[ndarray, " N"]:
-    return box_shares(sums, boxes[:, [0, 1, 0, 1]] + part * boxes[:, [2, 3, 2, 3]])

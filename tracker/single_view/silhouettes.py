@@ -1,7 +1,9 @@
 """Target boxes in outlines: where in a piece of foreground a head, or a head and torso, can be.
 
 A piece of foreground shows all of a person, what is tracked may be a part of it: a
-target's box begins at the crown, and its size is known from the calibrated camera.
+target's box begins at the crown, and its size is known from the calibrated camera. How
+many targets a piece shows is believed beforehand; of whom nothing is known,
+:mod:`~tracker.single_view.crowns` finds.
 """
 
 from __future__ import annotations
