@@ -30,7 +30,7 @@ from tracker.stage_cache import StageCache
 
 logger = logging.getLogger("app")
 
-NICENESS = 5
+NICENESS = 2
 """Work on pictures yields to whoever scrubs: the kernel gives its threads what the server
 leaves. The fusion does not: it is short, and whoever moves a slider waits for it."""
 

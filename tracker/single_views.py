@@ -64,11 +64,11 @@ class SingleViews:
         workers = [future.result() for future in preparing]
         blocks: deque[list[Future[list[tuple[ViewResult, Any]]]]] = deque()
 
-        def order_block() -> None:
+        def order_block(steps: int = BLOCK) -> None:
             pairs = zip(self._pools, workers, strict=True)
-            blocks.append([pool.submit(worker.block) for pool, worker in pairs])
+            blocks.append([pool.submit(worker.block, steps) for pool, worker in pairs])
 
-        order_block()
+        order_block(1)  # somebody waits for the first
         left = self._run.sequence.frames - len(self._run.views)
         while left > 0:
             order_block()  # is computed while the one before is fused
@@ -114,10 +114,10 @@ class _CameraWorker:
         self._pictures = reader.iterate(camera, self._frame) if method.needs_pictures else None
         self._likeness = Likeness.of(run.sequence, reader) if method.needs_pictures else None
 
-    def block(self) -> list[tuple[ViewResult, Any]]:
+    def block(self, steps: int) -> list[tuple[ViewResult, Any]]:
         """The next few steps: result and state of each; none at the end."""
         done: list[tuple[ViewResult, Any]] = []
-        while len(done) < BLOCK and self._frame < self._frames and not self._stopped():
+        while len(done) < steps and self._frame < self._frames and not self._stopped():
             picture = next(self._pictures, None) if self._pictures is not None else None
             rng = np.random.default_rng((self._seed, self._camera, self._frame))
             self._state, result = self._method.step(self._state, self._frame, picture, rng)

@@ -35,6 +35,7 @@ def run(short: bool) -> Iterator[Measurement]:
             write_sequence(folder, frames=250)
         server = Server(folder, Path(name) / "cache")
         try:
+            server.wait(lambda state: state["run"]["done"] > 0)
             yield from _first_steps(server, 4 if short else 20)
         finally:
             server.stop()
