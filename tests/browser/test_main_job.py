@@ -2,81 +2,29 @@
 
 from __future__ import annotations
 
-import base64
 import time
-from collections.abc import Callable
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
-from playwright.sync_api import Frame, Page, expect
+from playwright.sync_api import Page, expect
 
-from tests.browser.conftest import Server
+from tests.browser.looking import (
+    as_at_first,
+    clear_overlays,
+    numbers_in_pictures,
+    overlay_steps,
+    readout,
+    shown_in_3d,
+    until,
+    viser,
+)
+from tests.browser.serving import Server
 from tests.browser.walkers import FRAMES
-from tests.synthetic import number_in
 from tracker import pipeline
 from tracker.export import read_tracks_csv
 from tracker.parameters import with_values
 from tracker.sequences.library import open_sequence
-
-
-def viser(page: Page) -> Frame:
-    """The 3D view inside the page, once it is connected."""
-    page.wait_for_selector("iframe")
-    deadline = time.monotonic() + 60.0
-    while time.monotonic() < deadline:
-        for frame in page.frames:
-            if "/viser/" in frame.url and frame.query_selector(".mvp-status[data-step]"):
-                return frame
-        page.wait_for_timeout(100)
-    raise AssertionError("the 3D view did not connect within 60 s")
-
-
-def until(page: Page, condition: Callable[[], bool], what: str, seconds: float = 30.0) -> None:
-    """Wait for an end state: the software renderer draws a few frames a second."""
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        if condition():
-            return
-        page.wait_for_timeout(50)
-    raise AssertionError(f"not within {seconds} s: {what}")
-
-
-def numbers_in_pictures(page: Page) -> list[int]:
-    """What number each camera's picture says it is."""
-    numbers = []
-    for canvas in page.query_selector_all(".cam canvas"):
-        url = canvas.evaluate("canvas => canvas.toDataURL('image/png')")
-        data = np.frombuffer(base64.b64decode(url.partition(",")[2]), dtype=np.uint8)
-        picture = cv2.imdecode(data, cv2.IMREAD_COLOR)
-        assert picture is not None
-        numbers.append(number_in(cv2.resize(picture, (192, 144), interpolation=cv2.INTER_AREA)))
-    return numbers
-
-
-def overlay_steps(page: Page) -> list[str | None]:
-    """The step whose results are drawn over each picture."""
-    return [cam.get_attribute("data-overlay") for cam in page.query_selector_all(".cam")]
-
-
-def clear_overlays(page: Page) -> None:
-    """Switch every layer off, so that no box covers the number."""
-    chips = page.get_by_role("group", name="Layers in the pictures").get_by_role("button")
-    for chip in chips.all():
-        if chip.get_attribute("aria-pressed") == "true":
-            chip.click()
-
-
-def readout(page: Page) -> str:
-    """The step that the transport says is shown."""
-    return page.get_by_label("Go to step").inner_text().split("/")[0].strip()
-
-
-def shown_in_3d(frame: Frame) -> str | None:
-    """The step that the 3D view says it shows."""
-    status = frame.query_selector(".mvp-status")
-    return status.get_attribute("data-step") if status else None
 
 
 def test_pictures_overlays_readout_and_3d_show_the_same_step(page: Page, server: Server) -> None:
@@ -144,3 +92,48 @@ def test_a_slider_in_the_3d_panel_changes_the_run_and_the_csv_is_the_engines(
     assert run.tracks.frames.tolist() == tracks.frames.tolist()
     assert run.tracks.ids.tolist() == tracks.ids.tolist()
     assert tracks.positions == pytest.approx(run.tracks.positions, abs=1e-4)
+
+
+def test_a_slider_moved_twenty_times_in_a_second_ends_in_one_run(
+    page: Page, server: Server
+) -> None:
+    as_at_first(server)
+    scene = viser(page)
+    key = "fusion.detection_probability"
+    before = server.wait_for_run()["parameters"][key]
+    row = scene.locator("div:has(> .mantine-Text-root > label)", has_text="Detection probability")
+    thumb = row.locator("xpath=..").get_by_role("slider").last
+    thumb.focus()
+    begin = time.monotonic()
+    for _ in range(20):
+        thumb.press("ArrowLeft", no_wait_after=True)
+        page.wait_for_timeout(max(0.0, 50.0 - 1e3 * (time.monotonic() - begin) % 50.0))
+    wanted = float(thumb.get_attribute("aria-valuenow") or "nan")
+    assert wanted < before - 0.1
+    state = server.wait(
+        lambda state: (
+            state["parameters"][key] == pytest.approx(wanted) and state["run"]["state"] == "done"
+        )
+    )
+    page.wait_for_timeout(500)
+    assert server.get("/api/state").json()["run"]["key"] == state["run"]["key"], "no run follows"
+    runs = server.get("/api/tables/runs").text
+    assert runs.count("computing") == 0
+    assert float(thumb.get_attribute("aria-valuenow") or "nan") == pytest.approx(wanted)
+
+    sequence = open_sequence(str(server.folder))
+    parameters = with_values(pipeline.default_parameters(sequence), state["parameters"])
+    run = pipeline.compute(sequence, parameters, seed=0)
+    lives = {
+        int(track): (int(steps.min()), int(steps.max()))
+        for track in np.unique(run.tracks.ids)
+        if len(steps := run.tracks.frames[run.tracks.ids == track])
+    }
+    rows = page.locator("#panel-tracks tbody tr")
+    expect(rows).to_have_count(len(lives), timeout=20_000)
+    for row in rows.all():
+        track, _, born, died = (cell.inner_text() for cell in row.locator("td").all()[:4])
+        first, last = lives[int(track)]
+        assert born == str(first)
+        assert died == ("–" if last == FRAMES - 1 else str(last))
+    as_at_first(server)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from playwright.sync_api import Page, expect
 
-from tests.browser.conftest import Server
-from tests.browser.test_main_job import readout, shown_in_3d, until, viser
+from tests.browser.looking import readout, shown_in_3d, until, viser
+from tests.browser.serving import Server
 
 
 def test_the_page_and_the_3d_view_recover_where_they_were(page: Page, server: Server) -> None:

@@ -1,0 +1,97 @@
+"""What a person sees on the page, as values: numbers in pictures, the readout, the 3D view."""
+
+from __future__ import annotations
+
+import base64
+import time
+from collections.abc import Callable
+
+import cv2
+import httpx2
+import numpy as np
+from numpy import ndarray
+from playwright.sync_api import Frame, Page
+
+from tests.browser.serving import Server
+from tests.synthetic import number_in
+
+
+def viser(page: Page) -> Frame:
+    """The 3D view inside the page, once it is connected."""
+    page.wait_for_selector("iframe")
+    deadline = time.monotonic() + 60.0
+    while time.monotonic() < deadline:
+        for frame in page.frames:
+            if "/viser/" in frame.url and frame.query_selector(".mvp-status[data-step]"):
+                return frame
+        page.wait_for_timeout(100)
+    raise AssertionError("the 3D view did not connect within 60 s")
+
+
+def until(page: Page, condition: Callable[[], bool], what: str, seconds: float = 30.0) -> None:
+    """Wait for an end state: the software renderer draws a few frames a second."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        if condition():
+            return
+        page.wait_for_timeout(50)
+    raise AssertionError(f"not within {seconds} s: {what}")
+
+
+def painted(page: Page) -> list[ndarray]:
+    """The cameras' canvases as they are, pictures and overlays."""
+    pictures = []
+    for canvas in page.query_selector_all(".cam canvas"):
+        url = canvas.evaluate("canvas => canvas.toDataURL('image/png')")
+        data = np.frombuffer(base64.b64decode(url.partition(",")[2]), dtype=np.uint8)
+        picture = cv2.imdecode(data, cv2.IMREAD_COLOR)
+        assert picture is not None
+        pictures.append(np.asarray(picture))
+    return pictures
+
+
+def numbers_in_pictures(page: Page) -> list[int]:
+    """What number each camera's picture says it is."""
+    small = [cv2.resize(p, (192, 144), interpolation=cv2.INTER_AREA) for p in painted(page)]
+    return [number_in(np.asarray(picture)) for picture in small]
+
+
+def overlay_steps(page: Page) -> list[str | None]:
+    """The step whose results are drawn over each picture."""
+    return [cam.get_attribute("data-overlay") for cam in page.query_selector_all(".cam")]
+
+
+def clear_overlays(page: Page) -> None:
+    """Switch every layer off, so that no box covers the number."""
+    chips = page.get_by_role("group", name="Layers in the pictures").get_by_role("button")
+    for chip in chips.all():
+        if chip.get_attribute("aria-pressed") == "true":
+            chip.click()
+
+
+def readout(page: Page) -> str:
+    """The step that the transport says is shown."""
+    return page.get_by_label("Go to step").inner_text().split("/")[0].strip()
+
+
+def shown_in_3d(frame: Frame) -> str | None:
+    """The step that the 3D view says it shows."""
+    status = frame.query_selector(".mvp-status")
+    return status.get_attribute("data-step") if status else None
+
+
+def ask(server: Server, method: str, path: str, body: dict | None = None) -> dict:
+    """Have the server do something, as another program would."""
+    answer = httpx2.request(method, server.address + f"api/{path}", json=body, timeout=30.0)
+    assert answer.status_code == 200, answer.text
+    state: dict = answer.json()
+    return state
+
+
+def as_at_first(server: Server) -> None:
+    """Defaults, nothing pinned, nothing selected, the first step; and the run of it."""
+    ask(server, "DELETE", "run/pin")
+    ask(server, "POST", "parameters/reset", {})
+    ask(server, "POST", "select", {"id": None})
+    ask(server, "POST", "seek", {"step": 0})
+    server.wait_for_run()

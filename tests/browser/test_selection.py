@@ -1,0 +1,114 @@
+"""One selection: made in any view, it is marked in all of them, and can stand alone."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.browser.looking import as_at_first, ask, readout, until, viser
+from tests.browser.serving import Server
+
+STEP = 45
+"""Both walkers are in the room and seen by both cameras."""
+
+
+def by_row(page: Page, server: Server, track: int) -> None:
+    page.locator("#panel-tracks tbody tr", has=page.locator(f".id:text-is('{track}')")).click()
+
+
+def by_lane(page: Page, server: Server, track: int) -> None:
+    page.get_by_role("button", name=f"Track {track}", exact=True).click()
+
+
+def by_plot(page: Page, server: Server, track: int) -> None:
+    lane = page.get_by_role("button", name=f"Track {track}", exact=True).bounding_box()
+    head = page.locator(".time .ph:not(.wanted)").bounding_box()
+    assert lane is not None
+    assert head is not None
+    page.mouse.click(head["x"] + 1, lane["y"] + lane["height"] / 2)
+
+
+def by_picture(page: Page, server: Server, track: int) -> None:
+    left, top, width, height = box_of(server, track, 1)
+    cell = page.locator(".cam").nth(1).bounding_box()
+    assert cell is not None
+    scale = cell["width"] / 192
+    page.mouse.move(cell["x"] + 2, cell["y"] + 2)
+    x, y = cell["x"] + (left + width / 2) * scale, cell["y"] + (top + height / 2) * scale
+    page.mouse.move(x, y)
+    expect(page.locator(".card:visible")).to_contain_text("existence")
+    page.mouse.click(x, y)
+
+
+def by_3d(page: Page, server: Server, track: int) -> None:
+    scene = viser(page)
+    page.get_by_role("button", name="C1").click()
+    server.wait(lambda state: state["view"] == 0)
+    page.wait_for_timeout(1500)  # the flight to the camera
+    left, top, width, height = box_of(server, track, 0)
+    canvas = scene.locator("canvas").first.bounding_box()
+    assert canvas is not None
+    # seen through a camera the picture lies in the middle, as large as it fits
+    scale = min(canvas["width"] / 192, canvas["height"] / 144)
+    x = canvas["x"] + canvas["width"] / 2 + (left + width / 2 - 96) * scale
+    y = canvas["y"] + canvas["height"] / 2 + (top + height / 2 - 72) * scale
+    page.mouse.click(x, y)
+    server.wait(lambda state: state["selection"] is not None, 20.0)
+    page.get_by_role("button", name="free", exact=True).click()
+    server.wait(lambda state: state["view"] is None)
+
+
+def box_of(server: Server, track: int, camera: int) -> list[float]:
+    """Where a track is in a camera's picture."""
+    view = server.get(f"/api/step/{STEP}").json()["cameras"][camera]
+    box: list[float] = next(t["box"] for t in view["tracks"] if t["id"] == track)
+    return box
+
+
+@pytest.mark.parametrize("choose", [by_row, by_lane, by_plot, by_picture, by_3d])
+def test_a_selection_reaches_every_view(
+    page: Page, server: Server, choose: Callable[[Page, Server, int], None]
+) -> None:
+    as_at_first(server)
+    ask(server, "POST", "seek", {"step": STEP})
+    until(page, lambda: readout(page) == str(STEP), "both people are there")
+    tracks = [track["id"] for track in server.get(f"/api/step/{STEP}").json()["tracks"]]
+    assert len(tracks) == 2
+    # the one nearest to the camera, whom nobody hides
+    track = max(tracks, key=lambda track: box_of(server, track, 0)[3])
+    choose(page, server, track)
+    state = server.wait(lambda state: state["selection"] is not None)
+    assert state["selection"] == track
+    lane = page.locator(".lane[aria-pressed=true]")
+    expect(lane).to_have_count(1)
+    expect(lane).to_have_attribute("aria-label", f"Track {track}")
+    row = page.locator("#panel-tracks tr[aria-selected=true]")
+    expect(row).to_have_count(1)
+    assert re.match(rf"{track}\b", row.inner_text())
+    until(page, lambda: f"sel={track}" in page.url, "the address has it")
+
+    page.locator("body").press("f")  # this one alone
+    expect(page.locator(".lane")).to_have_count(1)
+    expect(page.locator("#panel-tracks tbody tr")).to_have_count(1)
+    expect(page.get_by_role("button", name="only selected")).to_have_attribute(
+        "aria-pressed", "true"
+    )
+    page.locator("body").press("f")
+    expect(page.locator(".lane")).to_have_count(2)
+    page.keyboard.press("Escape")
+    server.wait(lambda state: state["selection"] is None)
+    expect(page.locator("#panel-tracks tr[aria-selected=true]")).to_have_count(0)
+    expect(page.locator(".lane[aria-pressed=true]")).to_have_count(0)
+
+
+def test_a_double_click_looks_through_the_camera(page: Page, server: Server) -> None:
+    as_at_first(server)
+    page.locator(".cam").nth(1).dblclick(position={"x": 4, "y": 4})
+    assert server.wait(lambda state: state["view"] == 1)["view"] == 1
+    expect(page.locator(".cam").nth(1)).to_have_attribute("aria-pressed", "true")
+    page.keyboard.press("0")
+    server.wait(lambda state: state["view"] is None)
+    expect(page.locator(".cam[aria-pressed=true]")).to_have_count(0)

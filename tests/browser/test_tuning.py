@@ -1,0 +1,95 @@
+"""Tuning: a pinned run against the engine's own figures, presets by name, undo."""
+
+from __future__ import annotations
+
+from playwright.sync_api import Page, expect
+
+from app.markup import number
+from tests.browser.looking import as_at_first, ask
+from tests.browser.serving import Server
+from tracker import pipeline
+from tracker.evaluation import compare, evaluate
+from tracker.parameters import PARAMETERS, with_values
+from tracker.sequences.library import open_sequence
+
+P_D = "fusion.detection_probability"
+
+
+def test_a_pinned_run_is_compared_with_the_engines_figures(page: Page, server: Server) -> None:
+    as_at_first(server)
+    page.get_by_role("tab", name="Compare").click()
+    pin = page.get_by_role("button", name="Pin as A")
+    expect(pin).to_be_enabled(timeout=20_000)
+    pin.click()
+    server.wait(lambda state: state["pinned"] is not None)
+    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.3}})
+    server.wait_for_run()
+    differing = page.get_by_role("table", name="Parameters that differ")
+    expect(differing.locator("tbody tr")).to_have_count(1, timeout=20_000)
+    expect(differing).to_contain_text("0.3")
+    page.get_by_role("button", name="All figures").click()
+
+    sequence = open_sequence(str(server.folder))
+    assert sequence.ground_truth is not None
+    defaults = pipeline.default_parameters(sequence)
+    runs = [
+        pipeline.compute(sequence, parameters, seed=0)
+        for parameters in (defaults, with_values(defaults, {P_D: 0.3}))
+    ]
+    assert runs[0].tracks.frames.tolist() != runs[1].tracks.frames.tolist()
+    rows = compare(*(evaluate(sequence.ground_truth, run.tracks) for run in runs))
+    body = page.get_by_role("table", name="Figures").locator("tbody tr")
+    expect(body).to_have_count(len(rows))
+    verdicts = set()
+    for wanted, row in zip(rows, body.all(), strict=True):
+        name, a, b, difference, verdict = (cell.inner_text() for cell in row.locator("td").all())
+        assert name.startswith(wanted.name)
+        assert (a, b) == (number(wanted.a, wanted.digits), number(wanted.b, wanted.digits))
+        assert difference == number(wanted.difference, wanted.digits, signed=True)
+        assert verdict.endswith(wanted.verdict) or wanted.verdict == "undefined"
+        if a == b:
+            assert "worse" not in verdict
+            assert "better" not in verdict
+        verdicts.add(wanted.verdict)
+    assert {"worse", "same"} <= verdicts, "the change makes a difference"
+    expect(page.get_by_role("button", name="run A")).to_be_visible()  # its layer in 3D
+    as_at_first(server)
+
+
+def test_presets_of_ones_own_by_keyboard(page: Page, server: Server) -> None:
+    as_at_first(server)
+    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
+    page.get_by_role("tab", name="Changes").click()
+    preset = page.get_by_role("combobox", name="Preset")
+    expect(preset).to_have_value("")  # own values
+    page.get_by_role("button", name="Save as").focus()
+    page.keyboard.press("Enter")
+    page.keyboard.type("published")
+    page.keyboard.press("Enter")
+    expect(page.get_by_text("expected a name of your own")).to_be_visible()
+    page.get_by_role("textbox", name="Name of the preset").fill("quick <b>look</b>")
+    page.keyboard.press("Enter")
+    expect(preset).to_have_value("quick <b>look</b>")
+    expect(preset).to_be_focused()
+    page.get_by_role("button", name="Rename").focus()
+    page.keyboard.press("Enter")
+    page.keyboard.type("quick")
+    page.keyboard.press("Enter")
+    expect(preset).to_have_value("quick")
+
+    preset.focus()
+    preset.select_option("robust")
+    server.wait(lambda state: state["changed"] == [])
+    preset.select_option("quick")
+    server.wait(lambda state: state["parameters"][P_D] == 0.6)
+    page.keyboard.press("Control+z")
+    state = server.wait(lambda state: state["parameters"][P_D] != 0.6)
+    assert state["parameters"][P_D] == PARAMETERS[P_D].default
+    page.keyboard.press("Control+Shift+z")
+    server.wait(lambda state: state["preset"] == "quick")
+    page.reload()
+    expect(preset).to_have_value("quick")
+    page.get_by_role("button", name="Remove").click()
+    server.wait(lambda state: state["presets"] == [])
+    assert server.get("/api/state").json()["parameters"][P_D] == 0.6, "the values stay"
+    as_at_first(server)
