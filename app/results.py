@@ -7,6 +7,7 @@ from dataclasses import asdict
 from numpy import ndarray
 
 from app import models
+from app.command_line import command_line
 from app.snapshot import Snapshot
 from tracker import parameters as table
 from tracker.sequences.sequence import Sequence
@@ -24,6 +25,7 @@ def state_of(snapshot: Snapshot) -> models.State:
         else models.OpeningInfo(**asdict(snapshot.opening)),
         parameters={key: table.value(parameters, key) for key in table.PARAMETERS},
         changed=list(table.changed(parameters, snapshot.defaults)),
+        command=command_line(snapshot),
         methods=models.MethodsInfo(
             single_view=parameters.single_view, fusion_method=parameters.fusion_method
         ),

@@ -129,6 +129,8 @@ class State(Model):
     parameters: dict[str, Any]
     changed: list[str]
     """Keys whose value is not the default."""
+    command: str
+    """The command that computes the same in a terminal; empty while nothing is open."""
     methods: MethodsInfo
     presets: list[str]
     """Names of those that a person has saved."""

@@ -2,7 +2,9 @@
 import { ApiError, request, sendJson } from "./api.js";
 import { SPEEDS, clampStep } from "./clock.js";
 import { eventsNow, nextEvent, ordered } from "./events.js";
-import { commandLine } from "./url.js";
+
+/** What differs from the defaults. @param {ServerState} server */
+export const valuesOf = ({ changed, parameters }) => Object.fromEntries(changed.map((key) => [key, parameters[key]]));
 
 /** Changes of one drag that follow each other within this time are undone together. */
 const SAME_DRAG = 1500;
@@ -187,9 +189,7 @@ export function createActions({ store, seek, send, receive }) {
 		async copyRun(what) {
 			const { server } = store.get();
 			if (!server?.sequence) return;
-			const { parameters, changed, sequence } = server;
-			const json = () => JSON.stringify(Object.fromEntries(changed.map((key) => [key, parameters[key]])), null, 2);
-			const text = what === "json" ? json() : commandLine(sequence.name, parameters, changed);
+			const text = what === "json" ? JSON.stringify(valuesOf(server), null, 2) : server.command;
 			try {
 				await navigator.clipboard.writeText(text);
 				actions.note("info", "Copied", text.length < 400 ? text : "");

@@ -1,5 +1,5 @@
 /** Wires the page: one store, one socket, one playback, and the panes that look at them. */
-import { createActions } from "./actions.js";
+import { createActions, valuesOf } from "./actions.js";
 import { fetcher, getJson, openStream } from "./api.js";
 import { all, one } from "./dom.js";
 import { commandFor, commandOf, keyLabel, keyOf, perform, register } from "./commands.js";
@@ -307,9 +307,6 @@ store.on([...KEPT], (state) => {
 		// Without storage the page forgets; nothing else changes.
 	}
 });
-
-/** What differs from the defaults.  @param {ServerState} server */
-const valuesOf = ({ changed, parameters }) => Object.fromEntries(changed.map((key) => [key, parameters[key]]));
 
 /** The address without the step: what the back button goes back over. */
 let standing = "";

@@ -65,6 +65,8 @@ interface ServerState {
 	/** In the page with the methods among them. */
 	parameters: Record<string, any>;
 	changed: string[];
+	/** The command that computes the same in a terminal. */
+	command: string;
 	methods: {single_view: string, fusion_method: string};
 	/** Those that somebody has saved. */
 	presets: string[];

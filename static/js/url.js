@@ -1,4 +1,4 @@
-/** A place as text: the address that shows a colleague the same, the command that computes it. */
+/** A place as text: the address that shows a colleague the same. */
 
 const KNOWN = ["seq", "step", "sel", "cam"];
 
@@ -33,13 +33,4 @@ export function writePlace({ sequence, step, selection, camera, values }) {
 	for (const [key, value] of Object.entries(values ?? {})) query.set(`p.${key}`, String(value));
 	const text = query.toString();
 	return text ? `?${text}` : "";
-}
-
-/** The command line that makes the same run. @param {string} sequence @param {Record<string, any>} parameters @param {string[]} changed */
-export function commandLine(sequence, parameters, changed) {
-	const quote = (/** @type {any} */ value) => (/^[\w./+-]+$/.test(value) ? value : `'${String(value).replaceAll("'", "'\\''")}'`);
-	const methods = [["single-view", parameters.single_view], ["fusion", parameters.fusion_method]];
-	const flags = methods.filter(([, name]) => name !== undefined).map(([flag, name]) => `--${flag} ${quote(name)}`);
-	const sets = changed.filter((key) => key.includes(".")).map((key) => `--set ${key}=${quote(parameters[key])}`);
-	return ["multiview-phd track", quote(sequence), "-o tracks.csv", ...flags, ...sets].join(" ");
 }

@@ -5,7 +5,7 @@ import { createCache } from "../../static/js/cache.js";
 import { eventsNow, isAlone, nextEvent, ordered, resultOf, stateAt, viewWords } from "../../static/js/events.js";
 import { mosaic } from "../../static/js/mosaic.js";
 import { createStore } from "../../static/js/store.js";
-import { commandLine, readPlace, writePlace } from "../../static/js/url.js";
+import { readPlace, writePlace } from "../../static/js/url.js";
 
 const turn = () => new Promise((resolve) => setImmediate(resolve));
 
@@ -45,15 +45,6 @@ test("the address round-trips and names what it does not know", () => {
   assert.equal(writePlace({ ...none, values: {} }), "");
   assert.deepEqual(readPlace(""), { place: none, unknown: [] });
   assert.deepEqual(readPlace("?step=-4&sel=x&cam=0&zoom=3"), { place: none, unknown: ["zoom"] });
-});
-
-test("a run as a command line: methods and what differs, quoted for a shell", () => {
-  const parameters = { single_view: "none", fusion_method: "multi_bernoulli", "fusion.birth": "both", "fusion.x": 0.5 };
-  assert.equal(
-    commandLine("my room's", parameters, ["fusion_method", "fusion.x"]),
-    "multiview-phd track 'my room'\\''s' -o tracks.csv --single-view none --fusion multi_bernoulli --set fusion.x=0.5",
-  );
-  assert.equal(commandLine("room44-3p", {}, []), "multiview-phd track room44-3p -o tracks.csv");
 });
 
 /** A cache whose requests are answered by hand. */

@@ -4,7 +4,6 @@
  */
 import { fetcher, request } from "../api.js";
 import { all, choices, one, parts, write } from "../dom.js";
-import { commandLine } from "../url.js";
 
 /** What a panel tells of, and where it comes from. @type {Record<string, {keys: (keyof PageState)[], path: (state: Readonly<PageState>) => string}>} */
 const TABLES = {
@@ -15,8 +14,6 @@ const TABLES = {
 	compare: { keys: ["scores", "basis", "every"], path: ({ every }) => `compare?every=${every}` },
 	runs: { keys: ["server", "run"], path: () => "runs" },
 };
-/** @type {[string, string][]} */
-const KINDS = [["", "all"], ["birth", "births"], ["death", "deaths"], ["switch", "switches"], ["long miss", "long misses"]];
 
 /** @type {Pane} */
 export function mountTables(root, { store, actions }) {
@@ -45,7 +42,6 @@ export function mountTables(root, { store, actions }) {
 		if (act) /** @type {any} */ (actions)[act](value);
 	});
 
-	choices(kind, KINDS, "");
 	kind.addEventListener("change", () => store.set({ eventKind: /** @type {LaneEvent["kind"]} */ (kind.value) }));
 	more.addEventListener("click", () => store.set({ every: !store.get().every }));
 	presets.addEventListener("change", () => actions.preset(presets.value));
@@ -73,7 +69,7 @@ export function mountTables(root, { store, actions }) {
 		presets.disabled = savePreset.disabled = locked;
 		renamePreset.hidden = removePreset.hidden = !own.includes(now);
 		resetAll.disabled = locked || changed.length === 0;
-		write(code, sequence && server ? commandLine(sequence.name, server.parameters, changed) : "");
+		write(code, server?.command ?? "");
 		unpin.hidden = !server?.pinned;
 		pin.disabled = locked || run?.state !== "done" || server?.pinned?.key === run.key;
 		write(more, every ? "Headlines" : "All figures");
