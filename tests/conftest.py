@@ -25,6 +25,7 @@ settings.load_profile("repeatable")
 def pytest_addoption(parser: pytest.Parser) -> None:
     """``--long``: also what takes long; each such test has a short form that always runs."""
     parser.addoption("--long", action="store_true", help="also run the tests marked long")
+    parser.addoption("--screenshots", type=Path, help="folder that keeps pictures of the page")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

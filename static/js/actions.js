@@ -39,6 +39,8 @@ export function createActions({ store, seek, send, receive }) {
 	/** @param {unknown} error */
 	function tell(error) {
 		if (!(error instanceof ApiError)) throw error;
+		// This the socket tells, to all tabs.
+		if (error.code === "cannot_open") return;
 		actions.note("error", error.message, error.hint ?? "");
 	}
 

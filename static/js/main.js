@@ -161,7 +161,7 @@ function receiveState(told, streamed = false) {
 		playback.clear(server.playhead);
 		actions.forget();
 		// What went wrong before it was opened is over.
-		store.set({ notes: server.sequence ? [] : store.get().notes, basis: "", timeline: null, span: null, scores: null, result: null, shown: -1, step: 0, playing: 0, range: [null, null], loop: false, hover: null, selection: server.selection });
+		store.set({ notes: store.get().notes.filter(({ level }) => level !== "error" || !before || !server.sequence), basis: "", timeline: null, span: null, scores: null, result: null, shown: -1, step: 0, playing: 0, range: [null, null], loop: false, hover: null, selection: server.selection });
 	} else if (before) {
 		actions.remember(before.parameters, server.parameters);
 		if (before.selection !== server.selection) store.set({ selection: server.selection });

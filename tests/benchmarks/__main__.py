@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-from tests.benchmarks import growth, jpda, kernels, live, pipeline, server, stage_one, targets
+from tests.benchmarks import growth, jpda, kernels, live, page, pipeline, server, stage_one, targets
 from tests.benchmarks.measure import Measurement, machine
 
 SUITES = {
@@ -19,6 +19,7 @@ SUITES = {
     "live": live.run,
     "stage_one": stage_one.run,
     "server": server.run,
+    "page": page.run,
 }
 
 

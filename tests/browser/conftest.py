@@ -41,3 +41,10 @@ def page(browser: Browser, server: Server) -> Iterator[Page]:
     yield opened
     context.close()
     assert errors == []
+
+
+@pytest.fixture(scope="session")
+def screenshots(request: pytest.FixtureRequest) -> Path | None:
+    """Where pictures of the page are kept, if somebody wants to look at them."""
+    folder: Path | None = request.config.getoption("--screenshots")
+    return folder

@@ -73,7 +73,8 @@ class Server:
             except httpx2.TransportError:
                 pass
             time.sleep(0.1)
-        raise AssertionError(f"the server did not get there within {seconds} s: {state}")
+        told = {key: value for key, value in state.items() if key != "parameters"}
+        raise AssertionError(f"the server did not get there within {seconds} s: {told}")
 
     def wait_for_run(self, seconds: float = 180.0) -> dict:
         """The state with a finished run of the parameters that hold now."""

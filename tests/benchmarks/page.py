@@ -1,0 +1,189 @@
+"""The page in Chromium: first paint, steps by key and by jump, play, lanes, what it loads."""
+
+from __future__ import annotations
+
+import shutil
+import statistics
+import tempfile
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from app.paths import static_folder
+from tests.benchmarks.measure import Measurement
+from tests.browser.serving import Server
+from tests.conftest import CHROMIUM_FLAGS
+from tests.long_recording import write_long
+
+CAMERAS, SIZE = 4, (640, 480)
+WINDOW = {"width": 1440, "height": 900}
+
+WATCH = """() => {
+  // every painted step: when, and of which step the overlays are
+  window.paints = [];
+  const cams = [...document.querySelectorAll('.cam')];
+  new MutationObserver(() => {
+    const steps = cams.map((cam) => [cam.dataset.step, cam.dataset.overlay]);
+    window.paints.push({ at: performance.now(), steps });
+  }).observe(cams.at(-1), { attributes: true, attributeFilter: ['data-step'] });
+  window.stepTo = (step, act) => new Promise((done, late) => {
+    const begin = performance.now();
+    const wanted = String(step);
+    const limit = setTimeout(() => late(new Error(`step ${step} was not painted`)), 20000);
+    const watch = new MutationObserver(() => {
+      if (!cams.every((cam) => cam.dataset.step === wanted)) return;
+      watch.disconnect();
+      clearTimeout(limit);
+      done(performance.now() - begin);
+    });
+    const what = { attributes: true, attributeFilter: ['data-step'] };
+    for (const cam of cams) watch.observe(cam, what);
+    act();
+  });
+}"""
+
+BY_KEY = """(step) => window.stepTo(step, () => document.body.dispatchEvent(
+  new KeyboardEvent('keydown', { key: 'ArrowRight', bubbles: true })))"""
+
+BY_JUMP = """(step) => window.stepTo(step, () => {
+  const seek = document.querySelector('.seek');
+  seek.value = String(step);
+  seek.dispatchEvent(new Event('input'));
+})"""
+
+LANES = """async ([lanes, steps, runs]) => {
+  const { drawLanes, drawRange, drawRuler } = await import('/static/js/draw/lanes.js');
+  const { prepare } = await import('/static/js/draw/canvas.js');
+  const { palette } = await import('/static/js/palette.js');
+  const kinds = ['seen', 'coasting', 'seen', 'long miss'];
+  const tracks = Array.from({ length: lanes }, (_, lane) => {
+    const spans = [];
+    for (let k = 0, from = 0; from < steps; k += 1) {
+      const to = Math.min(steps - 1, from + 20 + ((lane * 7 + k * 13) % 60));
+      spans.push([from, to, kinds[k % 4]]);
+      from = to + 1;
+    }
+    return { id: lane + 1, first: 0, last: steps - 1, seen: 0.8, cameras: [0.8], spans };
+  });
+  const canvas = document.createElement('canvas');
+  document.body.append(canvas);
+  const view = { first: 0, last: steps - 1, width: 1240 };
+  const times = [];
+  for (let k = 0; k < runs; k += 1) {
+    await new Promise(requestAnimationFrame);
+    const begin = performance.now();
+    const g = prepare(canvas, 1254, 40 * 14 + 34);
+    const pen = (y, height) => ({ g, view, ink: palette(), row: { y, height } });
+    drawLanes(pen(34, 40 * 14), { tracks, pinned: [], scroll: 0, laneHeight: 14, done: steps,
+      selection: 3, hover: null, switches: [] });
+    drawRange(pen(0, 14), [1, 2, 3], steps, steps);
+    drawRuler(pen(14, 20), [null, null]);
+    times.push(performance.now() - begin);
+  }
+  canvas.remove();
+  return [times, tracks.reduce((sum, track) => sum + track.spans.length, 0)];
+}"""
+
+
+def run(short: bool) -> Iterator[Measurement]:
+    """Four cameras of 640×480 with boxes; Chromium draws by software, as on a server."""
+    own = sum(file.stat().st_size for file in static_folder().rglob("*.js"))
+    yield Measurement("page: JavaScript of our own", own / 1e3, "kB", "≤ 150 kB")
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    if path is None:
+        return  # what is left needs a browser
+    with tempfile.TemporaryDirectory() as name, sync_playwright() as playwright:
+        frames = 150 if short else 400
+        folder = write_long(Path(name) / "long", frames, cameras=CAMERAS, size=SIZE)
+        server = Server(folder, Path(name) / "cache")
+        browser = playwright.chromium.launch(executable_path=path, args=CHROMIUM_FLAGS)
+        try:
+            server.wait_for_run(seconds=600.0)
+            yield from _opened(browser, server, 2 if short else 5)
+            page = browser.new_context(viewport=WINDOW).new_page()
+            page.goto(server.address)
+            page.wait_for_selector(".cam[data-overlay='0']")
+            page.evaluate(WATCH)
+            yield from _stepped(page, frames, 10 if short else 40)
+            yield from _played(page, frames, 2.0 if short else 10.0)
+            yield from _drawn(page, 15 if short else 60)
+        finally:
+            browser.close()
+            server.stop()
+
+
+def _opened(browser: Browser, server: Server, times: int) -> Iterator[Measurement]:
+    first, whole = [], []
+    others: set[str] = set()
+    for _ in range(times):
+        context = browser.new_context(viewport=WINDOW)
+        page = context.new_page()
+        page.on("request", lambda request: others.add(urlsplit(request.url).hostname or ""))
+        page.goto(server.address)
+        page.wait_for_selector(".cam[data-overlay='0']")
+        whole.append(page.evaluate("performance.now()"))
+        first.append(
+            page.evaluate(
+                "performance.getEntriesByName('first-contentful-paint')[0]?.startTime ?? NaN"
+            )
+        )
+        context.close()
+    yield Measurement("page: first paint, median", statistics.median(first) / 1e3, "s", "≤ 1 s")
+    yield Measurement(
+        "page: pictures with their overlays, median", statistics.median(whole) / 1e3, "s"
+    )
+    elsewhere = others - {"127.0.0.1", ""}
+    yield Measurement("page: other hosts that were asked", len(elsewhere), "", "0")
+
+
+def _stepped(page: Page, frames: int, times: int) -> Iterator[Measurement]:
+    cached, jumped = [], []
+    page.wait_for_timeout(1500)  # what lies ahead is read meanwhile
+    for step in range(1, times + 1):
+        cached.append(page.evaluate(BY_KEY, step))
+        page.wait_for_timeout(120)
+    step = times
+    for number in range(times):
+        step = (step + frames // 2 + 7 * number) % frames
+        jumped.append(page.evaluate(BY_JUMP, step))
+        page.wait_for_timeout(120)
+    words = f"page: {CAMERAS} cameras of {SIZE[0]}×{SIZE[1]}, a step is painted"
+    for how, aim, taken in (
+        ("read ahead", "≤ 50 ms", cached),
+        ("not read yet", "≤ 150 ms", jumped),
+    ):
+        yield Measurement(f"{words}, {how}, median", statistics.median(taken), "ms", aim)
+        p95 = statistics.quantiles(taken, n=20)[-1]
+        yield Measurement(f"{words}, {how}, 95 %", p95, "ms", aim)
+
+
+def _played(page: Page, frames: int, seconds: float) -> Iterator[Measurement]:
+    page.evaluate(BY_JUMP, 0)
+    page.wait_for_timeout(1500)
+    page.evaluate("window.paints = []")
+    page.keyboard.press("Space")
+    page.wait_for_timeout(1000.0 * min(seconds, (frames - 40) / 25.0))
+    page.keyboard.press("k")
+    paints: list[dict[str, Any]] = page.evaluate("window.paints")
+    shown = [int(paint["steps"][0][0]) for paint in paints]
+    whole = [
+        all(step == overlay == str(shown[k]) for step, overlay in paint["steps"])
+        for k, paint in enumerate(paints)
+    ]
+    skipped = sum(b - a - 1 for a, b in pairwise(shown))
+    taken = (paints[-1]["at"] - paints[0]["at"]) / 1e3
+    words = f"page: play, {CAMERAS} cameras of {SIZE[0]}×{SIZE[1]}"
+    yield Measurement(f"{words}: steps a second", (len(shown) - 1) / taken, "1/s", "25 /s")
+    yield Measurement(f"{words}: steps skipped", skipped, "", "0")
+    yield Measurement(f"{words}: steps without all their overlays", whole.count(False), "", "0")
+
+
+def _drawn(page: Page, times: int) -> Iterator[Measurement]:
+    taken, spans = page.evaluate(LANES, [40, 5000, times])
+    words = f"page: 40 lanes of 5,000 steps, {spans} spans, drawn anew"
+    yield Measurement(f"{words}, median", statistics.median(taken), "ms", "≤ 8 ms")
+    yield Measurement(f"{words}, 95 %", statistics.quantiles(taken, n=20)[-1], "ms", "≤ 8 ms")
