@@ -92,7 +92,7 @@ export function openStream(path, on) {
 	/** @type {WebSocket | null} */
 	let socket = null;
 	let tries = 0;
-	/** @type {ReturnType<typeof setTimeout> | undefined} */
+	/** @type {Timer} */
 	let timer;
 
 	function connect() {

@@ -274,7 +274,9 @@ function press(event) {
 	const target = /** @type {Element} */ (event.target);
 	const open = document.querySelector("dialog[open]");
 	if (open && !(open.matches(".help") ? key === "?" : key === "Ctrl+k")) return false;
-	if (!key.startsWith("Ctrl+k") && target.matches?.("input:not([type=range], [type=checkbox]), textarea, select, [contenteditable=true]")) return false;
+	if (key !== "Ctrl+k" && target.matches?.("input:not([type=range], [type=checkbox]), textarea, [contenteditable=true]")) return false;
+	// In a list letters and arrows choose.
+	if (!key.startsWith("Ctrl+") && target.matches?.("select")) return false;
 	// Space on a focused control presses that control.
 	if (key === "Space" && target.closest?.("button, a, summary, input, [role=button]")) return false;
 	const command = commandFor(key, store.get().singleKeys);
@@ -310,7 +312,7 @@ store.on([...KEPT], (state) => {
 
 /** The address without the step: what the back button goes back over. */
 let standing = "";
-/** @type {ReturnType<typeof setTimeout> | undefined} */
+/** @type {Timer} */
 let writing;
 store.on(["shown", "selection", "large", "server"], () => {
 	// Browsers limit how often the address may change; while it plays, it follows slowly.

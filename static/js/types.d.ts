@@ -3,6 +3,7 @@
  * Steps are 0-based; boxes are `[left, top, width, height]` in pixels; positions are metres.
  */
 
+type Timer = ReturnType<typeof setTimeout> | undefined;
 type Brush = CanvasRenderingContext2D;
 type Box = [number, number, number, number];
 

@@ -19,7 +19,7 @@ export function mountCameras(root, { store, actions, playback }) {
 	/** @type {Frame | null} */
 	let frame = null;
 	let sequenceKey = "";
-	/** @type {ReturnType<typeof setTimeout> | undefined} */
+	/** @type {Timer} */
 	let clicked;
 	const cameras = () => store.get().cameras;
 

@@ -4,7 +4,7 @@ import { fill, h, icon } from "../dom.js";
 /** @type {Pane} */
 export function mountNotes(root, { store, actions, retry }) {
 	let dismissed = "";
-	/** @type {ReturnType<typeof setInterval> | undefined} */
+	/** @type {Timer} */
 	let ticking;
 
 	/** @param {string} kind @param {string} title @param {string} text @param {(Node | null | false)[]} buttons */

@@ -7,7 +7,7 @@ export function mountView3d(root, { store, actions, retry, press }) {
 	let path = "";
 	let reachable = false;
 	let tries = 0;
-	/** @type {ReturnType<typeof setTimeout> | undefined} */
+	/** @type {Timer} */
 	let timer;
 
 	/** Load viser's page, but only once it answers: a browser's error page inside ours says nothing. */
