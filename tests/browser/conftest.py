@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.serving import Server
 from tests.browser.walkers import write_walkers
+
+expect.set_options(timeout=30_000)  # the software renderer takes its time where others work too
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -32,13 +35,30 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 @pytest.fixture
 def page(browser: Browser, server: Server) -> Iterator[Page]:
     """The page of the server, with a finished run; an error in its console fails the test."""
+    with opened(browser, server) as page:
+        yield page
+
+
+@pytest.fixture
+def flat_page(browser: Browser, server: Server) -> Iterator[Page]:
+    """The same without the 3D view, whose software renderer takes most of the time."""
+    with opened(browser, server, flat=True) as page:
+        yield page
+
+
+@contextmanager
+def opened(browser: Browser, server: Server, *, flat: bool = False) -> Iterator[Page]:
+    """The page of the server in a window of its own, with a finished run."""
     server.wait_for_run()
     context = browser.new_context(viewport={"width": 1440, "height": 900})
-    opened = context.new_page()
+    context.set_default_timeout(60_000)
+    if flat:
+        context.route("**/viser/**", lambda route: route.abort())
+    page = context.new_page()
     errors: list[str] = []
-    opened.on("pageerror", lambda error: errors.append(str(error)))
-    opened.goto(server.address)
-    yield opened
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(server.address)
+    yield page
     context.close()
     assert errors == []
 

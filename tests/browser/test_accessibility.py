@@ -39,6 +39,8 @@ def themed(
         color_scheme=request.param,
         reduced_motion="reduce",  # colours are judged when they have come to rest
     )
+    context.set_default_timeout(60_000)
+    context.route("**/viser/**", lambda route: route.abort())
     page = context.new_page()
     page.goto(server.address)
     expect(page.locator("#panel-tracks tbody tr").first).to_be_visible()

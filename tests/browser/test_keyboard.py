@@ -41,8 +41,9 @@ def tab_to(page: Page, name: str) -> None:
 
 
 def test_from_opening_to_export_without_a_pointer(
-    page: Page, server: Server, tmp_path: Path
+    flat_page: Page, server: Server, tmp_path: Path
 ) -> None:
+    page = flat_page
     as_at_first(server)
     other = Path(str(server.folder) + "-next")
     shutil.copytree(server.folder, other, dirs_exist_ok=True)
@@ -110,7 +111,8 @@ def test_from_opening_to_export_without_a_pointer(
     as_at_first(server)
 
 
-def test_single_keys_can_be_switched_off(page: Page) -> None:
+def test_single_keys_can_be_switched_off(flat_page: Page) -> None:
+    page = flat_page
     page.keyboard.press("?")
     page.get_by_role("checkbox", name="Single-key shortcuts").uncheck()
     page.keyboard.press("Escape")
@@ -145,9 +147,11 @@ def test_the_palette_does_what_its_words_say(page: Page) -> None:
 
 def test_keys_work_after_a_click_into_3d(page: Page, server: Server) -> None:
     as_at_first(server)
-    canvas = page.frame_locator("section.view iframe").locator("canvas").first
+    canvas = page.frame_locator("section.view iframe").locator("canvas[data-engine]")
     canvas.wait_for()
-    canvas.click(position={"x": 8, "y": 200})
+    box = canvas.bounding_box()
+    assert box is not None
+    page.mouse.click(box["x"] + 8, box["y"] + 200)
     page.keyboard.press("PageDown")
     until(page, lambda: readout(page) == "10", "ten steps on")
     page.keyboard.press("Shift+N")

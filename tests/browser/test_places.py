@@ -31,7 +31,8 @@ def test_a_link_restores_step_selection_camera_and_parameters(
     as_at_first(server)
 
 
-def test_back_and_forward_go_over_what_was_chosen(page: Page, server: Server) -> None:
+def test_back_and_forward_go_over_what_was_chosen(flat_page: Page, server: Server) -> None:
+    page = flat_page
     as_at_first(server)
     page.goto(server.address)
     expect(page.locator(".lane").first).to_be_visible()
@@ -78,10 +79,6 @@ def test_a_sequence_opened_elsewhere_and_sought_in_at_once(page: Page, server: S
     first, second = str(server.folder), str(server.folder) + "-again"
     shutil.copytree(first, second, dirs_exist_ok=True)
     ask(server, "POST", "run/cancel")
-    page.evaluate(
-        "fetch('/api/sequence', {method: 'POST', body: '{\"name\": \"no such room\"}',"
-        " headers: {'Content-Type': 'application/json'}})"
-    )
     page.get_by_role("combobox", name="Sequence").evaluate(
         "select => { select.append(new Option('gone', 'gone')); select.value = 'gone';"
         " select.dispatchEvent(new Event('change')); }"
@@ -99,7 +96,8 @@ def test_a_sequence_opened_elsewhere_and_sought_in_at_once(page: Page, server: S
     as_at_first(server)
 
 
-def test_two_tabs_stay_in_step(page: Page, server: Server) -> None:
+def test_two_tabs_stay_in_step(flat_page: Page, server: Server) -> None:
+    page = flat_page
     as_at_first(server)
     other = page.context.new_page()
     other.goto(server.address)

@@ -49,7 +49,7 @@ def by_3d(page: Page, server: Server, track: int) -> None:
     server.wait(lambda state: state["view"] == 0)
     page.wait_for_timeout(1500)  # the flight to the camera
     left, top, width, height = box_of(server, track, 0)
-    canvas = scene.locator("canvas").first.bounding_box()
+    canvas = scene.locator("canvas[data-engine]").bounding_box()
     assert canvas is not None
     # seen through a camera the picture lies in the middle, as large as it fits
     scale = min(canvas["width"] / 192, canvas["height"] / 144)

@@ -15,7 +15,8 @@ from tracker.sequences.library import open_sequence
 P_D = "fusion.detection_probability"
 
 
-def test_a_pinned_run_is_compared_with_the_engines_figures(page: Page, server: Server) -> None:
+def test_a_pinned_run_is_compared_with_the_engines_figures(flat_page: Page, server: Server) -> None:
+    page = flat_page
     as_at_first(server)
     page.get_by_role("tab", name="Compare").click()
     pin = page.get_by_role("button", name="Pin as A")
@@ -56,7 +57,8 @@ def test_a_pinned_run_is_compared_with_the_engines_figures(page: Page, server: S
     as_at_first(server)
 
 
-def test_presets_of_ones_own_by_keyboard(page: Page, server: Server) -> None:
+def test_presets_of_ones_own_by_keyboard(flat_page: Page, server: Server) -> None:
+    page = flat_page
     as_at_first(server)
     ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
     page.get_by_role("tab", name="Changes").click()
