@@ -44,6 +44,12 @@ export function createActions({ store, seek, send, receive }) {
 		actions.note("error", error.message, error.hint ?? "");
 	}
 
+	/** A change that is undone by itself, however soon it follows another. @param {"POST"} method @param {string} path @param {object} [body] */
+	function askApart(method, path, body) {
+		rememberedAt = -Infinity;
+		return actions.ask(method, path, body);
+	}
+
 	/** @type {Actions} */
 	const actions = {
 		note(level, title, text) {
@@ -159,13 +165,13 @@ export function createActions({ store, seek, send, receive }) {
 			if (taught) await actions.ask("POST", "teach/restore", { key: taught });
 			if (Object.keys(changes).length) await actions.ask("PATCH", "parameters", { changes });
 		},
-		reset: (...keys) => void actions.ask("POST", "parameters/reset", keys.length ? { keys } : {}),
-		preset: (name) => void actions.ask("POST", "parameters/preset", { name }),
+		reset: (...keys) => void askApart("POST", "parameters/reset", keys.length ? { keys } : {}),
+		preset: (name) => void askApart("POST", "parameters/preset", { name }),
 		savePreset: (name) => actions.ask("POST", "presets", { name }),
 		renamePreset: (name, to) => actions.ask("PATCH", `presets/${encodeURIComponent(name)}`, { name: to }),
 		removePreset: (name) => actions.ask("DELETE", `presets/${encodeURIComponent(name)}`),
 		cancel: () => void actions.ask("POST", "run/cancel"),
-		useAgain: (number) => void actions.ask("POST", `run/again/${number}`),
+		useAgain: (number) => void askApart("POST", `run/again/${number}`),
 		runAgain: () => void actions.ask("POST", "run"),
 		pin: (on) => void actions.ask(on ? "POST" : "DELETE", "run/pin"),
 		remember(before, after) {

@@ -8,7 +8,7 @@ from app.markup import number
 from tests.browser.looking import as_at_first, ask
 from tests.browser.serving import Server
 from tracker import pipeline
-from tracker.evaluation import compare, evaluate
+from tracker.evaluation import compare, evaluate_sequence
 from tracker.parameters import PARAMETERS, with_values
 from tracker.sequences.library import open_sequence
 
@@ -31,14 +31,13 @@ def test_a_pinned_run_is_compared_with_the_engines_figures(flat_page: Page, serv
     page.get_by_role("button", name="All figures").click()
 
     sequence = open_sequence(str(server.folder))
-    assert sequence.ground_truth is not None
     defaults = pipeline.default_parameters(sequence)
     runs = [
         pipeline.compute(sequence, parameters, seed=0)
         for parameters in (defaults, with_values(defaults, {P_D: 0.3}))
     ]
     assert runs[0].tracks.frames.tolist() != runs[1].tracks.frames.tolist()
-    rows = compare(*(evaluate(sequence.ground_truth, run.tracks) for run in runs))
+    rows = compare(*(evaluate_sequence(sequence, run.tracks) for run in runs))
     body = page.get_by_role("table", name="Figures").locator("tbody tr")
     expect(body).to_have_count(len(rows))
     verdicts = set()
