@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from pathlib import Path
 
 from playwright.sync_api import Browser, Page, expect
 
@@ -78,6 +79,8 @@ def test_a_sequence_opened_elsewhere_and_sought_in_at_once(page: Page, server: S
     scene = viser(page)
     first, second = str(server.folder), str(server.folder) + "-again"
     shutil.copytree(first, second, dirs_exist_ok=True)
+    head = Path(second) / "sequence.toml"
+    head.write_text(head.read_text().replace("fps = 25.0", "fps = 20.0"))  # another recording
     ask(server, "POST", "run/cancel")
     page.get_by_role("combobox", name="Sequence").evaluate(
         "select => { select.append(new Option('gone', 'gone')); select.value = 'gone';"
