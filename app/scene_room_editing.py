@@ -106,6 +106,7 @@ class RoomEditing:
             disable_sliders=face,
             disable_rotations=True,
             depth_test=False,
+            wxyz=_outward(grip),
             visible=False,
         )
 
@@ -173,7 +174,8 @@ class RoomEditing:
             if index not in self.handles:
                 self._make(index)
         places = grips(room)
-        side = float(min((room.maximum - room.minimum)[:2].min(), 6.0))
+        standing = sequence.room  # a handle that grew while it is held would be lost to the hand
+        side = float(min((standing.maximum - standing.minimum)[:2].min(), 6.0))
         edges = scene_geometry.box_edges(
             (room.minimum + room.maximum)[None] / 2.0, (room.maximum - room.minimum) / 2.0
         )[0]
@@ -181,7 +183,9 @@ class RoomEditing:
             self._box.show(edges, PALETTES[snapshot.theme].entrance)
             for grip, handle in self.handles.items():
                 handle.visible = grip in places
-                handle.scale = side * (FACE_HANDLE if isinstance(grip, Face) else ENTRANCE_HANDLE)
+                scale = side * (FACE_HANDLE if isinstance(grip, Face) else ENTRANCE_HANDLE)
+                if handle.scale != scale and not held:
+                    handle.scale = scale
                 with self._lock:
                     if grip in places and grip not in self._held:
                         handle.position = places[grip]
@@ -220,6 +224,13 @@ def grips(room: Room) -> dict[Grip, tuple[float, float, float]]:
         x, y, z = entrance.position.tolist()
         places[index] = (x, y, z)
     return places
+
+
+def _outward(grip: Grip) -> tuple[float, float, float, float]:
+    """The turn of a handle, w x y z: the arrow of a face points out of the room."""
+    if isinstance(grip, int) or grip.side == "max":
+        return (1.0, 0.0, 0.0, 0.0)
+    return (0.0, 1.0, 0.0, 0.0) if grip.axis == 2 else (0.0, 0.0, 0.0, 1.0)
 
 
 def _words(grip: Grip, place: tuple[float, float, float]) -> Tag:

@@ -1,6 +1,6 @@
 // @ts-check
 /** Teaching: boxes dragged on a picture, and the fields of a panel that the server writes; each says where it is sent. */
-import { h, one } from "../dom.js";
+import { all, h, one } from "../dom.js";
 
 /** @param {HTMLElement} mosaic  the pictures @param {Context} context */
 export function mountTeach(mosaic, { store, actions }) {
@@ -10,7 +10,8 @@ export function mountTeach(mosaic, { store, actions }) {
 	mosaic.before(hint);
 	/** Where a drag began.  @type {{cam: HTMLElement, x: number, y: number} | null} */
 	let begun = null;
-	let added = false;
+	/** How many templates there are when the new one is listed. */
+	let added = Infinity;
 
 	actions.drawTemplate = () => {
 		begun = null;
@@ -54,7 +55,7 @@ export function mountTeach(mosaic, { store, actions }) {
 			const camera = store.get().cameras[[...mosaic.children].indexOf(cam)];
 			const [left, top, width, height] = sides.map((side) => (side * camera.width) / cam.clientWidth);
 			actions.showTab("teach");
-			added = true;
+			added = (store.get().sequence?.templates ?? 0) + 1;
 			void actions.ask("POST", "teach/templates", { camera: camera.name, step: Number(cam.dataset.step), left, top, width, height });
 		},
 		click() {},
@@ -84,8 +85,10 @@ export function mountTeach(mosaic, { store, actions }) {
 	};
 	// The name of a new template is asked for where it is listed.
 	new MutationObserver(() => {
-		if (added) /** @type {HTMLInputElement | undefined} */ ([...panel.querySelectorAll("[id^=template-]")].pop())?.select();
-		added = false;
+		const names = all("[id^=template-]", panel);
+		if (names.length < added) return;
+		added = Infinity;
+		names[names.length - 1].select();
 	}).observe(panel, { childList: true, subtree: true });
 
 	store.on(["server"], ({ server }) => {
