@@ -174,7 +174,8 @@ class RoomEditing:
             if index not in self.handles:
                 self._make(index)
         places = grips(room)
-        standing = sequence.room  # a handle that grew while it is held would be lost to the hand
+        # a hand would lose the handle that it holds if any of them moved or grew meanwhile
+        standing = sequence.room
         side = float(min((standing.maximum - standing.minimum)[:2].min(), 6.0))
         edges = scene_geometry.box_edges(
             (room.minimum + room.maximum)[None] / 2.0, (room.maximum - room.minimum) / 2.0
@@ -187,7 +188,7 @@ class RoomEditing:
                 if handle.scale != scale and not held:
                     handle.scale = scale
                 with self._lock:
-                    if grip in places and grip not in self._held:
+                    if grip in places and not self._held:
                         handle.position = places[grip]
             self._words.show([_words(grip, place) for grip, place in places.items()])
         self._server.flush()
