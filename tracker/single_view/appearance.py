@@ -81,11 +81,7 @@ class Appearance:
                 "or images in sequence.toml, or choose single_view none to use its detections"
             )
         self.model = read_templates(sequence, colour_space, histogram_kernel, reader)
-        # no parameter has a say in it, so that a moved slider does not wait for it again
-        self.sizes = reader.once(
-            ("sizes", camera_index),
-            lambda: BoxSizes.of(view.camera, sequence.room, sequence.target_half_extents),
-        )
+        self.sizes = BoxSizes.of(view.camera, sequence.room, sequence.target_half_extents)
         self._image_size = view.camera.image_size
         self._foreground: ForegroundModel | None = None
         if foreground is not None:
