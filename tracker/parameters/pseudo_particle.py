@@ -1,8 +1,8 @@
 """Numbers of the particle filters on colour.
 
 [SG08] Sun, Guo, "Multiple object tracking with a pseudo particle filter", 2008. A field's
-``published`` value makes the scheme of that paper; λ and d_0, for flat RGB histograms, are
-chosen on rendered clips.
+``published`` value makes the scheme of that paper: particles are drawn anew at a target's
+radius; λ and d_0, for flat RGB histograms, and h near that radius are chosen on rendered clips.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class PseudoParticleParams(Params):
     """Whether particles cluster with those of the same person's colours only, or with all."""
 
     bandwidth: Annotated[
-        float, Field(ge=0.2, le=3.0), ui("h", unit="half sizes", step=0.05, log=True)
+        float, Field(ge=0.2, le=3.0), ui("h", unit="half sizes", step=0.05, log=True, published=0.7)
     ] = 1.0
     """Radius of the mean shift's kernel; it follows the size of the target."""
 
@@ -84,7 +84,7 @@ class PseudoParticleParams(Params):
     """A cluster with a smaller share of the particles is dropped."""
 
     redistribution: Annotated[
-        float, Field(ge=0.0, le=3.0), ui("σ_r", unit="half sizes", step=0.05)
+        float, Field(ge=0.0, le=3.0), ui("σ_r", unit="half sizes", step=0.05, published=1.0)
     ] = 0.7
     """Spread of the particles that are drawn anew around each target; 0 keeps the resampled."""
 
