@@ -81,7 +81,13 @@ class Appearance:
                 "or images in sequence.toml, or choose single_view none to use its detections"
             )
         self.model = read_templates(sequence, colour_space, histogram_kernel, reader)
-        self.sizes = BoxSizes.of(view.camera, sequence.room, sequence.target_half_extents)
+        camera, room, half_extents = view.camera, sequence.room, sequence.target_half_extents
+        # no parameter has a say in it, so that a moved slider does not wait for it again
+        numbers = (*camera.numbers, room.minimum, room.maximum, half_extents)
+        self.sizes = reader.once(
+            ("sizes", camera.image_size, *(number.tobytes() for number in numbers)),
+            lambda: BoxSizes.of(camera, room, half_extents),
+        )
         self._image_size = view.camera.image_size
         self._foreground: ForegroundModel | None = None
         if foreground is not None:
