@@ -46,8 +46,8 @@ def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(
     httpx2.patch(server.address + "api/parameters", json={"changes": {"single_view": "colour_phd"}})
     server.wait(lambda state: state["run"]["state"] == "failed")  # there is no template yet
     page.keyboard.press("c")
-    expect(page.locator(".mosaic")).to_have_class(re.compile("drawing"))
-    expect(page.get_by_text("Drag a box around a person.")).to_be_visible()
+    expect(page.locator(".mosaic")).to_have_class(re.compile("drawing"), timeout=20_000)
+    expect(page.get_by_text("Drag a box around a person.")).to_be_visible(timeout=20_000)
     picture = page.locator(".cam").first.bounding_box()
     assert picture is not None
     scale = picture["width"] / 192
@@ -58,16 +58,16 @@ def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(
         (left + 64 * scale, top + 78 * scale),
     )
     name = page.get_by_label("Name of template 1")
-    expect(name).to_be_focused()
+    expect(name).to_be_focused(timeout=20_000)
     page.keyboard.type("Anna")
     page.keyboard.press("Enter")
     state = server.wait(
         lambda state: state["run"]["state"] == "done" and state["teaching"]["unsaved"] == 1
     )
     assert state["sequence"]["templates"] == 1
-    expect(page.locator("#panel-teach img")).to_have_count(2)
-    expect(page.get_by_text("1 change not saved")).to_be_visible()
-    expect(page.get_by_text("template Anna added")).to_be_visible()
+    expect(page.locator("#panel-teach img")).to_have_count(2, timeout=20_000)
+    expect(page.get_by_text("1 change not saved")).to_be_visible(timeout=20_000)
+    expect(page.get_by_text("template Anna added")).to_be_visible(timeout=20_000)
     natural = "images => images.every((i) => i.complete && i.naturalWidth > 0)"
     until(page, lambda: page.locator("#panel-teach img").evaluate_all(natural), "its pictures")
     assert page.locator(".cam[aria-pressed=true]").count() == 0  # the drag chose no camera
@@ -96,7 +96,7 @@ def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(
     page.keyboard.press("Escape")  # out of the name
     page.evaluate("document.activeElement.blur()")
     page.keyboard.press("Escape")
-    expect(page.get_by_text("Drag a box around a person.")).to_be_hidden()
+    expect(page.get_by_text("Drag a box around a person.")).to_be_hidden(timeout=20_000)
     page.keyboard.press("Control+z")
     server.wait(lambda state: state["teaching"]["unsaved"] > 0)
     page.keyboard.press("Control+Shift+z")
