@@ -81,7 +81,8 @@ class Jobs:
             data: Its folders are sequences by name.
             seed: Of all runs.
             cache: Where columns of runs are kept; in memory only, if none is given.
-            compiling: Whom to wait for before a sequence is shown; closed with this.
+            compiling: Whom to wait for before a sequence is shown, and before the first run;
+                closed with this.
         """
         self._workbench = workbench
         self._data = data
@@ -146,7 +147,7 @@ class Jobs:
                 cancelled=cancelled.is_set,
             )
             if self._compiling is not None:
-                self._compiling.wait(partial(progress, WORDS), cancelled.is_set)
+                self._compiling.wait("shown", partial(progress, WORDS), cancelled.is_set)
             parameters = pipeline.default_parameters(sequence)
             reader = FrameReader(sequence)
             with self._condition:
@@ -249,7 +250,13 @@ class Jobs:
             if not wanted.cancelled.is_set():
                 workbench.run_progresses(run, progress)
 
+        def on_compiling(done: int, total: int) -> None:
+            if total and not wanted.cancelled.is_set():
+                workbench.run_waits(wanted.key, f"{WORDS}, {done} of {total}")
+
         try:
+            if self._compiling is not None:
+                self._compiling.wait("ready", on_compiling, wanted.cancelled.is_set)
             pipeline.compute(
                 sequence,
                 snapshot.parameters,

@@ -291,6 +291,12 @@ class Workbench:
             total = now.sequence.frames if now.sequence is not None else 0
             self._put("run", run_state=RunState(key=key, state="computing", total=total))
 
+    def run_waits(self, key: str, message: str) -> None:
+        """The run with this key has not begun, and why."""
+        with self._edit() as now:
+            if key == now.run_state.key and message != now.run_state.message:
+                self._put("progress", run_state=replace(now.run_state, message=message))
+
     def run_progresses(self, run: Run, progress: Progress) -> None:
         """A run has new steps; from its first call on it is the one that is shown."""
         with self._edit() as now:

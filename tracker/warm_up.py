@@ -6,7 +6,8 @@ kernels; what the first real run calls is then there.
 
 ``python -m tracker.warm_up`` does it in a process of its own, which leaves the interpreter
 of the workbench alone, and tells how far it is: a line ``done total`` whenever a kernel
-has been compiled, a line ``ready`` when the default methods have all of theirs.
+has been compiled, a line ``shown`` when a sequence can be seen, a line ``ready`` when the
+default methods have all of theirs.
 """
 
 from __future__ import annotations
@@ -53,6 +54,7 @@ _OTHER_WAYS = (
 
 def compile_kernels(
     told: Callable[[int, int], None] = lambda done, total: None,
+    shown: Callable[[], None] = lambda: None,
     ready: Callable[[], None] = lambda: None,
 ) -> None:
     """Compile what has not been compiled on this machine; takes a minute where nothing was.
@@ -60,6 +62,7 @@ def compile_kernels(
     Args:
         told: Called with the number of kernels that are ready and of all, whenever one has
             been compiled.
+        shown: Called when the cameras have theirs: a sequence can be seen.
         ready: Called when the methods that a sequence starts with have their kernels.
     """
     with (
@@ -67,6 +70,8 @@ def compile_kernels(
         compilation.followed(lambda: told(*compilation.counts())),
     ):
         recording = _recording(Path(folder))
+        recording.cameras[0].back_project(np.zeros((1, 2)))
+        shown()
         for single_view in _FIRST:
             values = {"single_view": single_view, "fusion_method": "multi_bernoulli"}
             pipeline.compute(recording, with_values(RunParameters(), values))
@@ -154,7 +159,9 @@ def main() -> None:
         sys.stdout.write(f"{words}\n")
         sys.stdout.flush()
 
-    compile_kernels(lambda done, total: say(f"{done} {total}"), lambda: say("ready"))
+    compile_kernels(
+        lambda done, total: say(f"{done} {total}"), lambda: say("shown"), lambda: say("ready")
+    )
 
 
 if __name__ == "__main__":

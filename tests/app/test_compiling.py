@@ -39,22 +39,26 @@ SLOW = """
 import sys, time
 def say(words):
     print(words, flush=True)
-say("3 50"); time.sleep(0.4); say("20 50"); say("ready"); time.sleep(30)
+say("3 50"); time.sleep(0.4); say("shown")
+time.sleep(0.4); say("20 50"); time.sleep(0.4); say("ready"); time.sleep(30)
 """
 
 
-def test_a_sequence_is_shown_when_its_kernels_are_there(
+def test_a_sequence_is_shown_and_run_when_its_kernels_are_there(
     uncompiled: None, monkeypatch: pytest.MonkeyPatch, data: Path
 ) -> None:
     instead(monkeypatch, SLOW)
     said: list[str] = []
     bench = Workbench()
     told: list[tuple[str, int, int]] = []
+    waits: list[str] = []
 
     def note(change: str) -> None:
-        opening = bench.snapshot().opening
-        if opening is not None:
-            told.append((opening.message, opening.done, opening.total))
+        now = bench.snapshot()
+        if now.opening is not None:
+            told.append((now.opening.message, now.opening.done, now.opening.total))
+        if now.sequence is not None and now.run is None:
+            waits.append(now.run_state.message)
 
     bench.subscribe(note)
     worker = Compiling(said.append)
@@ -62,7 +66,9 @@ def test_a_sequence_is_shown_when_its_kernels_are_there(
     jobs.open("crossing").result(30.0)
     assert said == [WORDS]
     assert (WORDS, 3, 50) in told
+    assert bench.snapshot().run_state.done == 0, "it is seen before it can be run"
     wait_until(lambda: bench.snapshot().run_state.state == "done")
+    assert f"{WORDS}, 20 of 50" in waits
     begin = time.monotonic()
     jobs.close()
     assert time.monotonic() - begin < 5.0
@@ -79,7 +85,7 @@ def test_where_everything_is_compiled_nothing_starts(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(compiling.subprocess, "Popen", never)
     said: list[str] = []
     worker = Compiling(said.append)
-    worker.wait(never, lambda: False)
+    worker.wait("ready", never, lambda: False)
     worker.close()
     assert said == []
 
@@ -93,7 +99,7 @@ def test_nobody_waits_for_a_process_that_failed(
 ) -> None:
     instead(monkeypatch, code)
     worker = Compiling()
-    worker.wait(lambda done, total: None, lambda: False)
+    worker.wait("ready", lambda done, total: None, lambda: False)
     assert "compiling ended with status" in caplog.text
 
 
@@ -104,7 +110,7 @@ def test_nobody_waits_where_no_process_can_be_started(
         raise OSError("no more processes")
 
     monkeypatch.setattr(compiling.subprocess, "Popen", refuse)
-    Compiling().wait(lambda done, total: None, lambda: False)
+    Compiling().wait("shown", lambda done, total: None, lambda: False)
 
 
 def test_who_does_not_want_the_sequence_any_more_does_not_wait(
@@ -114,5 +120,5 @@ def test_who_does_not_want_the_sequence_any_more_does_not_wait(
     worker = Compiling()
     wanted = threading.Event()
     threading.Timer(0.2, wanted.set).start()
-    worker.wait(lambda done, total: None, wanted.is_set)
+    worker.wait("ready", lambda done, total: None, wanted.is_set)
     worker.close()

@@ -73,9 +73,9 @@ const WORDS = { computing: ["busy", "computing"], done: ["good", "computed"], fa
 /** @param {RunState} run  @returns {[string, string]} sign and word */
 export const runWords = (run) => WORDS[run.state];
 
-/** @param {RunState} run  @returns {string} speed, and the time left while there is some */
-export function rateText({ state, steps_per_second: speed, seconds_left: left }) {
-	if (!speed) return "";
+/** @param {RunState} run  @returns {string} speed and time left, or why it does not begin */
+export function rateText({ state, message, steps_per_second: speed, seconds_left: left }) {
+	if (!speed) return message;
 	const rate = `${speed < 10 ? speed.toFixed(1) : Math.round(speed)} steps/s`;
 	if (state !== "computing" || left === null) return rate;
 	const time = left < 60 ? `${left.toFixed(left < 10 ? 1 : 0)} s` : `${Math.floor(left / 60)} min ${Math.round(left % 60)} s`;
