@@ -10,7 +10,7 @@ import cv2
 import httpx2
 import numpy as np
 from numpy import ndarray
-from playwright.sync_api import Frame, Page
+from playwright.sync_api import FloatRect, Frame, Page
 
 from tests.browser.serving import Server
 from tests.synthetic import number_in
@@ -36,6 +36,20 @@ def until(page: Page, condition: Callable[[], bool], what: str, seconds: float =
             return
         page.wait_for_timeout(50)
     raise AssertionError(f"not within {seconds} s: {what}")
+
+
+def until_still(page: Page, box: FloatRect) -> None:
+    """Wait until a part of the window looks the same as half a second ago: nothing flies there."""
+    before = b""
+
+    def still() -> bool:
+        nonlocal before
+        now, then = page.screenshot(clip=box), before
+        before = now
+        page.wait_for_timeout(500)
+        return now == then
+
+    until(page, still, "the view stands still")
 
 
 def painted(page: Page) -> list[ndarray]:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browser.looking import as_at_first, ask, readout, until, viser
+from tests.browser.looking import as_at_first, ask, readout, shown_in_3d, until, until_still, viser
 from tests.browser.serving import Server
 
 STEP = 45
@@ -47,10 +47,11 @@ def by_3d(page: Page, server: Server, track: int) -> None:
     scene = viser(page)
     page.get_by_role("button", name="C1").click()
     server.wait(lambda state: state["view"] == 0)
-    page.wait_for_timeout(1500)  # the flight to the camera
-    left, top, width, height = box_of(server, track, 0)
     canvas = scene.locator("canvas[data-engine]").bounding_box()
     assert canvas is not None
+    until(page, lambda: shown_in_3d(scene) == str(STEP), "the step in 3D")
+    until_still(page, canvas)  # it is drawn and the flight to the camera is over
+    left, top, width, height = box_of(server, track, 0)
     # seen through a camera the picture lies in the middle, as large as it fits
     scale = min(canvas["width"] / 192, canvas["height"] / 144)
     x = canvas["x"] + canvas["width"] / 2 + (left + width / 2 - 96) * scale
