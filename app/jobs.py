@@ -175,8 +175,9 @@ class Jobs:
                 return
             self._opening = None
         self._workbench.set_opening(None)
+        words = sentence(error).removeprefix(f"{name}: ")
         self._workbench.notify(
-            "error", f"{name} cannot be opened: {sentence(error)}", "What was open still is."
+            "error", f"{name} cannot be opened: {words}", "What was open still is."
         )
 
     def _close_when_unused(self, reader: FrameReader) -> None:
@@ -274,9 +275,7 @@ class Jobs:
         except Exception as error:
             if not isinstance(error, ValueError | OSError):
                 logger.exception("a run failed")
-            words = sentence(error)
-            workbench.run_ends(wanted.key, "failed", words)
-            workbench.notify("error", f"The run failed: {words}", "The last good run is shown.")
+            workbench.run_ends(wanted.key, "failed", sentence(error))
         else:
             workbench.run_ends(wanted.key, "done")
 

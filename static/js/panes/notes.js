@@ -26,7 +26,7 @@ export function mountNotes(root, { store, actions, retry }) {
 		if (run?.state === "failed" && dismissed !== run.key) {
 			const next = basis && basis !== run.key ? "The run before is still shown." : "Change a parameter, or choose another method.";
 			all.push(
-				note("bad", `The run stopped at step ${run.done}`, `${run.error ?? "The terminal says more."} ${next}`, [
+				note("bad", `The run stopped at step ${run.done}`, `${(run.error ?? "The terminal says more").replace(/\.$/, "")}. ${next}`, [
 					server?.changed.length ? button("Reset all parameters", () => actions.reset()) : null,
 					button("Try again", actions.runAgain),
 					close(() => {

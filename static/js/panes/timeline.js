@@ -161,7 +161,7 @@ export function mountTimeline(root, context) {
 		const { run, sequence, laneOrder } = store.get();
 		write(order, laneOrder === "longest" ? "tracks, longest first" : "tracks, first born first");
 		const idle = tracks.length === 0 && sequence && run?.state !== "computing";
-		write(empty, !idle ? "" : run?.state === "failed" ? "The run failed before a track was found." : "No track was found with these parameters.");
+		write(empty, !idle ? "" : run?.state === "failed" ? "The run failed before a track was found." : !run?.done ? "" : "No track was found with these parameters.");
 		empty.style.top = `${above() + 8}px`;
 	}
 

@@ -66,7 +66,9 @@ export function mountTracks(root, { store, actions, playback }) {
 				? ["Tracks appear here", "once a sequence is open."]
 				: run?.state === "computing"
 					? ["No track yet", "The run goes on; tracks appear as they are found."]
-					: ["No track was found", "Lower the extraction threshold, or look at the detections in the pictures: without boxes there is nothing to fuse."];
+					: !run?.done && run?.state === "cancelled"
+						? ["No track yet", "The run was stopped before its first step."]
+						: ["No track was found", "Lower the extraction threshold, or look at the detections in the pictures: without boxes there is nothing to fuse."];
 			fill(blank, h("h3", {}, title), h("p", {}, text));
 		}
 		now();
