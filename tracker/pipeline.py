@@ -119,6 +119,7 @@ class _Telling:
         self._on_progress = on_progress
         self._first = len(run.fused)
         self._begin = self._last_told = time.perf_counter()
+        self._preparing = 0.0
         self._ids: dict[int, int] = {}
         self._stage: Stage = "single_view"
         if len(run.views) >= total:
@@ -127,6 +128,7 @@ class _Telling:
     def after_step(self) -> None:
         """Tell if it is time."""
         run, now = self._run, time.perf_counter()
+        self._preparing = self._preparing or now - self._begin
         if now - self._last_told > PROGRESS_SECONDS or run.done <= self._wanted() < len(run.fused):
             self.now()
             self._last_told = now
@@ -142,7 +144,7 @@ class _Telling:
         if self._on_progress is not None:
             seconds = time.perf_counter() - self._begin
             fresh = run.done - self._first
-            progress = Progress(self._stage, run.done, self._total, seconds, fresh)
+            progress = Progress(self._stage, run.done, self._total, seconds, fresh, self._preparing)
             self._on_progress(run, progress)
 
     def _extract(self) -> Trajectories:

@@ -33,10 +33,14 @@ class Progress:
     """Since the run began."""
     fresh: int
     """Steps that this run computed itself, rather than took from an earlier one."""
+    preparing: float = 0.0
+    """Seconds until the first of them was there: a background to learn, kernels to load."""
 
     @property
     def steps_per_second(self) -> float:
-        """Mean speed so far."""
+        """Mean speed so far, from the first step on: the preparation does not come again."""
+        if self.fresh > 1 and self.seconds > self.preparing:
+            return (self.fresh - 1) / (self.seconds - self.preparing)
         return self.fresh / self.seconds if self.seconds > 0.0 else 0.0
 
     @property

@@ -223,6 +223,14 @@ def test_progress_only_grows(earlier: RunParameters | None, stage: str, fresh: i
         assert all(p.seconds_left is not None and p.seconds_left >= 0.0 for p in told[1:])
 
 
+def test_the_preparation_does_not_count_as_slowness() -> None:
+    early = Progress("single_view", done=1, total=101, seconds=50.0, fresh=1, preparing=50.0)
+    later = Progress("single_view", done=21, total=101, seconds=52.0, fresh=21, preparing=50.0)
+    assert early.steps_per_second == pytest.approx(1.0 / 50.0)
+    assert later.steps_per_second == pytest.approx(10.0)
+    assert later.seconds_left == pytest.approx(8.0)
+
+
 def test_no_thread_outlives_a_run() -> None:
     def threads() -> list[str]:
         return [t.name for t in threading.enumerate() if t.name.startswith("single-view")]
