@@ -16,6 +16,7 @@ from app.history import History
 from app.jobs import Jobs
 from app.pictures import Pictures
 from app.presets import OwnPresets
+from app.teaching import Teaching
 from app.timeline import BUCKETS, Timelines, Window
 from app.workbench import Workbench
 from tracker import export
@@ -189,9 +190,10 @@ async def run_again(bench: Bench, jobs: Work) -> models.State:
 
 @router.post("/run/again/{number}")
 async def use_again(request: Request, number: int, bench: Bench) -> models.State:
-    """Set all parameters to those of a run before, by its number in the table of runs."""
+    """Set all values, and what was taught, to those of a run before, by its number in the table."""
     history: History = request.app.state.history
-    history.use_again(number)
+    teaching: Teaching = request.app.state.teaching
+    history.use_again(number, teaching.restore)
     return results.state_of(bench.snapshot())
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from app.snapshot import Change, RunState
@@ -29,6 +30,8 @@ class PastRun:
     """How many parameters were not at their defaults."""
     state: RunState
     """How far it was when it was last heard of."""
+    taught: str
+    """The digest of the sequence with the templates and the room that it had."""
 
 
 class History:
@@ -47,8 +50,12 @@ class History:
         with self._lock:
             return list(self._runs)
 
-    def use_again(self, number: int) -> RunParameters:
-        """Set all parameters to those of a run.
+    def use_again(self, number: int, restore: Callable[[str], bool]) -> RunParameters:
+        """Set all parameters to those of a run, and what was taught, where it is still known.
+
+        Args:
+            number: The run's.
+            restore: Goes back to what was taught once; another sequence's it does not know.
 
         Raises:
             ParameterError: If there is no such run.
@@ -56,6 +63,9 @@ class History:
         run = next((run for run in self.runs if run.number == number), None)
         if run is None:
             raise ParameterError("number", f"expected the number of a listed run, got {number}")
+        now = self._workbench.snapshot().sequence
+        if now is not None and now.digest != run.taught:
+            restore(run.taught)
         keys = (*table.METHODS, *table.PARAMETERS)
         values = {key: table.value(run.parameters, key) for key in keys}
         return self._workbench.set_parameters(values, "api")
@@ -77,5 +87,7 @@ class History:
             self._counted += 1
             changes = len(table.changed(now.parameters, now.defaults))
             at = time.strftime("%H:%M:%S")
-            new = PastRun(self._counted, at, sequence.name, now.parameters, changes, state)
+            new = PastRun(
+                self._counted, at, sequence.name, now.parameters, changes, state, sequence.digest
+            )
             self._runs = [new, *earlier][:MOST_RUNS]

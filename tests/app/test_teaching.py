@@ -77,6 +77,20 @@ def test_the_first_template_makes_the_colour_methods_usable(client: TestClient) 
         done(client)
 
 
+def test_a_run_used_again_brings_its_templates_back(client: TestClient) -> None:
+    before, first = state(client), tracks(client)
+    client.patch("/api/parameters", json={"changes": {"single_view": "colour_phd"}})
+    client.post("/api/teach/templates", json=BOX)
+    taught = done(client)
+    assert tracks(client) != first
+    client.post("/api/run/again/1")
+    again = done(client)
+    assert again["teaching"]["key"] == before["teaching"]["key"] != taught["teaching"]["key"]
+    assert again["sequence"]["templates"] == 0
+    assert again["parameters"] == before["parameters"]
+    assert tracks(client) == first
+
+
 def test_a_template_is_named_renamed_removed_and_brought_back(client: TestClient) -> None:
     keys = [state(client)["teaching"]["key"]]
     for body in (BOX, {**BOX, "step": 6}, {**BOX, "step": 7, "name": "Bob"}):
