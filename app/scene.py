@@ -117,7 +117,7 @@ class Scene:
             self._set_home(snapshot)
             self._views.home()
         elif turned:
-            self._views.look(self._pose_of(snapshot))
+            self._views.look(self._pose_of(snapshot), flies=snapshot.flies)
 
     @property
     def _through(self) -> int | None:

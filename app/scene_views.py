@@ -50,13 +50,14 @@ class Views:
         for follower in followers:
             follower.place_again()
 
-    def look(self, through: Callable[[float], Pose] | None) -> None:
+    def look(self, through: Callable[[float], Pose] | None, *, flies: bool = True) -> None:
         """Fly every browser to a camera's place, or back to where it was.
 
         Returns at once; a later call takes over from a flight under way.
 
         Args:
             through: The camera's pose for an aspect; None is the free view.
+            flies: Otherwise it is there at once.
         """
         clients = self._server.get_clients()
         with self._lock:
@@ -79,7 +80,7 @@ class Views:
             self._flight += 1
             flight = self._flight
         threading.Thread(
-            target=self._fly, args=(flight, flights), name="scene-flight", daemon=True
+            target=self._fly, args=(flight, flights, flies), name="scene-flight", daemon=True
         ).start()
 
     def close(self) -> None:
@@ -109,12 +110,14 @@ class Views:
             self._free.pop(client.client_id, None)
             self._followers.pop(client.client_id, None)
 
-    def _fly(self, flight: int, flights: list[tuple[viser.ClientHandle, Pose]]) -> None:
+    def _fly(
+        self, flight: int, flights: list[tuple[viser.ClientHandle, Pose]], flies: bool
+    ) -> None:
         paths = [(client, _pose_of(client), goal) for client, goal in flights]
         begin = time.monotonic()
         share = 0.0
         while share < 1.0 and flight == self._flight:
-            share = min(1.0, (time.monotonic() - begin) / FLIGHT_SECONDS)
+            share = min(1.0, (time.monotonic() - begin) / FLIGHT_SECONDS) if flies else 1.0
             eased = share * share * (3.0 - 2.0 * share)
             for client, start, goal in paths:
                 _place(client, between(start, goal, eased))

@@ -119,6 +119,8 @@ class Snapshot:
         default_factory=lambda: MappingProxyType(dict.fromkeys(LAYERS, True))
     )
     view: View = None
+    flies: bool = True
+    """Whether the 3D view moves to it, or is there at once."""
     theme: Theme = "dark"
     """Of the 3D view."""
 

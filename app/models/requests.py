@@ -53,6 +53,8 @@ class ViewChange(Model):
 
     camera: int | Literal["top"] | None
     """Its index; null for the free view."""
+    flies: bool = True
+    """False: the view is there at once, for whoever wants less motion."""
 
 
 class ThemeChange(Model):
