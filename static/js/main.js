@@ -205,8 +205,9 @@ const fetchTimeline = fetcher(async () => {
 });
 
 const fetchScores = fetcher(async () => {
-	const { sequence } = store.get();
-	if (!sequence?.has_truth) return;
+	const { sequence, run } = store.get();
+	// A run without a step has no figures; they come with its first news.
+	if (!sequence?.has_truth || (!run?.done && run?.state !== "failed")) return;
 	const told = (/** @type {string} */ what) => getJson(`/api/evaluation${what}`);
 	const [evaluation, series, comparison] = await Promise.all([told(""), told(`/series?${part()}`), told("/comparison")]);
 	const reference = comparison && (await told(`/series?of=${comparison.against}&${part()}`));

@@ -62,7 +62,7 @@ export function drawLanes(pen, { tracks, pinned, scroll, laneHeight, done, selec
 		const below = topOf(index) + laneHeight - 1.5;
 		for (const { like, spans } of pinned) {
 			if (like !== track.id) continue;
-			for (const [from, to] of spans) stroke(trace(g, [[xOf(from, view), below], [xOf(to + 1, view), below]]), ink.get("ink-2"), 1, [4, 2]);
+			for (const [from, to] of spans) stroke(trace(g, [[Math.max(-4, xOf(from, view)), below], [Math.min(view.width + 4, xOf(to + 1, view)), below]]), ink.get("ink-2"), 1, [4, 2]);
 		}
 		if (track.last >= view.first && track.first <= view.last) drawLane(pen, track, middle, done, Math.max(5, Math.round(laneHeight * 0.42)));
 	}
