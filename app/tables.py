@@ -126,7 +126,7 @@ def _feeding(track: CameraTrack) -> str:
     fed = track.fed_by
     if fed is None:
         return "–"
-    return f"box {track.source + 1}, {fed.share:.0%} sure"
+    return f"box {track.source + 1}, {100 * fed.share:.0f} % sure"
 
 
 def _curves(snapshot: Snapshot, sequence: Sequence, message: Step) -> str:

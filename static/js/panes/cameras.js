@@ -167,7 +167,7 @@ export function mountCameras(root, { store, actions, playback }) {
 				{},
 				whole && row("existence", whole.existence.toFixed(2)),
 				p !== null && row([h("i", {}, "p"), h("sub", {}, "D")], show(Number(p.toFixed(3))), h("small", {}, front !== null ? ` hidden by ${front}` : reason ? ` ${reason}` : "")),
-				row("fed by", ...(seen && fed ? [`box ${source + 1}`, h("small", {}, ` of weight ${fed.weight.toFixed(2)}, its own by ${Math.round(100 * fed.share)} %`)] : ["no box here"])),
+				row("fed by", ...(seen && fed ? [`box ${source + 1}`, h("small", {}, `, ${Math.round(100 * fed.share)} % sure, weight ${fed.weight.toFixed(2)}`)] : ["no box here"])),
 				whole && row("at", whole.position.map((v) => v.toFixed(2).replace("-", "−")).join("  "), h("small", {}, " m")),
 			),
 		);
