@@ -55,7 +55,7 @@ interface RunState {
 	steps_per_second: number | null;
 	seconds_left: number | null;
 	/** The stage that takes the time. */
-	message: string | null;
+	message: string;
 	error: string | null;
 }
 
