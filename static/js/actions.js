@@ -33,7 +33,7 @@ export function createActions({ store, seek, send, receive }) {
 	/** Values to go back to and on to, newest last.  @type {Record<string, any>[][]} */
 	const [past, future] = [[], []];
 	let rememberedAt = -Infinity;
-	let undoing = 0;
+	let [undoing, turn] = [0, Promise.resolve()];
 	const frames = () => store.get().frames;
 
 	/** @param {unknown} error */
@@ -187,12 +187,16 @@ export function createActions({ store, seek, send, receive }) {
 			if (past.length > 100) past.shift();
 		},
 		forget: () => void (past.length = future.length = 0),
-		async undo(direction) {
-			const old = (direction < 0 ? past : future).pop();
-			if (!old || undoing) return;
-			undoing = direction;
-			await actions.change(old);
-			undoing = 0;
+		undo(direction) {
+			// Pressed again before the last answer came, it waits for its turn.
+			turn = turn.then(async () => {
+				const old = (direction < 0 ? past : future).pop();
+				if (!old) return;
+				undoing = direction;
+				await actions.change(old);
+				undoing = 0;
+			});
+			return turn;
 		},
 		async copyRun(what) {
 			const { server } = store.get();

@@ -58,7 +58,7 @@ def opened(browser: Browser, server: Server, *, flat: bool = False) -> Iterator[
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.goto(server.address)
-    page.locator(".lane").first.wait_for()  # whoever presses keys sees what he does
+    page.locator(".cam canvas").first.wait_for()  # whoever presses keys sees what he does
     yield page
     context.close()
     assert errors == []

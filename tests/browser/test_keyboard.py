@@ -113,6 +113,7 @@ def test_from_opening_to_export_without_a_pointer(
 
 def test_single_keys_can_be_switched_off(flat_page: Page) -> None:
     page = flat_page
+    expect(page.locator(".lane").first).to_be_visible()
     page.keyboard.press("?")
     page.get_by_role("checkbox", name="Single-key shortcuts").uncheck()
     page.keyboard.press("Escape")
