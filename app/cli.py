@@ -53,6 +53,9 @@ def main(arguments: list[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Exception as error:
+        if _is_interruption(error):
+            say("interrupted; nothing was written")
+            return INTERRUPTED
         if os.environ.get(TRACEBACK):
             raise
         say(_sentence(error))
@@ -82,6 +85,13 @@ def _run(command: Arguments) -> int:
         case Parameters():
             _parameters()
     return 0
+
+
+def _is_interruption(error: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind it: one heard inside a compiled kernel comes out as its failure."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__
+    return error is not None
 
 
 def _sentence(error: Exception) -> str:

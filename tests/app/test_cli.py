@@ -251,6 +251,25 @@ def test_ctrl_c_in_the_middle_leaves_nothing(tmp_path: Path) -> None:
     assert not list(out.iterdir())
 
 
+def test_ctrl_c_inside_a_compiled_kernel(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Compiled code hands an interruption on as a failure that it caused, some levels down."""
+
+    def heard(_: object) -> int:
+        try:
+            try:
+                raise KeyboardInterrupt
+            except KeyboardInterrupt as interruption:
+                raise SystemError("unpickle: result with an exception") from interruption
+        except SystemError as error:
+            raise SystemError("update: result with an exception") from error
+
+    monkeypatch.setattr(cli, "_run", heard)
+    assert cli.main(["parameters"]) == 130
+    assert capsys.readouterr().err == "multiview-phd: interrupted; nothing was written\n"
+
+
 BARRED = """
 import sys
 from app import cli

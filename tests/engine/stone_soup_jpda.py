@@ -96,10 +96,10 @@ class _Remembering:
 
     def __init__(self, hypothesiser: Any) -> None:
         self._hypothesiser = hypothesiser
-        self._known: dict[int, Any] = {}
+        self._known: dict[str, Any] = {}  # by the tracks' own names: an address is given again
 
     def hypothesise(self, track: Any, detections: Any, timestamp: datetime) -> Any:
         """Those of the first time that the track was asked for."""
-        if id(track) not in self._known:
-            self._known[id(track)] = self._hypothesiser.hypothesise(track, detections, timestamp)
-        return self._known[id(track)]
+        if track.id not in self._known:
+            self._known[track.id] = self._hypothesiser.hypothesise(track, detections, timestamp)
+        return self._known[track.id]
