@@ -12,6 +12,27 @@ from tracker.kernels import _kernel, factorise, solve, squared_length
 
 
 @_kernel
+def free_boxes(unexplained: ndarray, starts: ndarray, least: float) -> tuple[ndarray, ndarray, int]:
+    """The boxes that nobody explains.
+
+    Args:
+        unexplained: (B,), probability that nobody made each box.
+        starts: (C + 1,), where each camera's boxes begin.
+        least: A box is free above this probability.
+
+    Returns:
+        (F,) indices of the free boxes, (C + 1,) where each camera's begin among them, and how
+        many cameras have any.
+    """
+    free = np.flatnonzero(unexplained > least)
+    begins = np.searchsorted(free, starts)
+    cameras = 0
+    for c in range(len(starts) - 1):
+        cameras += begins[c + 1] > begins[c]
+    return free, begins, cameras
+
+
+@_kernel
 def meeting_points(
     rays: ndarray, starts: ndarray, centres: ndarray, largest_gap: float
 ) -> tuple[ndarray, ndarray]:

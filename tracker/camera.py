@@ -7,6 +7,7 @@ pixel, x right, y down. Lens: OpenCV's radial-tangential model (k1 k2 p1 p2 k3).
 
 from __future__ import annotations
 
+from collections.abc import Sequence as Many
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -189,3 +190,26 @@ class Camera:
             (high > -0.5).all(axis=1) & (low[:, 0] < width - 0.5) & (low[:, 1] < height - 0.5)
         )
         return boxes, visible
+
+
+def stacked(
+    cameras: Many[Camera],
+) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray, float, ndarray]:
+    """C cameras in the form that compiled kernels know.
+
+    Returns:
+        Sizes of the pictures (C, 2), rotations (C, 3, 3), translations (C, 3), intrinsics
+        (C, 3, 3), lenses (C, 5), :data:`NEAREST_DEPTH` and the largest radii (C,).
+    """
+    rotations, translations, intrinsics, distortions = (
+        np.array([camera.numbers[part] for camera in cameras]) for part in range(4)
+    )
+    return (
+        np.array([camera.image_size for camera in cameras]),
+        rotations,
+        translations,
+        intrinsics,
+        distortions,
+        NEAREST_DEPTH,
+        np.array([camera.largest_radius for camera in cameras]),
+    )

@@ -189,7 +189,8 @@ def sum_pairs(
         weights: (A,).
 
     Returns:
-        (K,) camera, component, box and sum of each pair, in the order of these three.
+        (K,) camera, component, box and sum, at most 1, of each pair, in the order of the first
+        three: as int32 and float32.
     """
     count = len(of_pairs)
     width = 1
@@ -218,4 +219,9 @@ def sum_pairs(
     found = found[:distinct]
     rest = found // width
     size = max(len(labels), 1)
-    return rest // size, rest % size, found % width, sums[:distinct].copy()
+    return (
+        (rest // size).astype(np.int32),
+        (rest % size).astype(np.int32),
+        (found % width).astype(np.int32),
+        np.minimum(sums[:distinct], 1.0).astype(np.float32),
+    )

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose
 
 from tests.engine.standing import CAMERAS, HALF_EXTENTS, ROOM, watch
-from tracker.fusion.measurement_births import CameraEvidence, MeasurementBirths, Newborns
+from tracker.fusion.measurement_births import Evidence, MeasurementBirths, Newborns
+from tracker.fusion.model import all_boxes
 from tracker.fusion.target_model import MeasurementKind, TargetModel
 from tracker.single_view.protocol import ViewResult
 
@@ -23,6 +22,7 @@ def births(kind: MeasurementKind = "box", margin: float = 0.0) -> MeasurementBir
         TargetModel(HALF_EXTENTS, kind),
         birth_rate=0.005,
         detection_probability=0.98,
+        clutter=np.full(len(CAMERAS), 1e-8 if kind != "centre" else 1e-6),
         gate=21.0,
         margin=margin,
         largest_gap=1.0,
@@ -31,18 +31,14 @@ def births(kind: MeasurementKind = "box", margin: float = 0.0) -> MeasurementBir
 
 def evidence(
     views: tuple[ViewResult, ...], kind: MeasurementKind = "box", unexplained: float = 1.0
-) -> list[CameraEvidence]:
+) -> Evidence:
     """All boxes equally unexplained."""
+    boxes, _, starts = all_boxes(views)
     model = TargetModel(HALF_EXTENTS, kind)
-    return [
-        CameraEvidence(
-            view.boxes[:, :2],
-            *model.measured(view, 1.0),
-            np.full(len(view.boxes), unexplained),
-            1e-8 if kind != "centre" else 1e-6,
-        )
-        for view in views
-    ]
+    values, noises = (
+        np.concatenate(part) for part in zip(*(model.measured(v, 1.0) for v in views), strict=True)
+    )
+    return Evidence(boxes[:, :2], values, noises, np.full(len(boxes), unexplained), starts)
 
 
 def seen(places: ndarray, clutter_rate: float = 0.0, seed: int = 0) -> tuple[ViewResult, ...]:
@@ -102,7 +98,7 @@ def test_boxes_that_somebody_explains_start_nobody() -> None:
     views = seen(np.array([[0.5, -0.8, 0.85]]))
     assert births().propose(evidence(views, unexplained=0.3)) is None
     mixed = evidence(views)
-    mixed[2] = replace(mixed[2], unexplained=np.zeros(1))
+    mixed.unexplained[mixed.starts[2]] = 0.0
     found = proposed(births().propose(mixed))
     assert found.sources[:, 0].tolist() == [0, 0, -1, 0]
 

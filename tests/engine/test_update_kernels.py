@@ -106,7 +106,19 @@ def test_pairs_are_summed_by_camera_component_and_box(seed: int, count: int, siz
             expected[key] = expected.get(key, 0.0) + weight
     found = kernels.sum_pairs(labels, cameras, names, boxes, weights)
     assert [tuple(map(int, key)) for key in zip(*found[:3], strict=True)] == sorted(expected)
-    assert_allclose(found[3], [expected[key] for key in sorted(expected)], rtol=1e-12)
+    assert found[3].dtype == np.float32
+    assert_allclose(found[3], [min(expected[key], 1.0) for key in sorted(expected)], rtol=1e-6)
+
+
+@given(seeds, st.lists(st.integers(0, 4), min_size=1, max_size=4))
+def test_free_boxes_are_those_that_nobody_explains(seed: int, counts: list[int]) -> None:
+    unexplained = np.random.default_rng(seed).random(sum(counts))
+    starts = np.cumsum([0, *counts])
+    free, begins, cameras = birth_kernels.free_boxes(unexplained, starts, 0.5)
+    by_camera = [np.flatnonzero(part > 0.5) for part in np.split(unexplained, starts[1:-1])]
+    assert_array_equal(free, np.flatnonzero(unexplained > 0.5))
+    assert np.diff(begins).tolist() == [len(part) for part in by_camera]
+    assert cameras == sum(len(part) > 0 for part in by_camera)
 
 
 @given(seeds, st.integers(0, 4), st.integers(0, 4))

@@ -10,7 +10,7 @@ from numpy import ndarray
 from scipy.special import expit
 
 from tracker import birth_kernels
-from tracker.camera import NEAREST_DEPTH, Camera
+from tracker.camera import Camera, stacked
 from tracker.fusion.target_model import TargetModel
 from tracker.sequences.sequence import Room
 
@@ -21,18 +21,18 @@ _UNEXPLAINED = 0.5  # a box that somebody made with more than this probability s
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CameraEvidence:
-    """What one camera leaves unexplained at one step. M boxes."""
+class Evidence:
+    """What the cameras leave unexplained at one step: B boxes, camera after camera."""
 
-    centres: Float[ndarray, "M 2"]
+    centres: Float[ndarray, "B 2"]
     """Of the boxes, pixels."""
-    values: Float[ndarray, "M m"]
+    values: Float[ndarray, "B m"]
     """Measurements of the target model, pixels."""
-    noises: Float[ndarray, "M m m"]
-    unexplained: Float[ndarray, " M"]
+    noises: Float[ndarray, "B m m"]
+    unexplained: Float[ndarray, " B"]
     """Probability that no target made the box."""
-    clutter_intensity: float
-    """κ, per unit of the measurement space."""
+    starts: Int[ndarray, " C1"]
+    """Where each camera's boxes begin, and the end."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,6 +78,7 @@ class MeasurementBirths:
         *,
         birth_rate: float,
         detection_probability: float,
+        clutter: Float[ndarray, " C"],
         gate: float,
         margin: float,
         largest_gap: float,
@@ -90,6 +91,7 @@ class MeasurementBirths:
             model: Of a target's box.
             birth_rate: λ_b, expected newcomers a step.
             detection_probability: p_D of a target in the picture.
+            clutter: κ of each camera, per unit of the measurement space.
             gate: Squared Mahalanobis distance of a box that belongs to a newcomer.
             margin: Metres outside the volume within which newcomers are taken, too.
             largest_gap: Metres by which the rays of two boxes of one target may miss each other.
@@ -103,25 +105,14 @@ class MeasurementBirths:
         self._log_miss = (
             float(np.log1p(-detection_probability)) if detection_probability < 1.0 else -np.inf
         )
+        self._log_clutter = np.log(clutter)
         self._gate = gate
         self._margin = margin
         self._largest_gap = largest_gap
         self._centres = np.array([camera.centre for camera in cameras])
-        rotations, translations, intrinsics, distortions = (
-            np.array([camera.numbers[part] for camera in cameras]) for part in range(4)
-        )
-        self._numbers = (
-            np.array([camera.image_size for camera in cameras]),
-            rotations,
-            translations,
-            intrinsics,
-            distortions,
-            NEAREST_DEPTH,
-            np.array([camera.largest_radius for camera in cameras]),
-        )
-        """All cameras in the form that the compiled fit knows."""
+        self._numbers = stacked(cameras)
 
-    def propose(self, evidence: list[CameraEvidence]) -> Newborns | None:
+    def propose(self, evidence: Evidence) -> Newborns | None:
         """Newcomers that share no box, the surest first; None for nobody."""
         seeds = self._meeting_points(evidence)
         if not len(seeds):
@@ -137,27 +128,28 @@ class MeasurementBirths:
                 chosen.append(index)
         return found.take(np.array(chosen)) if chosen else None
 
-    def _meeting_points(self, evidence: list[CameraEvidence]) -> Float[ndarray, "N 3"]:
+    def _meeting_points(self, evidence: Evidence) -> Float[ndarray, "N 3"]:
         """Where the rays of unexplained boxes of two cameras pass close by each other."""
-        free = [one.centres[one.unexplained > _UNEXPLAINED] for one in evidence]
-        if sum(len(centres) > 0 for centres in free) < 2:
+        free, starts, cameras = birth_kernels.free_boxes(
+            evidence.unexplained, evidence.starts, _UNEXPLAINED
+        )
+        if cameras < 2:
             return np.zeros((0, 3))
+        centres = evidence.centres.take(free, 0)
         rays = np.concatenate(
             [
-                camera.back_project(centres)
-                for camera, centres in zip(self._cameras, free, strict=True)
+                camera.back_project(centres[first:last])
+                for camera, first, last in zip(self._cameras, starts, starts[1:], strict=False)
             ]
         )
-        points, gaps = birth_kernels.meeting_points(
-            rays, _starts([len(centres) for centres in free]), self._centres, self._largest_gap
-        )
+        points, gaps = birth_kernels.meeting_points(rays, starts, self._centres, self._largest_gap)
         inside = self._room.contains(points, self._margin)
         points, gaps = points[inside], gaps[inside]
         if len(points) > _MOST_SEEDS:
             points = points[np.argsort(gaps, kind="stable")[:_MOST_SEEDS]]
         return np.asarray(points)
 
-    def _fit(self, seeds: Float[ndarray, "N 3"], evidence: list[CameraEvidence]) -> Newborns:
+    def _fit(self, seeds: Float[ndarray, "N 3"], evidence: Evidence) -> Newborns:
         """The places that fit best to the nearest box in every camera, and their odds.
 
         A seed that ends outside the room or with fewer than two boxes is left out.
@@ -166,10 +158,10 @@ class MeasurementBirths:
             seeds,
             _START_SIGMA,
             _REFINEMENTS,
-            np.concatenate([one.values for one in evidence]),
-            np.concatenate([one.noises for one in evidence]),
-            np.concatenate([one.unexplained for one in evidence]) > _UNEXPLAINED,
-            _starts([len(one.values) for one in evidence]),
+            evidence.values,
+            evidence.noises,
+            evidence.unexplained > _UNEXPLAINED,
+            evidence.starts,
             self._gate,
             self._model.half_height,
             self._model.half_width,
@@ -178,12 +170,10 @@ class MeasurementBirths:
         inside = self._room.contains(positions, self._margin)
         kept = np.flatnonzero(inside & ((sources >= 0).sum(axis=0) >= 2))
         found = Newborns(positions[kept], covariances[kept], np.zeros(len(kept)), sources[:, kept])
-        existences = expit(self._log_odds(found, fits[:, kept], evidence))
+        existences = expit(self._log_odds(found, fits[:, kept]))
         return Newborns(found.positions, found.covariances, existences, found.sources)
 
-    def _log_odds(
-        self, found: Newborns, fits: Float[ndarray, "C N"], evidence: list[CameraEvidence]
-    ) -> Float[ndarray, " N"]:
+    def _log_odds(self, found: Newborns, fits: Float[ndarray, "C N"]) -> Float[ndarray, " N"]:
         """log Λ of each newcomer, of whose boxes ``fits`` are the log likelihoods."""
         log_odds = self._log_density + 1.5 * np.log(2.0 * np.pi)
         log_odds = log_odds + 0.5 * np.linalg.slogdet(found.covariances)[1]
@@ -191,10 +181,5 @@ class MeasurementBirths:
             hit = found.sources[c] >= 0
             missed = ~hit & camera.sees(found.positions)
             log_odds[missed] += self._log_miss
-            log_odds[hit] += self._log_hit - np.log(evidence[c].clutter_intensity) + fits[c][hit]
+            log_odds[hit] += self._log_hit - self._log_clutter[c] + fits[c][hit]
         return np.asarray(log_odds)
-
-
-def _starts(counts: list[int]) -> Int[ndarray, " C1"]:
-    """Where each camera's boxes begin when all stand in one row, and the end."""
-    return np.cumsum([0, *counts])

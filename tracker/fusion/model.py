@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence as Many
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
@@ -9,7 +11,7 @@ from scipy.stats import chi2
 
 from tracker import kernels, models
 from tracker.fusion import visibility
-from tracker.fusion.measurement_births import CameraEvidence, MeasurementBirths, Newborns
+from tracker.fusion.measurement_births import Evidence, MeasurementBirths, Newborns
 from tracker.fusion.target_model import ExpectedBoxes, TargetModel
 from tracker.fusion.visibility import Visibility
 from tracker.gaussian_mixture import GaussianMixture
@@ -37,17 +39,19 @@ class FusionModel:
             models.entrance_births(sequence.room, p.birth_rate * sequence.step_time)
         )
         """γ: one component an entrance, with the weight of one step."""
-        self.clutter = [
-            p.clutter_rate / models.measurement_volume(camera, sequence.room, self.target.size)
-            for camera in self.cameras
-        ]
+        self.clutter = np.array(
+            [
+                p.clutter_rate / models.measurement_volume(camera, sequence.room, self.target.size)
+                for camera in self.cameras
+            ]
+        )
         """κ of each camera, per unit of the measurement space."""
         self.gate = float(chi2.ppf(p.gate_probability, df=self.target.size))
         """Squared Mahalanobis distance of the innovation."""
         self.near = p.duplicate_distance * 2.0 * float(np.mean(sequence.target_half_extents[:2]))
         """Metres within which two components may be one person."""
         margin = p.followed_margin
-        self._followed = (self.room.minimum - margin, self.room.maximum + margin)
+        self.followed = (self.room.minimum - margin, self.room.maximum + margin)
         """The corners between which people are followed."""
         self._newborns = MeasurementBirths(
             self.cameras,
@@ -55,6 +59,7 @@ class FusionModel:
             self.target,
             birth_rate=p.birth_rate * sequence.step_time,
             detection_probability=p.detection_probability,
+            clutter=self.clutter,
             gate=self.gate,
             margin=p.followed_margin,
             largest_gap=2.0 * float(np.max(sequence.target_half_extents)),
@@ -101,18 +106,7 @@ class FusionModel:
             near=self.near,
         )
 
-    def evidence(
-        self,
-        index: int,
-        view: ViewResult,
-        values: Float[ndarray, "M m"],
-        noises: Float[ndarray, "M m m"],
-        unexplained: Float[ndarray, " M"],
-    ) -> CameraEvidence:
-        """What one camera leaves to newcomers."""
-        return CameraEvidence(view.boxes[:, :2], values, noises, unexplained, self.clutter[index])
-
-    def newborns(self, evidence: list[CameraEvidence]) -> tuple[GaussianMixture, Newborns] | None:
+    def newborns(self, evidence: Evidence) -> tuple[GaussianMixture, Newborns] | None:
         """Newcomers where unexplained boxes of several cameras agree: components without labels,
         and what says so; None for nobody."""
         found = self._newborns.propose(evidence)
@@ -124,7 +118,7 @@ class FusionModel:
 
     def stays(self, mixture: GaussianMixture) -> Int[ndarray, " K"]:
         """Indices of the components that have not strayed from the room."""
-        inside: ndarray = kernels.inside_bounds(mixture.means, *self._followed)
+        inside: ndarray = kernels.inside_bounds(mixture.means, *self.followed)
         return inside
 
     def doubles(
@@ -145,3 +139,18 @@ class FusionModel:
             means, weights, labels, np.ascontiguousarray(sources), self.near, CONFIRMED
         )
         return found
+
+
+def all_boxes(
+    views: Many[ViewResult],
+) -> tuple[Float[ndarray, "B 4"], Float[ndarray, "B 4"], Int[ndarray, " C1"]]:
+    """The boxes of all cameras, one after another, their standard deviations, pixels, and where
+    each camera's begin, with the end."""
+    starts = [0]
+    for view in views:
+        starts.append(starts[-1] + len(view.boxes))
+    return (
+        np.concatenate([view.boxes for view in views], dtype=float),
+        np.concatenate([view.sigmas for view in views], dtype=float),
+        np.array(starts),
+    )

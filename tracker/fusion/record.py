@@ -93,18 +93,33 @@ class Ledger:
         Args:
             labels: Of the posterior's components, the heaviest first.
         """
-        if not self._cameras or not len(labels):
+        if not self._cameras:
             return Associations.none()
-        cameras, components, boxes, sums = kernels.sum_pairs(
+        return summed(
             labels,
             np.concatenate(self._cameras),
             np.concatenate(self._labels),
             np.concatenate(self._boxes),
             np.concatenate(self._probabilities),
         )
-        return Associations(
-            cameras.astype(np.int32),
-            components.astype(np.int32),
-            boxes.astype(np.int32),
-            np.minimum(sums, 1.0).astype(np.float32),
-        )
+
+
+def summed(
+    labels: Int[ndarray, " J"],
+    cameras: Int[ndarray, " A"],
+    of_pairs: Int[ndarray, " A"],
+    boxes: Int[ndarray, " A"],
+    probabilities: Float[ndarray, " A"],
+) -> Associations:
+    """The pairs of those labels that lived on; several of one label and box are summed.
+
+    Args:
+        labels: Of the posterior's components, the heaviest first.
+        cameras: Of the pairs, as the further ones.
+        of_pairs: Their labels.
+        boxes: Their boxes.
+        probabilities: Theirs.
+    """
+    if not len(labels) or not len(cameras):
+        return Associations.none()
+    return Associations(*kernels.sum_pairs(labels, cameras, of_pairs, boxes, probabilities))

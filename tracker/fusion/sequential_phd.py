@@ -15,9 +15,9 @@ from numpy import ndarray
 
 from tracker import gaussian_mixture, kernels, mixture_kernels, models, phd
 from tracker.fusion import memory, one_person
-from tracker.fusion.measurement_births import CameraEvidence
+from tracker.fusion.measurement_births import Evidence
 from tracker.fusion.memory import Memory
-from tracker.fusion.model import CONFIRMED, FusionModel
+from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import Ledger, Record
 from tracker.gaussian_mixture import GaussianMixture
@@ -46,7 +46,8 @@ class _Work:
     """Labels of this step's births."""
     sure: dict[int, float]
     """Predicted weight of each label, where it is enough to hide others."""
-    evidence: list[CameraEvidence]
+    measured: list[tuple[ndarray, ndarray, ndarray]]
+    """Of each camera: the boxes as measurements, their noises, what nobody explains of each."""
     ledger: Ledger
 
 
@@ -89,13 +90,13 @@ class SequentialPhd:
             next_label,
             range(state.next_label, next_label),
             sure,
-            evidence=[],
+            measured=[],
             ledger=Ledger(),
         )
         for index, view in enumerate(views):
             self._update(work, index, view)
         if p.birth != "entrances":
-            self._add_newborns(work)
+            self._add_newborns(work, views)
         inside = self._model.stays(work.mixture)
         mixture, record = work.mixture.take(inside), work.record.take(inside)
         if p.misses == "per_person":
@@ -153,12 +154,15 @@ class SequentialPhd:
             owners=owners,
         )
         work.record = record.take(leaders)
-        unexplained = 1.0 - updated.measurement_weights
-        work.evidence.append(model.evidence(index, view, values, noises, unexplained))
+        work.measured.append((values, noises, 1.0 - updated.measurement_weights))
 
-    def _add_newborns(self, work: _Work) -> None:
+    def _add_newborns(self, work: _Work, views: Many[ViewResult]) -> None:
         """Components where unexplained boxes of several cameras agree on a place."""
-        found = self._model.newborns(work.evidence)
+        values, noises, unexplained = (
+            np.concatenate(part) for part in zip(*work.measured, strict=True)
+        )
+        boxes, _, starts = all_boxes(views)
+        found = self._model.newborns(Evidence(boxes[:, :2], values, noises, unexplained, starts))
         if found is None:
             return
         born, newborns = found

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from tracker import box_kernels
+from tracker import measurement_kernels
 from tracker.camera import NEAREST_DEPTH, Camera
 from tracker.single_view.protocol import ViewResult
 from tracker.update_kernels import Alternative
@@ -35,8 +35,7 @@ _LOW_HALF_HEIGHT, _LOW_HALF_WIDTH = 0.5, 0.6
 _LOW_SIGMAS = np.array([0.15, 0.15, 0.5, 0.25])  # centre across and down, half width, half height
 _DROP = 0.3  # how far his middle moves from one camera's box to the next
 
-# the unscented points of a 3D position, in standard deviations: the axes at ±√3, each with 1/6
-_SIGMA_POINTS = np.sqrt(3.0) * np.concatenate([np.eye(3), -np.eye(3)])
+_NO_COVARIANCES = np.zeros((0, 3, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,16 +103,26 @@ class TargetModel:
         """
         self.kind: MeasurementKind = kind
         self.size = SIZES[kind]
-        self._unscented = update == "unscented"
+        self.unscented = update == "unscented"
         # a centre alone looks the same in any posture
-        self._low_share = low_share if kind != "centre" else 0.0
+        self.low_share = low_share if kind != "centre" else 0.0
         self.half_height = float(half_extents[2])
         self.half_width = float(np.mean(half_extents[:2]))
-        self._transform = _FROM_BOX[kind]
+        transform = _FROM_BOX[kind]
         # R = T diag(σ²) Tᵀ is linear in σ²
-        products = np.einsum("pa,qa->apq", self._transform, self._transform)
-        self._products = products.reshape(4, self.size**2)
-        self._low_noise = (_LOW_SIGMAS**2 @ self._products).reshape(self.size, self.size)
+        products = np.einsum("pa,qa->apq", transform, transform).reshape(4, self.size**2).copy()
+        self.transforms = transform, products
+        """T (m, 4) and (4, m²), as :func:`tracker.measurement_kernels.measured_boxes` has them."""
+        low_noise = (_LOW_SIGMAS**2 @ products).reshape(self.size, self.size)
+        self.numbers = (
+            self.half_height,
+            self.half_width,
+            _LOW_HALF_HEIGHT * self.half_height,
+            _LOW_HALF_WIDTH * self.half_height,
+            low_noise if self.low_share else np.zeros((0, 0)),
+            self.size,
+        )
+        """The target as :func:`tracker.measurement_kernels.expected_measurements` knows it."""
 
     def expected(
         self,
@@ -128,93 +137,31 @@ class TargetModel:
             states: Position first, metres, world frame.
             covariances: Their uncertainty, for the unscented kind; none is taken as 0.
         """
-        values, jacobians, boxes, depths, valid = self._project(
-            camera, states, self.half_height, self.half_width
-        )
-        no_spread = np.zeros((0, self.size, self.size))
-        low = self._low(camera, states, boxes) if self._low_share and len(states) else None
-        straight = ExpectedBoxes(values, jacobians, no_spread, boxes, depths, valid, low)
-        if not self._unscented or covariances is None or not len(states):
-            return straight
-        return self._bent(camera, straight, states, covariances)
-
-    def _low(
-        self, camera: Camera, states: Float[ndarray, "J d"], boxes: Float[ndarray, "J 4"]
-    ) -> Alternative:
-        """What the camera should measure of people who lie or bend.
-
-        ``boxes`` are theirs if they stood.
-        """
-        values, jacobians, spreads = box_kernels.low_boxes(
+        bends = self.unscented and covariances is not None
+        (
+            values, jacobians, spreads, boxes, depths, valid,
+            low_values, low_jacobians, low_spreads,
+        ) = measurement_kernels.expected_measurements(
             np.ascontiguousarray(states, dtype=float),
-            boxes,
-            self._low_noise,
-            _LOW_HALF_HEIGHT * self.half_height,
-            _LOW_HALF_WIDTH * self.half_height,
-            self.size,
+            np.ascontiguousarray(covariances) if bends else _NO_COVARIANCES,
+            bends,
+            *self.numbers,
             camera.image_size,
             *camera.numbers,
             NEAREST_DEPTH,
             camera.largest_radius,
-        )
-        drift = np.zeros((states.shape[1], states.shape[1]))
+        )  # fmt: skip
+        low = None
+        if self.low_share:
+            drift = self.drift(states.shape[1])
+            low = Alternative(low_values, low_jacobians, low_spreads, drift, self.low_share)
+        return ExpectedBoxes(values, jacobians, spreads, boxes, depths, valid, low)
+
+    def drift(self, dimension: int) -> Float[ndarray, "d d"]:
+        """How far a state may have moved with a change of posture from one box to the next: P."""
+        drift = np.zeros((dimension, dimension))
         drift[2, 2] = (_DROP * self.half_height) ** 2
-        return Alternative(values, jacobians, spreads, drift, self._low_share)
-
-    def _project(
-        self, camera: Camera, states: Float[ndarray, "J d"], half_height: float, half_width: float
-    ) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
-        found: tuple[ndarray, ndarray, ndarray, ndarray, ndarray] = box_kernels.expected_boxes(
-            np.ascontiguousarray(states, dtype=float),
-            half_height,
-            half_width,
-            self.size,
-            camera.image_size,
-            *camera.numbers,
-            NEAREST_DEPTH,
-            camera.largest_radius,
-        )
-        return found
-
-    def _bent(
-        self,
-        camera: Camera,
-        straight: ExpectedBoxes,
-        states: Float[ndarray, "J d"],
-        covariances: Float[ndarray, "J d d"],
-    ) -> ExpectedBoxes:
-        """The statistical linear regression over each state's uncertainty.
-
-            ẑ = Σ w h(χ),  H = [Σ w (h(χ) − ẑ)(χ − m)ᵀ] P⁻¹,
-            Ω = Σ w (h(χ) − ẑ)(h(χ) − ẑ)ᵀ − H P Hᵀ
-
-        over the unscented points χ of the position. Where one of them lies behind
-        the lens the straight prediction stays.
-        """
-        count = len(states)
-        spread = covariances[:, :3, :3]
-        offsets = _SIGMA_POINTS @ np.linalg.cholesky(spread).transpose(0, 2, 1)
-        points = (states[:, None, :3] + offsets).reshape(-1, 3)
-        values, _, _, _, valid = self._project(camera, points, self.half_height, self.half_width)
-        values = values.reshape(count, 6, self.size)
-        means = values.mean(axis=1)
-        off = values - means[:, None]
-        cross = np.einsum("jkm,jka->jma", off, offsets) / 6.0
-        slopes = np.linalg.solve(spread, cross.transpose(0, 2, 1)).transpose(0, 2, 1)
-        rest = np.einsum("jkm,jkn->jmn", off, off) / 6.0 - slopes @ cross.transpose(0, 2, 1)
-        bent = valid.reshape(count, 6).all(axis=1) & straight.valid
-        jacobians = straight.jacobians.copy()
-        jacobians[bent, :, :3] = slopes[bent]
-        rest = np.where(bent[:, None, None], (rest + rest.transpose(0, 2, 1)) / 2.0, 0.0)
-        return ExpectedBoxes(
-            np.where(bent[:, None], means, straight.values),
-            jacobians,
-            rest,
-            straight.boxes,
-            straight.depths,
-            straight.valid,
-            straight.other,
-        )
+        return drift
 
     def measured(
         self, view: ViewResult, factor: float
@@ -225,10 +172,9 @@ class TargetModel:
             view: Boxes and how far each is to be trusted.
             factor: On the standard deviations.
         """
-        measured: tuple[ndarray, ndarray] = box_kernels.measured_boxes(
+        measured: tuple[ndarray, ndarray] = measurement_kernels.measured_boxes(
             np.ascontiguousarray(view.boxes, dtype=float),
             np.ascontiguousarray((factor * view.sigmas) ** 2, dtype=float),
-            self._transform,
-            self._products,
+            *self.transforms,
         )
         return measured
