@@ -11,7 +11,7 @@ from typing import Any, Literal
 from app.colours import Theme
 from app.evaluation.scores import Scores
 from tracker import parameters as table
-from tracker.parameters import ParameterError, RunParameters
+from tracker.parameters import RunParameters
 from tracker.pipeline import Run
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
@@ -127,13 +127,13 @@ class Snapshot:
     @property
     def preset(self) -> str | None:
         """The preset, built in or saved, whose values the parameters have."""
+        own = table.changed(self.parameters, self.defaults)
         single_view = {"single_view": self.parameters.single_view}
         for name, values in {**table.PRESETS, **self.presets}.items():
-            try:
-                meant = table.with_values(self.defaults, {**single_view, **values})
-            except ParameterError:  # saved by another version
+            meant = {**single_view, **values}
+            if not meant.keys() <= _KEYS:  # saved by another version
                 continue
-            if meant == self.parameters:
+            if own == {k: v for k, v in meant.items() if v != table.value(self.defaults, k)}:
                 return name
         return None
 
@@ -141,6 +141,9 @@ class Snapshot:
     def step_is_computed(self) -> bool:
         """Whether the shown run has the playhead's step."""
         return self.run is not None and self.playhead < self.run.done
+
+
+_KEYS = {*table.METHODS, *table.PARAMETERS}
 
 
 def clamp(key: str, value: Any) -> Any:

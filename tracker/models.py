@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -130,13 +131,14 @@ def label_births(births: GaussianMixture, first_label: int) -> GaussianMixture:
     return GaussianMixture(births.weights, births.means, births.covariances, labels)
 
 
+@lru_cache(maxsize=64)
 def visible_area(camera: Camera, room: Room) -> float:
     """Area of the picture that the room's volume fills, in squared pixels.
 
     False boxes are taken as uniform over it ([ZW21] §2.4: clutter uniform over
     the volume, as this camera sees it). Never less than one per cent of the
     picture, so that the clutter intensity stays finite for a camera that looks
-    elsewhere.
+    elsewhere. Of the same camera and room it is found once: every run asks for it.
     """
     axes = np.linspace(room.minimum, room.maximum, 12).T
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker import kernels, mixture_kernels, phd
+from tracker import gaussian_mixture, kernels, mixture_kernels
 from tracker.fusion.protocol import FusionResult
 from tracker.gaussian_mixture import GaussianMixture
 from tracker.sequences.sequence import Room
@@ -98,37 +98,45 @@ def extract(
             piece, pass the same one again.
     """
     ids = {} if ids is None else ids
-    rows: list[Trajectories] = []
-    for offset, result in enumerate(results):
-        targets, leaders = result.posterior, np.arange(result.posterior.size)
-        if rule == "boxes":
-            targets, leaders = by_boxes(result)
-        chosen = phd.extract(targets, extraction_threshold)
-        if room is not None:
-            chosen = chosen[room.contains(targets.means[chosen, :3], margin, below)]
-        if not len(chosen):
-            continue
-        labels, first = np.unique(targets.labels[chosen], return_index=True)
-        for label in labels.tolist():
-            ids.setdefault(label, len(ids) + 1)
-        numbers = np.array([ids[label] for label in labels.tolist()], dtype=np.int64)
-        order = np.argsort(numbers)
-        found = targets.take(chosen[first][order])
-        components = leaders[chosen[first][order]]
-        variances = np.diagonal(found.covariances, axis1=1, axis2=2)
-        rows.append(
-            Trajectories(
-                frames=np.full(len(labels), first_frame + offset, dtype=np.int64),
-                ids=numbers[order],
-                positions=found.means[:, :3],
-                existences=found.weights,
-                sigmas=np.sqrt(variances[:, :3]),
-                seen=(result.sources[:, components] >= 0).T,
-                components=components,
-                labels=found.labels,
-            )
-        )
-    return concatenate(rows, cameras)
+    results = list(results)
+    if not results:
+        return Trajectories.empty(cameras)
+    if rule == "boxes":
+        gathered = [by_boxes(result) for result in results]
+    else:
+        gathered = [(result.posterior, np.arange(result.posterior.size)) for result in results]
+    targets = gaussian_mixture.concatenate([mixture for mixture, _ in gathered])
+    steps = np.repeat(np.arange(len(results)), [mixture.size for mixture, _ in gathered])
+    chosen = np.flatnonzero(targets.weights > extraction_threshold)
+    if room is not None:
+        chosen = chosen[room.contains(targets.means[chosen, :3], margin, below)]
+    if not len(chosen):
+        return Trajectories.empty(cameras)
+    # step by step, label by label, the heaviest first
+    of_step, of_label = steps[chosen], targets.labels[chosen]
+    order = np.lexsort((-targets.weights[chosen], of_label, of_step))
+    chosen, of_step, of_label = chosen[order], of_step[order], of_label[order]
+    first = np.ones(len(chosen), dtype=bool)
+    first[1:] = (np.diff(of_step) != 0) | (np.diff(of_label) != 0)
+    chosen, of_step, of_label = chosen[first], of_step[first], of_label[first]
+    numbers = np.array([ids.setdefault(label, len(ids) + 1) for label in of_label.tolist()])
+    order = np.lexsort((numbers, of_step))
+    chosen, of_step, of_label = chosen[order], of_step[order], of_label[order]
+    components = np.concatenate([leaders for _, leaders in gathered])[chosen]
+    sizes = [result.posterior.size for result in results]
+    starts = np.cumsum([0, *sizes[:-1]])
+    sources = np.concatenate([result.sources for result in results], axis=1)
+    variances = np.diagonal(targets.covariances[chosen], axis1=1, axis2=2)
+    return Trajectories(
+        frames=first_frame + of_step,
+        ids=numbers[order],
+        positions=targets.means[chosen, :3],
+        existences=targets.weights[chosen],
+        sigmas=np.sqrt(variances[:, :3]),
+        seen=(sources[:, starts[of_step] + components] >= 0).T,
+        components=components,
+        labels=of_label,
+    )
 
 
 def by_boxes(result: FusionResult) -> tuple[GaussianMixture, Int[ndarray, " K"]]:

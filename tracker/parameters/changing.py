@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
+from operator import attrgetter
 from typing import Any
 
 from tracker.parameters.colour_phd import ColourPeakParams
 from tracker.parameters.definition import Stage
 from tracker.parameters.run import FOREGROUND_METHODS, RunParameters
 from tracker.parameters.table import METHODS, PARAMETERS, Parameter
+
+_READ = {key: attrgetter(key) for key in (*METHODS, *PARAMETERS)}
+"""How the value of each key is read: a slider asks for all of them many times."""
 
 
 class ParameterError(ValueError):
@@ -22,9 +26,7 @@ class ParameterError(ValueError):
 
 def value(parameters: RunParameters, key: str) -> Any:
     """The value of one parameter (``group.name``), or of a method choice."""
-    if key in METHODS:
-        return getattr(parameters, key)
-    return getattr(getattr(parameters, key.split(".")[0]), key.split(".", 1)[1])
+    return _READ[key](parameters)
 
 
 def with_values(parameters: RunParameters, changes: Mapping[str, Any]) -> RunParameters:
@@ -93,11 +95,8 @@ def _checked(parameter: Parameter, new: Any) -> Any:
 def changed(parameters: RunParameters, reference: RunParameters | None = None) -> dict[str, Any]:
     """The values that differ from the reference (the defaults, if none), by key."""
     reference = reference or RunParameters()
-    return {
-        key: value(parameters, key)
-        for key in (*METHODS, *PARAMETERS)
-        if value(parameters, key) != value(reference, key)
-    }
+    values = ((key, read(parameters), read(reference)) for key, read in _READ.items())
+    return {key: own for key, own, other in values if own != other}
 
 
 def stage_values(parameters: RunParameters, stage: Stage) -> dict[str, Any]:
