@@ -99,21 +99,26 @@ def _missing(
 ) -> Memory:
     """Who of the lost and of the known is not present, where he may be now: the new lost."""
     there = set(present.tolist())
-    away = np.array([label not in there for label in memory.known.labels.tolist()], dtype=bool)
-    count = int(away.sum())
-    if not count and not memory.lost.size:
+    known = memory.known
+    away = [i for i, label in enumerate(known.labels.tolist()) if label not in there]
+    if not away and not memory.lost.size:
         return memory
-    missing = Memory(
-        memory.known,
-        gaussian_mixture.concatenate([memory.lost, memory.known.take(away)]),
-        np.concatenate([memory.ages, np.zeros(count)]) + model.step_time,
-        np.concatenate([memory.newer, np.full(count, first_label)]),
-    )
-    missing = missing.take(~np.isin(missing.lost.labels, present))
+    missing = Memory(known, memory.lost, memory.ages + model.step_time, memory.newer)
+    if away:
+        missing = Memory(
+            known,
+            gaussian_mixture.concatenate([missing.lost, known.take(np.array(away))]),
+            np.concatenate([missing.ages, np.full(len(away), model.step_time)]),
+            np.concatenate([missing.newer, np.full(len(away), first_label)]),
+        )
+    absent = [i for i, label in enumerate(missing.lost.labels.tolist()) if label not in there]
+    if len(absent) < missing.lost.size:
+        missing = missing.take(np.array(absent, dtype=np.int64))
     lost = model.motion.predict(missing.lost, 1.0)
     waiting = model.room.contains(lost.means[:, :3])
     waiting &= missing.ages <= model.parameters.memory + 1e-9
-    return Memory(memory.known, lost, missing.ages, missing.newer).take(waiting)
+    missing = Memory(known, lost, missing.ages, missing.newer)
+    return missing if waiting.all() else missing.take(waiting)
 
 
 def _returned(

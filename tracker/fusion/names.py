@@ -84,21 +84,25 @@ def recognise(
     people = max((view.likenesses.shape[1] for view in views), default=0)
     if people < 2:
         return {}, names
-    looks = _looked(names, posterior, associations, views, people, waiting, step_time)
+    labels, looks = _looked(names, posterior, associations, views, people, waiting, step_time)
     owners = names.owners if len(names.owners) else np.full(people, -1, dtype=np.int64)
-    sure = np.flatnonzero(posterior.weights > CONFIRMED)
+    sure = posterior.labels.compress(posterior.weights > CONFIRMED)
+    told = looks.take(np.searchsorted(labels, sure), 0)
+    if _is_settled(told, sure, owners):
+        return {}, Names(labels, looks, owners)
     wanted: dict[int, int] = {}
     owners = owners.copy()
-    for track, person in _named(np.array([looks[int(n)] for n in posterior.labels[sure]])):
-        label = int(posterior.labels[sure[track]])
+    for track, person in _named(told):
+        label = int(sure[track])
         if owners[person] < 0 and label not in owners:
             owners[person] = label
         elif owners[person] >= 0:
             wanted[label] = int(owners[person])
     renamed = _permuted(wanted, posterior.labels.tolist())
-    kept = {renamed.get(label, label): look for label, look in looks.items()}
+    own: dict[int, ndarray] = dict(zip(labels.tolist(), looks, strict=True))
+    kept = {renamed.get(label, label): look for label, look in own.items()}
     # who takes over the label of somebody lost brings his own looks along
-    kept |= {renamed[label]: looks[label] for label in renamed}
+    kept |= {renamed[label]: own[label] for label in renamed}
     order = sorted(kept)
     rows = np.array([kept[label] for label in order]).reshape(-1, people)
     return renamed, Names(np.array(order, dtype=np.int64), rows, owners)
@@ -112,28 +116,41 @@ def _looked(
     people: int,
     waiting: Int[ndarray, " L"],
     step_time: float,
-) -> dict[int, ndarray]:
-    """log π of every label that is there or waited for, after this step's boxes."""
-    before = dict(zip(names.labels.tolist(), names.looks, strict=True))
+) -> tuple[Int[ndarray, " K"], Float[ndarray, "K G"]]:
+    """The labels that are there or waited for, ascending, and log π of each after this step."""
+    labels = np.unique(np.concatenate([posterior.labels, waiting]))
+    before = np.zeros((len(labels), people))
+    if len(names.labels):
+        place = names.labels.searchsorted(labels).clip(max=len(names.labels) - 1)
+        known = names.labels.take(place) == labels
+        before[known] = names.looks.take(place.compress(known), 0)
     leak = min(step_time / _SWAP, 1.0)
-    looks = {}
-    for label in {*posterior.labels.tolist(), *waiting.tolist()}:
-        chances = np.exp(before.get(label, np.zeros(people)))
-        looks[label] = np.log((1.0 - leak) * chances / chances.sum() + leak / people)
-    rows = zip(
-        associations.cameras.tolist(),
-        associations.components.tolist(),
-        associations.boxes.tolist(),
-        associations.probabilities.tolist(),
-        strict=True,
-    )
-    for camera, component, box, probability in rows:
-        likeness = views[camera].likenesses
-        if likeness.shape[1] != people:
-            continue
-        told = np.log((1.0 - _DOUBT) * likeness[box] + _DOUBT / people)
-        looks[int(posterior.labels[component])] += probability * min(step_time / _FRESH, 1.0) * told
-    return looks
+    chances = np.exp(before)
+    looks = np.log((1.0 - leak) * chances / chances.sum(axis=1, keepdims=True) + leak / people)
+    # a camera without a picture tells nothing
+    tellers = np.array([view.likenesses.shape[1] == people for view in views])
+    rows = tellers.take(associations.cameras).nonzero()[0]
+    if len(rows):
+        pairs = zip(
+            associations.cameras.take(rows).tolist(),
+            associations.boxes.take(rows).tolist(),
+            strict=True,
+        )
+        likeness = np.array([views[camera].likenesses[box] for camera, box in pairs])
+        told = np.log((1.0 - _DOUBT) * likeness + _DOUBT / people)
+        share = associations.probabilities.take(rows).astype(float) * min(step_time / _FRESH, 1.0)
+        whose = labels.searchsorted(posterior.labels.take(associations.components.take(rows)))
+        np.add.at(looks, whose, share[:, None] * told)
+    return labels, looks
+
+
+def _is_settled(
+    looks: Float[ndarray, "n G"], labels: Int[ndarray, " n"], owners: Int[ndarray, " G"]
+) -> bool:
+    """Whether whoever may be named has that name already: so it is at nearly every step."""
+    ordered = np.sort(looks, axis=1)
+    clear = ordered[:, -1] - ordered[:, -2] >= _OWN
+    return bool((owners.take(looks.argmax(axis=1)) == labels).compress(clear).all())
 
 
 def _named(looks: Float[ndarray, "n G"]) -> list[tuple[int, int]]:
