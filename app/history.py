@@ -25,6 +25,9 @@ class PastRun:
     at: str
     """When it began: the time of day."""
     sequence: str
+    """Its name then."""
+    recording: str
+    """The same as long as it is open, under whatever name."""
     parameters: RunParameters
     changes: int
     """How many parameters were not at their defaults."""
@@ -88,6 +91,7 @@ class History:
             changes = len(table.changed(now.parameters, now.defaults))
             at = time.strftime("%H:%M:%S")
             new = PastRun(
-                self._counted, at, sequence.name, now.parameters, changes, state, sequence.digest
-            )
+                self._counted, at, sequence.name, now.sequence_key, now.parameters, changes, state,
+                sequence.digest,
+            )  # fmt: skip
             self._runs = [new, *earlier][:MOST_RUNS]

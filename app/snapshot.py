@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Literal
 
@@ -136,6 +136,10 @@ class Snapshot:
             if meant == self.parameters:
                 return name
         return None
+
+    def named(self, sequence: Sequence) -> Sequence:
+        """What a run was made of, by its name now: it is another since a copy was saved."""
+        return sequence if self.sequence is None else replace(sequence, name=self.sequence.name)
 
     @property
     def step_is_computed(self) -> bool:

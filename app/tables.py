@@ -301,7 +301,7 @@ def run_table(request: Request, bench: Bench) -> str:
         again: Cell = quiet("another sequence")
         if current:
             again = quiet("current")
-        elif run.sequence == open_now:
+        elif run.sequence == open_now or run.recording == snapshot.sequence_key:
             label = f"Use the parameters of run {run.number} again"
             again = button("use again", "useAgain", run.number, label=label)
         rows.append(

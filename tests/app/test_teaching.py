@@ -202,6 +202,10 @@ def test_a_copy_leaves_the_original_and_goes_on_in_the_copy(
     assert answer["sequence"]["name"] == "mine"
     assert answer["teaching"]["unsaved"] == 0
     assert (answer["run"]["key"], answer["run"]["state"]) == (shown["run"]["key"], "done")
+    exported = client.get("/api/export/tracks.csv")  # of the run before, by the name of the copy
+    assert 'filename="mine-tracks.csv"' in exported.headers["content-disposition"]
+    assert "# sequence = mine\n" in exported.text
+    assert "another sequence" not in client.get("/api/tables/runs").text
     assert (walkers / FILE).read_bytes() == text
     assert client.get("/api/step/3").json()["computed"]
     client.delete("/api/teach/templates/0")
