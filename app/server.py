@@ -246,6 +246,7 @@ def serve(app: FastAPI, listener: sockets.socket, on_ready: Callable[[], None]) 
         listener: From :func:`bind`.
         on_ready: Called as soon as requests are answered.
     """
+    build_routes(app)
     config = uvicorn.Config(
         app,
         log_level="warning",
@@ -259,6 +260,15 @@ def serve(app: FastAPI, listener: sockets.socket, on_ready: Callable[[], None]) 
         server_header=False,
     )
     _Server(config, on_ready).run(sockets=[listener])
+
+
+def build_routes(app: FastAPI) -> None:
+    """Have all routes built before another thread runs.
+
+    FastAPI builds a route when it is first needed, and silences a warning of pydantic's
+    meanwhile, with a filter that any other thread which handles warnings may take away.
+    """
+    app.openapi()
 
 
 class _Server(uvicorn.Server):
