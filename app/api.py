@@ -221,7 +221,7 @@ async def set_layers(wish: models.LayerChanges, bench: Bench) -> models.State:
 @router.post("/view")
 async def view(wish: models.ViewChange, bench: Bench) -> models.State:
     """Look through a camera in 3D, from above, or freely again."""
-    bench.look(wish.camera, flies=wish.flies)
+    bench.look(wish.camera)
     return results.state_of(bench.snapshot())
 
 

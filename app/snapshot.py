@@ -120,7 +120,7 @@ class Snapshot:
     )
     view: View = None
     flies: bool = True
-    """Whether the 3D view moves to it, or is there at once."""
+    """Whether the 3D view moves to another, or is there at once: somebody wants less motion."""
     theme: Theme = "dark"
     """Of the 3D view."""
 

@@ -30,9 +30,9 @@ MOST_NOTICES = 20
 
 router = APIRouter()
 
-FromPage = TypeAdapter[models.StreamSeek | models.StreamSelect | models.StreamPing](
-    models.StreamSeek | models.StreamSelect | models.StreamPing
-)
+FromPage = TypeAdapter[
+    models.StreamSeek | models.StreamSelect | models.StreamMotion | models.StreamPing
+](models.StreamSeek | models.StreamSelect | models.StreamMotion | models.StreamPing)
 
 
 class _Page:
@@ -40,6 +40,7 @@ class _Page:
 
     def __init__(self) -> None:
         self.news: set[Change] = {"sequence", "playhead"}
+        self.flies = True
         self.messages: list[str] = []
         self.wake = asyncio.Event()
         self.wake.set()
@@ -121,6 +122,7 @@ class Stream:
             pass
         finally:
             self._pages.discard(page)
+            self._set_flies()
             if page.timer is not None:
                 page.timer.cancel()
             sender.cancel()
@@ -134,7 +136,7 @@ class Stream:
         except ValueError as error:
             words = str(error)
             if isinstance(error, ValidationError):
-                words = "expected seek, select or ping with their fields"
+                words = "expected seek, select, motion or ping with their fields"
             notice = {"type": "notice", "level": "warn", "message": words, "hint": None}
             page.messages = [*page.messages, json.dumps(notice)][-MOST_NOTICES:]
             page.wake.set()
@@ -144,9 +146,16 @@ class Stream:
                 self._workbench.seek(wish.step, wish.origin)
             case models.StreamSelect():
                 self._workbench.select(wish.id)
+            case models.StreamMotion():
+                page.flies = wish.flies
+                self._set_flies()
             case models.StreamPing():
                 page.messages = [*page.messages, '{"type":"pong"}'][-MOST_NOTICES:]
                 page.wake.set()
+
+    def _set_flies(self) -> None:
+        """A click in the 3D view does not say whose it was: one who wants less motion is enough."""
+        self._workbench.set_flies(all(page.flies for page in self._pages))
 
     async def _tell(self, socket: WebSocket, page: _Page) -> None:
         while True:

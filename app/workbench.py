@@ -182,12 +182,11 @@ class Workbench:
             if now.scores.pinned is not None:
                 self._put("pinned", scores=replace(now.scores, pinned=None))
 
-    def look(self, view: View, *, flies: bool = True) -> None:
+    def look(self, view: View) -> None:
         """Have the 3D view look through a camera, from above, or freely.
 
         Args:
             view: A camera's index, from above, or None for the free view.
-            flies: Whether it moves there, or is there at once.
 
         Raises:
             ParameterError: If there is no such camera.
@@ -199,7 +198,13 @@ class Workbench:
                     "camera", f"expected an index below {cameras}, top or null, got {view}"
                 )
             if view != now.view:
-                self._put("view", view=view, flies=flies)
+                self._put("view", view=view)
+
+    def set_flies(self, flies: bool) -> None:
+        """Have the 3D view move to another view, or be there at once."""
+        with self._edit() as now:
+            if flies != now.flies:
+                self._put("view", flies=flies)
 
     def teach(self, sequence: Sequence, defaults: RunParameters | None = None) -> None:
         """Have the open sequence with another room or other templates; its pictures stay.

@@ -137,7 +137,7 @@ export function createActions({ store, seek, send, receive }) {
 			const { cameras, large } = store.get();
 			if (index < cameras.length) store.set({ large: large === index ? null : index });
 		},
-		lookThrough: (view) => void actions.ask("POST", "view", { camera: view, flies: !matchMedia("(prefers-reduced-motion: reduce)").matches }),
+		lookThrough: (view) => void actions.ask("POST", "view", { camera: view }),
 		freeView() {
 			store.set({ large: null });
 			actions.lookThrough(null);

@@ -252,8 +252,14 @@ function receive(message) {
 	}
 }
 
+// Also for a click inside the 3D view, which the server hears of first.
+const still = matchMedia("(prefers-reduced-motion: reduce)");
+const tellMotion = () => stream.send({ type: "motion", flies: !still.matches });
+still.onchange = tellMotion;
+
 const stream = openStream("/api/stream", {
 	open() {
+		tellMotion();
 		store.set({ link: "open" });
 		if (!store.get().schema) void fetchSchema();
 		void fetchSequences();
