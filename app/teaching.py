@@ -11,9 +11,10 @@ import copy
 import os
 import threading
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Literal
 
 from app.snapshot import Change, Snapshot
@@ -157,13 +158,21 @@ class Teaching:
         """Take an entrance away."""
         self._edit(lambda values: _take(values["room"]["entrances"], "entrance", index))
 
-    def restore(self, key: str) -> bool:
-        """Go back, or on again, to what was taught once; whether it is still known."""
+    def restore(self, key: str, changes: Mapping[str, Any] = MappingProxyType({})) -> bool:
+        """Go back, or on again, to what was taught once, and to the values that went with it.
+
+        Args:
+            key: As the state named it.
+            changes: Values by key.
+
+        Returns:
+            Whether it is still known; nothing changes where it is not.
+        """
         with self._lock:
             known = self._states.get(key)
             if known is None:
                 return False
-            self._put(copy.deepcopy(known))
+            self._put(copy.deepcopy(known), changes=changes)
             return True
 
     def discard(self) -> None:
@@ -240,11 +249,17 @@ class Teaching:
             edit(values)
             self._put(values, check)
 
-    def _put(self, values: Values, check: Callable[[Sequence], None] | None = None) -> None:
+    def _put(
+        self,
+        values: Values,
+        check: Callable[[Sequence], None] | None = None,
+        changes: Mapping[str, Any] = MappingProxyType({}),
+    ) -> None:
         now, opened = self._sequence(), self._opened
         if opened is None or opened.views is not now.views:
             raise SequenceError("another sequence was opened meanwhile; look at it and try again")
         if values == taught_values(now):
+            self._workbench.teach(now, changes=changes)
             return
         sequence = with_taught(opened, values, f"{now.folder.name}/{FILE}")
         if check is not None:
@@ -253,7 +268,7 @@ class Teaching:
         if saved is not None and values == taught_values(saved):
             sequence = saved
         self._remember(sequence)
-        self._workbench.teach(sequence, _defaults(sequence))
+        self._workbench.teach(sequence, _defaults(sequence), changes)
 
     def _remember(self, sequence: Sequence) -> None:
         self._states[sequence.digest] = taught_values(sequence)

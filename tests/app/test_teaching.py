@@ -11,7 +11,9 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from app import results
 from app.server import Settings, create_app
+from app.workbench import Workbench
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tests.browser.walkers import write_walkers
 from tracker import pipeline
@@ -83,12 +85,24 @@ def test_a_run_used_again_brings_its_templates_back(client: TestClient) -> None:
     client.post("/api/teach/templates", json=BOX)
     taught = done(client)
     assert tracks(client) != first
+    bench: Workbench = client.app.state.workbench  # type: ignore[attr-defined]
+    told = []
+    end = bench.subscribe(lambda _: told.append(results.state_of(bench.snapshot())))
     client.post("/api/run/again/1")
+    end()
+    both = {(now.teaching.key, now.methods.single_view) for now in told}
+    assert len(both) == 1, "one change, so that one undo takes it back"
     again = done(client)
     assert again["teaching"]["key"] == before["teaching"]["key"] != taught["teaching"]["key"]
     assert again["sequence"]["templates"] == 0
     assert again["parameters"] == before["parameters"]
     assert tracks(client) == first
+    wish = {"key": taught["teaching"]["key"], "changes": {"single_view": "never"}}
+    assert client.post("/api/teach/restore", json=wish).status_code == 422
+    assert state(client)["teaching"]["key"] == before["teaching"]["key"]
+    wish["changes"] = {"single_view": "colour_phd"}
+    client.post("/api/teach/restore", json=wish)
+    assert done(client)["run"]["key"] == taught["run"]["key"]
 
 
 def test_a_template_is_named_renamed_removed_and_brought_back(client: TestClient) -> None:
