@@ -145,7 +145,9 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     app.state.presets = OwnPresets(workbench, own_presets)
     app.state.likelihoods = Likelihoods()
     app.state.swatches = Swatches()
-    teaching = app.state.teaching = Teaching(workbench, settings.data)
+    teaching = app.state.teaching = Teaching(
+        workbench, settings.data, settings_folder() / "unsaved" if kept else None
+    )
     evaluator = app.state.evaluator = Evaluator(workbench)
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()

@@ -60,6 +60,8 @@ class Stream:
         self._workbench = workbench
         self._pages: set[_Page] = set()
         self._last_error: str | None = None
+        self._unheard: str | None = None
+        """What was said last while there was no page, for the first that comes."""
         self._state: tuple[int, str] = (-1, "")
         self._steps: OrderedDict[tuple[Any, ...], str] = OrderedDict()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -103,6 +105,8 @@ class Stream:
                 text = json.dumps(notice)
                 if level == "error":
                     self._last_error = text  # also for a page that is not there yet
+                elif not self._pages:
+                    self._unheard = text
         for page in self._pages:
             page.messages = [*page.messages, text][-MOST_NOTICES:]
             page.wake.set()
@@ -111,8 +115,8 @@ class Stream:
         """One page, until it goes."""
         await socket.accept()
         page = _Page()
-        if self._last_error is not None:
-            page.messages.append(self._last_error)
+        page.messages += [text for text in (self._last_error, self._unheard) if text is not None]
+        self._unheard = None
         self._pages.add(page)
         sender = asyncio.create_task(self._tell(socket, page))
         try:

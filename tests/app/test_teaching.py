@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,13 @@ import pytest
 from starlette.testclient import TestClient
 
 from app import results
+from app.drafts import Drafts
 from app.server import Settings, create_app
 from app.workbench import Workbench
-from tests.app.conftest import ADDRESS, run_is, wait_until
+from tests.app.conftest import ADDRESS, connect, run_is, wait_until
 from tests.browser.walkers import write_walkers
 from tracker import pipeline
+from tracker.compilation import kernel_folder
 from tracker.sequences.reader import FILE, read_sequence
 
 BOX = {"camera": "cam1", "step": 5, "left": 40, "top": 30, "width": 24, "height": 48}
@@ -261,6 +264,57 @@ def test_what_is_not_saved_is_there_again_after_another_sequence(
     wait_until(lambda: state(client)["teaching"]["unsaved"] == 1)
     assert state(client)["sequence"]["templates"] == 1
     done(client)
+
+
+def test_what_is_not_saved_outlives_the_server(
+    walkers: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MULTIVIEW_PHD_SETTINGS", str(tmp_path / "settings"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(kernel_folder()))  # they are the machine's
+    monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(tmp_path / "cache"))
+    settings = Settings(sequence=str(walkers), with_viser=False, keep_on_disk=True)
+
+    @contextmanager
+    def started() -> Iterator[tuple[TestClient, str]]:
+        """A server of its own, and what its first page is told."""
+        with TestClient(create_app(settings), base_url=ADDRESS) as client:
+            wait_until(lambda: state(client)["sequence"] is not None)
+            with connect(client) as socket:
+                heard = str(socket.receive_json())
+            yield client, heard
+
+    with started() as (client, _):
+        client.post("/api/teach/templates", json=BOX)
+        taught = done(client)
+    with started() as (client, heard):
+        assert "1 change of numbers not saved, as you left it" in heard
+        again = done(client)
+        assert again["teaching"] == taught["teaching"]
+        assert again["run"]["key"] == taught["run"]["key"]
+        client.post("/api/teach/discard")
+        assert list((tmp_path / "settings" / "unsaved").iterdir()) == []
+        client.post("/api/teach/restore", json={"key": taught["teaching"]["key"]})
+    text = (walkers / FILE).read_text("utf-8")
+    (walkers / FILE).write_text(
+        text.replace("min = [", "min = [-9.0, ", 1).replace(", 0.0]", "]", 1)
+    )
+    with started() as (client, heard):
+        assert "cannot be taken up" in heard
+        assert "template person1 added" in heard
+        assert state(client)["teaching"]["unsaved"] == 0
+    with started() as (client, heard):
+        assert "taken up" not in heard
+
+
+def test_a_draft_that_cannot_be_read_is_left_alone(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    drafts = Drafts(tmp_path)
+    values = {"room": {}, "template": []}
+    drafts.keep(tmp_path, values, {**values, "template": [1]})
+    assert Drafts(tmp_path).read(tmp_path) is None
+    assert "cannot be read and is left as it is" in caplog.text
+    assert len(list(tmp_path.iterdir())) == 1
 
 
 def test_a_template_shows_its_box_and_its_colours(client: TestClient) -> None:
