@@ -221,7 +221,7 @@ async def set_layers(wish: models.LayerChanges, bench: Bench) -> models.State:
 @router.post("/view")
 async def view(wish: models.ViewChange, bench: Bench) -> models.State:
     """Look through a camera in 3D, from above, or freely again."""
-    bench.look(wish.camera, flies=wish.flies)
+    bench.look(wish.camera)
     return results.state_of(bench.snapshot())
 
 
@@ -300,9 +300,10 @@ def export_tracks(bench: Bench) -> Response:
             hint="Wait for the run's first steps, or start it again.",
         )
     done, tracks = run.done, run.tracks
-    name = file_name(run.sequence.name, "tracks.csv")
+    sequence = snapshot.named(run.sequence)
+    name = file_name(sequence.name, "tracks.csv")
     stream = io.StringIO(newline="")
-    export.write_tracks_csv(stream, run.sequence, tracks, run.parameters, run.seed, done=done)
+    export.write_tracks_csv(stream, sequence, tracks, run.parameters, run.seed, done=done)
     return Response(
         stream.getvalue(),
         media_type="text/csv; charset=utf-8",

@@ -28,6 +28,9 @@ ORIGIN = "viser"
 PANEL_WIDTH = 276
 """Pixels."""
 
+OWN_VALUES = "own values"
+"""What the values are while they are no preset's, as on the page."""
+
 STAGES: dict[Stage, str] = {"single_view": "Single view", "fusion": "Fusion", "tracks": "Tracks"}
 METHOD_STAGE: dict[str, Stage] = {"single_view": "single_view", "fusion_method": "fusion"}
 
@@ -63,12 +66,12 @@ class Controls:
         server.gui.main_panel.set_width(PANEL_WIDTH)
         server.gui.add_html(scene_style.PANEL)
         self._values = server.gui.add_html("")
-        self._presets = server.gui.add_button_group(
+        self._presets: Any = server.gui.add_dropdown(
             "Preset",
-            tuple(table.PRESETS),
-            hint="Takes a named set of values and the fusion that goes with it.",
+            (OWN_VALUES, *table.PRESETS),
+            hint="Takes a named set of values; Changes on the page saves one of your own.",
         )
-        self._presets.on_click(self._take_preset)
+        self._presets.on_update(self._take_preset)
         for stage, title in STAGES.items():
             self._make_stage(stage, title)
         self._reset_all = server.gui.add_button(
@@ -170,14 +173,17 @@ class Controls:
     # what happens: these return at once
 
     def _note(self, change: Change) -> None:
-        if change in ("parameters", "sequence", "taught"):
+        if change in ("parameters", "sequence", "taught", "presets"):
             self._worker.ask("refresh")
 
     def _relay(self, name: str, _: object) -> None:
         self._workbench.command(name)
 
-    def _take_preset(self, event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
-        self._workbench.apply_preset(event.target.value, ORIGIN)
+    def _take_preset(self, event: viser.GuiEvent[Any]) -> None:
+        now = self._workbench.snapshot()
+        if event.client_id is not None and event.target.value in (*table.PRESETS, *now.presets):
+            self._workbench.apply_preset(event.target.value, ORIGIN)
+        self._worker.ask("refresh")  # own values cannot be taken: it shows again what they are
 
     def _reset(self, stage: Stage | None) -> None:
         keys = None
@@ -227,8 +233,17 @@ class Controls:
             for stage, reset in self._resets.items():
                 reset.visible = any(self._stage_of(k) == stage for k in changed if k in shown)
             self._reset_all.visible = bool(changed)
+            self._show_presets(snapshot)
             self._values.content = self._value_style(parameters, set(changed))
         self._server.flush()
+
+    def _show_presets(self, snapshot: Snapshot) -> None:
+        """Those that the page lists, in the same order, and which of them the values are."""
+        own = () if snapshot.preset is not None else (OWN_VALUES,)
+        options = (*own, *table.PRESETS, *snapshot.presets)
+        if self._presets.options != options:
+            self._presets.options = options
+        self._presets.value = snapshot.preset or OWN_VALUES
 
     def _write(self, key: str, handle: Any, value: Any) -> None:
         scale = self._scales.get(key)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from app.snapshot import Change, RunState
 from app.workbench import Workbench
@@ -25,6 +26,9 @@ class PastRun:
     at: str
     """When it began: the time of day."""
     sequence: str
+    """Its name then."""
+    recording: str
+    """The same as long as it is open, under whatever name."""
     parameters: RunParameters
     changes: int
     """How many parameters were not at their defaults."""
@@ -50,12 +54,13 @@ class History:
         with self._lock:
             return list(self._runs)
 
-    def use_again(self, number: int, restore: Callable[[str], bool]) -> RunParameters:
+    def use_again(self, number: int, restore: Callable[[str, Mapping[str, Any]], bool]) -> None:
         """Set all parameters to those of a run, and what was taught, where it is still known.
 
         Args:
             number: The run's.
-            restore: Goes back to what was taught once; another sequence's it does not know.
+            restore: Goes back to what was taught once and to values by key, in one change;
+                another sequence's it does not know.
 
         Raises:
             ParameterError: If there is no such run.
@@ -63,12 +68,10 @@ class History:
         run = next((run for run in self.runs if run.number == number), None)
         if run is None:
             raise ParameterError("number", f"expected the number of a listed run, got {number}")
-        now = self._workbench.snapshot().sequence
-        if now is not None and now.digest != run.taught:
-            restore(run.taught)
         keys = (*table.METHODS, *table.PARAMETERS)
         values = {key: table.value(run.parameters, key) for key in keys}
-        return self._workbench.set_parameters(values, "api")
+        if not restore(run.taught, values):
+            self._workbench.set_parameters(values, "api")
 
     def _note(self, change: Change) -> None:
         if change not in ("run", "progress"):
@@ -88,6 +91,7 @@ class History:
             changes = len(table.changed(now.parameters, now.defaults))
             at = time.strftime("%H:%M:%S")
             new = PastRun(
-                self._counted, at, sequence.name, now.parameters, changes, state, sequence.digest
-            )
+                self._counted, at, sequence.name, now.sequence_key, now.parameters, changes, state,
+                sequence.digest,
+            )  # fmt: skip
             self._runs = [new, *earlier][:MOST_RUNS]

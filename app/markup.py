@@ -43,12 +43,12 @@ def number(value: float | None, digits: int, *, signed: bool = False) -> str:
 
 
 def value_text(value: Any) -> str:
-    """A parameter's value as a person reads it."""
+    """A parameter's value as a person reads it; methods and choices by their own names."""
     if isinstance(value, bool):
         return "on" if value else "off"
     if isinstance(value, float):
         return f"{value:.5g}".replace("-", "−")
-    return "–" if value is None else str(value).replace("_", " ")
+    return "–" if value is None else str(value)
 
 
 def vector(values: Iterable[float]) -> str:

@@ -7,12 +7,11 @@ defaults. It is written beside its place and moved there when it is complete.
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from app.json_files import write_json
 from app.snapshot import Presets
 from app.workbench import Workbench
 from tracker import parameters as table
@@ -85,7 +84,7 @@ class OwnPresets:
 
     def _put(self, presets: Presets) -> None:
         if self._path is not None:
-            _write(self._path, presets)
+            write_json(self._path, dict(presets))
         self._workbench.set_presets(presets)
 
 
@@ -103,15 +102,3 @@ def _read(path: Path) -> dict[str, Mapping[str, Any]]:
     if not isinstance(found, dict) or not all(isinstance(v, dict) for v in found.values()):
         raise ValueError(f"{path.name}: expected an object of values for each name")
     return found
-
-
-def _write(path: Path, presets: Presets) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, begun = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            json.dump(dict(presets), file, indent=2, ensure_ascii=False)
-        os.replace(begun, path)
-    except BaseException:
-        Path(begun).unlink(missing_ok=True)
-        raise

@@ -145,7 +145,9 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     app.state.presets = OwnPresets(workbench, own_presets)
     app.state.likelihoods = Likelihoods()
     app.state.swatches = Swatches()
-    teaching = app.state.teaching = Teaching(workbench, settings.data)
+    teaching = app.state.teaching = Teaching(
+        workbench, settings.data, settings_folder() / "unsaved" if kept else None
+    )
     evaluator = app.state.evaluator = Evaluator(workbench)
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
@@ -246,6 +248,7 @@ def serve(app: FastAPI, listener: sockets.socket, on_ready: Callable[[], None]) 
         listener: From :func:`bind`.
         on_ready: Called as soon as requests are answered.
     """
+    build_routes(app)
     config = uvicorn.Config(
         app,
         log_level="warning",
@@ -259,6 +262,15 @@ def serve(app: FastAPI, listener: sockets.socket, on_ready: Callable[[], None]) 
         server_header=False,
     )
     _Server(config, on_ready).run(sockets=[listener])
+
+
+def build_routes(app: FastAPI) -> None:
+    """Have all routes built before another thread runs.
+
+    FastAPI builds a route when it is first needed, and silences a warning of pydantic's
+    meanwhile, with a filter that any other thread which handles warnings may take away.
+    """
+    app.openapi()
 
 
 class _Server(uvicorn.Server):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Literal
 
@@ -120,7 +120,7 @@ class Snapshot:
     )
     view: View = None
     flies: bool = True
-    """Whether the 3D view moves to it, or is there at once."""
+    """Whether the 3D view moves to another, or is there at once: somebody wants less motion."""
     theme: Theme = "dark"
     """Of the 3D view."""
 
@@ -136,6 +136,10 @@ class Snapshot:
             if own == {k: v for k, v in meant.items() if v != table.value(self.defaults, k)}:
                 return name
         return None
+
+    def named(self, sequence: Sequence) -> Sequence:
+        """What a run was made of, by its name now: it is another since a copy was saved."""
+        return sequence if self.sequence is None else replace(sequence, name=self.sequence.name)
 
     @property
     def step_is_computed(self) -> bool:

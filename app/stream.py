@@ -30,9 +30,9 @@ MOST_NOTICES = 20
 
 router = APIRouter()
 
-FromPage = TypeAdapter[models.StreamSeek | models.StreamSelect | models.StreamPing](
-    models.StreamSeek | models.StreamSelect | models.StreamPing
-)
+FromPage = TypeAdapter[
+    models.StreamSeek | models.StreamSelect | models.StreamMotion | models.StreamPing
+](models.StreamSeek | models.StreamSelect | models.StreamMotion | models.StreamPing)
 
 
 class _Page:
@@ -40,6 +40,7 @@ class _Page:
 
     def __init__(self) -> None:
         self.news: set[Change] = {"sequence", "playhead"}
+        self.flies = True
         self.messages: list[str] = []
         self.wake = asyncio.Event()
         self.wake.set()
@@ -59,6 +60,8 @@ class Stream:
         self._workbench = workbench
         self._pages: set[_Page] = set()
         self._last_error: str | None = None
+        self._unheard: str | None = None
+        """What was said last while there was no page, for the first that comes."""
         self._state: tuple[int, str] = (-1, "")
         self._steps: OrderedDict[tuple[Any, ...], str] = OrderedDict()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -102,6 +105,8 @@ class Stream:
                 text = json.dumps(notice)
                 if level == "error":
                     self._last_error = text  # also for a page that is not there yet
+                elif not self._pages:
+                    self._unheard = text
         for page in self._pages:
             page.messages = [*page.messages, text][-MOST_NOTICES:]
             page.wake.set()
@@ -110,8 +115,8 @@ class Stream:
         """One page, until it goes."""
         await socket.accept()
         page = _Page()
-        if self._last_error is not None:
-            page.messages.append(self._last_error)
+        page.messages += [text for text in (self._last_error, self._unheard) if text is not None]
+        self._unheard = None
         self._pages.add(page)
         sender = asyncio.create_task(self._tell(socket, page))
         try:
@@ -121,6 +126,7 @@ class Stream:
             pass
         finally:
             self._pages.discard(page)
+            self._set_flies()
             if page.timer is not None:
                 page.timer.cancel()
             sender.cancel()
@@ -134,7 +140,7 @@ class Stream:
         except ValueError as error:
             words = str(error)
             if isinstance(error, ValidationError):
-                words = "expected seek, select or ping with their fields"
+                words = "expected seek, select, motion or ping with their fields"
             notice = {"type": "notice", "level": "warn", "message": words, "hint": None}
             page.messages = [*page.messages, json.dumps(notice)][-MOST_NOTICES:]
             page.wake.set()
@@ -144,9 +150,16 @@ class Stream:
                 self._workbench.seek(wish.step, wish.origin)
             case models.StreamSelect():
                 self._workbench.select(wish.id)
+            case models.StreamMotion():
+                page.flies = wish.flies
+                self._set_flies()
             case models.StreamPing():
                 page.messages = [*page.messages, '{"type":"pong"}'][-MOST_NOTICES:]
                 page.wake.set()
+
+    def _set_flies(self) -> None:
+        """A click in the 3D view does not say whose it was: one who wants less motion is enough."""
+        self._workbench.set_flies(all(page.flies for page in self._pages))
 
     async def _tell(self, socket: WebSocket, page: _Page) -> None:
         while True:

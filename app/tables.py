@@ -215,7 +215,7 @@ def change_table(bench: Bench) -> str:
         ("Stage", "Parameter", "#Default", "#Now", "#"),
         [
             (
-                quiet(key.partition(".")[0].replace("_", " ") if "." in key else "method"),
+                quiet(_stage(key)),
                 _name(key),
                 quiet(value_text(parameter_table.value(snapshot.defaults, key))),
                 joined(value_text(value), quiet(f" {_unit(key)}".rstrip())),
@@ -229,6 +229,13 @@ def change_table(bench: Bench) -> str:
 def _label(key: str) -> str:
     known = parameter_table.PARAMETERS.get(key)
     return known.label if known is not None else key.replace("_", " ")
+
+
+def _stage(key: str) -> str:
+    group = key.partition(".")[0]
+    if group in parameter_table.METHODS:
+        return "method"
+    return group if group in parameter_table.METHODS["single_view"] else group.replace("_", " ")
 
 
 def _name(key: str) -> Markup:
@@ -297,26 +304,25 @@ def run_table(request: Request, bench: Bench) -> str:
     rows: list[tuple[Cell, ...]] = []
     for run in runs:
         state, methods = run.state, (run.parameters.single_view, run.parameters.fusion_method)
-        current = state.key == snapshot.run_state.key
+        current, speed = state.key == snapshot.run_state.key, state.steps_per_second
         again: Cell = quiet("another sequence")
         if current:
             again = quiet("current")
-        elif run.sequence == open_now:
+        elif run.sequence == open_now or run.recording == snapshot.sequence_key:
             label = f"Use the parameters of run {run.number} again"
             again = button("use again", "useAgain", run.number, label=label)
         rows.append(
             (
                 run.number,
-                quiet(run.at),
-                run.sequence,
-                quiet(" · ".join(value_text(method) for method in methods)),
+                joined(Markup(f"<span>{escaped(run.sequence)}</span> "), quiet(run.at)),
+                joined(quiet(f"{methods[0]} ·"), " ", quiet(methods[1])),
                 _phase(state, current),
-                f"{state.steps_per_second:.3g}" if state.steps_per_second else None,
+                number(speed, 0 if speed >= 10.0 else 1) if speed else None,
                 run.changes,
                 again,
             )
         )
-    heads = ("Run", "At", "Sequence", "Methods", "State", "#Steps/s", "#Changes", "#")
+    heads = ("Run", "Sequence", "Methods", "State", "#Steps/s", "#Changes", "#")
     return table("Runs", heads, rows)
 
 

@@ -11,12 +11,15 @@ import copy
 import os
 import threading
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Literal
 
-from app.snapshot import Change, Snapshot
+from app.drafts import Drafts
+from app.errors import sentence
+from app.snapshot import Change
 from app.workbench import Workbench
 from tracker import pipeline
 from tracker.parameters import RunParameters
@@ -44,21 +47,22 @@ Part = Literal["position", "sigma"]
 class Teaching:
     """Edits what the open sequence was taught; any thread may ask."""
 
-    def __init__(self, workbench: Workbench, data: Path | None = None) -> None:
+    def __init__(
+        self, workbench: Workbench, data: Path | None = None, drafts: Path | None = None
+    ) -> None:
         """Follow a workbench.
 
         Args:
             workbench: Whose sequence.
             data: Where a copy is offered to be put.
+            drafts: Where what is not saved is kept for the next start; None: not beyond this one.
         """
         self._workbench = workbench
         self._data = data
         self._lock = threading.RLock()
         self._opened: Sequence | None = None
         self._states: OrderedDict[str, Values] = OrderedDict()
-        self._drafts: dict[Path, tuple[Values, Values]] = {}
-        """What was not saved when another sequence was opened: as saved, and as taught."""
-        self._last: Snapshot | None = None
+        self._drafts = Drafts(drafts)
         self._unsubscribe = workbench.subscribe(self._on_change)
 
     def close(self) -> None:
@@ -157,13 +161,21 @@ class Teaching:
         """Take an entrance away."""
         self._edit(lambda values: _take(values["room"]["entrances"], "entrance", index))
 
-    def restore(self, key: str) -> bool:
-        """Go back, or on again, to what was taught once; whether it is still known."""
+    def restore(self, key: str, changes: Mapping[str, Any] = MappingProxyType({})) -> bool:
+        """Go back, or on again, to what was taught once, and to the values that went with it.
+
+        Args:
+            key: As the state named it.
+            changes: Values by key.
+
+        Returns:
+            Whether it is still known; nothing changes where it is not.
+        """
         with self._lock:
             known = self._states.get(key)
             if known is None:
                 return False
-            self._put(copy.deepcopy(known))
+            self._put(copy.deepcopy(known), changes=changes)
             return True
 
     def discard(self) -> None:
@@ -199,6 +211,7 @@ class Teaching:
             if not folder.expanduser().is_absolute():
                 folder = self.copies_in() / folder
             copied = saving.save_copy(sequence, saved, folder)
+            self._drafts.forget(sequence.folder)
             self._opened = _moved(self._opened or sequence, copied)
             shown = _moved(sequence, copied)
             self._workbench.mark_saved(shown, shown)
@@ -240,11 +253,17 @@ class Teaching:
             edit(values)
             self._put(values, check)
 
-    def _put(self, values: Values, check: Callable[[Sequence], None] | None = None) -> None:
+    def _put(
+        self,
+        values: Values,
+        check: Callable[[Sequence], None] | None = None,
+        changes: Mapping[str, Any] = MappingProxyType({}),
+    ) -> None:
         now, opened = self._sequence(), self._opened
         if opened is None or opened.views is not now.views:
             raise SequenceError("another sequence was opened meanwhile; look at it and try again")
         if values == taught_values(now):
+            self._workbench.teach(now, changes=changes)
             return
         sequence = with_taught(opened, values, f"{now.folder.name}/{FILE}")
         if check is not None:
@@ -253,7 +272,7 @@ class Teaching:
         if saved is not None and values == taught_values(saved):
             sequence = saved
         self._remember(sequence)
-        self._workbench.teach(sequence, _defaults(sequence))
+        self._workbench.teach(sequence, _defaults(sequence), changes)
 
     def _remember(self, sequence: Sequence) -> None:
         self._states[sequence.digest] = taught_values(sequence)
@@ -273,42 +292,46 @@ class Teaching:
             )
 
     def _on_change(self, change: Change) -> None:
-        if change != "sequence":
-            now, opened = self._workbench.snapshot(), self._opened
-            if now.sequence is not None and opened is not None:
-                if now.sequence.views is opened.views:  # else the next is already open
-                    self._last = now
+        if change not in ("sequence", "taught"):
             return
         with self._lock:
-            now, before = self._workbench.snapshot(), self._last
-            self._last = now
-            if before is not None and before.sequence is not None and before.saved is not None:
-                draft = taught_values(before.saved), taught_values(before.sequence)
-                self._drafts.pop(before.sequence.folder, None)
-                if draft[0] != draft[1]:
-                    self._drafts[before.sequence.folder] = draft
-            self._opened = now.sequence
+            now = self._workbench.snapshot()
+            sequence, saved = now.sequence, now.saved
+            if sequence is None or saved is None:
+                return
+            if change == "taught":
+                if self._opened is not None and sequence.views is self._opened.views:
+                    values = taught_values(saved), taught_values(sequence)
+                    self._drafts.keep(sequence.folder, *values)
+                return
+            self._opened = sequence
             self._states.clear()
-            if now.sequence is not None:
-                self._remember(now.sequence)
-                self._take_up(now.sequence)
+            self._remember(sequence)
+            self._take_up(sequence)
 
     def _take_up(self, sequence: Sequence) -> None:
         """Go on with what was not saved when the sequence was open before."""
-        saved, taught = self._drafts.pop(sequence.folder, (None, None))
-        if saved is None or taught is None:
+        draft = self._drafts.read(sequence.folder)
+        if draft is None:
             return
+        saved, taught = draft
         count = len(changes(saved, taught))
         words = f"{count} change{'s' if count > 1 else ''} of {sequence.name}"
-        if saved != taught_values(sequence):
+        try:
+            if saved != taught_values(sequence):
+                raise SequenceError("its room or templates are others now")
+            self._put(taught)
+        except SequenceError as error:
+            self._drafts.forget(sequence.folder)
             self._workbench.notify(
                 "warn",
                 f"{words} cannot be taken up: its file was changed meanwhile",
-                f"They were: {'; '.join(changes(saved, taught))}.",
+                f"{sentence(error)}. They were: {'; '.join(changes(saved, taught))}.",
             )
-            return
-        self._put(taught)
-        self._workbench.notify("info", f"{words} not saved, as you left it", "Save or discard it.")
+        else:
+            self._workbench.notify(
+                "info", f"{words} not saved, as you left it", "Save or discard it."
+            )
 
 
 def _moved(sequence: Sequence, copied: Sequence) -> Sequence:

@@ -122,9 +122,9 @@ async def edit_room(wish: EditingChange, bench: Bench) -> models.State:
 
 @router.post("/restore")
 def restore(wish: RestoreRequest, bench: Bench, teach: Teach) -> models.State:
-    """Go back to room and templates as they were; what undo does."""
+    """Go back to room and templates, and values, as they were; what undo does."""
     with _complaining():
-        if not teach.restore(wish.key):
+        if not teach.restore(wish.key, wish.changes):
             raise ApiError(
                 404,
                 "unknown_state",

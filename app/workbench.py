@@ -182,12 +182,11 @@ class Workbench:
             if now.scores.pinned is not None:
                 self._put("pinned", scores=replace(now.scores, pinned=None))
 
-    def look(self, view: View, *, flies: bool = True) -> None:
+    def look(self, view: View) -> None:
         """Have the 3D view look through a camera, from above, or freely.
 
         Args:
             view: A camera's index, from above, or None for the free view.
-            flies: Whether it moves there, or is there at once.
 
         Raises:
             ParameterError: If there is no such camera.
@@ -199,21 +198,44 @@ class Workbench:
                     "camera", f"expected an index below {cameras}, top or null, got {view}"
                 )
             if view != now.view:
-                self._put("view", view=view, flies=flies)
+                self._put("view", view=view)
 
-    def teach(self, sequence: Sequence, defaults: RunParameters | None = None) -> None:
+    def set_flies(self, flies: bool) -> None:
+        """Have the 3D view move to another view, or be there at once."""
+        with self._edit() as now:
+            if flies != now.flies:
+                self._put("view", flies=flies)
+
+    def teach(
+        self,
+        sequence: Sequence,
+        defaults: RunParameters | None = None,
+        changes: Mapping[str, Any] = MappingProxyType({}),
+    ) -> None:
         """Have the open sequence with another room or other templates; its pictures stay.
 
         Args:
             sequence: Of the same recording; any other is refused silently, since the one it was
                 made of is not open any more.
             defaults: Its default parameters; those before where none fit.
+            changes: Values by key that come with it: one change for whoever takes it back.
+
+        Raises:
+            ParameterError: If a key does not exist or a value does not fit; nothing changes then.
         """
         with self._edit() as now:
             if now.sequence is None or sequence.views is not now.sequence.views:
                 return
-            if sequence is not now.sequence:
-                self._put("taught", sequence=sequence, defaults=defaults or now.defaults)
+            parameters = table.with_values(now.parameters, changes)
+            if sequence is now.sequence:
+                self._put_parameters(parameters, "api")
+                return
+            taught = {"sequence": sequence, "defaults": defaults or now.defaults}
+            if parameters == now.parameters:
+                self._put("taught", **taught)
+            else:
+                self._put("taught", **taught, parameters=parameters, parameters_origin="api")
+                self._pending.append("parameters")
 
     def mark_saved(self, saved: Sequence, shown: Sequence) -> None:
         """What was taught is in a file now.

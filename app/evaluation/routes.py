@@ -133,15 +133,16 @@ def export_report(bench: Bench, evaluator: Scorer) -> Response:
     snapshot = bench.snapshot()
     scored, evaluated = _evaluated(snapshot, snapshot.scores.shown)
     reference = snapshot.scores.reference
+    sequence = snapshot.named(scored.sequence)
     text = report_html(
-        scored.sequence,
+        sequence,
         scored.tracks,
         scored.parameters,
         evaluated,
         reference=evaluator.beginning(reference[1], scored.steps) if reference else None,
         seed=scored.seed,
     )
-    name = file_name(scored.sequence.name, "report.html")
+    name = file_name(sequence.name, "report.html")
     return Response(
         text,
         media_type="text/html; charset=utf-8",

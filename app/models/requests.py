@@ -53,8 +53,6 @@ class ViewChange(Model):
 
     camera: int | Literal["top"] | None
     """Its index; null for the free view."""
-    flies: bool = True
-    """False: the view is there at once, for whoever wants less motion."""
 
 
 class ThemeChange(Model):
@@ -86,6 +84,14 @@ class StreamSelect(SelectChange):
     """From the page over the socket."""
 
     type: Literal["select"]
+
+
+class StreamMotion(Model):
+    """From the page over the socket: what its person wishes of movement."""
+
+    type: Literal["motion"]
+    flies: bool
+    """False: another view in 3D is there at once, however it was chosen."""
 
 
 class StreamPing(Model):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from pydantic import Field
 
 from app.models.base import Model, Vector
@@ -52,6 +54,8 @@ class RestoreRequest(Model):
 
     key: str = Field(max_length=64)
     """As the state named them."""
+    changes: dict[str, Any] = Field(default_factory=dict)
+    """Values by key that were changed with them."""
 
 
 class CopyRequest(Model):

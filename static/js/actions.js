@@ -137,7 +137,7 @@ export function createActions({ store, seek, send, receive }) {
 			const { cameras, large } = store.get();
 			if (index < cameras.length) store.set({ large: large === index ? null : index });
 		},
-		lookThrough: (view) => void actions.ask("POST", "view", { camera: view, flies: !matchMedia("(prefers-reduced-motion: reduce)").matches }),
+		lookThrough: (view) => void actions.ask("POST", "view", { camera: view }),
 		freeView() {
 			store.set({ large: null });
 			actions.lookThrough(null);
@@ -162,8 +162,8 @@ export function createActions({ store, seek, send, receive }) {
 		// runs and parameters
 		open: (name) => actions.ask("POST", "sequence", { name }),
 		async change({ taught, ...changes }) {
-			if (taught) await actions.ask("POST", "teach/restore", { key: taught });
-			if (Object.keys(changes).length) await actions.ask("PATCH", "parameters", { changes });
+			if (taught) await actions.ask("POST", "teach/restore", { key: taught, changes });
+			else await actions.ask("PATCH", "parameters", { changes });
 		},
 		reset: (...keys) => void askApart("POST", "parameters/reset", keys.length ? { keys } : {}),
 		preset: (name) => void askApart("POST", "parameters/preset", { name }),

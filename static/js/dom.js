@@ -65,10 +65,8 @@ export function idTag(id) {
 	return h("span", { class: "id", "--c": `var(--id-${n})`, "--on-id": `var(--on-${n})` }, id);
 }
 
-/** @param {unknown} value  @returns {string} as short as it stays readable */
+/** @param {number} value  @returns {string} as short as it stays readable */
 export function show(value) {
-	if (typeof value === "boolean") return value ? "on" : "off";
-	if (typeof value !== "number") return value === null || value === undefined ? "–" : String(value).replaceAll("_", " ");
 	if (Number.isInteger(value)) return String(value);
 	return Math.abs(value) < 1e-3 ? value.toExponential().replace("e-", "e−") : String(Number(value.toPrecision(5)));
 }

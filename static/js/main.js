@@ -120,13 +120,15 @@ if (start.unknown.length) actions.note("warn", `The address has unknown parts: $
 function arrive(server) {
 	const { sequence } = server;
 	if (!sequence) return;
-	if (place.sequence && place.sequence !== sequence.name) return store.set({ step: server.playhead });
+	const cameras = sequence.cameras.length;
+	const usual = cameras > 2 ? 0 : null;
+	// It may be that the place's sequence cannot be opened.
+	if (place.sequence && place.sequence !== sequence.name) return store.set({ step: server.playhead, large: usual });
 	const { step, camera, selection, values } = place;
 	place = { sequence: null, step: null, selection: null, camera: null, values: null };
-	const cameras = sequence.cameras.length;
 	store.set({
 		step: Math.max(0, Math.min(sequence.frames - 1, step ?? server.playhead)),
-		large: camera !== null && camera < cameras ? camera : cameras > 2 ? 0 : null,
+		large: camera !== null && camera < cameras ? camera : usual,
 	});
 	if (selection !== null) actions.select(selection);
 	if (values) void restore(server, values);
@@ -252,8 +254,14 @@ function receive(message) {
 	}
 }
 
+// Also for a click inside the 3D view, which the server hears of first.
+const still = matchMedia("(prefers-reduced-motion: reduce)");
+const tellMotion = () => stream.send({ type: "motion", flies: !still.matches });
+still.onchange = tellMotion;
+
 const stream = openStream("/api/stream", {
 	open() {
+		tellMotion();
 		store.set({ link: "open" });
 		if (!store.get().schema) void fetchSchema();
 		void fetchSequences();

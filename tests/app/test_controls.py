@@ -23,6 +23,7 @@ from tracker import parameters as table
 from tracker.parameters import PARAMETERS
 
 SECONDS = 20.0
+P_D = "fusion.detection_probability"
 NUMBERS = [p for p in PARAMETERS.values() if p.kind in ("float", "int")]
 
 
@@ -53,6 +54,11 @@ def move(panel: Controls, key: str, place: Any) -> None:
     handle._impl.value = place
     for callback in handle._impl.update_cb:
         callback(viser.GuiEvent(None, 1, handle))  # type: ignore[arg-type]
+
+
+def take_preset(panel: Controls, name: str) -> None:
+    panel._presets._impl.value = name
+    panel._take_preset(viser.GuiEvent(None, 1, panel._presets))  # type: ignore[arg-type]
 
 
 def value(workbench: Workbench, key: str) -> Any:
@@ -260,9 +266,28 @@ def test_changed_values_are_marked_and_can_be_reset(panel: Controls, workbench: 
     assert not panel._reset_all.visible
 
 
+def test_presets_of_ones_own_are_in_the_panel(panel: Controls, workbench: Workbench) -> None:
+    workbench.apply_preset("robust")
+    assert panel.wait(SECONDS)
+    assert panel._presets.value == "robust"
+    assert panel._presets.options == tuple(table.PRESETS)
+    workbench.set_presets({"quick": {P_D: 0.6}})
+    take_preset(panel, "quick")
+    assert panel.wait(SECONDS)
+    assert value(workbench, P_D) == 0.6
+    assert (panel._presets.value, panel._presets.options) == ("quick", (*table.PRESETS, "quick"))
+    workbench.set_parameters({P_D: 0.7}, "api")
+    assert panel.wait(SECONDS)
+    assert (panel._presets.value, panel._presets.options[0]) == ("own values", "own values")
+    take_preset(panel, "own values")
+    workbench.set_presets({})
+    assert panel.wait(SECONDS)
+    assert value(workbench, P_D) == 0.7
+    assert "quick" not in panel._presets.options
+
+
 def test_a_preset_moves_the_sliders(panel: Controls, workbench: Workbench) -> None:
-    panel._presets._impl.value = "published"
-    panel._take_preset(viser.GuiEvent(None, 1, panel._presets))  # type: ignore[arg-type]
+    take_preset(panel, "published")
     assert panel.wait(SECONDS)
     for key, wanted in table.PRESETS["published"].items():
         assert value(workbench, key) == wanted

@@ -8,6 +8,7 @@ from typing import Any
 
 from starlette.testclient import TestClient
 
+from app.workbench import Workbench
 from tests.app.conftest import connect, run_is, wait_until
 
 P_D = "fusion.detection_probability"
@@ -140,3 +141,15 @@ def test_a_failed_opening_is_told_to_a_page_that_comes_later(client: TestClient)
     wait_until(lambda: client.get("/api/state").json()["sequence"]["name"] == "numbers")
     with connect(client) as socket:
         assert socket.receive_json()["type"] == "playhead"
+
+
+def test_the_3d_view_jumps_while_somebody_wants_less_motion(client: TestClient) -> None:
+    bench: Workbench = client.app.state.workbench  # type: ignore[attr-defined]
+    with connect(client) as other:
+        other.send_json({"type": "motion", "flies": True})
+        with connect(client) as socket:
+            socket.send_json({"type": "motion", "flies": False})
+            wait_until(lambda: not bench.snapshot().flies)
+            bench.look(None)  # a click inside the 3D view: it does not say whose
+            assert not bench.snapshot().flies
+        wait_until(lambda: bench.snapshot().flies)

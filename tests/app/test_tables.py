@@ -57,7 +57,7 @@ def test_numbers_are_written_for_people() -> None:
     assert markup.symbol("p_D").html == "<i>p</i><sub>D</sub>"
     assert markup.value_text(True) == "on"
     assert markup.value_text(0.1 + 0.2) == "0.3"
-    assert markup.value_text("multi_bernoulli") == "multi bernoulli"
+    assert markup.value_text("multi_bernoulli") == "multi_bernoulli"
 
 
 def test_a_step_is_told_as_the_step_tells_it(client: TestClient) -> None:
@@ -108,7 +108,7 @@ def test_changes_are_listed_with_their_reset(client: TestClient) -> None:
     html = get(client, "changes")
     rows = {row[1]: row for row in cells(html, "Changed parameters")}
     assert rows["Detection probability pD"][3].strip() == "0.6"
-    assert rows["fusion method"][2] == "multi bernoulli"
+    assert rows["fusion method"][2] == "multi_bernoulli"
     assert 'data-do="reset" data-value="fusion.detection_probability"' in html
     wait_until(run_is(client, "done"))
 
@@ -145,10 +145,10 @@ def test_runs_are_listed_and_can_be_taken_up_again(client: TestClient) -> None:
     html = get(client, "runs")
     rows = cells(html, "Runs")
     assert [row[0] for row in rows] == sorted((row[0] for row in rows), key=int, reverse=True)
-    assert rows[0][3].endswith("sequential phd")
-    assert rows[0][4] == rows[-1][4] == "computed"
-    assert (rows[0][6], rows[-1][6]) == ("2", "0")
-    assert (rows[0][7], rows[-1][7]) == ("current", "use again")
+    assert rows[0][2] == "none · sequential_phd", "by their own names, as everywhere"
+    assert rows[0][3] == rows[-1][3] == "computed"
+    assert (rows[0][5], rows[-1][5]) == ("2", "0")
+    assert (rows[0][6], rows[-1][6]) == ("current", "use again")
     assert 'data-do="useAgain" data-value="1"' in html
     after = client.post("/api/run/again/1").json()
     assert after["parameters"] == before["parameters"]

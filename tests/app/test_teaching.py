@@ -5,16 +5,21 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
 
+from app import results
+from app.drafts import Drafts
 from app.server import Settings, create_app
-from tests.app.conftest import ADDRESS, run_is, wait_until
+from app.workbench import Workbench
+from tests.app.conftest import ADDRESS, connect, run_is, wait_until
 from tests.browser.walkers import write_walkers
 from tracker import pipeline
+from tracker.compilation import kernel_folder
 from tracker.sequences.reader import FILE, read_sequence
 
 BOX = {"camera": "cam1", "step": 5, "left": 40, "top": 30, "width": 24, "height": 48}
@@ -83,12 +88,24 @@ def test_a_run_used_again_brings_its_templates_back(client: TestClient) -> None:
     client.post("/api/teach/templates", json=BOX)
     taught = done(client)
     assert tracks(client) != first
+    bench: Workbench = client.app.state.workbench  # type: ignore[attr-defined]
+    told = []
+    end = bench.subscribe(lambda _: told.append(results.state_of(bench.snapshot())))
     client.post("/api/run/again/1")
+    end()
+    both = {(now.teaching.key, now.methods.single_view) for now in told}
+    assert len(both) == 1, "one change, so that one undo takes it back"
     again = done(client)
     assert again["teaching"]["key"] == before["teaching"]["key"] != taught["teaching"]["key"]
     assert again["sequence"]["templates"] == 0
     assert again["parameters"] == before["parameters"]
     assert tracks(client) == first
+    wish = {"key": taught["teaching"]["key"], "changes": {"single_view": "never"}}
+    assert client.post("/api/teach/restore", json=wish).status_code == 422
+    assert state(client)["teaching"]["key"] == before["teaching"]["key"]
+    wish["changes"] = {"single_view": "colour_phd"}
+    client.post("/api/teach/restore", json=wish)
+    assert done(client)["run"]["key"] == taught["run"]["key"]
 
 
 def test_a_template_is_named_renamed_removed_and_brought_back(client: TestClient) -> None:
@@ -202,6 +219,10 @@ def test_a_copy_leaves_the_original_and_goes_on_in_the_copy(
     assert answer["sequence"]["name"] == "mine"
     assert answer["teaching"]["unsaved"] == 0
     assert (answer["run"]["key"], answer["run"]["state"]) == (shown["run"]["key"], "done")
+    exported = client.get("/api/export/tracks.csv")  # of the run before, by the name of the copy
+    assert 'filename="mine-tracks.csv"' in exported.headers["content-disposition"]
+    assert "# sequence = mine\n" in exported.text
+    assert "another sequence" not in client.get("/api/tables/runs").text
     assert (walkers / FILE).read_bytes() == text
     assert client.get("/api/step/3").json()["computed"]
     client.delete("/api/teach/templates/0")
@@ -243,6 +264,57 @@ def test_what_is_not_saved_is_there_again_after_another_sequence(
     wait_until(lambda: state(client)["teaching"]["unsaved"] == 1)
     assert state(client)["sequence"]["templates"] == 1
     done(client)
+
+
+def test_what_is_not_saved_outlives_the_server(
+    walkers: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MULTIVIEW_PHD_SETTINGS", str(tmp_path / "settings"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(kernel_folder()))  # they are the machine's
+    monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(tmp_path / "cache"))
+    settings = Settings(sequence=str(walkers), with_viser=False, keep_on_disk=True)
+
+    @contextmanager
+    def started() -> Iterator[tuple[TestClient, str]]:
+        """A server of its own, and what its first page is told."""
+        with TestClient(create_app(settings), base_url=ADDRESS) as client:
+            wait_until(lambda: state(client)["sequence"] is not None)
+            with connect(client) as socket:
+                heard = str(socket.receive_json())
+            yield client, heard
+
+    with started() as (client, _):
+        client.post("/api/teach/templates", json=BOX)
+        taught = done(client)
+    with started() as (client, heard):
+        assert "1 change of numbers not saved, as you left it" in heard
+        again = done(client)
+        assert again["teaching"] == taught["teaching"]
+        assert again["run"]["key"] == taught["run"]["key"]
+        client.post("/api/teach/discard")
+        assert list((tmp_path / "settings" / "unsaved").iterdir()) == []
+        client.post("/api/teach/restore", json={"key": taught["teaching"]["key"]})
+    text = (walkers / FILE).read_text("utf-8")
+    (walkers / FILE).write_text(
+        text.replace("min = [", "min = [-9.0, ", 1).replace(", 0.0]", "]", 1)
+    )
+    with started() as (client, heard):
+        assert "cannot be taken up" in heard
+        assert "template person1 added" in heard
+        assert state(client)["teaching"]["unsaved"] == 0
+    with started() as (client, heard):
+        assert "taken up" not in heard
+
+
+def test_a_draft_that_cannot_be_read_is_left_alone(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    drafts = Drafts(tmp_path)
+    values = {"room": {}, "template": []}
+    drafts.keep(tmp_path, values, {**values, "template": [1]})
+    assert Drafts(tmp_path).read(tmp_path) is None
+    assert "cannot be read and is left as it is" in caplog.text
+    assert len(list(tmp_path.iterdir())) == 1
 
 
 def test_a_template_shows_its_box_and_its_colours(client: TestClient) -> None:

@@ -125,13 +125,20 @@ def run(short: bool) -> Iterator[Measurement]:
 
 def _page(browser: Browser, server: Server, *, flat: bool) -> Page:
     context = browser.new_context(viewport=WINDOW)
-    if flat:
-        context.route("**/viser/**", lambda route: route.abort())
     page = context.new_page()
+    if flat:
+        _without_3d(page)
     page.goto(server.address)
     page.wait_for_selector(".cam[data-overlay]:not([data-overlay=''])")
     page.evaluate(WATCH)
     return page
+
+
+def _without_3d(page: Page) -> None:
+    """Have nothing of viser's loaded; by the browser, since a route would hold up every request."""
+    devtools = page.context.new_cdp_session(page)
+    devtools.send("Network.enable")
+    devtools.send("Network.setBlockedURLs", {"urls": ["*/viser/*"]})
 
 
 def _opened(browser: Browser, server: Server, times: int) -> Iterator[Measurement]:
@@ -139,8 +146,8 @@ def _opened(browser: Browser, server: Server, times: int) -> Iterator[Measuremen
     others: set[str] = set()
     for _ in range(times):
         context = browser.new_context(viewport=WINDOW)
-        context.route("**/viser/**", lambda route: route.abort())
         page = context.new_page()
+        _without_3d(page)
         page.on("request", lambda request: others.add(urlsplit(request.url).hostname or ""))
         page.goto(server.address)
         page.wait_for_selector(".cam[data-overlay='0']")

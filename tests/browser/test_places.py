@@ -10,6 +10,7 @@ from playwright.sync_api import Browser, Page, expect
 from tests.browser.looking import as_at_first, ask, readout, shown_in_3d, until, viser
 from tests.browser.serving import Server
 from tests.browser.walkers import FRAMES
+from tests.long_recording import write_long
 
 P_D = "fusion.detection_probability"
 
@@ -29,6 +30,25 @@ def test_a_link_restores_step_selection_camera_and_parameters(
     expect(page.get_by_text("unknown parts: zoom")).to_be_visible()
     until(page, lambda: f"p.{P_D}=0.71" in page.url, "the address keeps it")
     context.close()
+    as_at_first(server)
+
+
+def test_a_link_to_a_sequence_that_is_not_there_shows_what_is_open_as_usual(
+    browser: Browser, server: Server, tmp_path: Path
+) -> None:
+    before = server.get("/api/state").json()["sequence"]["key"]
+    ask(server, "POST", "sequence", {"name": str(write_long(tmp_path / "ring", 20, cameras=3))})
+    server.wait(lambda state: state["opening"] is None and state["sequence"]["key"] != before)
+    context = browser.new_context(viewport={"width": 1440, "height": 900})
+    context.route("**/viser/**", lambda route: route.abort())
+    page = context.new_page()
+    page.goto(f"{server.address}?seq=nowhere&step=7&cam=3")
+    expect(page.get_by_text("nowhere cannot be opened")).to_be_visible()
+    expect(page.locator(".cam").first).to_have_attribute("aria-pressed", "true")
+    until(page, lambda: readout(page) == "0", "the step of what is open")
+    context.close()
+    ask(server, "POST", "sequence", {"name": str(server.folder)})
+    server.wait(lambda state: state["opening"] is None and state["sequence"]["key"] == before)
     as_at_first(server)
 
 

@@ -87,6 +87,11 @@ def test_everything_is_inside_the_window(
             page.get_by_role("tab", name=tab).click()
             expect(page.locator(f"#panel-{tab.lower()} [data-fill] > *").first).to_be_visible()
             keep(page, screenshots, f"{size}-{theme}-{tab.lower()}", tmp_path)
+        wide = page.locator("#panel-runs [data-fill]").evaluate(
+            "e => e.scrollWidth - e.clientWidth"
+        )
+        assert wide == 0, "every column of the runs is in sight"
+        expect(page.get_by_role("button", name="only selected")).to_be_visible()
         page.get_by_role("tab", name="Tracks").click()
     page.locator(".lane").first.click()
     page.locator(".lane").first.hover()

@@ -101,6 +101,21 @@ def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(
     server.wait(lambda state: state["teaching"]["unsaved"] > 0)
     page.keyboard.press("Control+Shift+z")
     server.wait(lambda state: state["teaching"]["unsaved"] == 0)
+
+    # so it is with an earlier run: its templates and its method are one step
+    taught = server.wait_for_run()
+    page.get_by_role("tab", name="Runs").click()
+    again = page.get_by_role("button", name="Use the parameters of run 1 again")
+    again.click()
+    state = server.wait(lambda state: state["sequence"]["templates"] == 0)
+    assert state["methods"]["single_view"] != "colour_phd"
+    expect(again).to_have_count(0)
+    for key, templates in (("Control+z", 1), ("Control+Shift+z", 0), ("Control+z", 1)):
+        page.keyboard.press(key)
+        state = server.wait(lambda state, n=templates: state["sequence"]["templates"] == n)
+        assert (state["methods"] == taught["methods"]) == (templates == 1)
+        assert (state["teaching"]["key"] == taught["teaching"]["key"]) == (templates == 1)
+        page.wait_for_timeout(300)  # the page hears of it
     httpx2.post(server.address + "api/parameters/reset", json={})
     server.wait_for_run()
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy import ndarray
 
 from tests.engine.rooms import SKIN, clip, empty_room, person_mask, photograph, with_person
-from tracker.foreground import AdaptiveForeground, kernels
+from tracker.foreground import AdaptiveForeground, first_background, kernels
 from tracker.foreground.adaptive import AdaptiveState, choose_iteration, clean, cluster
 from tracker.parameters import ForegroundParams
 
@@ -23,7 +23,13 @@ both = pytest.mark.parametrize("parameters", [PUBLISHED, ROBUST], ids=["publishe
 
 
 def prepared(parameters: ForegroundParams) -> AdaptiveForeground:
-    return AdaptiveForeground(clip(np.ones(25)), parameters)
+    return over(clip(np.ones(25)), parameters)
+
+
+def over(pictures: list[ndarray], parameters: ForegroundParams) -> AdaptiveForeground:
+    first = first_background(pictures, follow_exposure=parameters.follow_exposure)
+    assert first is not None
+    return AdaptiveForeground(first, parameters)
 
 
 def run(model: AdaptiveForeground, pictures: list[ndarray]) -> tuple[AdaptiveState, list[ndarray]]:
@@ -105,13 +111,23 @@ def test_a_black_or_white_frame_has_no_foreground_and_teaches_nothing(
 @both
 def test_a_frozen_camera_has_no_foreground(parameters: ForegroundParams) -> None:
     picture = clip(np.ones(1))[0]
-    _, masks = run(AdaptiveForeground([picture] * 5, parameters), [picture] * 5)
+    _, masks = run(over([picture] * 5, parameters), [picture] * 5)
     assert not np.any(masks)
 
 
-def test_a_background_needs_a_picture() -> None:
-    with pytest.raises(ValueError, match="at least one picture, got none"):
-        AdaptiveForeground([], PUBLISHED)
+@both
+def test_without_a_picture_there_is_no_background(parameters: ForegroundParams) -> None:
+    follow = parameters.follow_exposure
+    assert first_background([], follow_exposure=follow) is None
+
+
+@both
+def test_whoever_is_to_stop_is_asked_within_a_median(parameters: ForegroundParams) -> None:
+    pictures, asked = [np.zeros((480, 640, 3), dtype=np.uint8)] * 3, []
+    first_background(
+        pictures, follow_exposure=parameters.follow_exposure, check=lambda: asked.append(True)
+    )
+    assert len(asked) > 15
 
 
 def test_a_step_leaves_the_state_before_as_it_was() -> None:

@@ -16,6 +16,7 @@ from tracker import pipeline
 from tracker.parameters import RunParameters, SingleViewName
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
+from tracker.single_view import templates
 from tracker.single_view.box_sizes import upright_boxes
 from tracker.single_view.likeness import Likeness
 
@@ -89,3 +90,20 @@ def test_every_method_with_pictures_passes_it_on(painted: Sequence, method: str)
     assert boxes
     sure = np.concatenate([view.likenesses for view in boxes]).max(axis=1)
     assert np.median(sure) > 0.9
+
+
+def test_the_templates_of_a_run_are_read_once(
+    painted: Sequence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read = []
+    histograms = templates.colour.histograms
+    monkeypatch.setattr(
+        templates.colour, "histograms", lambda *a: read.append(len(a[1])) or histograms(*a)
+    )
+    with FrameReader(painted) as reader:
+        first = templates.read_templates(painted, "hue_saturation", "epanechnikov", reader)
+        assert Likeness.of(painted, reader) is not None
+        assert read == [1] * len(painted.templates)
+        fewer = replace(painted, templates=painted.templates[:1])
+        other = templates.read_templates(fewer, "hue_saturation", "epanechnikov", reader)
+        assert len(other.roots) < len(first.roots)

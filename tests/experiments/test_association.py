@@ -148,9 +148,8 @@ def test_light_is_judged_by_the_best_fixed_threshold() -> None:
 
 def test_a_fixed_threshold_is_the_same_model_with_another_threshold() -> None:
     clip = coming_and_going(0)
-    pictures = [clip.picture(step) for step in range(0, 12, 3)]
     parameters = ForegroundParams(model="adaptive", least_threshold=0.0)
-    model = FixedForeground(pictures, parameters, 33.0)
+    model = FixedForeground(clip.picture(0), parameters, 33.0)
     _, found = model.step(model.start(), clip.picture(60))
     np.testing.assert_array_equal(found.thresholds, 33.0)
 

@@ -200,7 +200,8 @@ def _changed_table(parameters: RunParameters) -> str:
         parameter = PARAMETERS.get(key)
         if parameter and parameter.group != group:
             group = parameter.group
-            words = group.replace("_", " ").capitalize()
+            own = group in METHODS["single_view"]
+            words = group if own else group.replace("_", " ").capitalize()
             rows.append(f'<tr class="group"><th colspan="6" scope="rowgroup">{words}</th></tr>')
         rows.append(
             _row(

@@ -13,7 +13,7 @@ from tracker.evaluation.figures import number
 from tracker.experiments.association_clips import FULL_LIGHT, coming_and_going, light, true_mask
 from tracker.experiments.experiment import Context, Finding
 from tracker.experiments.pool import Desk, spread
-from tracker.foreground import AdaptiveForeground
+from tracker.foreground import AdaptiveForeground, first_background
 from tracker.parameters import ForegroundParams
 from tracker.pipeline import Cancelled
 
@@ -33,9 +33,9 @@ class FixedForeground(AdaptiveForeground):
     """The same background and the same cleaning, with a threshold that stays."""
 
     def __init__(
-        self, pictures: list[UInt8[ndarray, "h w 3"]], parameters: ForegroundParams, fixed: float
+        self, first: UInt8[ndarray, "h w 3"], parameters: ForegroundParams, fixed: float
     ) -> None:
-        super().__init__(pictures, parameters)
+        super().__init__(first, parameters)
         self._fixed = np.full(3, fixed)
 
     def thresholds(self, difference: UInt8[ndarray, "h w 3"]) -> Float[ndarray, " 3"]:
@@ -126,13 +126,17 @@ def _segment(seed: int, desk: Desk) -> dict[str, Float[ndarray, "T 3"]]:
     )
     # the background is that of full light: nobody knows what is to come
     pictures = [clip.picture(step) for step in range(0, FULL_LIGHT, 2)]
+    first = first_background(pictures, follow_exposure=False)
+    aligned = first_background(pictures, follow_exposure=True)
+    assert first is not None
+    assert aligned is not None
     made: dict[str, AdaptiveForeground] = {
-        name: AdaptiveForeground(pictures, published)
+        name: AdaptiveForeground(first, published)
         if fixed is None
-        else FixedForeground(pictures, published, fixed)
+        else FixedForeground(first, published, fixed)
         for name, fixed in models().items()
     }
-    made[ROBUST] = AdaptiveForeground(pictures, ForegroundParams(model="adaptive"))
+    made[ROBUST] = AdaptiveForeground(aligned, ForegroundParams(model="adaptive"))
     states = {name: model.start() for name, model in made.items()}
     rows: dict[str, list[list[int]]] = {name: [] for name in made}
     for step in range(clip.steps):

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import UInt8
 from numpy import ndarray
 
-from tracker.foreground.adaptive import AdaptiveForeground
+from tracker.foreground.adaptive import AdaptiveForeground, first_background
 from tracker.foreground.exposure import BackgroundModel, LearntForeground, tone_curve
 from tracker.foreground.segmentation import ForegroundModel, Segmentation, pack, unpack
 from tracker.foreground.shares import box_shares, integral, shape_scores, shape_shares
@@ -26,6 +26,7 @@ __all__ = [
     "LearntForeground",
     "Segmentation",
     "box_shares",
+    "first_background",
     "integral",
     "learn",
     "pack",
@@ -57,10 +58,14 @@ def learn(
         found = (reader.picture(camera_index, int(step)) for step in steps)
         return [picture for picture in found if picture is not None]
 
+    # no slider has a say in a background, so that a moved one does not wait for it again
     if parameters.model == "adaptive":
-        there = pictures()
-        return AdaptiveForeground(there, parameters) if there else None
-    # no parameter has a say in it, so that a moved slider does not wait for it again
+        follow = parameters.follow_exposure
+        first = reader.once(
+            ("first background", camera_index, follow),
+            lambda: first_background(pictures(), follow_exposure=follow, check=reader.check),
+        )
+        return None if first is None else AdaptiveForeground(first, parameters)
     background = reader.once(
         ("background", camera_index), lambda: BackgroundModel.learn(pictures(), reader.check)
     )

@@ -6,7 +6,7 @@ sequence", Control and Decision 22(4), 2007.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -95,6 +95,25 @@ def cluster(difference: UInt8[ndarray, "h w 3"], parameters: ForegroundParams) -
     return Iterations(thresholds, counts, choose_iteration(counts))
 
 
+def first_background(
+    pictures: list[UInt8[ndarray, "h w 3"]],
+    *,
+    follow_exposure: bool,
+    check: Callable[[], None] = lambda: None,
+) -> UInt8[ndarray, "h w 3"] | None:
+    """The median of pictures spread over the clip; None where there is none.
+
+    Args:
+        pictures: BGR, of one size.
+        follow_exposure: Whether they are brought to one exposure first.
+        check: Called every so often; what it raises ends the work.
+    """
+    if not follow_exposure:
+        return median(pictures, check) if pictures else None
+    learnt = BackgroundModel.learn(pictures, check)
+    return None if learnt is None else learnt.picture
+
+
 class AdaptiveForeground:
     """The segmentation of [CMQ07] in one camera.
 
@@ -108,26 +127,13 @@ class AdaptiveForeground:
     brought to each picture's exposure first, and a shadow's difference is no difference.
     """
 
-    def __init__(
-        self, pictures: Iterable[UInt8[ndarray, "h w 3"]], parameters: ForegroundParams
-    ) -> None:
-        """Learn the first background: the median of pictures spread over the clip.
+    def __init__(self, first: UInt8[ndarray, "h w 3"], parameters: ForegroundParams) -> None:
+        """Take the background to begin with.
 
         Args:
-            pictures: BGR, of one size, at least one.
+            first: From :func:`first_background`, or any other picture of the empty scene, BGR.
             parameters: The numbers.
-
-        Raises:
-            ValueError: If there is no picture.
         """
-        stack = list(pictures)
-        if not stack:
-            raise ValueError("a background needs at least one picture, got none")
-        first = median(stack)
-        if parameters.follow_exposure:
-            learnt = BackgroundModel.learn(stack)
-            assert learnt is not None
-            first = learnt.picture
         self._first = first
         self._parameters = parameters
 

@@ -28,6 +28,9 @@ LEVELS = 16
 SAMPLED_PIXELS = 6000
 """About so many pixels a tone curve is measured on."""
 
+MEDIAN_VALUES = 50_000
+"""Values of a picture of which medians are taken at a time: some ten milliseconds."""
+
 DARKEST_SHADOW, SHADOW_TINT = 0.65, 0.08
 """A shadow leaves at least this share of the light, and nearly the same of each channel."""
 
@@ -61,15 +64,15 @@ class BackgroundModel:
         if not stack:
             return None
         # the first median is blurred by the exposures, but good enough to align them by
-        reference = median(stack)
-        check()
-        aligned = [cv2.LUT(picture, _inverse(tone_curve(reference, picture))) for picture in stack]
-        check()
-        reference = median(aligned)
-        check()
+        reference = median(stack, check)
+        aligned = []
+        for picture in stack:
+            check()
+            aligned.append(cv2.LUT(picture, _inverse(tone_curve(reference, picture))))
+        reference = median(aligned, check)
         roots = cv2.LUT(reference, _ROOTS)
         deviations = [_largest(cv2.absdiff(cv2.LUT(picture, _ROOTS), roots)) for picture in aligned]
-        return BackgroundModel(reference, median(deviations))
+        return BackgroundModel(reference, median(deviations, check))
 
     def foreground(
         self, picture: UInt8[ndarray, "h w 3"], threshold: float
@@ -142,11 +145,23 @@ def _inverse(curve: UInt8[ndarray, "1 256 3"]) -> UInt8[ndarray, "1 256 3"]:
     return inverse
 
 
-def median(pictures: list[ndarray]) -> UInt8[ndarray, "h w *c"]:
-    """Each value's median over pictures of one size; of an even number the upper one."""
-    stack = np.stack(pictures)
-    result: ndarray = kernels.upper_medians(stack.reshape(len(stack), -1))
-    return result.reshape(stack.shape[1:])
+def median(
+    pictures: list[ndarray], check: Callable[[], None] = lambda: None
+) -> UInt8[ndarray, "h w *c"]:
+    """Each value's median over pictures of one size; of an even number the upper one.
+
+    Args:
+        pictures: At least one.
+        check: Called before every few rows: a median of large pictures takes its time.
+    """
+    result = np.empty_like(pictures[0])
+    rows = max(1, MEDIAN_VALUES // pictures[0][0].size)
+    for top in range(0, len(result), rows):
+        check()
+        stack = np.stack([picture[top : top + rows] for picture in pictures])
+        medians: ndarray = kernels.upper_medians(stack.reshape(len(stack), -1))
+        result[top : top + rows] = medians.reshape(stack.shape[1:])
+    return result
 
 
 def _largest(picture: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w"]:

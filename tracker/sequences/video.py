@@ -30,8 +30,8 @@ cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)
 DECODED_TO_VERIFY = 24
 """Frames decoded from the start to see whether the time stamps hold; more than any reordering."""
 
-SHORT_RUN = 32
-"""Frames: nearer than this, decoding forward is never slower than a jump."""
+RUN_UP = 16
+"""Frames that OpenCV lands before the one it is to jump to, to decode them all again."""
 
 
 class VideoError(ValueError):
@@ -183,19 +183,21 @@ class VideoDecoder:
             self._capture = None
 
     def _jump_pays(self, frame: int) -> bool:
-        """Whether a key frame lies between here and there, far enough ahead."""
-        if self._times is None or frame - self._at <= SHORT_RUN:
+        """Whether a jump would begin to decode ahead of here: at a key frame before its run-up."""
+        if self._times is None or frame - RUN_UP <= self._at:
             return False
         keys = self._index.keys
-        last_key = int(keys[np.searchsorted(keys, frame, side="right") - 1])
+        last_key = int(keys[np.searchsorted(keys, frame - RUN_UP, side="right") - 1])
         return last_key > self._at + 1
 
     def _jump(self, frame: int) -> None:
         """Bring the decoder to ``frame`` or before it, as near as the file allows."""
+        if self._capture is None:
+            self._open()
+            if frame <= RUN_UP:  # it stands at its start already
+                return
         back = 0
-        while self._times is not None and frame - back > SHORT_RUN:
-            if self._capture is None:
-                self._open()
+        while self._times is not None and frame - back > 0:
             assert self._capture is not None
             self._capture.set(cv2.CAP_PROP_POS_MSEC, self._times[frame - back] / 1000.0)
             if self._capture.grab():
@@ -203,7 +205,7 @@ class VideoDecoder:
                 if landed is not None and landed <= frame:
                     self._at, self._broken = landed, False
                     return
-            back = max(SHORT_RUN, 4 * back)
+            back = max(2 * RUN_UP, 4 * back)
         self._open()
 
     def _open(self) -> None:

@@ -79,6 +79,7 @@ class AssociationMatrix:
         self._parameters = parameters
         self._minimum_area = foreground.minimum_area
         self._foreground: ForegroundModel | None = learn(sequence, camera_index, reader, foreground)
+        reader.check()
         self._silhouettes = Silhouettes(view.camera, sequence.room, sequence.target_half_extents)
 
     def start(self) -> AssociationMatrixState:

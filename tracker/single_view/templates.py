@@ -13,7 +13,7 @@ from tracker.sequences.sequence import Sequence
 def read_templates(
     sequence: Sequence, space: ColourSpaceName, kernel: KernelName, reader: FrameReader
 ) -> ColourModel:
-    """The colour model of the sequence's templates.
+    """The colour model of the sequence's templates, read once for all cameras that ask for it.
 
     Args:
         sequence: Templates of one name are of one person.
@@ -29,6 +29,15 @@ def read_templates(
             f"{sequence.name} has no template of a person's colours; add at least one [[template]] "
             "with camera, frame and box to sequence.toml"
         )
+    what = [(t.name, t.camera, t.frame, t.box.tobytes()) for t in sequence.templates]
+    return reader.once(
+        ("templates", space, kernel, *what), lambda: _read(sequence, space, kernel, reader)
+    )
+
+
+def _read(
+    sequence: Sequence, space: ColourSpaceName, kernel: KernelName, reader: FrameReader
+) -> ColourModel:
     names = [camera.name for camera in sequence.cameras]
     histograms = []
     for template in sequence.templates:

@@ -35,18 +35,20 @@ export function stroke(g, colour, width, dash = [], halo = 0) {
 	g.setLineDash([]);
 }
 
-/** Slanted lines: not computed, or missed for long. @param {Brush} g @param {Cell} cell @param {string} colour @param {number} [gap] */
-export function hatch(g, { x, y, width, height }, colour, gap = 4) {
-	if (width <= 0 || height <= 0) return;
+/** Slanted lines: not computed, or missed for long. @param {Brush} g @param {Cell[]} cells @param {string} colour @param {number} [gap] */
+export function hatch(g, cells, colour, gap = 4) {
+	if (!cells.length) return;
 	g.save();
 	g.beginPath();
-	g.rect(x, y, width, height);
+	for (const { x, y, width, height } of cells) g.rect(x, y, width, height);
 	g.clip();
 	g.beginPath();
 	// Lines hang on the page and not on the rectangle, so that they stand still while it grows.
-	for (let k = Math.floor((x - height) / gap) * gap; k < x + width; k += gap) {
-		g.moveTo(k, y + height);
-		g.lineTo(k + height, y);
+	for (const { x, y, width, height } of cells) {
+		for (let k = Math.floor((x - height) / gap) * gap; k < x + width; k += gap) {
+			g.moveTo(k, y + height);
+			g.lineTo(k + height, y);
+		}
 	}
 	stroke(g, colour, 1);
 	g.restore();

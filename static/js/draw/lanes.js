@@ -91,20 +91,27 @@ function drawLane({ g, view, ink }, track, middle, done, thick) {
 	const colour = ink.id(track.id);
 	const top = middle - Math.round(thick / 2);
 	const centre = top + thick / 2;
+	/** @type {Cell[]} */
+	const missed = [];
+	// Thousands of spans: each kind is one path a lane.
+	g.fillStyle = colour;
+	g.beginPath();
 	for (const [from, to, kind] of track.spans) {
 		if (to < view.first || from > view.last) continue;
 		const x = Math.max(-4, xOf(from, view));
 		const width = Math.max(1.5, Math.min(view.width + 4, xOf(Math.min(to + 1, view.last), view)) - x);
-		if (kind === "seen") {
-			g.fillStyle = colour;
-			g.fillRect(x, top, width, thick);
-		} else if (kind === "long miss" && width > 6) {
-			hatch(g, { x, y: top, width, height: thick }, faded(colour, 0.75));
-			g.beginPath();
-			g.rect(x + 0.5, top + 0.5, width - 1, thick - 1);
-			stroke(g, colour, 1);
-		} else stroke(trace(g, [[x, centre], [x + width, centre]]), colour, 2, [2.5, 2]);
+		if (kind === "seen") g.fillRect(x, top, width, thick);
+		else if (kind === "long miss" && width > 6) missed.push({ x, y: top, width, height: thick });
+		else {
+			g.moveTo(x, centre);
+			g.lineTo(x + width, centre);
+		}
 	}
+	stroke(g, colour, 2, [2.5, 2]);
+	hatch(g, missed, faded(colour, 0.75));
+	g.beginPath();
+	for (const { x, width } of missed) g.rect(x + 0.5, top + 0.5, width - 1, thick - 1);
+	stroke(g, colour, 1);
 	g.fillStyle = ink.get("ink-1");
 	const x = xOf(track.first, view);
 	if (track.first > 0 && track.first >= view.first) trace(g, [[x - 5.5, centre - 4], [x - 0.5, centre], [x - 5.5, centre + 4]]).fill();

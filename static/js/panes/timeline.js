@@ -110,7 +110,7 @@ export function mountTimeline(root, context) {
 		}
 		if (done < frames) {
 			const x = Math.max(0, xOf(done, view));
-			hatch(g, { x, y: top, width: view.width - x, height: height - top - 2 }, ink.get("line"), 6);
+			hatch(g, [{ x, y: top, width: Math.max(0, view.width - x), height: Math.max(0, height - top - 2) }], ink.get("line"), 6);
 		}
 	}
 
