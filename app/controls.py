@@ -83,6 +83,10 @@ class Controls:
                 hotkey.title, hotkey=hotkey.key, modifier=hotkey.modifier
             )
             command.on_trigger(partial(self._relay, hotkey.name))
+        self._changed: set[str] = set()
+        """The inputs whose labels are marked as changed."""
+        self._shown: set[str] = set(self._inputs)
+        """The inputs that are visible."""
         self._refresh(workbench.snapshot())
         self._unsubscribe = workbench.subscribe(self._note)
         self._worker.ask("refresh")
@@ -214,18 +218,21 @@ class Controls:
 
     def _refresh(self, snapshot: Snapshot) -> None:
         parameters = snapshot.parameters
-        changed = table.changed(parameters, snapshot.defaults)
+        changed = self._inputs.keys() & table.changed(parameters, snapshot.defaults).keys()
+        shown = self._inputs.keys() & self._shown_keys(parameters)
         with self._server.atomic():
             for key, handle in self._inputs.items():
                 self._write(key, handle, table.value(parameters, key))
+            # only what differs is written: the interpreter is wanted by the run
+            for key in changed ^ self._changed:
                 if key in table.PARAMETERS:
                     label = label_text(table.PARAMETERS[key], changed=key in changed)
                 else:
                     label = "• Method" if key in changed else "Method"
-                handle.label = label
-            shown = self._shown_keys(parameters)
-            for key, handle in self._inputs.items():
-                handle.visible = key in shown
+                self._inputs[key].label = label
+            for key in shown ^ self._shown:
+                self._inputs[key].visible = key in shown
+            self._changed, self._shown = changed, shown
             groups = {table.PARAMETERS[key].group for key in shown if key in table.PARAMETERS}
             for group, folders in self._groups.items():
                 for folder in folders:
@@ -234,7 +241,7 @@ class Controls:
                 reset.visible = any(self._stage_of(k) == stage for k in changed if k in shown)
             self._reset_all.visible = bool(changed)
             self._show_presets(snapshot)
-            self._values.content = self._value_style(parameters, set(changed))
+            self._values.content = self._value_style(parameters, changed)
         self._server.flush()
 
     def _show_presets(self, snapshot: Snapshot) -> None:
@@ -251,7 +258,8 @@ class Controls:
             if key in self._moved:  # somebody is moving it; the edit comes next
                 return
             if scale is None:
-                handle.value = value
+                if handle.value != value:
+                    handle.value = value
             elif not scale.stands_at(handle.value, value):
                 handle.value = scale.place(value)
 
@@ -270,5 +278,5 @@ class Controls:
             for key, scale in self._scales.items()
             if scale.parameter.log
         }
-        marked = [self._inputs[key]._impl.uuid for key in changed if key in self._inputs]
+        marked = [self._inputs[key]._impl.uuid for key in sorted(changed)]
         return scene_style.values(numbers, marked)
