@@ -8,7 +8,7 @@ import numpy as np
 from numpy import ndarray
 
 from tracker.kernels import _kernel
-from tracker.update_kernels import all_pairs
+from tracker.update_kernels import all_pairs_behind
 
 
 @_kernel
@@ -86,15 +86,20 @@ def phd_update(
         measurement, -1 for a miss; (P,) log odds of the pairs against clutter; (M,) sums
         of the weights.
     """
-    size, dimension = means.shape
+    size = len(means)
     detectable = np.flatnonzero(detection_probabilities * weights > 0.0)
-    spread = spreads[detectable] if len(spreads) else spreads
+    seen, spread_out, foreseen, slopes, spread = means, covariances, expected, jacobians, spreads
+    if len(detectable) < size:  # else nothing need be moved
+        seen, spread_out = means[detectable], covariances[detectable]
+        foreseen, slopes = expected[detectable], jacobians[detectable]
+        spread = spreads[detectable] if len(spreads) else spreads
     there = detectable if len(other_expected) else detectable[:0]
-    parent, measured, log_likelihood, new_means, new_covariances = all_pairs(
-        means[detectable],
-        covariances[detectable],
-        expected[detectable],
-        jacobians[detectable],
+    parent, measured, log_likelihood, all_means, all_covariances = all_pairs_behind(
+        size,
+        seen,
+        spread_out,
+        foreseen,
+        slopes,
         measurements,
         noises,
         spread,
@@ -109,22 +114,22 @@ def phd_update(
     log_clutter = np.empty(len(clutter))
     for z in range(len(clutter)):
         log_clutter[z] = math.log(clutter[z]) if clutter[z] > 0.0 else -math.inf
+    log_scales = np.empty(len(detectable))
+    for k in range(len(detectable)):
+        j = detectable[k]
+        log_scales[k] = math.log(detection_probabilities[j] * weights[j])
     log_terms = np.empty(pairs)
     for pair in range(pairs):
-        j = detectable[parent[pair]]
-        parent[pair] = j
-        log_terms[pair] = math.log(detection_probabilities[j] * weights[j]) + log_likelihood[pair]
+        log_terms[pair] = log_scales[parent[pair]] + log_likelihood[pair]
+        parent[pair] = detectable[parent[pair]]
     pair_weights, log_odds, sums = phd_weights(log_terms, measured, log_clutter)
 
     all_weights = np.empty(size + pairs)
-    all_means = np.empty((size + pairs, dimension))
-    all_covariances = np.empty((size + pairs, dimension, dimension))
     parents = np.empty(size + pairs, dtype=np.int64)
     sources = np.empty(size + pairs, dtype=np.int64)
     all_weights[:size] = weights * (1.0 - detection_probabilities)
     all_means[:size], all_covariances[:size] = means, covariances
     parents[:size], sources[:size] = np.arange(size), -1
     all_weights[size:] = pair_weights
-    all_means[size:], all_covariances[size:] = new_means, new_covariances
     parents[size:], sources[size:] = parent, measured
     return all_weights, all_means, all_covariances, parents, sources, log_odds, sums

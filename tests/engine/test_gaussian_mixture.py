@@ -19,7 +19,7 @@ from tests.engine.mixtures import (
     second_moment,
 )
 from tracker import gaussian_mixture as gm
-from tracker import mixture_kernels
+from tracker import merging_kernels, mixture_kernels
 from tracker.gaussian_mixture import GaussianMixture
 
 thresholds = st.sampled_from((0.0, 0.5, 4.0, 50.0, 1e6))
@@ -58,7 +58,7 @@ def test_leaders_are_the_heaviest_of_their_groups(
 ) -> None:
     order = np.argsort(-mixture.weights, kind="stable")
     nobody = np.full(mixture.size, -1)
-    group, leaders = mixture_kernels.merge_groups(
+    group, leaders = merging_kernels.merge_groups(
         mixture.means, mixture.covariances, order, nobody, threshold
     )
     _, reference_leaders, members = reference_merge(mixture, threshold)

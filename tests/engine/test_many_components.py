@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.benchmarks import scenario as scene
 from tests.engine import plain_phd
 from tests.engine.mixtures import random_covariances, random_mixture
-from tracker import gaussian_mixture, mixture_kernels, phd, update_kernels
+from tracker import gaussian_mixture, merging_kernels, phd, update_kernels
 from tracker.gaussian_mixture import GaussianMixture
 
 
@@ -60,7 +60,7 @@ def test_merging_groups_as_if_all_pairs_were_looked_at(
     owners = np.random.default_rng(seed).integers(-1, 3, size)
     order = np.argsort(-mixture.weights, kind="stable")
     for whose in (np.full(size, -1), owners):
-        group, leaders = mixture_kernels.merge_groups(
+        group, leaders = merging_kernels.merge_groups(
             mixture.means, mixture.covariances, order, whose, threshold
         )
         expected, first = groups_of_all(mixture, threshold, whose)
@@ -76,7 +76,7 @@ def test_a_few_very_wide_components_are_found_among_many_small_ones() -> None:
     both = gaussian_mixture.concatenate([mixture, wide])
     order = np.argsort(-both.weights, kind="stable")
     nobody = np.full(both.size, -1)
-    found = mixture_kernels.merge_groups(both.means, both.covariances, order, nobody, 4.0)
+    found = merging_kernels.merge_groups(both.means, both.covariances, order, nobody, 4.0)
     expected = groups_of_all(both, 4.0, nobody)
     assert_array_equal(found[0], expected[0])
 
