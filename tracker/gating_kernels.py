@@ -58,35 +58,6 @@ def factor_innovation(
 
 
 @_kernel
-def _inside(
-    ordered: ndarray,
-    axis: int,
-    expected: ndarray,
-    reach: ndarray,
-    j: int,
-    first: int,
-    hits: ndarray,
-    rows: range,
-) -> int:
-    """How many of the measurements from ``first`` on, by one axis, are within reach along all.
-
-    ``hits`` takes their places.
-    """
-    last = expected[j, axis] + reach[j, axis]
-    found = 0
-    for k in range(first, len(ordered)):
-        if ordered[k, axis] > last:
-            break
-        # without a branch, which nobody could foresee
-        near = True
-        for p in range(len(rows)):
-            near &= abs(ordered[k, p] - expected[j, p]) <= reach[j, p]
-        hits[found] = k
-        found += int(near)
-    return found
-
-
-@_kernel
 def gated_pairs(
     expected: ndarray, measurements: ndarray, noises: ndarray, own: ndarray, gate: float
 ) -> tuple[ndarray, ndarray, ndarray]:
@@ -111,6 +82,25 @@ def gated_pairs(
     if size == 0 or count == 0:
         nothing = np.empty(0, dtype=np.int64)
         return nothing, nothing, np.empty(0)
+    if order == 2:
+        found = _pairs(expected, measurements, noises, own, gate, (0, 1))
+    else:
+        found = _pairs(expected, measurements, noises, own, gate, range(order))
+    return _by_measurement(found[0], found[1], found[2], count)
+
+
+@_kernel
+def _pairs(
+    expected: ndarray,
+    measurements: ndarray,
+    noises: ndarray,
+    own: ndarray,
+    gate: float,
+    rows: range,
+) -> tuple[ndarray, ndarray, ndarray]:
+    """:func:`gated_pairs` component by component, rows as of :func:`factor_innovation`."""
+    size, order = expected.shape
+    count = len(measurements)
     shared = noises.shape[0] == 1
     reach = np.empty((size, order))
     for p in range(order):
@@ -122,8 +112,12 @@ def gated_pairs(
             reach[j, p] = math.sqrt(gate * (own[j, p, p] + noise)) * (1.0 + 1e-9)
     axis = _widest_axis(measurements, reach)
     by_axis = np.argsort(measurements[:, axis])
-    ordered = measurements[by_axis]
-    coordinates = ordered[:, axis].copy()
+    ordered = np.empty(measurements.shape)
+    coordinates = np.empty(count)
+    for k in range(count):
+        coordinates[k] = measurements[by_axis[k], axis]
+        for p in range(len(rows)):
+            ordered[k, p] = measurements[by_axis[k], p]
 
     capacity = 4 * (size + count)
     component = np.empty(capacity, dtype=np.int64)
@@ -136,18 +130,24 @@ def gated_pairs(
     pairs = 0
     for j in range(size):
         first = np.searchsorted(coordinates, expected[j, axis] - reach[j, axis])
-        if order == 2:
-            found = _inside(ordered, axis, expected, reach, j, first, hits, (0, 1))
-        else:
-            found = _inside(ordered, axis, expected, reach, j, first, hits, range(order))
+        last = np.searchsorted(coordinates, expected[j, axis] + reach[j, axis], "right")
+        found = 0
+        for k in range(first, last):
+            # without a branch, which nobody could foresee
+            near = True
+            for p in range(len(rows)):
+                near &= abs(ordered[k, p] - expected[j, p]) <= reach[j, p]
+            hits[found] = k
+            found += int(near)
         if shared:
-            constant = factor_innovation(own, j, noises, 0, lower, range(order))
-        for k in hits[:found]:
+            constant = factor_innovation(own, j, noises, 0, lower, rows)
+        for place in range(found):
+            k = hits[place]
             z = by_axis[k]
             if not shared:
-                constant = factor_innovation(own, j, noises, z, lower, range(order))
+                constant = factor_innovation(own, j, noises, z, lower, rows)
             distance = 0.0
-            for p in range(order):
+            for p in range(len(rows)):
                 total = ordered[k, p] - expected[j, p]
                 for r in range(p):
                     total -= lower[p, r] * solved[r]
@@ -164,7 +164,7 @@ def gated_pairs(
             measured[pairs] = z
             likelihood[pairs] = constant - 0.5 * distance
             pairs += 1
-    return _by_measurement(component[:pairs], measured[:pairs], likelihood[:pairs], count)
+    return component[:pairs], measured[:pairs], likelihood[:pairs]
 
 
 @_kernel

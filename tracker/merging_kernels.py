@@ -65,8 +65,8 @@ def _factors(covariances: ndarray, which: ndarray) -> ndarray:
 
 
 @_kernel
-def _widest_axes(means: ndarray, reach: ndarray, which: ndarray) -> tuple[int, int]:
-    """The two axes along which components lie furthest apart, measured by their mean reach."""
+def _widest_axes(means: ndarray, covariances: ndarray, which: ndarray) -> tuple[int, int]:
+    """The two axes along which components lie furthest apart, measured by their variances."""
     first = second = 0
     most = more = -1.0
     for a in range(means.shape[1]):
@@ -75,8 +75,8 @@ def _widest_axes(means: ndarray, reach: ndarray, which: ndarray) -> tuple[int, i
         for i in which:
             low = min(low, means[i, a])
             high = max(high, means[i, a])
-            total += reach[i, a]
-        width = (high - low) / total
+            total += covariances[i, a, a]
+        width = (high - low) ** 2 / total
         if width > most:
             second, more = first, most
             first, most = a, width
@@ -249,23 +249,23 @@ def merge_groups(
     group[order] = -2
     which = np.flatnonzero(group == -2)
     lower = _factors(covariances, which)
-    reach = np.empty(means.shape)
-    for i in which:
-        for a in range(dimension):
-            # a little more than the bound, so that rounding excludes nobody
-            reach[i, a] = math.sqrt(threshold * covariances[i, a, a]) * (1.0 + 1e-9) + 1e-300
-    first, second = _widest_axes(means, reach, which)
+    first, second = _widest_axes(means, covariances, which)
     places = np.empty((len(which), 4))
+    # a little more than the bound, so that rounding excludes nobody
+    bound = threshold * (1.0 + 1e-9)
     for k in range(len(which)):
         i = which[k]
         places[k, 0], places[k, 1] = means[i, first], means[i, second]
-        places[k, 2], places[k, 3] = reach[i, first], reach[i, second]
+        places[k, 2] = math.sqrt(bound * covariances[i, first, first]) + 1e-300
+        places[k, 3] = math.sqrt(bound * covariances[i, second, second]) + 1e-300
     by_cell, begins, first_cell, counts, sides = _grids(places)
     # place and reach in the order of the cells; nobody reaches out of -1
-    beside = places[by_cell]
-    by_cell = which[by_cell]
+    beside = np.empty(places.shape)
     slot = np.empty(len(means), dtype=np.int64)
     for k in range(len(by_cell)):
+        for side in range(4):
+            beside[k, side] = places[by_cell[k], side]
+        by_cell[k] = which[by_cell[k]]
         slot[by_cell[k]] = k
     hits = np.empty(len(which) + 1, dtype=np.int64)
     solved = np.empty(dimension)
@@ -282,11 +282,6 @@ def merge_groups(
         for k in hits[:found]:
             i = by_cell[k]
             if len(owners) and owners[i] >= 0 and owners[i] != owners[leader]:
-                continue
-            near = True
-            for a in range(dimension):
-                near &= abs(means[i, a] - means[leader, a]) <= reach[i, a]
-            if not near:
                 continue
             if dimension == 4:
                 distance = _squared_distance(means, lower, i, leader, solved, (0, 1, 2, 3))

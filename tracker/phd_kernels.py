@@ -91,7 +91,8 @@ def phd_update(
     seen, spread_out, foreseen, slopes, spread = means, covariances, expected, jacobians, spreads
     if len(detectable) < size:  # else nothing need be moved
         seen, spread_out = means[detectable], covariances[detectable]
-        foreseen, slopes = expected[detectable], jacobians[detectable]
+        foreseen = expected[detectable]
+        slopes = jacobians[detectable] if len(jacobians) > 1 else jacobians
         spread = spreads[detectable] if len(spreads) else spreads
     there = detectable if len(other_expected) else detectable[:0]
     parent, measured, log_likelihood, all_means, all_covariances = all_pairs_behind(

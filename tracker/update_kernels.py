@@ -52,17 +52,18 @@ def _innovations(
     ph = np.empty((size, len(axes), len(rows)))
     own = np.empty((size, len(rows), len(rows)))
     for j in range(size):
+        h = 0 if len(jacobians) == 1 else j
         for a in range(len(axes)):
             for p in range(len(rows)):
                 total = 0.0
                 for b in range(len(axes)):
-                    total += covariances[j, a, b] * jacobians[j, p, b]
+                    total += covariances[j, a, b] * jacobians[h, p, b]
                 ph[j, a, p] = total
         for p in range(len(rows)):
             for q in range(len(rows)):
                 total = spreads[j, p, q] if len(spreads) else 0.0
                 for a in range(len(axes)):
-                    total += jacobians[j, p, a] * ph[j, a, q]
+                    total += jacobians[h, p, a] * ph[j, a, q]
                 own[j, p, q] = total
     return ph, own
 
@@ -77,45 +78,51 @@ def _gain(
     jacobians: ndarray,
     noises: ndarray,
     spreads: ndarray,
-    gain: ndarray,
+    gains: ndarray,
     updated: ndarray,
-    work: ndarray,
+    place: int,
+    work: tuple[ndarray, ndarray, ndarray, ndarray, ndarray],
     axes: range,
     rows: range,
 ) -> None:
-    """K into ``gain`` (d, m) and (I − K H) P (I − K H)ᵀ + K R Kᵀ into ``updated`` (d, d).
+    """K into ``gains[place]`` and (I − K H) P (I − K H)ᵀ + K R Kᵀ into ``updated[place]``.
 
     Args:
         j: The component.
         n: The noise.
-        work: (4, max(d, m), max(d, m)), to write in.
+        work: Twice (m, m), twice (d, d), and (d, m), to write in.
         axes: As ``rows``, of :func:`_innovations`.
     """
-    lower, factor, half, noisy = work
+    lower, noise, factor, half, noisy = work
     factor_innovation(own, j, noises, n, lower, rows)
+    h = 0 if len(jacobians) == 1 else j
+    for p in range(len(rows)):
+        for q in range(len(rows)):
+            noise[p, q] = noises[n, p, q]
+            if len(spreads):
+                noise[p, q] += spreads[j, p, q]
     # K = P Hᵀ S⁻¹, row by row through the factor
     for a in range(len(axes)):
         for p in range(len(rows)):
             total = ph[j, a, p]
             for r in range(p):
-                total -= lower[p, r] * gain[a, r]
-            gain[a, p] = total * lower[p, p]
+                total -= lower[p, r] * gains[place, a, r]
+            gains[place, a, p] = total * lower[p, p]
         for p in range(len(rows) - 1, -1, -1):
-            total = gain[a, p]
+            total = gains[place, a, p]
             for r in range(p + 1, len(rows)):
-                total -= lower[r, p] * gain[a, r]
-            gain[a, p] = total * lower[p, p]
+                total -= lower[r, p] * gains[place, a, r]
+            gains[place, a, p] = total * lower[p, p]
     for a in range(len(axes)):
         for b in range(len(axes)):
             total = 1.0 if a == b else 0.0
             for p in range(len(rows)):
-                total -= gain[a, p] * jacobians[j, p, b]
+                total -= gains[place, a, p] * jacobians[h, p, b]
             factor[a, b] = total
         for p in range(len(rows)):
             total = 0.0
             for q in range(len(rows)):
-                noise = noises[n, q, p] + (spreads[j, q, p] if len(spreads) else 0.0)
-                total += gain[a, q] * noise
+                total += gains[place, a, q] * noise[q, p]
             noisy[a, p] = total
     for a in range(len(axes)):
         for b in range(len(axes)):
@@ -129,9 +136,9 @@ def _gain(
             for c in range(len(axes)):
                 total += half[a, c] * factor[b, c]
             for p in range(len(rows)):
-                total += noisy[a, p] * gain[b, p]
-            updated[a, b] = total
-            updated[b, a] = total
+                total += noisy[a, p] * gains[place, b, p]
+            updated[place, a, b] = total
+            updated[place, b, a] = total
 
 
 @_kernel
@@ -158,21 +165,29 @@ def _updated(
     new_covariances = np.empty((room + pairs, dimension, dimension))
     # with one noise for all, the pairs of a component share gain and covariance
     shared = len(noises) == 1
-    places = len(means) if shared else 1
+    known = np.zeros(len(means), dtype=np.bool_)
+    known[component] = True
+    filtered = np.flatnonzero(known) if shared else component
+    places = len(means) if shared else pairs
     gains = np.empty((places, dimension, len(rows)))
     updated = np.empty((places, dimension, dimension))
-    known = np.zeros(places, dtype=np.bool_)
-    side = max(dimension, len(rows))
-    work = np.empty((4, side, side))
+    work = (
+        np.empty((len(rows), len(rows))),
+        np.empty((len(rows), len(rows))),
+        np.empty((dimension, dimension)),
+        np.empty((dimension, dimension)),
+        np.empty((dimension, len(rows))),
+    )
+    for k in range(len(filtered)):
+        j = filtered[k]
+        n, place = (0, j) if shared else (measured[k], k)
+        _gain(
+            j, n, ph, own, covariances, jacobians, noises, spreads,
+            gains, updated, place, work, axes, rows,
+        )  # fmt: skip
     for pair in range(pairs):
         j, z = component[pair], measured[pair]
-        place = j if shared else 0
-        if not (shared and known[place]):
-            known[place] = True
-            _gain(
-                j, 0 if shared else z, ph, own, covariances, jacobians, noises, spreads,
-                gains[place], updated[place], work, axes, rows,
-            )  # fmt: skip
+        place = j if shared else pair
         for a in range(len(axes)):
             total = means[j, a]
             for p in range(len(rows)):
@@ -234,7 +249,7 @@ def kalman_pairs(
         means: (J, d).
         covariances: (J, d, d).
         expected: (J, m), the measurement each component predicts.
-        jacobians: (J, m, d), its derivative H.
+        jacobians: (J, m, d), its derivative H, or (1, m, d), one for all.
         measurements: (M, m).
         noises: (1, m, m) for all, or (M, m, m).
         spreads: (J, m, m), what a component adds to the noise, or (0, m, m) for nothing.
