@@ -33,9 +33,9 @@ def _widest_axis(values: ndarray, reach: ndarray) -> int:
 
 @_kernel
 def factor_innovation(
-    own: ndarray, j: int, noises: ndarray, n: int, lower: ndarray, rows: range
+    own: ndarray, j: int, noises: ndarray, n: int, lower: ndarray, place: int, rows: range
 ) -> float:
-    """Cholesky factor of S = own + R, with 1 / L_pp for L_pp; log of 1 / √(det(2π S)).
+    """Cholesky factor of S = own + R into ``lower[place]``, 1 / L_pp for L_pp; log 1 / √det(2π S).
 
     Args:
         rows: Of the measurement: a range, or, so that loops are unrolled, a tuple of as many.
@@ -45,21 +45,26 @@ def factor_innovation(
         for q in range(p):
             total = own[j, p, q] + noises[n, p, q]
             for r in range(q):
-                total -= lower[p, r] * lower[q, r]
-            lower[p, q] = total * lower[q, q]
+                total -= lower[place, p, r] * lower[place, q, r]
+            lower[place, p, q] = total * lower[place, q, q]
         total = own[j, p, p] + noises[n, p, p]
         for r in range(p):
-            total -= lower[p, r] * lower[p, r]
+            total -= lower[place, p, r] * lower[place, p, r]
         if not total > 0.0:
             raise np.linalg.LinAlgError("H P H' + R is not positive definite")
-        lower[p, p] = 1.0 / math.sqrt(total)
-        product *= lower[p, p]
+        lower[place, p, p] = 1.0 / math.sqrt(total)
+        product *= lower[place, p, p]
     return math.log(product) - 0.5 * len(rows) * math.log(2.0 * math.pi)
 
 
 @_kernel
 def gated_pairs(
-    expected: ndarray, measurements: ndarray, noises: ndarray, own: ndarray, gate: float
+    expected: ndarray,
+    measurements: ndarray,
+    noises: ndarray,
+    own: ndarray,
+    gate: float,
+    lower: ndarray,
 ) -> tuple[ndarray, ndarray, ndarray]:
     """Component, measurement and log-likelihood of each pair inside its gate.
 
@@ -73,6 +78,8 @@ def gated_pairs(
         noises: (1, m, m) for all, or (M, m, m).
         own: (J, m, m), what each component adds to the noise.
         gate: Squared Mahalanobis distance.
+        lower: (J, m, m) with one noise for all, else (1, m, m): takes what
+            :func:`factor_innovation` gives for each component, or at last.
 
     Returns:
         (P,) each, measurement by measurement.
@@ -83,9 +90,9 @@ def gated_pairs(
         nothing = np.empty(0, dtype=np.int64)
         return nothing, nothing, np.empty(0)
     if order == 2:
-        found = _pairs(expected, measurements, noises, own, gate, (0, 1))
+        found = _pairs(expected, measurements, noises, own, gate, lower, (0, 1))
     else:
-        found = _pairs(expected, measurements, noises, own, gate, range(order))
+        found = _pairs(expected, measurements, noises, own, gate, lower, range(order))
     return _by_measurement(found[0], found[1], found[2], count)
 
 
@@ -96,6 +103,7 @@ def _pairs(
     noises: ndarray,
     own: ndarray,
     gate: float,
+    lower: ndarray,
     rows: range,
 ) -> tuple[ndarray, ndarray, ndarray]:
     """:func:`gated_pairs` component by component, rows as of :func:`factor_innovation`."""
@@ -124,7 +132,6 @@ def _pairs(
     measured = np.empty(capacity, dtype=np.int64)
     likelihood = np.empty(capacity)
     hits = np.empty(count + 1, dtype=np.int64)
-    lower = np.empty((order, order))
     solved = np.empty(order)
     constant = 0.0
     pairs = 0
@@ -140,18 +147,19 @@ def _pairs(
             hits[found] = k
             found += int(near)
         if shared:
-            constant = factor_innovation(own, j, noises, 0, lower, rows)
-        for place in range(found):
-            k = hits[place]
+            constant = factor_innovation(own, j, noises, 0, lower, j, rows)
+        place = j if shared else 0
+        for hit in range(found):
+            k = hits[hit]
             z = by_axis[k]
             if not shared:
-                constant = factor_innovation(own, j, noises, z, lower, rows)
+                constant = factor_innovation(own, j, noises, z, lower, 0, rows)
             distance = 0.0
             for p in range(len(rows)):
                 total = ordered[k, p] - expected[j, p]
                 for r in range(p):
-                    total -= lower[p, r] * solved[r]
-                solved[p] = total * lower[p, p]
+                    total -= lower[place, p, r] * solved[r]
+                solved[p] = total * lower[place, p, p]
                 distance += solved[p] * solved[p]
             if not distance <= gate or distance == math.inf:
                 continue

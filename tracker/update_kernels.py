@@ -73,7 +73,8 @@ def _gain(
     j: int,
     n: int,
     ph: ndarray,
-    own: ndarray,
+    lower: ndarray,
+    factored: int,
     covariances: ndarray,
     jacobians: ndarray,
     noises: ndarray,
@@ -81,7 +82,7 @@ def _gain(
     gains: ndarray,
     updated: ndarray,
     place: int,
-    work: tuple[ndarray, ndarray, ndarray, ndarray, ndarray],
+    work: tuple[ndarray, ndarray, ndarray, ndarray],
     axes: range,
     rows: range,
 ) -> None:
@@ -90,11 +91,11 @@ def _gain(
     Args:
         j: The component.
         n: The noise.
-        work: Twice (m, m), twice (d, d), and (d, m), to write in.
+        factored: Where the factor of S is in ``lower``.
+        work: (m, m), twice (d, d), and (d, m), to write in.
         axes: As ``rows``, of :func:`_innovations`.
     """
-    lower, noise, factor, half, noisy = work
-    factor_innovation(own, j, noises, n, lower, rows)
+    noise, factor, half, noisy = work
     h = 0 if len(jacobians) == 1 else j
     for p in range(len(rows)):
         for q in range(len(rows)):
@@ -106,13 +107,13 @@ def _gain(
         for p in range(len(rows)):
             total = ph[j, a, p]
             for r in range(p):
-                total -= lower[p, r] * gains[place, a, r]
-            gains[place, a, p] = total * lower[p, p]
+                total -= lower[factored, p, r] * gains[place, a, r]
+            gains[place, a, p] = total * lower[factored, p, p]
         for p in range(len(rows) - 1, -1, -1):
             total = gains[place, a, p]
             for r in range(p + 1, len(rows)):
-                total -= lower[r, p] * gains[place, a, r]
-            gains[place, a, p] = total * lower[p, p]
+                total -= lower[factored, r, p] * gains[place, a, r]
+            gains[place, a, p] = total * lower[factored, p, p]
     for a in range(len(axes)):
         for b in range(len(axes)):
             total = 1.0 if a == b else 0.0
@@ -148,6 +149,7 @@ def _updated(
     measured: ndarray,
     ph: ndarray,
     own: ndarray,
+    lower: ndarray,
     means: ndarray,
     covariances: ndarray,
     expected: ndarray,
@@ -173,16 +175,17 @@ def _updated(
     updated = np.empty((places, dimension, dimension))
     work = (
         np.empty((len(rows), len(rows))),
-        np.empty((len(rows), len(rows))),
         np.empty((dimension, dimension)),
         np.empty((dimension, dimension)),
         np.empty((dimension, len(rows))),
     )
     for k in range(len(filtered)):
         j = filtered[k]
-        n, place = (0, j) if shared else (measured[k], k)
+        n, place, factored = (0, j, j) if shared else (measured[k], k, 0)
+        if not shared:
+            factor_innovation(own, j, noises, n, lower, 0, rows)
         _gain(
-            j, n, ph, own, covariances, jacobians, noises, spreads,
+            j, n, ph, lower, factored, covariances, jacobians, noises, spreads,
             gains, updated, place, work, axes, rows,
         )  # fmt: skip
     for pair in range(pairs):
@@ -218,15 +221,16 @@ def kalman_pairs_behind(
         ph, own = _innovations(covariances, jacobians, spreads, (0, 1, 2, 3), (0, 1))
     else:
         ph, own = _innovations(covariances, jacobians, spreads, range(dimension), range(order))
-    component, measured, likelihood = gated_pairs(expected, measurements, noises, own, gate)
+    lower = np.empty((len(means) if len(noises) == 1 else 1, order, order))
+    component, measured, likelihood = gated_pairs(expected, measurements, noises, own, gate, lower)
     if plane:
         new_means, new_covariances = _updated(
-            room, component, measured, ph, own, means, covariances, expected, jacobians,
+            room, component, measured, ph, own, lower, means, covariances, expected, jacobians,
             measurements, noises, spreads, (0, 1, 2, 3), (0, 1),
         )  # fmt: skip
     else:
         new_means, new_covariances = _updated(
-            room, component, measured, ph, own, means, covariances, expected, jacobians,
+            room, component, measured, ph, own, lower, means, covariances, expected, jacobians,
             measurements, noises, spreads, range(dimension), range(order),
         )  # fmt: skip
     return component, measured, likelihood, new_means, new_covariances
