@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy import ndarray
@@ -33,13 +34,16 @@ def _widest_axis(values: ndarray, reach: ndarray) -> int:
 
 @_kernel
 def factor_innovation(
-    own: ndarray, j: int, noises: ndarray, n: int, lower: ndarray, place: int, rows: range
+    own: ndarray, j: int, noises: ndarray, n: int, lower: ndarray, place: int, rows: Sequence[int]
 ) -> float:
-    """Cholesky factor of S = own + R into ``lower[place]``, 1 / L_pp for L_pp; log 1 / √det(2π S).
+    """Cholesky factor of S = own + R into ``lower[place]``, and log of 1 / √det(2π S).
+
+    On its diagonal is 1 / L_pp instead of L_pp: whoever solves with it multiplies.
 
     Args:
         rows: Of the measurement: a range, or, so that loops are unrolled, a tuple of as many.
     """
+    constant: float = -0.5 * len(rows) * math.log(2.0 * math.pi)
     product = 1.0
     for p in range(len(rows)):
         for q in range(p):
@@ -54,7 +58,7 @@ def factor_innovation(
             raise np.linalg.LinAlgError("H P H' + R is not positive definite")
         lower[place, p, p] = 1.0 / math.sqrt(total)
         product *= lower[place, p, p]
-    return math.log(product) - 0.5 * len(rows) * math.log(2.0 * math.pi)
+    return constant + math.log(product)
 
 
 @_kernel
@@ -90,28 +94,28 @@ def gated_pairs(
         nothing = np.empty(0, dtype=np.int64)
         return nothing, nothing, np.empty(0)
     if order == 2:
-        found = _pairs(expected, measurements, noises, own, gate, lower, (0, 1))
+        found = _gated(expected, measurements, noises, own, gate, lower, (0, 1))
     else:
-        found = _pairs(expected, measurements, noises, own, gate, lower, range(order))
+        found = _gated(expected, measurements, noises, own, gate, lower, range(order))
     return _by_measurement(found[0], found[1], found[2], count)
 
 
 @_kernel
-def _pairs(
+def _gated(
     expected: ndarray,
     measurements: ndarray,
     noises: ndarray,
     own: ndarray,
     gate: float,
     lower: ndarray,
-    rows: range,
+    rows: Sequence[int],
 ) -> tuple[ndarray, ndarray, ndarray]:
-    """:func:`gated_pairs` component by component, rows as of :func:`factor_innovation`."""
+    """:func:`gated_pairs`, component by component; rows as of :func:`factor_innovation`."""
     size, order = expected.shape
     count = len(measurements)
     shared = noises.shape[0] == 1
     reach = np.empty((size, order))
-    for p in range(order):
+    for p in range(len(rows)):
         noise = noises[:, p, p].max()
         for j in range(size):
             if not own[j, p, p] + noise > 0.0:
@@ -134,7 +138,7 @@ def _pairs(
     hits = np.empty(count + 1, dtype=np.int64)
     solved = np.empty(order)
     constant = 0.0
-    pairs = 0
+    n = place = pairs = 0
     for j in range(size):
         first = np.searchsorted(coordinates, expected[j, axis] - reach[j, axis])
         last = np.searchsorted(coordinates, expected[j, axis] + reach[j, axis], "right")
@@ -147,13 +151,14 @@ def _pairs(
             hits[found] = k
             found += int(near)
         if shared:
-            constant = factor_innovation(own, j, noises, 0, lower, j, rows)
-        place = j if shared else 0
+            place = j
+            constant = factor_innovation(own, j, noises, n, lower, place, rows)
         for hit in range(found):
             k = hits[hit]
             z = by_axis[k]
             if not shared:
-                constant = factor_innovation(own, j, noises, z, lower, 0, rows)
+                n = z
+                constant = factor_innovation(own, j, noises, n, lower, place, rows)
             distance = 0.0
             for p in range(len(rows)):
                 total = ordered[k, p] - expected[j, p]

@@ -13,6 +13,7 @@ filter", IEEE Transactions on Signal Processing 54(11), 2006.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy import ndarray
@@ -26,7 +27,7 @@ not make the search wide for all."""
 
 
 @_kernel
-def _factor(covariances: ndarray, which: ndarray, lower: ndarray, axes: range) -> None:
+def _factor(covariances: ndarray, which: ndarray, lower: ndarray, axes: Sequence[int]) -> None:
     """Cholesky factors of the covariances at ``which`` into ``lower``, with 1 / L_aa for L_aa.
 
     Args:
@@ -205,7 +206,7 @@ def _reached(offset: float, reach: float, cells_a_metre: float, count: int) -> t
 
 @_kernel
 def _squared_distance(
-    means: ndarray, lower: ndarray, i: int, leader: int, solved: ndarray, axes: range
+    means: ndarray, lower: ndarray, i: int, leader: int, solved: ndarray, axes: Sequence[int]
 ) -> float:
     """(m_i − m_l)ᵀ P_i⁻¹ (m_i − m_l), by a factor and for axes as of :func:`_factor`."""
     distance = 0.0

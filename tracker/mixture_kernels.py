@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy import ndarray
 
@@ -34,7 +36,7 @@ def predict(
 
 @_kernel
 def _predicted(
-    means: ndarray, covariances: ndarray, transition: ndarray, noises: ndarray, axes: range
+    means: ndarray, covariances: ndarray, transition: ndarray, noises: ndarray, axes: Sequence[int]
 ) -> tuple[ndarray, ndarray]:
     """:func:`predict` for axes that are a range, or, to have loops unrolled, a tuple of as many."""
     moved = np.empty(means.shape)
@@ -98,10 +100,11 @@ def heaviest_first(weights: ndarray) -> ndarray:
     bits = 0
     while bits < 64 and highest >> np.uint64(bits):
         bits += 1
-    _sort_bits(keys, order, max(bits - 2 * _DIGIT, 0), bits)
-    if not _insert(weights, order, 4 * size):
+    for first in (max(bits - 2 * _DIGIT, 0), 0):
         order = np.arange(size)
-        _sort_bits(keys, order, 0, bits)
+        _sort_bits(keys, order, first, bits)
+        if _insert(weights, order, 4 * size):
+            break
     return order
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -40,7 +41,11 @@ class Alternative(NamedTuple):
 
 @_kernel
 def _innovations(
-    covariances: ndarray, jacobians: ndarray, spreads: ndarray, axes: range, rows: range
+    covariances: ndarray,
+    jacobians: ndarray,
+    spreads: ndarray,
+    axes: Sequence[int],
+    rows: Sequence[int],
 ) -> tuple[ndarray, ndarray]:
     """P Hᵀ (J, d, m) and H P Hᵀ + Ω (J, m, m), what a component adds to the noise.
 
@@ -83,8 +88,8 @@ def _gain(
     updated: ndarray,
     place: int,
     work: tuple[ndarray, ndarray, ndarray, ndarray],
-    axes: range,
-    rows: range,
+    axes: Sequence[int],
+    rows: Sequence[int],
 ) -> None:
     """K into ``gains[place]`` and (I − K H) P (I − K H)ᵀ + K R Kᵀ into ``updated[place]``.
 
@@ -144,7 +149,6 @@ def _gain(
 
 @_kernel
 def _updated(
-    room: int,
     component: ndarray,
     measured: ndarray,
     ph: ndarray,
@@ -157,14 +161,14 @@ def _updated(
     measurements: ndarray,
     noises: ndarray,
     spreads: ndarray,
-    axes: range,
-    rows: range,
+    axes: Sequence[int],
+    rows: Sequence[int],
 ) -> tuple[ndarray, ndarray]:
-    """Means (room + P, d) and covariances (room + P, d, d) of pairs, the first rows left free."""
+    """Means (P, d) and covariances (P, d, d) of pairs."""
     pairs = len(component)
     dimension = len(axes)
-    new_means = np.empty((room + pairs, dimension))
-    new_covariances = np.empty((room + pairs, dimension, dimension))
+    new_means = np.empty((pairs, dimension))
+    new_covariances = np.empty((pairs, dimension, dimension))
     # with one noise for all, the pairs of a component share gain and covariance
     shared = len(noises) == 1
     known = np.zeros(len(means), dtype=np.bool_)
@@ -183,7 +187,7 @@ def _updated(
         j = filtered[k]
         n, place, factored = (0, j, j) if shared else (measured[k], k, 0)
         if not shared:
-            factor_innovation(own, j, noises, n, lower, 0, rows)
+            factor_innovation(own, j, noises, n, lower, factored, rows)
         _gain(
             j, n, ph, lower, factored, covariances, jacobians, noises, spreads,
             gains, updated, place, work, axes, rows,
@@ -195,45 +199,10 @@ def _updated(
             total = means[j, a]
             for p in range(len(rows)):
                 total += gains[place, a, p] * (measurements[z, p] - expected[j, p])
-            new_means[room + pair, a] = total
+            new_means[pair, a] = total
             for b in range(len(axes)):
-                new_covariances[room + pair, a, b] = updated[place, a, b]
+                new_covariances[pair, a, b] = updated[place, a, b]
     return new_means, new_covariances
-
-
-@_kernel
-def kalman_pairs_behind(
-    room: int,
-    means: ndarray,
-    covariances: ndarray,
-    expected: ndarray,
-    jacobians: ndarray,
-    measurements: ndarray,
-    noises: ndarray,
-    spreads: ndarray,
-    gate: float,
-) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
-    """:func:`kalman_pairs` whose means and covariances begin with ``room`` rows left free."""
-    dimension, order = means.shape[1], measurements.shape[1]
-    # places in the plane and velocities are so frequent that their loops are unrolled
-    plane = dimension == 4 and order == 2
-    if plane:
-        ph, own = _innovations(covariances, jacobians, spreads, (0, 1, 2, 3), (0, 1))
-    else:
-        ph, own = _innovations(covariances, jacobians, spreads, range(dimension), range(order))
-    lower = np.empty((len(means) if len(noises) == 1 else 1, order, order))
-    component, measured, likelihood = gated_pairs(expected, measurements, noises, own, gate, lower)
-    if plane:
-        new_means, new_covariances = _updated(
-            room, component, measured, ph, own, lower, means, covariances, expected, jacobians,
-            measurements, noises, spreads, (0, 1, 2, 3), (0, 1),
-        )  # fmt: skip
-    else:
-        new_means, new_covariances = _updated(
-            room, component, measured, ph, own, lower, means, covariances, expected, jacobians,
-            measurements, noises, spreads, range(dimension), range(order),
-        )  # fmt: skip
-    return component, measured, likelihood, new_means, new_covariances
 
 
 @_kernel
@@ -267,51 +236,26 @@ def kalman_pairs(
     Raises:
         numpy.linalg.LinAlgError: If the covariance of an innovation is not positive definite.
     """
-    return kalman_pairs_behind(
-        0, means, covariances, expected, jacobians, measurements, noises, spreads, gate
-    )
-
-
-@_kernel
-def all_pairs_behind(
-    room: int,
-    means: ndarray,
-    covariances: ndarray,
-    expected: ndarray,
-    jacobians: ndarray,
-    measurements: ndarray,
-    noises: ndarray,
-    spreads: ndarray,
-    gate: float,
-    other_expected: ndarray,
-    other_jacobians: ndarray,
-    other_spreads: ndarray,
-    other_drift: ndarray,
-    other_share: float,
-) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
-    """:func:`all_pairs` whose means and covariances begin with ``room`` rows left free."""
-    component, measured, likelihood, new_means, new_covariances = kalman_pairs_behind(
-        room, means, covariances, expected, jacobians, measurements, noises, spreads, gate
-    )
-    if len(other_expected) == 0:
-        return component, measured, likelihood, new_means, new_covariances
-    more = kalman_pairs(
-        means,
-        covariances + other_drift,
-        other_expected,
-        other_jacobians,
-        measurements,
-        noises,
-        other_spreads,
-        gate,
-    )
-    return (
-        np.concatenate((component, more[0])),
-        np.concatenate((measured, more[1])),
-        np.concatenate((likelihood + math.log(1.0 - other_share), more[2] + math.log(other_share))),
-        np.concatenate((new_means, more[3])),
-        np.concatenate((new_covariances, more[4])),
-    )
+    dimension, order = means.shape[1], measurements.shape[1]
+    # places in the plane and velocities are so frequent that their loops are unrolled
+    plane = dimension == 4 and order == 2
+    if plane:
+        ph, own = _innovations(covariances, jacobians, spreads, (0, 1, 2, 3), (0, 1))
+    else:
+        ph, own = _innovations(covariances, jacobians, spreads, range(dimension), range(order))
+    lower = np.empty((len(means) if len(noises) == 1 else 1, order, order))
+    component, measured, likelihood = gated_pairs(expected, measurements, noises, own, gate, lower)
+    if plane:
+        new_means, new_covariances = _updated(
+            component, measured, ph, own, lower, means, covariances, expected, jacobians,
+            measurements, noises, spreads, (0, 1, 2, 3), (0, 1),
+        )  # fmt: skip
+    else:
+        new_means, new_covariances = _updated(
+            component, measured, ph, own, lower, means, covariances, expected, jacobians,
+            measurements, noises, spreads, range(dimension), range(order),
+        )  # fmt: skip
+    return component, measured, likelihood, new_means, new_covariances
 
 
 @_kernel
@@ -341,19 +285,25 @@ def all_pairs(
     Returns:
         The pairs of the first kind and then those of the other.
     """
-    return all_pairs_behind(
-        0,
+    component, measured, likelihood, new_means, new_covariances = kalman_pairs(
+        means, covariances, expected, jacobians, measurements, noises, spreads, gate
+    )
+    if len(other_expected) == 0:
+        return component, measured, likelihood, new_means, new_covariances
+    more = kalman_pairs(
         means,
-        covariances,
-        expected,
-        jacobians,
-        measurements,
-        noises,
-        spreads,
-        gate,
+        covariances + other_drift,
         other_expected,
         other_jacobians,
+        measurements,
+        noises,
         other_spreads,
-        other_drift,
-        other_share,
+        gate,
+    )
+    return (
+        np.concatenate((component, more[0])),
+        np.concatenate((measured, more[1])),
+        np.concatenate((likelihood + math.log(1.0 - other_share), more[2] + math.log(other_share))),
+        np.concatenate((new_means, more[3])),
+        np.concatenate((new_covariances, more[4])),
     )
