@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy import ndarray
 
-from tracker.kernels import _kernel
+from tracker.kernels import _kernel, merge_moments
+from tracker.mixture_kernels import heaviest_of_groups
 
 
 @_kernel
@@ -36,14 +37,16 @@ def pay_for_measurements(
     count = len(sums)
     spent = np.zeros(len(weights))
     group = np.full(len(weights), -1, dtype=np.int64)
-    starts = np.searchsorted(measured, np.arange(count + 1))
+    starts = np.zeros(count + 1, dtype=np.int64)
     surest = np.full(count, -np.inf)
     for pair in range(len(weights)):
+        starts[measured[pair] + 1] += 1
         surest[measured[pair]] = max(surest[measured[pair]], log_odds[pair])
+    for z in range(count):
+        starts[z + 1] += starts[z]
+    worth = np.flatnonzero(sums > threshold)
     reported = 0
-    for z in np.argsort(-surest, kind="mergesort"):
-        if sums[z] <= threshold:
-            continue
+    for z in worth[np.argsort(-surest[worth], kind="mergesort")]:
         total = 0.0
         for pair in range(starts[z], starts[z + 1]):
             total += min(weights[pair], left[parents[pair]])
@@ -55,3 +58,51 @@ def pay_for_measurements(
             group[pair] = reported
         reported += 1
     return spent, group, reported
+
+
+@_kernel
+def report(
+    predicted: ndarray,
+    weights: ndarray,
+    means: ndarray,
+    covariances: ndarray,
+    parents: ndarray,
+    sources: ndarray,
+    log_odds: ndarray,
+    sums: ndarray,
+    threshold: float,
+    spare: float,
+) -> tuple[ndarray, ndarray, ndarray, ndarray]:
+    """The targets that an update reports: :func:`tracker.phd.extract_measured`.
+
+    Args:
+        predicted: (J,) weights.
+        weights: (K,), as the further ones, of :func:`tracker.phd_kernels.phd_update`.
+        threshold: Expected number of targets.
+        spare: What a component may spend beyond its weight, or beyond one target.
+
+    Returns:
+        (T,) weights, (T, d) means, (T, d, d) covariances, and (T,) the heaviest of the
+        components that each was made of.
+    """
+    size = len(predicted)
+    spent, group, count = pay_for_measurements(
+        np.maximum(predicted, 1.0) + spare,
+        weights[size:],
+        parents[size:],
+        sources[size:],
+        log_odds,
+        sums,
+        threshold,
+    )
+    found = merge_moments(spent, means[size:], covariances[size:], group, count)
+    heaviest = size + heaviest_of_groups(spent, group, count)
+    missed = np.flatnonzero(weights[:size] > threshold)
+    if len(missed) == 0:
+        return found[0], found[1], found[2], heaviest
+    return (
+        np.concatenate((found[0], weights[missed])),
+        np.concatenate((found[1], means[missed])),
+        np.concatenate((found[2], covariances[missed])),
+        np.concatenate((heaviest, missed)),
+    )

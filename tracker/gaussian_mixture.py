@@ -9,7 +9,10 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker import kernels, mixture_kernels
+from tracker import kernels, merging_kernels, mixture_kernels
+
+_NOBODY = np.zeros(0, dtype=np.int64)
+"""Instead of owners, where no component has one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,15 +162,16 @@ def merge(
         ValueError: If ``threshold`` is negative.
         numpy.linalg.LinAlgError: If a covariance is not positive definite.
     """
-    if threshold < 0.0:
-        raise ValueError(f"threshold must be >= 0 (squared Mahalanobis distance), got {threshold}")
+    _check(threshold)
     if mixture.size == 0:
         return mixture, np.zeros(0, dtype=np.int64)
     order = mixture_kernels.heaviest_first(mixture.weights)
-    if owners is None:
-        owners = np.full(mixture.size, -1, dtype=np.int64)
-    group, leaders = mixture_kernels.merge_groups(
-        mixture.means, mixture.covariances, order, owners, threshold
+    group, leaders = merging_kernels.merge_groups(
+        mixture.means,
+        mixture.covariances,
+        order,
+        _NOBODY if owners is None else owners,
+        threshold,
     )
     weights, means, covariances = kernels.merge_moments(
         mixture.weights, mixture.means, mixture.covariances, group, len(leaders)
@@ -200,13 +204,19 @@ def reduce(
         The reduced mixture, heaviest first, and the index into ``mixture`` of
         the component that led each.
     """
-    kept = prune(mixture, pruning_threshold)
-    merged, leaders = merge(
-        mixture.take(kept), merging_threshold, None if owners is None else owners[kept]
+    _check(merging_threshold)
+    weights, means, covariances, leaders = merging_kernels.reduce_mixture(
+        mixture.weights,
+        mixture.means,
+        mixture.covariances,
+        _NOBODY if owners is None else owners,
+        pruning_threshold,
+        merging_threshold,
+        max_components,
     )
-    heaviest = mixture_kernels.heaviest_first(merged.weights)[:max_components]
-    reduced = merged.take(heaviest)
-    if reduced.size < merged.size:
-        weights = reduced.weights * (merged.cardinality / reduced.cardinality)
-        reduced = GaussianMixture(weights, reduced.means, reduced.covariances, reduced.labels)
-    return reduced, kept.take(leaders.take(heaviest))
+    return GaussianMixture(weights, means, covariances, mixture.labels.take(leaders)), leaders
+
+
+def _check(threshold: float) -> None:
+    if threshold < 0.0:
+        raise ValueError(f"threshold must be >= 0 (squared Mahalanobis distance), got {threshold}")

@@ -73,7 +73,7 @@ def merge_moments(
 ) -> tuple[ndarray, ndarray, ndarray]:
     """Weight, mean and covariance (spread of the means included) of each group.
 
-    In a group without any weight all count the same.
+    In a group without any weight all count the same. Who is in the group -1 is left out.
     """
     size, dimension = means.shape
     merged_weights = np.zeros(count)
@@ -81,15 +81,20 @@ def merge_moments(
     merged_covariances = np.zeros((count, dimension, dimension))
     members = np.zeros(count)
     for i in range(size):
-        merged_weights[group[i]] += weights[i]
-        members[group[i]] += 1.0
+        if group[i] >= 0:
+            merged_weights[group[i]] += weights[i]
+            members[group[i]] += 1.0
     for i in range(size):
         g = group[i]
+        if g < 0:
+            continue
         share = weights[i] / merged_weights[g] if merged_weights[g] > 0.0 else 1.0 / members[g]
         for a in range(dimension):
             merged_means[g, a] += share * means[i, a]
     for i in range(size):
         g = group[i]
+        if g < 0:
+            continue
         share = weights[i] / merged_weights[g] if merged_weights[g] > 0.0 else 1.0 / members[g]
         for a in range(dimension):
             difference_a = means[i, a] - merged_means[g, a]

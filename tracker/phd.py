@@ -16,8 +16,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker import extraction_kernels, kernels, mixture_kernels, phd_kernels
-from tracker.gaussian_mixture import GaussianMixture, concatenate
+from tracker import extraction_kernels, mixture_kernels, phd_kernels
+from tracker.gaussian_mixture import GaussianMixture
 from tracker.update_kernels import Alternative
 
 SPARE = 0.25
@@ -46,7 +46,7 @@ def update(
     measurements: Float[ndarray, "M m"],
     *,
     expected: Float[ndarray, "J m"],
-    jacobians: Float[ndarray, "J m d"],
+    jacobians: Float[ndarray, "*J m d"],
     noise: Float[ndarray, "N m m"],
     spread: Float[ndarray, "K m m"] | None = None,
     detection_probability: float | Float[ndarray, " J"],
@@ -68,7 +68,7 @@ def update(
         predicted: v', J components.
         measurements: z, one a row; none is allowed.
         expected: h(m_j) for each component; for a linear model H m_j.
-        jacobians: H for each component.
+        jacobians: H for each component, or one for all.
         noise: R, one for all measurements (N = 1) or one each (N = M).
         spread: What each component adds to the noise, where h bends (K = J); nothing, if none
             (or K = 0).
@@ -135,25 +135,17 @@ def extract_measured(
     Returns:
         The reported targets: first those of measurements, the surest first.
     """
-    size = predicted.size
-    measured = updated.measurements[size:]
-    spent, group, count = extraction_kernels.pay_for_measurements(
-        np.maximum(predicted.weights, 1.0) + SPARE,
-        updated.posterior.weights[size:],
-        updated.parents[size:],
-        measured,
+    posterior = updated.posterior
+    weights, means, covariances, heaviest = extraction_kernels.report(
+        predicted.weights,
+        posterior.weights,
+        posterior.means,
+        posterior.covariances,
+        updated.parents,
+        updated.measurements,
         updated.log_odds,
         updated.measurement_weights,
         threshold,
+        SPARE,
     )
-    pairs = (group >= 0).nonzero()[0]
-    payers = updated.posterior.take(size + pairs)
-    group, spent = group.take(pairs), spent.take(pairs)
-    weights, means, covariances = kernels.merge_moments(
-        spent, payers.means, payers.covariances, group, count
-    )
-    labels = payers.labels.take(mixture_kernels.heaviest_of_groups(spent, group, count))
-    missed = (updated.posterior.weights[:size] > threshold).nonzero()[0]
-    return concatenate(
-        [GaussianMixture(weights, means, covariances, labels), updated.posterior.take(missed)]
-    )
+    return GaussianMixture(weights, means, covariances, posterior.labels.take(heaviest))

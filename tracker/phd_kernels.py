@@ -51,6 +51,27 @@ def phd_weights(
 
 
 @_kernel
+def _vectors(values: ndarray, which: ndarray) -> ndarray:
+    """The rows ``which`` of (J, d): by brackets it takes several times as long, as to compile."""
+    taken = np.empty((len(which), values.shape[1]))
+    for k in range(len(which)):
+        for a in range(values.shape[1]):
+            taken[k, a] = values[which[k], a]
+    return taken
+
+
+@_kernel
+def _matrices(values: ndarray, which: ndarray) -> ndarray:
+    """The matrices ``which`` of (J, n, d), likewise."""
+    taken = np.empty((len(which), values.shape[1], values.shape[2]))
+    for k in range(len(which)):
+        for a in range(values.shape[1]):
+            for b in range(values.shape[2]):
+                taken[k, a, b] = values[which[k], a, b]
+    return taken
+
+
+@_kernel
 def phd_update(
     weights: ndarray,
     means: ndarray,
@@ -88,20 +109,21 @@ def phd_update(
     """
     size, dimension = means.shape
     detectable = np.flatnonzero(detection_probabilities * weights > 0.0)
-    spread = spreads[detectable] if len(spreads) else spreads
-    there = detectable if len(other_expected) else detectable[:0]
+    nothing = detectable[:0]
+    of_all = np.zeros(1, dtype=np.int64)
+    there = detectable if len(other_expected) else nothing
     parent, measured, log_likelihood, new_means, new_covariances = all_pairs(
-        means[detectable],
-        covariances[detectable],
-        expected[detectable],
-        jacobians[detectable],
+        _vectors(means, detectable),
+        _matrices(covariances, detectable),
+        _vectors(expected, detectable),
+        _matrices(jacobians, detectable if len(jacobians) == size else of_all),
         measurements,
         noises,
-        spread,
+        _matrices(spreads, detectable if len(spreads) else nothing),
         gate,
-        other_expected[there],
-        other_jacobians[there],
-        other_spreads[there],
+        _vectors(other_expected, there),
+        _matrices(other_jacobians, there),
+        _matrices(other_spreads, there),
         other_drift,
         other_share,
     )
@@ -109,11 +131,14 @@ def phd_update(
     log_clutter = np.empty(len(clutter))
     for z in range(len(clutter)):
         log_clutter[z] = math.log(clutter[z]) if clutter[z] > 0.0 else -math.inf
+    log_scales = np.empty(len(detectable))
+    for k in range(len(detectable)):
+        j = detectable[k]
+        log_scales[k] = math.log(detection_probabilities[j] * weights[j])
     log_terms = np.empty(pairs)
     for pair in range(pairs):
-        j = detectable[parent[pair]]
-        parent[pair] = j
-        log_terms[pair] = math.log(detection_probabilities[j] * weights[j]) + log_likelihood[pair]
+        log_terms[pair] = log_scales[parent[pair]] + log_likelihood[pair]
+        parent[pair] = detectable[parent[pair]]
     pair_weights, log_odds, sums = phd_weights(log_terms, measured, log_clutter)
 
     all_weights = np.empty(size + pairs)
@@ -121,10 +146,19 @@ def phd_update(
     all_covariances = np.empty((size + pairs, dimension, dimension))
     parents = np.empty(size + pairs, dtype=np.int64)
     sources = np.empty(size + pairs, dtype=np.int64)
-    all_weights[:size] = weights * (1.0 - detection_probabilities)
-    all_means[:size], all_covariances[:size] = means, covariances
-    parents[:size], sources[:size] = np.arange(size), -1
-    all_weights[size:] = pair_weights
-    all_means[size:], all_covariances[size:] = new_means, new_covariances
-    parents[size:], sources[size:] = parent, measured
+    # row by row: by slices it takes longer, as to compile
+    for k in range(size + pairs):
+        pair = k - size
+        if k < size:
+            all_weights[k] = weights[k] * (1.0 - detection_probabilities[k])
+            parents[k], sources[k] = k, -1
+        else:
+            all_weights[k] = pair_weights[pair]
+            parents[k], sources[k] = parent[pair], measured[pair]
+        for a in range(dimension):
+            all_means[k, a] = means[k, a] if k < size else new_means[pair, a]
+            for b in range(dimension):
+                all_covariances[k, a, b] = (
+                    covariances[k, a, b] if k < size else new_covariances[pair, a, b]
+                )
     return all_weights, all_means, all_covariances, parents, sources, log_odds, sums

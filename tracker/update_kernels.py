@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy import ndarray
 
+from tracker.gating_kernels import factor_innovation, gated_pairs
 from tracker.kernels import _kernel
 
 
@@ -38,133 +40,169 @@ class Alternative(NamedTuple):
 
 
 @_kernel
-def _widest_axis(values: ndarray, reach: ndarray) -> int:
-    """The axis along which values (N, d) lie furthest apart, measured by the mean reach (J, d)."""
-    best = 0
-    most = -1.0
-    for a in range(values.shape[1]):
-        low = math.inf
-        high = -math.inf
-        total = 0.0
-        for i in range(values.shape[0]):
-            low = min(low, values[i, a])
-            high = max(high, values[i, a])
-        for i in range(reach.shape[0]):
-            total += reach[i, a]
-        width = (high - low) / max(total, 1e-300)
-        if width > most:
-            most = width
-            best = a
-    return best
+def _innovations(
+    covariances: ndarray,
+    jacobians: ndarray,
+    spreads: ndarray,
+    axes: Sequence[int],
+    rows: Sequence[int],
+) -> tuple[ndarray, ndarray]:
+    """P Hᵀ (J, d, m) and H P Hᵀ + Ω (J, m, m), what a component adds to the noise.
+
+    Args:
+        axes: Of the state: a range, or, so that loops are unrolled, a tuple of as many.
+        rows: Of the measurement, likewise.
+    """
+    size = len(covariances)
+    ph = np.empty((size, len(axes), len(rows)))
+    own = np.empty((size, len(rows), len(rows)))
+    for j in range(size):
+        h = 0 if len(jacobians) == 1 else j
+        for a in range(len(axes)):
+            for p in range(len(rows)):
+                total = 0.0
+                for b in range(len(axes)):
+                    total += covariances[j, a, b] * jacobians[h, p, b]
+                ph[j, a, p] = total
+        for p in range(len(rows)):
+            for q in range(len(rows)):
+                total = spreads[j, p, q] if len(spreads) else 0.0
+                for a in range(len(axes)):
+                    total += jacobians[h, p, a] * ph[j, a, q]
+                own[j, p, q] = total
+    return ph, own
 
 
 @_kernel
-def _factor(own: ndarray, j: int, noises: ndarray, n: int, lower: ndarray, place: int) -> float:
-    """Cholesky factor of S = own + R into ``lower[place]``; log of 1 / √det(2π S)."""
-    order = own.shape[1]
-    constant: float = -0.5 * order * math.log(2.0 * math.pi)
-    for p in range(order):
-        for q in range(p + 1):
-            total = own[j, p, q] + noises[n, p, q]
-            for r in range(q):
-                total -= lower[place, p, r] * lower[place, q, r]
-            if p == q:
-                if not total > 0.0:
-                    raise np.linalg.LinAlgError("H P H' + R is not positive definite")
-                lower[place, p, p] = math.sqrt(total)
-                constant -= math.log(lower[place, p, p])
-            else:
-                lower[place, p, q] = total / lower[place, q, q]
-    return constant
+def _gain(
+    j: int,
+    n: int,
+    ph: ndarray,
+    lower: ndarray,
+    factored: int,
+    covariances: ndarray,
+    jacobians: ndarray,
+    noises: ndarray,
+    spreads: ndarray,
+    gains: ndarray,
+    updated: ndarray,
+    place: int,
+    work: tuple[ndarray, ndarray, ndarray, ndarray],
+    axes: Sequence[int],
+    rows: Sequence[int],
+) -> None:
+    """K into ``gains[place]`` and (I − K H) P (I − K H)ᵀ + K R Kᵀ into ``updated[place]``.
+
+    Args:
+        j: The component.
+        n: The noise.
+        factored: Where the factor of S is in ``lower``.
+        work: (m, m), twice (d, d), and (d, m), to write in.
+        axes: As ``rows``, of :func:`_innovations`.
+    """
+    noise, factor, half, noisy = work
+    h = 0 if len(jacobians) == 1 else j
+    for p in range(len(rows)):
+        for q in range(len(rows)):
+            noise[p, q] = noises[n, p, q]
+            if len(spreads):
+                noise[p, q] += spreads[j, p, q]
+    # K = P Hᵀ S⁻¹, row by row through the factor
+    for a in range(len(axes)):
+        for p in range(len(rows)):
+            total = ph[j, a, p]
+            for r in range(p):
+                total -= lower[factored, p, r] * gains[place, a, r]
+            gains[place, a, p] = total * lower[factored, p, p]
+        for p in range(len(rows) - 1, -1, -1):
+            total = gains[place, a, p]
+            for r in range(p + 1, len(rows)):
+                total -= lower[factored, r, p] * gains[place, a, r]
+            gains[place, a, p] = total * lower[factored, p, p]
+    for a in range(len(axes)):
+        for b in range(len(axes)):
+            total = 1.0 if a == b else 0.0
+            for p in range(len(rows)):
+                total -= gains[place, a, p] * jacobians[h, p, b]
+            factor[a, b] = total
+        for p in range(len(rows)):
+            total = 0.0
+            for q in range(len(rows)):
+                total += gains[place, a, q] * noise[q, p]
+            noisy[a, p] = total
+    for a in range(len(axes)):
+        for b in range(len(axes)):
+            total = 0.0
+            for c in range(len(axes)):
+                total += factor[a, c] * covariances[j, c, b]
+            half[a, b] = total
+    for a in range(len(axes)):
+        for b in range(a + 1):
+            total = 0.0
+            for c in range(len(axes)):
+                total += half[a, c] * factor[b, c]
+            for p in range(len(rows)):
+                total += noisy[a, p] * gains[place, b, p]
+            updated[place, a, b] = total
+            updated[place, b, a] = total
 
 
 @_kernel
-def _gated_pairs(
+def _updated(
+    component: ndarray,
+    measured: ndarray,
+    ph: ndarray,
+    own: ndarray,
+    lower: ndarray,
+    means: ndarray,
+    covariances: ndarray,
     expected: ndarray,
+    jacobians: ndarray,
     measurements: ndarray,
     noises: ndarray,
-    own: ndarray,
-    gate: float,
-    lower: ndarray,
-    constants: ndarray,
-) -> tuple[ndarray, ndarray, ndarray]:
-    """Component, measurement and log-likelihood of each pair inside its gate.
-
-    What lies within the gate of S lies within √(gate S_pp) along every axis p: only such
-    measurements are looked at, found by bisection along one axis. The result is that of
-    looking at all.
-    """
-    size, order = expected.shape
-    count = len(measurements)
-    if size == 0 or count == 0:
-        nothing = np.empty(0, dtype=np.int64)
-        return nothing, nothing, np.empty(0)
-    shared = noises.shape[0] == 1
-    reach = np.empty((size, order))
-    for p in range(order):
-        noise = noises[:, p, p].max()
-        for j in range(size):
-            if not own[j, p, p] + noise > 0.0:
-                raise np.linalg.LinAlgError("H P H' + R is not positive definite")
-            # a little more than the bound, so that rounding excludes nothing
-            reach[j, p] = math.sqrt(gate * (own[j, p, p] + noise)) * (1.0 + 1e-9)
-    axis = _widest_axis(measurements, reach)
-    by_axis = np.argsort(measurements[:, axis])
-    coordinates = measurements[:, axis][by_axis]
-
-    capacity = 4 * (size + count)
-    component = np.empty(capacity, dtype=np.int64)
-    measured = np.empty(capacity, dtype=np.int64)
-    likelihood = np.empty(capacity)
-    solved = np.empty(order)
-    pairs = 0
-    for j in range(size):
-        if shared:
-            constants[j] = _factor(own, j, noises, 0, lower, j)
-        first = np.searchsorted(coordinates, expected[j, axis] - reach[j, axis])
-        last = expected[j, axis] + reach[j, axis]
-        for k in range(first, count):
-            if coordinates[k] > last:
-                break
-            z = by_axis[k]
-            near = True
-            for p in range(order):
-                if abs(measurements[z, p] - expected[j, p]) > reach[j, p]:
-                    near = False
-            if not near:
-                continue
-            place = j if shared else 0
-            constant = constants[j] if shared else _factor(own, j, noises, z, lower, 0)
-            distance = 0.0
-            for p in range(order):
-                total = measurements[z, p] - expected[j, p]
-                for r in range(p):
-                    total -= lower[place, p, r] * solved[r]
-                solved[p] = total / lower[place, p, p]
-                distance += solved[p] * solved[p]
-            if not distance <= gate or distance == math.inf:
-                continue
-            if pairs == capacity:
-                component = np.concatenate((component, np.empty_like(component)))
-                measured = np.concatenate((measured, np.empty_like(measured)))
-                likelihood = np.concatenate((likelihood, np.empty_like(likelihood)))
-                capacity *= 2
-            component[pairs] = j
-            measured[pairs] = z
-            likelihood[pairs] = constant - 0.5 * distance
-            pairs += 1
-
-    # measurement by measurement
-    place_of = np.zeros(count + 1, dtype=np.int64)
+    spreads: ndarray,
+    axes: Sequence[int],
+    rows: Sequence[int],
+) -> tuple[ndarray, ndarray]:
+    """Means (P, d) and covariances (P, d, d) of pairs."""
+    pairs = len(component)
+    dimension = len(axes)
+    new_means = np.empty((pairs, dimension))
+    new_covariances = np.empty((pairs, dimension, dimension))
+    # with one noise for all, the pairs of a component share gain and covariance
+    shared = len(noises) == 1
+    known = np.zeros(len(means), dtype=np.bool_)
+    known[component] = True
+    filtered = np.flatnonzero(known) if shared else component
+    places = len(means) if shared else pairs
+    gains = np.empty((places, dimension, len(rows)))
+    updated = np.empty((places, dimension, dimension))
+    work = (
+        np.empty((len(rows), len(rows))),
+        np.empty((dimension, dimension)),
+        np.empty((dimension, dimension)),
+        np.empty((dimension, len(rows))),
+    )
+    for k in range(len(filtered)):
+        j = filtered[k]
+        n, place, factored = (0, j, j) if shared else (measured[k], k, 0)
+        if not shared:
+            factor_innovation(own, j, noises, n, lower, factored, rows)
+        _gain(
+            j, n, ph, lower, factored, covariances, jacobians, noises, spreads,
+            gains, updated, place, work, axes, rows,
+        )  # fmt: skip
     for pair in range(pairs):
-        place_of[measured[pair] + 1] += 1
-    for z in range(count):
-        place_of[z + 1] += place_of[z]
-    order_of = np.empty(pairs, dtype=np.int64)
-    for pair in range(pairs):
-        order_of[place_of[measured[pair]]] = pair
-        place_of[measured[pair]] += 1
-    return component[order_of], measured[order_of], likelihood[order_of]
+        j, z = component[pair], measured[pair]
+        place = j if shared else pair
+        for a in range(len(axes)):
+            total = means[j, a]
+            for p in range(len(rows)):
+                total += gains[place, a, p] * (measurements[z, p] - expected[j, p])
+            new_means[pair, a] = total
+            for b in range(len(axes)):
+                new_covariances[pair, a, b] = updated[place, a, b]
+    return new_means, new_covariances
 
 
 @_kernel
@@ -184,7 +222,7 @@ def kalman_pairs(
         means: (J, d).
         covariances: (J, d, d).
         expected: (J, m), the measurement each component predicts.
-        jacobians: (J, m, d), its derivative H.
+        jacobians: (J, m, d), its derivative H, or (1, m, d), one for all.
         measurements: (M, m).
         noises: (1, m, m) for all, or (M, m, m).
         spreads: (J, m, m), what a component adds to the noise, or (0, m, m) for nothing.
@@ -198,95 +236,25 @@ def kalman_pairs(
     Raises:
         numpy.linalg.LinAlgError: If the covariance of an innovation is not positive definite.
     """
-    size, dimension = means.shape
-    order = measurements.shape[1]
-    shared = noises.shape[0] == 1
-    spread = spreads.shape[0] > 0
-    ph = np.empty((size, dimension, order))
-    own = np.empty((size, order, order))
-    for j in range(size):
-        for a in range(dimension):
-            for p in range(order):
-                total = 0.0
-                for b in range(dimension):
-                    total += covariances[j, a, b] * jacobians[j, p, b]
-                ph[j, a, p] = total
-        for p in range(order):
-            for q in range(order):
-                total = spreads[j, p, q] if spread else 0.0
-                for a in range(dimension):
-                    total += jacobians[j, p, a] * ph[j, a, q]
-                own[j, p, q] = total
-    lower = np.empty((size if shared else 1, order, order))
-    constants = np.empty(size)
-    component, measured, likelihood = _gated_pairs(
-        expected, measurements, noises, own, gate, lower, constants
-    )
-
-    pairs = len(component)
-    new_means = np.empty((pairs, dimension))
-    new_covariances = np.empty((pairs, dimension, dimension))
-    gains = np.empty((size if shared else 1, dimension, order))
-    updated = np.empty((size if shared else 1, dimension, dimension))
-    has_gain = np.zeros(size, dtype=np.bool_)
-    factor = np.empty((dimension, dimension))
-    half = np.empty((dimension, dimension))
-    noise = np.empty((order, order))
-    solved = np.empty(order)
-    for pair in range(pairs):
-        j = component[pair]
-        z = measured[pair]
-        place = j if shared else 0
-        if not (shared and has_gain[j]):
-            has_gain[j] = True
-            n = 0 if shared else z
-            if not shared:
-                _factor(own, j, noises, n, lower, 0)
-            for p in range(order):
-                for q in range(order):
-                    noise[p, q] = noises[n, p, q] + (spreads[j, p, q] if spread else 0.0)
-            # K = P Hᵀ S⁻¹, row by row through the factor
-            for a in range(dimension):
-                for p in range(order):
-                    total = ph[j, a, p]
-                    for r in range(p):
-                        total -= lower[place, p, r] * solved[r]
-                    solved[p] = total / lower[place, p, p]
-                for p in range(order - 1, -1, -1):
-                    total = solved[p]
-                    for r in range(p + 1, order):
-                        total -= lower[place, r, p] * gains[place, a, r]
-                    gains[place, a, p] = total / lower[place, p, p]
-            # P = (I - K H) P (I - K H)ᵀ + K R Kᵀ
-            for a in range(dimension):
-                for b in range(dimension):
-                    total = 1.0 if a == b else 0.0
-                    for p in range(order):
-                        total -= gains[place, a, p] * jacobians[j, p, b]
-                    factor[a, b] = total
-            for a in range(dimension):
-                for b in range(dimension):
-                    total = 0.0
-                    for c in range(dimension):
-                        total += factor[a, c] * covariances[j, c, b]
-                    half[a, b] = total
-            for a in range(dimension):
-                for b in range(a + 1):
-                    total = 0.0
-                    for c in range(dimension):
-                        total += half[a, c] * factor[b, c]
-                    for p in range(order):
-                        for q in range(order):
-                            total += gains[place, a, p] * noise[p, q] * gains[place, b, q]
-                    updated[place, a, b] = total
-                    updated[place, b, a] = total
-        for a in range(dimension):
-            total = means[j, a]
-            for p in range(order):
-                total += gains[place, a, p] * (measurements[z, p] - expected[j, p])
-            new_means[pair, a] = total
-            for b in range(dimension):
-                new_covariances[pair, a, b] = updated[place, a, b]
+    dimension, order = means.shape[1], measurements.shape[1]
+    # places in the plane and velocities are so frequent that their loops are unrolled
+    plane = dimension == 4 and order == 2
+    if plane:
+        ph, own = _innovations(covariances, jacobians, spreads, (0, 1, 2, 3), (0, 1))
+    else:
+        ph, own = _innovations(covariances, jacobians, spreads, range(dimension), range(order))
+    lower = np.empty((len(means) if len(noises) == 1 else 1, order, order))
+    component, measured, likelihood = gated_pairs(expected, measurements, noises, own, gate, lower)
+    if plane:
+        new_means, new_covariances = _updated(
+            component, measured, ph, own, lower, means, covariances, expected, jacobians,
+            measurements, noises, spreads, (0, 1, 2, 3), (0, 1),
+        )  # fmt: skip
+    else:
+        new_means, new_covariances = _updated(
+            component, measured, ph, own, lower, means, covariances, expected, jacobians,
+            measurements, noises, spreads, range(dimension), range(order),
+        )  # fmt: skip
     return component, measured, likelihood, new_means, new_covariances
 
 

@@ -19,7 +19,7 @@ from tests.engine.mixtures import (
     second_moment,
 )
 from tracker import gaussian_mixture as gm
-from tracker import mixture_kernels
+from tracker import merging_kernels, mixture_kernels
 from tracker.gaussian_mixture import GaussianMixture
 
 thresholds = st.sampled_from((0.0, 0.5, 4.0, 50.0, 1e6))
@@ -58,7 +58,7 @@ def test_leaders_are_the_heaviest_of_their_groups(
 ) -> None:
     order = np.argsort(-mixture.weights, kind="stable")
     nobody = np.full(mixture.size, -1)
-    group, leaders = mixture_kernels.merge_groups(
+    group, leaders = merging_kernels.merge_groups(
         mixture.means, mixture.covariances, order, nobody, threshold
     )
     _, reference_leaders, members = reference_merge(mixture, threshold)
@@ -228,7 +228,15 @@ def test_the_heaviest_come_first_and_equal_ones_in_order(size: int) -> None:
         assert_array_equal(order, np.argsort(-weights, kind="stable"))
 
 
+def test_weights_that_differ_in_their_last_bits_only_are_sorted_too() -> None:
+    rng = np.random.default_rng(0)
+    close = 1.0 + 1e-13 * rng.random(2000)
+    for weights in (close, np.append(close, 0.0)):  # with the zero the upper bits all agree
+        order = mixture_kernels.heaviest_first(weights)
+        assert_array_equal(order, np.argsort(-weights, kind="stable"))
+
+
 def test_the_heaviest_of_each_group_and_of_equal_ones_the_last() -> None:
-    weights = np.array([0.2, 0.7, 0.7, 0.1, 0.0])
-    group = np.array([0, 2, 2, 0, 3])
+    weights = np.array([0.2, 0.7, 0.7, 0.1, 0.0, 0.9])
+    group = np.array([0, 2, 2, 0, 3, -1])
     assert_array_equal(mixture_kernels.heaviest_of_groups(weights, group, 5), [0, -1, 2, 4, -1])

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.benchmarks import scenario as scene
 from tests.engine import plain_phd
 from tests.engine.mixtures import random_covariances, random_mixture
-from tracker import gaussian_mixture, mixture_kernels, phd, update_kernels
+from tracker import gaussian_mixture, merging_kernels, phd, update_kernels
 from tracker.gaussian_mixture import GaussianMixture
 
 
@@ -60,12 +60,52 @@ def test_merging_groups_as_if_all_pairs_were_looked_at(
     owners = np.random.default_rng(seed).integers(-1, 3, size)
     order = np.argsort(-mixture.weights, kind="stable")
     for whose in (np.full(size, -1), owners):
-        group, leaders = mixture_kernels.merge_groups(
+        group, leaders = merging_kernels.merge_groups(
             mixture.means, mixture.covariances, order, whose, threshold
         )
         expected, first = groups_of_all(mixture, threshold, whose)
         assert_array_equal(group, expected)
         assert leaders.tolist() == first
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.sampled_from((2, 4)))
+def test_reducing_is_pruning_merging_and_capping(seed: int, size: int, dimension: int) -> None:
+    mixture = crowd(seed, size, dimension)
+    owners = np.random.default_rng(seed).integers(-1, 3, size)
+    reduced, leaders = gaussian_mixture.reduce(
+        mixture, pruning_threshold=0.3, merging_threshold=4.0, max_components=5, owners=owners
+    )
+    kept = np.flatnonzero(mixture.weights >= 0.3)
+    merged, first = gaussian_mixture.merge(mixture.take(kept), 4.0, owners[kept])
+    chosen = np.argsort(-merged.weights, kind="stable")[:5]
+    part = merged.take(chosen)
+    assert_array_equal(leaders, kept[first[chosen]])
+    assert_array_equal(reduced.labels, part.labels)
+    assert_allclose(reduced.cardinality, merged.cardinality, rtol=1e-12)
+    if part.size:
+        ratios = reduced.weights / part.weights
+        assert_allclose(ratios, ratios[0], rtol=1e-12)
+    assert_allclose(reduced.means, part.means, rtol=1e-12, atol=1e-12)
+    assert_allclose(reduced.covariances, part.covariances, rtol=1e-12, atol=1e-12)
+
+
+def test_one_jacobian_for_all_is_as_good_as_one_each() -> None:
+    mixture = crowd(5, 30, 4)
+    settings = {
+        "expected": mixture.means[:, [0, 2]],
+        "noise": scene.NOISE[None],
+        # some are out of sight, so that the others are picked out
+        "detection_probability": np.where(np.arange(30) % 3 == 0, 0.0, 0.9),
+        "clutter_intensity": 1e-3,
+    }
+    measurements = mixture.means[:8, [0, 2]] + 0.5
+    each = np.tile(scene.POSITION, (30, 1, 1))
+    one = phd.update(mixture, measurements, jacobians=scene.POSITION[None], **settings)
+    many = phd.update(mixture, measurements, jacobians=each, **settings)
+    assert one.posterior.size > mixture.size
+    assert_array_equal(one.posterior.weights, many.posterior.weights)
+    assert_array_equal(one.posterior.means, many.posterior.means)
+    assert_array_equal(one.posterior.covariances, many.posterior.covariances)
 
 
 def test_a_few_very_wide_components_are_found_among_many_small_ones() -> None:
@@ -76,7 +116,7 @@ def test_a_few_very_wide_components_are_found_among_many_small_ones() -> None:
     both = gaussian_mixture.concatenate([mixture, wide])
     order = np.argsort(-both.weights, kind="stable")
     nobody = np.full(both.size, -1)
-    found = mixture_kernels.merge_groups(both.means, both.covariances, order, nobody, 4.0)
+    found = merging_kernels.merge_groups(both.means, both.covariances, order, nobody, 4.0)
     expected = groups_of_all(both, 4.0, nobody)
     assert_array_equal(found[0], expected[0])
 

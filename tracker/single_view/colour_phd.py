@@ -119,7 +119,7 @@ class ColourPhd:
             predicted,
             peaks.boxes,
             expected=predicted.means,
-            jacobians=np.broadcast_to(np.eye(4), (predicted.size, 4, 4)),
+            jacobians=np.eye(4)[None],
             noise=noise,
             detection_probability=p.detection_probability,
             clutter_intensity=self._clutter,

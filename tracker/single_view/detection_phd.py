@@ -90,7 +90,7 @@ class DetectionPhd:
             predicted,
             found.boxes[good],
             expected=predicted.means,
-            jacobians=np.tile(np.eye(4), (predicted.size, 1, 1)),
+            jacobians=np.eye(4)[None],
             noise=found.sigmas[good][:, :, None] ** 2 * np.eye(4),
             detection_probability=p.detection_probability,
             clutter_intensity=self._clutter
