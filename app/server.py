@@ -48,6 +48,7 @@ from app.timeline import Timelines
 from app.workbench import Workbench
 from tracker import __version__
 from tracker.folders import settings_folder
+from tracker.pipeline import Cancelled
 from tracker.stage_cache import StageCache
 
 if TYPE_CHECKING:
@@ -173,7 +174,8 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
 def _say_failure(name: str) -> Callable[..., None]:
     def say(future: object) -> None:
         error = future.exception()  # type: ignore[attr-defined]
-        if error is not None:
+        # an opening that another one or the end took over from has not failed
+        if error is not None and not isinstance(error, Cancelled):
             logger.error("%s cannot be opened: %s", name, sentence(error))
 
     return say

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,9 +24,10 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.typing import Origin, Subprotocol
 
 from app import cli
-from app.server import Settings, build_routes, create_app
+from app.server import Settings, _say_failure, build_routes, create_app
 from tests.app.conftest import wait_until
 from tests.app.folders import write_crossing
+from tracker.pipeline import Cancelled
 
 VISER = Subprotocol(f"viser-v{viser.__version__}")
 
@@ -230,3 +232,11 @@ def test_no_route_is_built_while_other_threads_may_warn(monkeypatch: pytest.Monk
         monkeypatch.setattr("warnings.catch_warnings", silenced)
         for path in ("/api/state", "/api/tables/runs", "/openapi.json"):
             assert client.get(path).status_code == 200
+
+
+def test_an_opening_that_the_end_cut_short_is_no_failure(caplog: pytest.LogCaptureFixture) -> None:
+    for error in (Cancelled("the end"), ValueError("no such folder")):
+        future: Future[None] = Future()
+        future.add_done_callback(_say_failure("crossing"))
+        future.set_exception(error)
+    assert [r.getMessage() for r in caplog.records] == ["crossing cannot be opened: no such folder"]
