@@ -46,13 +46,10 @@ def main(arguments: list[str] | None = None) -> int:
     except ParameterError as error:
         say(str(error))
         return USAGE
-    except KeyboardInterrupt:
-        say("interrupted; nothing was written")
-        return INTERRUPTED
     except BrokenPipeError:  # whoever read our output has enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except Exception as error:
+    except (Exception, KeyboardInterrupt) as error:
         if _is_interruption(error):
             say("interrupted; nothing was written")
             return INTERRUPTED
@@ -94,7 +91,7 @@ def _is_interruption(error: BaseException | None) -> bool:
     return error is not None
 
 
-def _sentence(error: Exception) -> str:
+def _sentence(error: BaseException) -> str:
     words = " ".join(str(error).split())
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename}: {error.strerror}" if error.filename else error.strerror

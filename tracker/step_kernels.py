@@ -9,7 +9,7 @@ import numpy as np
 from numpy import ndarray
 
 from tracker.bernoulli_kernels import update_by_camera
-from tracker.kernels import _kernel, doubles
+from tracker.kernels import _kernel, doubles, inside_bounds
 from tracker.measurement_kernels import expected_measurements, measured_boxes
 from tracker.mixture_kernels import heaviest_first, predict
 
@@ -212,16 +212,9 @@ def kept_tracks(
         low: (3,), as ``high``, the corners that a track stays between.
         most: No more than this are kept.
     """
-    alive = np.empty(len(existences), dtype=np.int64)
-    count = 0
-    for i in range(len(existences)):
-        within = existences[i] >= least_existence
-        for axis in range(3):
-            within &= low[axis] <= means[i, axis] <= high[axis]
-        if within:
-            alive[count] = i
-            count += 1
-    order = alive[:count][heaviest_first(existences[alive[:count]])][:most]
+    alive = inside_bounds(means, low, high)
+    alive = alive[existences[alive] >= least_existence]
+    order = alive[heaviest_first(existences[alive])][:most]
     double = doubles(
         means[order], existences[order], labels[order], sources[:, order], near, confirmed
     )

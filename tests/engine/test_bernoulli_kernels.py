@@ -7,25 +7,13 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tests.engine.synthetic import CAMERAS
+from tests.engine.synthetic import CAMERAS, people
 from tracker import bernoulli_kernels, kernels, phd, pmb
 from tracker.fusion.target_model import TargetModel
 from tracker.fusion.visibility import inside_probability, visibility
-from tracker.gaussian_mixture import GaussianMixture
 from tracker.update_kernels import Alternative
 
 CLUTTER, GATE, P_D, NEAR, STRENGTH, TOLD = 1e-6, 30.0, 0.9, 0.3, 0.8, 0.01
-
-
-def people(rng: np.random.Generator, count: int, first_label: int) -> GaussianMixture:
-    """Anywhere in the room, known to some decimetres, of any existence."""
-    places = np.concatenate([rng.uniform(-1.2, 1.2, (count, 2)), np.full((count, 1), 0.9)], axis=1)
-    return GaussianMixture(
-        rng.uniform(0.05, 1.0, count),
-        np.concatenate([places, np.zeros((count, 3))], axis=1),
-        np.tile(np.diag([0.05, 0.05, 0.01, 0.2, 0.2, 0.05]), (count, 1, 1)),
-        first_label + np.arange(count),
-    )
 
 
 @pytest.mark.parametrize("update", ["extended", "unscented"])

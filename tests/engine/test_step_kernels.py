@@ -9,7 +9,7 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tests.engine.synthetic import CAMERAS
+from tests.engine.synthetic import CAMERAS, people
 from tracker import bernoulli_kernels, gaussian_mixture, kernels, step_kernels
 from tracker.camera import stacked
 from tracker.fusion.target_model import TargetModel
@@ -22,17 +22,6 @@ TOLERANCE, ITERATIONS, TOLD, LEAST = 1e-6, 200, 0.01, 1e-4
 FACTOR = 1.3
 TRANSITION = np.eye(6) + 0.1 * np.eye(6, k=3)
 NOISE = np.diag([1e-3, 1e-3, 1e-4, 0.01, 0.01, 1e-3])
-
-
-def people(rng: np.random.Generator, count: int, first_label: int) -> GaussianMixture:
-    """Anywhere in the room, known to some decimetres, of any existence."""
-    places = np.concatenate([rng.uniform(-1.2, 1.2, (count, 2)), np.full((count, 1), 0.9)], axis=1)
-    return GaussianMixture(
-        rng.uniform(0.05, 1.0, count),
-        np.concatenate([places, np.zeros((count, 3))], axis=1),
-        np.tile(np.diag([0.05, 0.05, 0.01, 0.2, 0.2, 0.05]), (count, 1, 1)),
-        first_label + np.arange(count),
-    )
 
 
 def seen(
