@@ -126,12 +126,17 @@ def _asking(group: str) -> tuple[str, ...]:
     return METHODS["fusion_method"] if group == "fusion" else ("multi_bernoulli",)
 
 
-def runs(sequence: Sequence, chosen: list[Combination]) -> Iterator[tuple[Combination, Run]]:
-    """Run them all; those that share stage 1 compute it once."""
+def runs(
+    sequence: Sequence, steps: int, chosen: list[Combination]
+) -> Iterator[tuple[Combination, Run]]:
+    """Run them all over the first steps; those that share stage 1 compute it once."""
     previous: Mapping[str, Run] = {}
     for combination in chosen:
         run = pipeline.compute(
-            sequence, combination.parameters, previous=previous.get(combination.view_name)
+            sequence,
+            combination.parameters,
+            steps=steps,
+            previous=previous.get(combination.view_name),
         )
         previous = {combination.view_name: run}
         yield combination, run

@@ -7,6 +7,7 @@ import hashlib
 import json
 import tempfile
 from collections.abc import Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -45,9 +46,9 @@ def digests(data: Path, only: str = "") -> Iterator[tuple[str, Digests]]:
         if piece.name in WITH_ALTERNATIVES:
             chosen += alternatives(sequence)
         if only in piece.name:
-            yield piece.name, _of_recording(sequence)
+            yield piece.name, _of_recording(sequence, piece.steps)
         chosen = [one for one in chosen if only in f"{piece.name} / {one.name}"]
-        for combination, run in runs(sequence, chosen):
+        for combination, run in runs(sequence, piece.steps, chosen):
             yield f"{piece.name} / {combination.name}", _of_run(run)
 
 
@@ -62,7 +63,7 @@ def _rendered(room: str) -> Digests:
         }
 
 
-def _of_recording(sequence: Sequence) -> Digests:
+def _of_recording(sequence: Sequence, steps: int) -> Digests:
     found: Digests = {
         "truth": digest(sequence.ground_truth),
         "room": digest(sequence.room),
@@ -73,7 +74,9 @@ def _of_recording(sequence: Sequence) -> Digests:
             name = view.camera.name
             found[f"{name} / boxes"] = digest(view.detections)
             if view.has_pictures:
-                found[f"{name} / pictures"] = [short(p) for p in reader.iterate(index)]
+                found[f"{name} / pictures"] = [
+                    short(picture) for picture in islice(reader.iterate(index), steps)
+                ]
     return found
 
 
@@ -87,7 +90,7 @@ def _of_run(run: Run) -> Digests:
         found[f"fusion / {field}"] = values
     for field in _names(run.tracks):
         found[f"tracks / {field}"] = digest(getattr(run.tracks, field))
-    evaluation = evaluate_sequence(run.sequence, run.tracks)
+    evaluation = evaluate_sequence(run.sequence, run.tracks, steps=run.done)
     found["evaluation"] = hashlib.sha256(
         json.dumps(evaluation.to_json(), sort_keys=True).encode()
     ).hexdigest()

@@ -22,34 +22,36 @@ class Piece:
     """Which steps of which recording."""
 
     name: str
-    first: int
-    steps: int
-    long_steps: int
-    """Of the longer form."""
     real: bool
     """Whether it is one of the recordings beside the checkout, else a rendered room."""
+    first: int
+    frames: int
+    """Of the piece: the background is learnt of them, and their templates are known."""
+    steps: int
+    """That are tracked, from the first on."""
+    long_steps: int
+    """That are tracked in the longer form."""
 
-    def open(self, data: Path, *, long: bool = False) -> Sequence:
+    def open(self, data: Path) -> Sequence:
         """The piece as a sequence.
 
         Args:
             data: The folder of the real recordings.
-            long: The longer form.
         """
         sequence = read_sequence(data / self.name) if self.real else open_sequence(self.name)
-        return cut(sequence, self.first, self.long_steps if long else self.steps)
+        return cut(sequence, self.first, self.frames)
 
 
 PIECES: tuple[Piece, ...] = (
-    # each begins where templates of two people are near, and two or more are in the room
-    Piece("room24-2p", 235, 36, 120, real=False),
-    Piece("room35-2p", 1300, 36, 120, real=False),
-    Piece("room44-3p", 555, 60, 150, real=False),
-    Piece("av163-seq30-2p-1101", 72, 60, 150, real=True),
-    Piece("av163-seq45-3p-1111-points", 300, 60, 400, real=True),
-    Piece("cmc1", 60, 50, 150, real=True),
-    Piece("cmc2", 60, 50, 150, real=True),
-    Piece("wildtrack-points-300", 150, 30, 60, real=True),
+    # in the rooms each begins where all are inside and templates of every person follow
+    Piece("room24-2p", False, 200, 800, 40, 200),
+    Piece("room35-2p", False, 270, 800, 40, 200),
+    Piece("room44-3p", False, 360, 800, 40, 200),
+    Piece("av163-seq30-2p-1101", True, 60, 440, 40, 200),
+    Piece("av163-seq45-3p-1111-points", True, 300, 600, 50, 600),
+    Piece("cmc1", True, 60, 201, 50, 201),
+    Piece("cmc2", True, 60, 201, 40, 201),
+    Piece("wildtrack-points-300", True, 150, 100, 24, 100),
 )
 """Every recording at hand."""
 
