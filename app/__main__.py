@@ -2,6 +2,6 @@
 
 import sys
 
-from app.cli import main
+from app.command.main import main
 
 sys.exit(main())

@@ -17,13 +17,13 @@ from tracker.sequences.rendering import (
     render,
 )
 from tracker.sequences.rendering.avi import AviWriter, compress
-from tracker.sequences.rendering.background import Tracer
-from tracker.sequences.rendering.interior import furnish
-from tracker.sequences.rendering.paths import FASTEST, FRAMES_PER_SECOND, walk
+from tracker.sequences.rendering.cast.paths import FASTEST, FRAMES_PER_SECOND, walk
 from tracker.sequences.rendering.raster import floor_shadows
 from tracker.sequences.rendering.rooms import CAMERAS, TARGET_HALF_EXTENTS
 from tracker.sequences.rendering.scene import Scene, script
 from tracker.sequences.rendering.studio import Studio
+from tracker.sequences.rendering.walls.background import Tracer
+from tracker.sequences.rendering.walls.interior import furnish
 
 
 @pytest.fixture(scope="module")

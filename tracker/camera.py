@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from tracker import lens
+from tracker.kernels import lens
 
 NEAREST_DEPTH = 0.05
 """Metres: a point nearer than this in front of the lens counts as behind the camera."""

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
 from numpy import ndarray
 
-from tracker import image_kernels
+from tracker.kernels import images
 
 ColourSpaceName = Literal["hue_saturation", "rgb", "hsi"]
 KernelName = Literal["epanechnikov", "flat"]
@@ -55,7 +55,7 @@ def bin_map(picture: UInt8[ndarray, "h w 3"], space: ColourSpaceName) -> UInt16[
         return bins
     if space == "hue_saturation":
         hsv = cv2.cvtColor(picture, cv2.COLOR_BGR2HSV)
-        bins = image_kernels.hue_saturation_bins(hsv, LEAST_SATURATION, LEAST_VALUE)
+        bins = images.hue_saturation_bins(hsv, LEAST_SATURATION, LEAST_VALUE)
         return bins
     if space == "hsi":
         fives: ndarray = (picture >> 3).astype(np.uint16)
@@ -158,7 +158,7 @@ class ColourModel:
                 wholly outside, D is 1.
         """
         boxes = np.ascontiguousarray(boxes, dtype=float)
-        nearest: ndarray = image_kernels.template_distances(
+        nearest: ndarray = images.template_distances(
             bins, boxes, self.roots, self.owners, self.kernel == "epanechnikov", LONGEST_SIDE
         )
         return nearest
@@ -176,7 +176,7 @@ def histograms(
     inscribed in the box ([CRM03]): the middle counts, the corners do not.
     """
     boxes = np.ascontiguousarray(boxes, dtype=float)
-    result: ndarray = image_kernels.box_histograms(
+    result: ndarray = images.box_histograms(
         bins, boxes, BINS[space], kernel == "epanechnikov", LONGEST_SIDE
     )
     return result

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker import image_kernels
+from tracker.kernels import images
 
 ITERATIONS = 30
 """Steps after which a climb ends; most end after five to ten."""
@@ -38,7 +38,7 @@ def starts(
     if not spread:
         chosen = order[:most]
         return chosen[weights[chosen] > 0.0]
-    indices: ndarray = image_kernels.spread_starts(boxes, weights, order, most)
+    indices: ndarray = images.spread_starts(boxes, weights, order, most)
     return indices
 
 
@@ -67,7 +67,7 @@ def modes(
         The modes, densest first, and their densities. None for an empty sample, and
         none from a start that no sample is near to.
     """
-    found, densities = image_kernels.mean_shift(
+    found, densities = images.mean_shift(
         np.ascontiguousarray(boxes, dtype=float),
         np.ascontiguousarray(weights, dtype=float),
         np.ascontiguousarray(start_boxes, dtype=float),
@@ -76,5 +76,5 @@ def modes(
         TOLERANCE,
     )
     order = np.argsort(-densities, kind="stable")
-    kept = image_kernels.keep_apart(found, densities, order, merge_distance)
+    kept = images.keep_apart(found, densities, order, merge_distance)
     return found.take(kept, 0), densities.take(kept)

@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker import particle_kernels
+from tracker.kernels import particles
 
 ITERATIONS = 30
 """Steps after which a climb ends; most end after five."""
@@ -124,11 +124,11 @@ def clusters(
         No modes for no particles.
     """
     weights = np.ascontiguousarray(counts, dtype=float)
-    points, densities = particle_kernels.epanechnikov_climb(
+    points, densities = particles.epanechnikov_climb(
         np.ascontiguousarray(boxes, dtype=float), weights, groups, bandwidth, ITERATIONS, TOLERANCE
     )
     order = np.argsort(-densities, kind="stable")
-    owners, leaders = particle_kernels.join_modes(points, weights, order, merge_distance)
+    owners, leaders = particles.join_modes(points, weights, order, merge_distance)
     there = owners >= 0
     sums = np.bincount(owners[there], weights[there], minlength=len(leaders))
     by_size = np.argsort(-sums, kind="stable")

@@ -9,11 +9,11 @@ from contextlib import ExitStack
 from tracker import fusion
 from tracker import trajectories as tracks_stage
 from tracker.parameters import RunParameters, Stage
-from tracker.run import Cancelled, Progress, Run, stage_keys
+from tracker.runs.run import Cancelled, Progress, Run, stage_keys
+from tracker.runs.single_views import Cancel, SingleViews
+from tracker.runs.stage_cache import FusionColumn, StageCache, ViewColumn
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
-from tracker.single_views import Cancel, SingleViews
-from tracker.stage_cache import FusionColumn, StageCache, ViewColumn
 from tracker.trajectories import Trajectories
 
 __all__ = [

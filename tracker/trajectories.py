@@ -10,9 +10,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker import gaussian_mixture, kernels, mixture_kernels
+from tracker.filters import gaussian_mixture
+from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.protocol import FusionResult
-from tracker.gaussian_mixture import GaussianMixture
+from tracker.kernels import linear_algebra
+from tracker.kernels.intensity import mixture as mixture_kernels
 from tracker.sequences.sequence import Room
 
 Rule = Literal["components", "boxes"]
@@ -162,7 +164,7 @@ def by_boxes(result: FusionResult) -> tuple[GaussianMixture, Int[ndarray, " K"]]
     group[rest] = count + np.arange(len(rest))
     count += len(rest)
     leaders = mixture_kernels.heaviest_of_groups(posterior.weights, group, count)
-    weights, means, covariances = kernels.merge_moments(
+    weights, means, covariances = linear_algebra.merge_moments(
         posterior.weights, posterior.means, posterior.covariances, group, count
     )
     return GaussianMixture(weights, means, covariances, posterior.labels.take(leaders)), leaders

@@ -21,8 +21,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from tracker import compilation, pipeline
+from tracker import pipeline
 from tracker.camera import Camera
+from tracker.kernels import compilation
 from tracker.parameters import METHODS, PRESETS, RunParameters, with_values
 from tracker.sequences.sequence import Detections, Entrance, Room, Sequence, Template, View
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Literal
 
 from app.models.base import Model, Vector
-from app.snapshot import RunPhase
+from app.state.snapshot import RunPhase
 
 
 class EntranceInfo(Model):

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app import cli
-from app.server import Settings, create_app
+from app.command import main as cli
+from app.web.server import Settings, create_app
 from tests.app.folders import write_crossing
 from tests.synthetic import write_sequence
 

@@ -25,8 +25,9 @@ from tests.benchmarks.scenario import (
     Scenario,
 )
 from tests.engine import plain_phd
-from tracker import gaussian_mixture, kernels, phd, pmb
-from tracker.gaussian_mixture import GaussianMixture
+from tracker.filters import gaussian_mixture, phd, pmb
+from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.kernels import linear_algebra
 
 GATE = float(chi2.ppf(0.9999, df=2))
 """Squared Mahalanobis distance: a target's own measurement lies inside with this probability."""
@@ -179,7 +180,7 @@ class Labelled:
         place = np.full(count, -1)
         place[born] = np.arange(len(born))
         pairs = size + np.flatnonzero(place[new.measurements[size:]] >= 0)
-        _, means, covariances = kernels.merge_moments(
+        _, means, covariances = linear_algebra.merge_moments(
             new.posterior.weights[pairs],
             new.posterior.means[pairs],
             new.posterior.covariances[pairs],

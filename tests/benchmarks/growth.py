@@ -13,8 +13,9 @@ import numpy as np
 from tests.benchmarks.measure import Measurement, seconds
 from tests.engine import synthetic
 from tests.engine.mixtures import random_mixture
-from tracker import gaussian_mixture, pipeline
+from tracker import pipeline
 from tracker.camera import Camera
+from tracker.filters import gaussian_mixture
 from tracker.parameters import RunParameters, with_values
 
 PEOPLE = RunParameters(single_view="none", fusion_method="multi_bernoulli")

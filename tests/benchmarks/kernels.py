@@ -7,9 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from tests.benchmarks.measure import Measurement, ratio, seconds
+from tests.engine.filters.test_particles import reference_climb
 from tests.engine.mixtures import random_mixture, reference_merge, reference_update
-from tests.engine.test_particles import reference_climb
-from tracker import colour, gaussian_mixture, particles, phd
+from tracker import colour, particles
+from tracker.filters import gaussian_mixture, phd
 
 
 def run(short: bool) -> Iterator[Measurement]:

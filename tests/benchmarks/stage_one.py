@@ -14,14 +14,14 @@ from typing import Any
 import httpx2
 from websockets.sync.client import connect
 
-from app.jobs import Jobs
-from app.workbench import Workbench
+from app.state.jobs import Jobs
+from app.state.workbench import Workbench
 from tests.benchmarks.measure import Measurement
 from tests.benchmarks.pipeline import DATA
 from tests.browser.serving import Server
 from tests.synthetic import write_sequence
 from tracker import pipeline
-from tracker.run import Run
+from tracker.runs.run import Run
 
 P_D = "colour_phd.detection_probability"
 

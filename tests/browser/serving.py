@@ -13,7 +13,7 @@ from pathlib import Path
 
 import httpx2
 
-from tracker.compilation import kernel_folder
+from tracker.kernels.compilation import kernel_folder
 
 
 class Server:

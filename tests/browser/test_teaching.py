@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from app import scene_geometry
-from app.scene import _margin_around
+from app.scene import geometry
+from app.scene.scene import _margin_around
 from tests.browser.conftest import Server
 from tests.browser.test_main_job import readout, until, viser
 from tracker import pipeline
 from tracker.export import read_tracks_csv
 from tracker.sequences.reader import FILE, read_sequence
-from tracker.sequences.teaching import taught_values, with_taught
+from tracker.sequences.writing.teaching import taught_values, with_taught
 
 
 def drag(page: Page, begin: tuple[float, float], end: tuple[float, float], pause: int = 0) -> None:
@@ -132,7 +132,7 @@ def test_a_face_is_dragged_in_3d_saved_and_reopened(page: Page, server: Server) 
     place = canvas.bounding_box()
     assert place is not None
     room = read_sequence(Path(server.folder)).room
-    pose = scene_geometry.from_above(_margin_around(room), place["width"] / place["height"])
+    pose = geometry.from_above(_margin_around(room), place["width"] / place["height"])
     focal = place["height"] / 2.0 / np.tan(pose.fov / 2.0)
 
     def on_screen(point: list[float]) -> tuple[float, float]:

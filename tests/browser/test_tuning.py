@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from playwright.sync_api import Page, expect
 
-from app.markup import number
+from app.web.tables.markup import number
 from tests.browser.looking import as_at_first, ask
 from tests.browser.serving import Server
 from tracker import pipeline

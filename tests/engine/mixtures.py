@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy import ndarray
 
-from tracker.gaussian_mixture import GaussianMixture
+from tracker.filters.gaussian_mixture import GaussianMixture
 
 
 def random_covariances(rng: np.random.Generator, count: int, dimension: int) -> ndarray:

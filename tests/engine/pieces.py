@@ -9,9 +9,9 @@ from numpy import ndarray
 
 from tracker.blobs import Blobs, blobs
 from tracker.parameters import AssociationMatrixParams
-from tracker.single_view.following import object_histograms
-from tracker.single_view.handing_over import advance
-from tracker.single_view.moving_objects import Situation
+from tracker.single_view.association_matrix.following import object_histograms
+from tracker.single_view.association_matrix.handing_over import advance
+from tracker.single_view.association_matrix.moving_objects import Situation
 from tracker.single_view.protocol import ViewEvent
 
 SIZE = (80, 200)

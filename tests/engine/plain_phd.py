@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy import ndarray
 
-from tracker.gaussian_mixture import GaussianMixture
+from tracker.filters.gaussian_mixture import GaussianMixture
 
 
 def predict(
@@ -172,7 +172,7 @@ def extract_measured(
     threshold: float,
     spare: float,
 ) -> list[tuple[float, ndarray]]:
-    """Each reported target's weight and mean; see :func:`tracker.phd.extract_measured`."""
+    """Each reported target's weight and mean; see :func:`tracker.filters.phd.extract_measured`."""
     pairs = np.flatnonzero(measured >= 0)
     parent, z = parents[pairs], measured[pairs]
     weights, means = posterior.weights[pairs], posterior.means[pairs]

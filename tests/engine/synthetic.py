@@ -9,7 +9,7 @@ import numpy as np
 from numpy import ndarray
 
 from tracker.camera import Camera
-from tracker.gaussian_mixture import GaussianMixture
+from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.sequences.sequence import Detections, Entrance, GroundTruth, Room, Sequence, View
 from tracker.single_view.protocol import ViewResult
 

@@ -9,7 +9,7 @@ import pytest
 
 from tracker.experiments import EXPERIMENTS, Context, association
 from tracker.experiments.association import DEFAULTS, ONE_OBJECT, PUBLISHED, compare
-from tracker.experiments.association_clips import (
+from tracker.experiments.clips.association import (
     CLIPS,
     FULL_LIGHT,
     SIZE,
@@ -18,14 +18,14 @@ from tracker.experiments.association_clips import (
     together,
     true_mask,
 )
-from tracker.experiments.association_light import (
+from tracker.experiments.clips.clip import Actor, Clip, constant_size, wall
+from tracker.experiments.clips.light import (
     ADAPTIVE,
     ROBUST,
     FixedForeground,
     Light,
     models,
 )
-from tracker.experiments.clips import Actor, Clip, constant_size, wall
 from tracker.parameters import ForegroundParams
 from tracker.single_view.protocol import ViewResult
 

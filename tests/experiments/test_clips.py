@@ -10,7 +10,7 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tracker.experiments.clips import (
+from tracker.experiments.clips.clip import (
     Actor,
     Clip,
     constant_size,

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from app import cli
+from app.command import main as cli
 from tests.conftest import DATA
 from tracker.experiments import EXPERIMENTS, Context, Experiment, Finding, Result, Unavailable
 

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tracker.experiments import EXPERIMENTS, Experiment, Result, cameras, fig1, fig3, sequences
-from tracker.experiments.writing import write
+from tracker.experiments import EXPERIMENTS, Experiment, Result, cameras, fig1, fig3
+from tracker.experiments.laboratory import sequences
+from tracker.experiments.laboratory.writing import write
 
 NONE = float("nan")
 
@@ -129,7 +130,7 @@ def result(**more: Any) -> Result:
 
 def test_numbers_and_figure_are_written(experiment: Experiment, tmp_path: Path) -> None:
     def draw() -> Any:
-        from tracker.experiments import drawing
+        from tracker.experiments.laboratory import drawing
 
         figure = drawing.sheet(3.0, 2.0, "title")
         axes = drawing.panels(figure, [["a"]])["a"]

@@ -10,8 +10,9 @@ import pytest
 from tests.app.folders import write_crossing
 from tests.synthetic import write_sequence
 from tracker import pipeline
-from tracker.experiments import Context, Unavailable, runs
-from tracker.experiments.noise import NoisyReader
+from tracker.experiments import Context, Unavailable
+from tracker.experiments.laboratory import runs
+from tracker.experiments.laboratory.noise import NoisyReader
 from tracker.parameters import with_values
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.reader import read_sequence

@@ -14,7 +14,7 @@ import pytest
 
 from tests.experiments import work
 from tracker.experiments import Context
-from tracker.experiments.pool import cores, spread
+from tracker.experiments.laboratory.pool import cores, spread
 from tracker.pipeline import Cancelled
 
 

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from tracker.experiments import EXPERIMENTS, Context, clips, ppf
-from tracker.experiments.clips import Clip
-from tracker.experiments.pool import Desk
+from tracker.experiments import EXPERIMENTS, Context, ppf
+from tracker.experiments.clips import clip as clips
+from tracker.experiments.clips.clip import Clip
+from tracker.experiments.clips.ppf import CLIPS, SHADE
+from tracker.experiments.laboratory.pool import Desk
 from tracker.experiments.ppf import CLASSICAL, PSEUDO, ROBUST, Scene
-from tracker.experiments.ppf_clips import CLIPS, SHADE
 
 NOBODY = Desk(advance=lambda steps: None, cancelled=lambda: False)
 BOX = [50.0, 60.0, 10.0, 14.0]

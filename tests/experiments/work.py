@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tracker import experiments
 from tracker.experiments import Context, Experiment, Result
-from tracker.experiments.pool import Desk, spread
+from tracker.experiments.laboratory.pool import Desk, spread
 
 
 def double(item: int, desk: Desk) -> tuple[int, int]:
@@ -48,7 +48,7 @@ def endless(context: Context) -> Result:
 
 
 if __name__ == "__main__":
-    from app import cli
+    from app.command import main as cli
     from tests.experiments import work  # not __main__, which another process does not find
 
     experiments.EXPERIMENTS["endless"] = Experiment("endless", "It never ends.", work.endless)

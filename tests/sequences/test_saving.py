@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 from tests.synthetic import write_sequence
 from tracker import pipeline
 from tracker.parameters import with_values
-from tracker.sequences import saving
 from tracker.sequences.reader import FILE, read_sequence
-from tracker.sequences.rewriting import rewritten, taught_in
 from tracker.sequences.sequence import Sequence, SequenceError
-from tracker.sequences.teaching import Values, changes, taught_values, with_taught
+from tracker.sequences.writing import saving
+from tracker.sequences.writing.rewriting import rewritten, taught_in
+from tracker.sequences.writing.teaching import Values, changes, taught_values, with_taught
 
 Edit = Callable[[Values], Any]
 

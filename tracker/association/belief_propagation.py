@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker import marginal_kernels
+from tracker.kernels.labelled import marginals as marginal_kernels
 
 TOLERANCE = 1e-6
 """Largest change of a message, relative to the intensity it meets, at which all are settled."""

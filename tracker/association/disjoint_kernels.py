@@ -16,13 +16,13 @@ from __future__ import annotations
 import numpy as np
 from numpy import ndarray
 
-from tracker.kernels import _kernel
+from tracker.kernels.compilation import kernel
 
 CORE = 6
 """Of each row so many of the nearest columns are kept."""
 
 
-@_kernel
+@kernel
 def disjoint_matchings(weights: ndarray, count: int) -> ndarray:
     """Matchings one after the other, each the heaviest without the pairs of those before.
 
@@ -94,7 +94,7 @@ def disjoint_matchings(weights: ndarray, count: int) -> ndarray:
     return found
 
 
-@_kernel
+@kernel
 def _nearest(cost: ndarray, duals: ndarray, columns: ndarray, reduced: ndarray) -> None:
     """The columns of the least reduced cost of one row, nearest first, in place."""
     kept = len(columns)
@@ -113,7 +113,7 @@ def _nearest(cost: ndarray, duals: ndarray, columns: ndarray, reduced: ndarray) 
         columns[place] = j
 
 
-@_kernel
+@kernel
 def _augment(
     cost: ndarray,
     start: int,
@@ -205,7 +205,7 @@ def _augment(
             return
 
 
-@_kernel
+@kernel
 def _push(keys: ndarray, nodes: ndarray, count: int, key: float, node: int) -> int:
     """One more node of a binary heap, least key first, in place; how many there are now."""
     place = count
@@ -219,7 +219,7 @@ def _push(keys: ndarray, nodes: ndarray, count: int, key: float, node: int) -> i
     return count + 1
 
 
-@_kernel
+@kernel
 def _pop(keys: ndarray, nodes: ndarray, count: int) -> int:
     """The heap without its first node, in place; how many there are now."""
     count -= 1

@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numpy import ndarray
 
-from tracker.kernels import _kernel
+from tracker.kernels.compilation import kernel
 
 
-@_kernel
+@kernel
 def augment(
     cost: ndarray,
     start: int,
@@ -88,7 +88,7 @@ def augment(
             return True
 
 
-@_kernel
+@kernel
 def assign(
     cost: ndarray,
     row_duals: ndarray,
@@ -128,7 +128,7 @@ def assign(
     return True
 
 
-@_kernel
+@kernel
 def best_matchings(cost: ndarray, branching: int, count: int) -> ndarray:
     """The cheapest matchings of all rows to all columns that differ in the first rows ([M68]).
 
@@ -207,7 +207,7 @@ def best_matchings(cost: ndarray, branching: int, count: int) -> ndarray:
     return found
 
 
-@_kernel
+@kernel
 def subset_marginals(
     skips: ndarray, pairs: ndarray, rests: ndarray, factors: ndarray
 ) -> tuple[ndarray, ndarray, ndarray, float]:

@@ -5,19 +5,9 @@ One module a claim; its ``EXPERIMENT`` is entered here under its name.
 
 from __future__ import annotations
 
-from tracker.experiments import (
-    association,
-    cameras,
-    cmc,
-    fig1,
-    fig2,
-    fig3,
-    jpda,
-    methods,
-    ppf,
-    sequences,
-)
-from tracker.experiments.experiment import (
+from tracker.experiments import association, cameras, cmc, fig1, fig2, fig3, jpda, methods, ppf
+from tracker.experiments.laboratory import sequences
+from tracker.experiments.laboratory.experiment import (
     Context,
     Experiment,
     Finding,

@@ -15,12 +15,12 @@ from tracker import parameters as table
 from tracker import single_view
 from tracker.evaluation.figures import number
 from tracker.evaluation.matching import assign
-from tracker.experiments import clips
-from tracker.experiments.association_clips import CLIPS, together
-from tracker.experiments.association_light import Light, light_rows, segment
-from tracker.experiments.clips import Clip
-from tracker.experiments.experiment import Context, Experiment, Finding, Result
-from tracker.experiments.pool import Desk, spread
+from tracker.experiments.clips import clip as clips
+from tracker.experiments.clips.association import CLIPS, together
+from tracker.experiments.clips.clip import Clip
+from tracker.experiments.clips.light import Light, light_rows, segment
+from tracker.experiments.laboratory.experiment import Context, Experiment, Finding, Result
+from tracker.experiments.laboratory.pool import Desk, spread
 from tracker.parameters import PRESETS, RunParameters, with_values
 from tracker.pipeline import Cancelled
 from tracker.sequences.frames import FrameReader
@@ -266,7 +266,7 @@ def _draw(
     measured: dict[str, dict[str, dict[str, Any]]],
     light: Light,
 ) -> Figure:
-    from tracker.experiments import drawing
+    from tracker.experiments.laboratory import drawing
 
     figure = drawing.sheet(11.0, 6.4, "Merging and splitting: tracks, ids and thresholds")
     layout = [[PUBLISHED, ONE_OBJECT, "errors"], ["street", "street", "light"]]

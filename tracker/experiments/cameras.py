@@ -12,10 +12,10 @@ import numpy as np
 from tracker import parameters as table
 from tracker.evaluation import EvaluationSettings, evaluate
 from tracker.evaluation.figures import number
-from tracker.experiments import runs
-from tracker.experiments.experiment import Context, Experiment, Finding, Result
 from tracker.experiments.fig3 import parameters_of
-from tracker.experiments.pool import Desk, spread
+from tracker.experiments.laboratory import runs
+from tracker.experiments.laboratory.experiment import Context, Experiment, Finding, Result
+from tracker.experiments.laboratory.pool import Desk, spread
 from tracker.parameters import RunParameters
 from tracker.sequences.reader import read_sequence
 
@@ -143,7 +143,7 @@ def _findings(by_count: dict[int, dict[str, Any]]) -> tuple[Finding, ...]:
 
 
 def _draw(name: str, measured: dict[str, Any], seeds: int) -> Figure:
-    from tracker.experiments import drawing
+    from tracker.experiments.laboratory import drawing
 
     figure = drawing.sheet(
         11.0, 3.9, f"{name}: fused from three, two and one camera, {seeds} seeds"

@@ -9,8 +9,14 @@ from tracker import fusion, pipeline
 from tracker import parameters as table
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.evaluation.figures import number
-from tracker.experiments import runs
-from tracker.experiments.experiment import Context, Experiment, Finding, Result, Unavailable
+from tracker.experiments.laboratory import runs
+from tracker.experiments.laboratory.experiment import (
+    Context,
+    Experiment,
+    Finding,
+    Result,
+    Unavailable,
+)
 from tracker.parameters import PRESETS, RunParameters, with_values
 from tracker.pipeline import Cancelled, Run
 from tracker.sequences.sequence import Sequence
@@ -147,7 +153,7 @@ def _findings(measured: dict[str, dict[str, Any]]) -> tuple[Finding, ...]:
 
 
 def _draw(measured: dict[str, dict[str, Any]]) -> Figure:
-    from tracker.experiments import drawing
+    from tracker.experiments.laboratory import drawing
 
     names = list(methods())
     figure = drawing.sheet(

@@ -9,8 +9,8 @@ import numpy as np
 from tracker.evaluation import Evaluation, evaluate_sequence
 from tracker.evaluation.figures import number
 from tracker.evaluation.tables import TrackRow
-from tracker.experiments import runs
-from tracker.experiments.experiment import Context, Experiment, Finding, Result
+from tracker.experiments.laboratory import runs
+from tracker.experiments.laboratory.experiment import Context, Experiment, Finding, Result
 from tracker.pipeline import Run
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ def _steps_there(run: Run, person: int) -> np.ndarray:
 
 
 def _draw(run: Run, evaluation: Evaluation) -> Figure:
-    from tracker.experiments import drawing
+    from tracker.experiments.laboratory import drawing
 
     sequence, tracks, truth = run.sequence, run.tracks, run.sequence.ground_truth
     assert truth is not None

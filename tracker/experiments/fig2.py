@@ -10,9 +10,9 @@ import numpy as np
 from tracker.evaluation.figures import number
 from tracker.evaluation.matching import assign
 from tracker.evaluation.pixels import box_overlaps
-from tracker.experiments import runs
-from tracker.experiments.experiment import Context, Experiment, Finding, Result
 from tracker.experiments.fig1 import QUICK_STEPS, ROOM
+from tracker.experiments.laboratory import runs
+from tracker.experiments.laboratory.experiment import Context, Experiment, Finding, Result
 from tracker.pipeline import Run
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.rendering import read_visibility
@@ -116,7 +116,7 @@ def _overlaps(run: Run, step: int, camera: int, visible: np.ndarray) -> dict[str
 
 
 def _draw(run: Run) -> Figure:
-    from tracker.experiments import drawing
+    from tracker.experiments.laboratory import drawing
 
     sequence, half = run.sequence, run.sequence.target_half_extents
     truth = sequence.ground_truth

@@ -15,11 +15,11 @@ from tracker import parameters as table
 from tracker import pipeline
 from tracker.evaluation import EvaluationSettings, evaluate
 from tracker.evaluation.figures import number
-from tracker.experiments import runs
-from tracker.experiments.experiment import Context, Experiment, Finding, Result, Verdict
 from tracker.experiments.fig1 import QUICK_STEPS, ROOM
-from tracker.experiments.noise import NoisyReader
-from tracker.experiments.pool import Desk, spread
+from tracker.experiments.laboratory import runs
+from tracker.experiments.laboratory.experiment import Context, Experiment, Finding, Result, Verdict
+from tracker.experiments.laboratory.noise import NoisyReader
+from tracker.experiments.laboratory.pool import Desk, spread
 from tracker.parameters import RunParameters
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.rendering import read_visibility
@@ -292,7 +292,7 @@ def _draw(
     single: Float[ndarray, "N C P S"],
     visible: Float[ndarray, "C P S"],
 ) -> Figure:
-    from tracker.experiments import drawing
+    from tracker.experiments.laboratory import drawing
 
     people, steps = scheme.shape[1:]
     figure = drawing.sheet(

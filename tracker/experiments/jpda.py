@@ -21,8 +21,16 @@ from tracker import parameters as table
 from tracker import single_view
 from tracker.evaluation.figures import number
 from tracker.evaluation.matching import assign
-from tracker.experiments import cameras, clips, runs
-from tracker.experiments.experiment import Context, Experiment, Finding, Result, Unavailable
+from tracker.experiments import cameras
+from tracker.experiments.clips import clip as clips
+from tracker.experiments.laboratory import runs
+from tracker.experiments.laboratory.experiment import (
+    Context,
+    Experiment,
+    Finding,
+    Result,
+    Unavailable,
+)
 from tracker.parameters import PRESETS, RunParameters, with_values
 from tracker.pipeline import Cancelled
 from tracker.sequences.frames import FrameReader
@@ -302,7 +310,7 @@ def _findings(figures: dict[str, dict[str, Any]]) -> tuple[Finding, ...]:
 
 
 def _draw(first: dict[str, list[ViewResult]], measured: dict[str, dict[str, Any]]) -> Figure:
-    from tracker.experiments import drawing
+    from tracker.experiments.laboratory import drawing
 
     scene, moments = clip(0), (30, 120, 160, 215)
     figure = drawing.sheet(11.0, 6.2, "Two who look alike: centre errors and estimates, first clip")

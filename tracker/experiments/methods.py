@@ -11,8 +11,15 @@ from tracker import parameters as table
 from tracker import pipeline
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.evaluation.figures import number
-from tracker.experiments import cameras, fig1, runs, sequences
-from tracker.experiments.experiment import Context, Experiment, Finding, Result, Unavailable
+from tracker.experiments import cameras, fig1
+from tracker.experiments.laboratory import runs, sequences
+from tracker.experiments.laboratory.experiment import (
+    Context,
+    Experiment,
+    Finding,
+    Result,
+    Unavailable,
+)
 from tracker.parameters import METHODS, RunParameters
 from tracker.sequences.sequence import Sequence
 
@@ -147,7 +154,7 @@ def _findings(measured: dict[str, dict[str, dict[str, Any]]]) -> tuple[Finding, 
 
 
 def _draw(measured: dict[str, dict[str, dict[str, Any]]]) -> Figure:
-    from tracker.experiments import drawing
+    from tracker.experiments.laboratory import drawing
 
     names = (*ON_PICTURES, ON_BOXES)
     bars = [

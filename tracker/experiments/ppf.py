@@ -16,10 +16,18 @@ from tracker import parameters as table
 from tracker import single_view
 from tracker.evaluation.figures import number
 from tracker.evaluation.matching import assign
-from tracker.experiments import cameras, clips, runs
-from tracker.experiments.experiment import Context, Experiment, Finding, Result, Unavailable
-from tracker.experiments.pool import Desk, spread
-from tracker.experiments.ppf_clips import CLIPS
+from tracker.experiments import cameras
+from tracker.experiments.clips import clip as clips
+from tracker.experiments.clips.ppf import CLIPS
+from tracker.experiments.laboratory import runs
+from tracker.experiments.laboratory.experiment import (
+    Context,
+    Experiment,
+    Finding,
+    Result,
+    Unavailable,
+)
+from tracker.experiments.laboratory.pool import Desk, spread
 from tracker.parameters import PRESETS, RunParameters, with_values
 from tracker.pipeline import Cancelled
 from tracker.sequences.frames import FrameReader
@@ -292,7 +300,7 @@ def _findings(measured: dict[str, dict[str, dict[str, Any]]]) -> tuple[Finding, 
 def _draw(
     scene: Scene, followed: dict[str, Followed], measured: dict[str, dict[str, dict[str, Any]]]
 ) -> Figure:
-    from tracker.experiments import drawing
+    from tracker.experiments.laboratory import drawing
 
     names = list(methods())
     figure = drawing.sheet(11.0, 6.2, f"Targets that look alike: {scene.name} over time, and all")

@@ -18,9 +18,9 @@ from jaxtyping import UInt8
 from numpy import ndarray
 from scipy.optimize import isotonic_regression
 
-from tracker import image_kernels
 from tracker.foreground import kernels
 from tracker.foreground.segmentation import Segmentation
+from tracker.kernels import images
 
 LEVELS = 16
 """Levels of the source at which a tone curve is measured."""
@@ -84,7 +84,7 @@ class BackgroundModel:
             threshold: Difference in the channel that differs most, on the scale 16 √level
                 (0 … 255); what a pixel varies by itself comes on top.
         """
-        mask = image_kernels.foreground_mask(
+        mask = images.foreground_mask(
             picture,
             self.picture,
             tone_curve(self.picture, picture),

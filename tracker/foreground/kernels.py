@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numpy import ndarray
 
-from tracker.kernels import _kernel
+from tracker.kernels.compilation import kernel
 
 
-@_kernel
+@kernel
 def two_classes(
     difference: ndarray,
     background_centre: float,
@@ -85,7 +85,7 @@ def two_classes(
     return thresholds, counts
 
 
-@_kernel
+@kernel
 def above(difference: ndarray, thresholds: ndarray) -> ndarray:
     """1 where any channel differs by more than its threshold.
 
@@ -107,7 +107,7 @@ def above(difference: ndarray, thresholds: ndarray) -> ndarray:
     return mask
 
 
-@_kernel
+@kernel
 def clear_shadows(
     difference: ndarray,
     picture: ndarray,
@@ -140,7 +140,7 @@ def clear_shadows(
                     difference[y, x, c] = 0
 
 
-@_kernel
+@kernel
 def update_background(
     background: ndarray,
     still: ndarray,
@@ -195,7 +195,7 @@ def update_background(
     return after, counts
 
 
-@_kernel
+@kernel
 def level_medians(
     source: ndarray, target: ndarray, groups: int
 ) -> tuple[ndarray, ndarray, ndarray]:
@@ -233,7 +233,7 @@ def level_medians(
     return totals, sums, medians
 
 
-@_kernel
+@kernel
 def upper_medians(values: ndarray) -> ndarray:
     """The median of each column of (N, P) uint8, of an even number the upper one.
 

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
-from tracker import image_kernels
+from tracker.kernels import images
 
 # in half sizes from a box's centre, left, top, right, bottom: inside, above, left and right
 _PARTS = np.array(
@@ -32,7 +32,7 @@ def box_shares(sums: Int[ndarray, "h1 w1"], edges: Float[ndarray, "N 4"]) -> Flo
     Of a rectangle partly outside the picture only what is inside counts; wholly
     outside the share is 0.
     """
-    shares: ndarray = image_kernels.box_means(sums, np.ascontiguousarray(edges, dtype=float))
+    shares: ndarray = images.box_means(sums, np.ascontiguousarray(edges, dtype=float))
     return shares
 
 

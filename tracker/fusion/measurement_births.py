@@ -9,9 +9,9 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 from scipy.special import expit
 
-from tracker import birth_kernels
 from tracker.camera import Camera, stacked
 from tracker.fusion.target_model import TargetModel
+from tracker.kernels import births
 from tracker.sequences.sequence import Room
 
 _REFINEMENTS = 3
@@ -130,7 +130,7 @@ class MeasurementBirths:
 
     def _meeting_points(self, evidence: Evidence) -> Float[ndarray, "N 3"]:
         """Where the rays of unexplained boxes of two cameras pass close by each other."""
-        free, starts, cameras = birth_kernels.free_boxes(
+        free, starts, cameras = births.free_boxes(
             evidence.unexplained, evidence.starts, _UNEXPLAINED
         )
         if cameras < 2:
@@ -142,7 +142,7 @@ class MeasurementBirths:
                 for camera, first, last in zip(self._cameras, starts, starts[1:], strict=False)
             ]
         )
-        points, gaps = birth_kernels.meeting_points(rays, starts, self._centres, self._largest_gap)
+        points, gaps = births.meeting_points(rays, starts, self._centres, self._largest_gap)
         inside = self._room.contains(points, self._margin)
         points, gaps = points[inside], gaps[inside]
         if len(points) > _MOST_SEEDS:
@@ -154,7 +154,7 @@ class MeasurementBirths:
 
         A seed that ends outside the room or with fewer than two boxes is left out.
         """
-        positions, covariances, sources, fits = birth_kernels.fit_places(
+        positions, covariances, sources, fits = births.fit_places(
             seeds,
             _START_SIGMA,
             _REFINEMENTS,

@@ -10,9 +10,9 @@ from numpy import ndarray
 from scipy.optimize import linear_sum_assignment
 from scipy.stats import chi2
 
-from tracker import gaussian_mixture
+from tracker.filters import gaussian_mixture
+from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.model import CONFIRMED, FusionModel
-from tracker.gaussian_mixture import GaussianMixture
 
 _REACH = float(chi2.ppf(0.9, df=3))
 """Squared Mahalanobis distance within which a newcomer may be somebody lately lost."""

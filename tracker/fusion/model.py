@@ -9,12 +9,13 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.stats import chi2
 
-from tracker import kernels, models
+from tracker.filters import models
+from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion import visibility
 from tracker.fusion.measurement_births import Evidence, MeasurementBirths, Newborns
 from tracker.fusion.target_model import ExpectedBoxes, TargetModel
 from tracker.fusion.visibility import Visibility
-from tracker.gaussian_mixture import GaussianMixture
+from tracker.kernels import linear_algebra
 from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
@@ -118,7 +119,7 @@ class FusionModel:
 
     def stays(self, mixture: GaussianMixture) -> Int[ndarray, " K"]:
         """Indices of the components that have not strayed from the room."""
-        inside: ndarray = kernels.inside_bounds(mixture.means, *self.followed)
+        inside: ndarray = linear_algebra.inside_bounds(mixture.means, *self.followed)
         return inside
 
     def doubles(
@@ -135,7 +136,7 @@ class FusionModel:
         around one person, and two people cannot stand in one place. Among sure ones
         the older label stays; an unsure one never displaces a sure one.
         """
-        found: ndarray = kernels.doubles(
+        found: ndarray = linear_algebra.doubles(
             means, weights, labels, np.ascontiguousarray(sources), self.near, CONFIRMED
         )
         return found

@@ -13,8 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from tracker import association, gaussian_mixture, models, step_kernels
+from tracker import association
 from tracker.camera import stacked
+from tracker.filters import gaussian_mixture, models
+from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion import memory, names, visibility
 from tracker.fusion.measurement_births import Evidence, Newborns
 from tracker.fusion.memory import Memory
@@ -22,7 +24,7 @@ from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
 from tracker.fusion.names import Names
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import WORTH_TELLING, Record, summed
-from tracker.gaussian_mixture import GaussianMixture
+from tracker.kernels.labelled import step as step_kernels
 from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
@@ -65,7 +67,7 @@ class MultiBernoulli:
             *(visibility.WORTH_TELLING, association.TOLERANCE, association.ITERATIONS),
             *(WORTH_TELLING, p.pruning_threshold),
         )
-        """What :func:`tracker.step_kernels.predict_and_update` is told at every step."""
+        """What :func:`tracker.kernels.labelled.step.predict_and_update` is told at every step."""
 
     def start(self) -> MultiBernoulliState:
         """Nobody is in the room."""

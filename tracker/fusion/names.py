@@ -10,9 +10,9 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 from scipy.optimize import linear_sum_assignment
 
+from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.model import CONFIRMED
 from tracker.fusion.protocol import Associations
-from tracker.gaussian_mixture import GaussianMixture
 from tracker.single_view.protocol import ViewResult
 
 _DOUBT = 0.1

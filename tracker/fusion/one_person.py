@@ -12,10 +12,12 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker import association, kernels, marginal_kernels
+from tracker import association
+from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.filters.phd import PhdUpdate
 from tracker.fusion.model import CONFIRMED
-from tracker.gaussian_mixture import GaussianMixture
-from tracker.phd import PhdUpdate
+from tracker.kernels import linear_algebra
+from tracker.kernels.labelled import marginals
 
 _LARGEST_ODDS = 600.0  # the logarithm of what still fits a float with room to spare
 
@@ -54,7 +56,7 @@ def share_boxes(
     """
     size, boxes = predicted.size, len(updated.measurement_weights)
     owner, box = updated.parents[size:], updated.measurements[size:]
-    factors, shares, known = marginal_kernels.share_boxes(
+    factors, shares, known = marginals.share_boxes(
         predicted.weights,
         predicted.labels,
         detection_probability,
@@ -86,6 +88,6 @@ def share_boxes(
 
 def owners(mixture: GaussianMixture) -> Int[ndarray, " J"]:
     """Who may be merged with whom: a sure person's components with nobody else's, -1 for others."""
-    _, label = kernels.group_labels(mixture.labels)
+    _, label = linear_algebra.group_labels(mixture.labels)
     sure = np.bincount(label, mixture.weights) > CONFIRMED
     return np.asarray(np.where(sure[label], mixture.labels, -1))

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.gaussian_mixture import GaussianMixture
+from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.single_view.protocol import ViewResult
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker import kernels
+from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.protocol import Associations, FusionResult
-from tracker.gaussian_mixture import GaussianMixture
+from tracker.kernels import linear_algebra
 
 WORTH_TELLING = 0.01
 """Association probability below which a pair is not kept."""
@@ -122,4 +122,4 @@ def summed(
     """
     if not len(labels) or not len(cameras):
         return Associations.none()
-    return Associations(*kernels.sum_pairs(labels, cameras, of_pairs, boxes, probabilities))
+    return Associations(*linear_algebra.sum_pairs(labels, cameras, of_pairs, boxes, probabilities))

@@ -13,14 +13,16 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker import gaussian_mixture, kernels, mixture_kernels, models, phd
+from tracker.filters import gaussian_mixture, models, phd
+from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion import memory, one_person
 from tracker.fusion.measurement_births import Evidence
 from tracker.fusion.memory import Memory
 from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import Ledger, Record
-from tracker.gaussian_mixture import GaussianMixture
+from tracker.kernels import linear_algebra
+from tracker.kernels.intensity import mixture as mixture_kernels
 from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
@@ -177,7 +179,7 @@ class SequentialPhd:
 
     def _without_doubles(self, mixture: GaussianMixture, record: Record) -> Int[ndarray, " K"]:
         """Indices of the components of those labels that do not only repeat another."""
-        labels, label = kernels.group_labels(mixture.labels)
+        labels, label = linear_algebra.group_labels(mixture.labels)
         held = np.bincount(label, mixture.weights, len(labels))
         # the heaviest component of a label has the last word on where its person is
         heaviest = mixture_kernels.heaviest_of_groups(mixture.weights, label, len(labels))

@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from tracker import measurement_kernels
 from tracker.camera import NEAREST_DEPTH, Camera
+from tracker.kernels import measurement
+from tracker.kernels.kalman import Alternative
 from tracker.single_view.protocol import ViewResult
-from tracker.update_kernels import Alternative
 
 MeasurementKind = Literal["centre", "box", "box_and_width"]
 UpdateKind = Literal["extended", "unscented"]
@@ -112,7 +112,7 @@ class TargetModel:
         # R = T diag(σ²) Tᵀ is linear in σ²
         products = np.einsum("pa,qa->apq", transform, transform).reshape(4, self.size**2).copy()
         self.transforms = transform, products
-        """T (m, 4) and (4, m²), as :func:`tracker.measurement_kernels.measured_boxes` has them."""
+        """T (m, 4) and (4, m²), as :func:`tracker.kernels.measurement.measured_boxes` has them."""
         low_noise = (_LOW_SIGMAS**2 @ products).reshape(self.size, self.size)
         self.numbers = (
             self.half_height,
@@ -122,7 +122,7 @@ class TargetModel:
             low_noise if self.low_share else np.zeros((0, 0)),
             self.size,
         )
-        """The target as :func:`tracker.measurement_kernels.expected_measurements` knows it."""
+        """The target as :func:`tracker.kernels.measurement.expected_measurements` knows it."""
 
     def expected(
         self,
@@ -141,7 +141,7 @@ class TargetModel:
         (
             values, jacobians, spreads, boxes, depths, valid,
             low_values, low_jacobians, low_spreads,
-        ) = measurement_kernels.expected_measurements(
+        ) = measurement.expected_measurements(
             np.ascontiguousarray(states, dtype=float),
             np.ascontiguousarray(covariances) if bends else _NO_COVARIANCES,
             bends,
@@ -172,7 +172,7 @@ class TargetModel:
             view: Boxes and how far each is to be trusted.
             factor: On the standard deviations.
         """
-        measured: tuple[ndarray, ndarray] = measurement_kernels.measured_boxes(
+        measured: tuple[ndarray, ndarray] = measurement.measured_boxes(
             np.ascontiguousarray(view.boxes, dtype=float),
             np.ascontiguousarray((factor * view.sigmas) ** 2, dtype=float),
             *self.transforms,

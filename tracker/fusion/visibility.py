@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker import box_kernels
 from tracker.camera import Camera
+from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.target_model import ExpectedBoxes
-from tracker.gaussian_mixture import GaussianMixture
+from tracker.kernels import boxes as box_kernels
 
 WORTH_TELLING = 0.2
 """Share of a target's box that must be covered for its occluder to be named."""

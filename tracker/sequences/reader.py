@@ -26,7 +26,7 @@ from tracker.sequences.sequence import (
     SequenceError,
     View,
 )
-from tracker.sequences.taught_fields import read_room, read_templates
+from tracker.sequences.writing.taught_fields import read_room, read_templates
 
 FILE = "sequence.toml"
 FORMAT = 1

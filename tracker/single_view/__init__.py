@@ -5,13 +5,13 @@ from __future__ import annotations
 from tracker.parameters import METHODS, RunParameters
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.association_matrix import AssociationMatrix
+from tracker.single_view.association_matrix.method import AssociationMatrix
 from tracker.single_view.colour_phd import ColourPhd
 from tracker.single_view.detection_phd import DetectionPhd
 from tracker.single_view.jpda import Jpda
 from tracker.single_view.none import DetectionBoxes
 from tracker.single_view.protocol import SingleViewMethod, ViewResult
-from tracker.single_view.pseudo_particle import PseudoParticle
+from tracker.single_view.pseudo_particle.method import PseudoParticle
 
 __all__ = ["SingleViewMethod", "ViewResult", "create"]
 

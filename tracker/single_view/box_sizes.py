@@ -9,9 +9,9 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.stats import norm
 
-from tracker import models
 from tracker.camera import Camera
-from tracker.gaussian_mixture import GaussianMixture
+from tracker.filters import models
+from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.sequences.sequence import Room
 
 CELLS = 24

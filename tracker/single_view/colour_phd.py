@@ -16,14 +16,14 @@ from jaxtyping import Float, UInt8
 from numpy import ndarray
 from scipy.stats import chi2
 
-from tracker import gaussian_mixture, models, phd
+from tracker.filters import gaussian_mixture, models, phd
+from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.foreground import pack
-from tracker.gaussian_mixture import GaussianMixture
 from tracker.parameters import ColourPhdParams, ForegroundParams
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import entrance_boxes
-from tracker.single_view.colour_peaks import PeakFinder, Peaks
+from tracker.single_view.colour.peaks import PeakFinder, Peaks
 from tracker.single_view.protocol import ViewResult
 
 GATE = float(chi2.ppf(0.9999, df=4))

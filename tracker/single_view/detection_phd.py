@@ -15,10 +15,10 @@ from jaxtyping import Float
 from numpy import ndarray
 from scipy.stats import chi2
 
-from tracker import gaussian_mixture, models, phd
-from tracker.gaussian_mixture import GaussianMixture
+from tracker.filters import gaussian_mixture, models, phd
+from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.filters.phd import PhdUpdate
 from tracker.parameters import DetectionPhdParams
-from tracker.phd import PhdUpdate
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.detector_boxes import Detected, DetectorBoxes, trust
 from tracker.single_view.protocol import ViewResult

@@ -61,7 +61,7 @@ class ViewResult:
     likenesses: Float[ndarray, "N P"] = field(default_factory=lambda: np.zeros((0, 0)))
     """Probability that the colours of each box are those of each of P people with templates,
     if they are one's; (0, 0) where there was no picture, or fewer than two have templates. A
-    method leaves it: :mod:`tracker.single_view.likeness` tells it of all."""
+    method leaves it: :mod:`tracker.single_view.colour.likeness` tells it of all."""
 
     @staticmethod
     def of_boxes(

@@ -17,7 +17,7 @@ from numpy import ndarray
 
 from tracker.camera import Camera
 from tracker.sequences.rendering.avi import AviWriter, compress
-from tracker.sequences.rendering.paths import FRAMES_PER_SECOND
+from tracker.sequences.rendering.cast.paths import FRAMES_PER_SECOND
 from tracker.sequences.rendering.rooms import (
     CAMERAS,
     ROOMS,

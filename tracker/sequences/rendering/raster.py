@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy import ndarray
 
-from tracker.compilation import compiled_later
+from tracker.kernels.compilation import compiled_later
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 

@@ -9,8 +9,8 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.camera import Camera
-from tracker.sequences.rendering.casts import CROSSING, MEETING, THREE, Person
-from tracker.sequences.rendering.interior import Decor
+from tracker.sequences.rendering.cast.casts import CROSSING, MEETING, THREE, Person
+from tracker.sequences.rendering.walls.interior import Decor
 
 VOLUME_MINIMUM = np.array([-1.5, -1.5, 0.0])
 VOLUME_MAXIMUM = np.array([1.5, 1.5, 2.0])

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from tracker.sequences.rendering.doors import leaf, leaf_angle, leaf_hinge
-from tracker.sequences.rendering.gait import (
+from tracker.sequences.rendering.cast.doors import leaf, leaf_angle, leaf_hinge
+from tracker.sequences.rendering.cast.gait import (
     CHEST,
     FOOT,
     FOREARM,
@@ -23,15 +23,15 @@ from tracker.sequences.rendering.gait import (
     Poses,
     pose,
 )
-from tracker.sequences.rendering.interior import FAR, RIGHT
-from tracker.sequences.rendering.paths import Path, walk
-from tracker.sequences.rendering.people import Body, build
+from tracker.sequences.rendering.cast.paths import Path, walk
+from tracker.sequences.rendering.cast.people import Body, build
 from tracker.sequences.rendering.rooms import (
     TARGET_HALF_EXTENTS,
     VOLUME_MAXIMUM,
     VOLUME_MINIMUM,
     RoomSpec,
 )
+from tracker.sequences.rendering.walls.interior import FAR, RIGHT
 
 
 @dataclass(frozen=True, slots=True, eq=False)

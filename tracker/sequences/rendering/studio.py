@@ -15,7 +15,10 @@ from numpy import ndarray
 from scipy.ndimage import gaussian_filter
 
 from tracker.camera import Camera
-from tracker.sequences.rendering.background import (
+from tracker.sequences.rendering.raster import draw, floor_shadows, place_bodies
+from tracker.sequences.rendering.rooms import CAMERAS, TARGET_HALF_EXTENTS, RoomSpec
+from tracker.sequences.rendering.scene import Figure, Scene, script, shadow_balls
+from tracker.sequences.rendering.walls.background import (
     AMBIENT,
     FINE,
     Background,
@@ -23,10 +26,7 @@ from tracker.sequences.rendering.background import (
     lamp_table,
     render_background,
 )
-from tracker.sequences.rendering.interior import LEFT, NEAR, Interior, furnish
-from tracker.sequences.rendering.raster import draw, floor_shadows, place_bodies
-from tracker.sequences.rendering.rooms import CAMERAS, TARGET_HALF_EXTENTS, RoomSpec
-from tracker.sequences.rendering.scene import Figure, Scene, script, shadow_balls
+from tracker.sequences.rendering.walls.interior import LEFT, NEAR, Interior, furnish
 
 Result = TypeVar("Result")
 

@@ -13,14 +13,14 @@ from jaxtyping import Float, UInt8
 from numpy import ndarray
 
 from tracker.blobs import blobs
+from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.foreground import ForegroundModel, box_shares, integral, learn
-from tracker.gaussian_mixture import GaussianMixture
 from tracker.parameters import ForegroundParams, JpdaParams, RunParameters
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.colour_peaks import PeakFinder
-from tracker.single_view.crowns import TargetSizes, crowns
+from tracker.single_view.colour.peaks import PeakFinder
 from tracker.single_view.detector_boxes import DetectorBoxes, trust
+from tracker.single_view.jpda.crowns import TargetSizes, crowns
 
 COVER = 2.0
 """Without a piece of foreground, whoever is hidden lies within so many half sizes of the box."""

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.gaussian_mixture import GaussianMixture
+from tracker.filters.gaussian_mixture import GaussianMixture
 
 X, Y = 0, 2
 """Where the position stands in the state."""

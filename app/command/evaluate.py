@@ -1,0 +1,137 @@
+"""``multiview-phd evaluate``: a track file against the truth of its sequence."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any
+
+from pydantic import ValidationError
+
+from app.command.flags import Evaluate
+from app.command.terminal import Bar, CommandError, print_table, say
+from tracker import __version__, export
+from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
+from tracker.evaluation.figures import number
+from tracker.evaluation.report.page import write_report
+from tracker.export import TrackFile
+from tracker.parameters import ParameterError
+from tracker.sequences import library
+from tracker.sequences.sequence import Sequence
+
+
+def evaluate(command: Evaluate) -> None:
+    """Print the figures, as tables or as JSON, and write the report where one is asked for.
+
+    Raises:
+        ParameterError: If a setting is not as it must be.
+        CommandError: If the tracks are not of the sequence, or it has no truth.
+        ValueError: If a file cannot be read.
+        OSError: If the report cannot be written.
+    """
+    settings = settings_from(command.changes())
+    if command.html is not None:
+        if command.html.is_dir():
+            raise CommandError(f"--html {command.html}: expected a file to write, found a folder")
+        if not command.html.parent.is_dir():
+            raise CommandError(
+                f"--html {command.html}: there is no folder {command.html.parent}; make it first"
+            )
+    with Bar("rendering", "frame") as rendering:
+        sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    tracks = export.read_tracks_csv(command.tracks)
+    check_fit(sequence, tracks, str(command.tracks))
+    evaluation = evaluate_sequence(sequence, tracks, settings, steps=tracks.done)
+    if command.html is not None:
+        seed = tracks.settings.get("seed", "")
+        write_report(
+            command.html,
+            sequence,
+            tracks,
+            tracks.settings or None,
+            evaluation,
+            seed=int(seed) if seed.isdecimal() else None,
+        )
+    if command.json:
+        head = {"version": __version__, "sequence": sequence.name, "file": str(command.tracks)}
+        text = json.dumps({**head, **evaluation.to_json()}, allow_nan=False)
+        sys.stdout.write(text + "\n")
+    else:
+        print_evaluation(evaluation)
+    done = "" if tracks.done is None else f" of {sequence.frames} (the file is partial)"
+    for line in (f"{evaluation.steps} steps{done}", *evaluation.notes):
+        say(line)
+    if command.html is not None:
+        say(f"the report is in {command.html}")
+
+
+def settings_from(changes: dict[str, Any]) -> EvaluationSettings:
+    """The settings with some values given as text.
+
+    Raises:
+        ParameterError: With the flag, its range and what was given.
+    """
+    try:
+        return EvaluationSettings.model_validate(changes)
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = str(first["loc"][0])
+    schema = EvaluationSettings.model_json_schema()["properties"][name]
+    given, unit = changes[name], schema["x-ui"]["unit"]
+    expected = "a whole number" if schema["type"] == "integer" else "a number"
+    if "enum" in schema:
+        expected = f"one of {', '.join(schema['enum'])}"
+    elif "parsing" not in first["type"] and "finite" not in first["type"]:
+        expected = f"{schema['minimum']:g} … {schema['maximum']:g} {unit}".rstrip()
+    raise ParameterError(f"--{name.replace('_', '-')}", f"expected {expected}, got {given!r}")
+
+
+def check_fit(sequence: Sequence, tracks: TrackFile, name: str) -> None:
+    """Whether tracks can be scored against a sequence.
+
+    Raises:
+        CommandError: If there is no truth, or the file is of another sequence.
+    """
+    if sequence.ground_truth is None:
+        raise CommandError(
+            f"{sequence.folder / 'sequence.toml'}: there is no truth to evaluate against; name "
+            "its file in [ground_truth]"
+        )
+    own = " ".join(sequence.name.split())
+    other = tracks.settings.get("sequence", own)
+    if other != own:
+        raise CommandError(
+            f'{name}: expected tracks of the sequence "{own}", found those of "{other}"; name '
+            "the sequence that they are of"
+        )
+    if len(tracks) and int(tracks.frames[-1]) >= sequence.frames:
+        raise CommandError(
+            f"{name}: expected steps 0 … {sequence.frames - 1} as {own} has them, found step "
+            f"{int(tracks.frames[-1])}; the tracks are of another or longer sequence"
+        )
+
+
+def print_evaluation(evaluation: Evaluation) -> None:
+    """The figures with what each was measured with, then the people."""
+    print_table(
+        ("figure", ">value", "unit", "measured with"),
+        [(f.definition.name, f.text, f.unit, f.stated) for f in evaluation.figures],
+    )
+    if not evaluation.people:
+        return
+    sys.stdout.write("\n")
+    print_table(
+        ("person", ">steps", ">tracked", ">error (m)", ">95 % (m)", ">switches", "status"),
+        [
+            (
+                str(row.id),
+                str(row.steps),
+                str(row.tracked),
+                number(row.error, 3),
+                number(row.error_95, 3),
+                str(row.switches),
+                row.status,
+            )
+            for row in evaluation.people
+        ],
+    )

@@ -1,0 +1,318 @@
+"""The command line: serve, track, evaluate, experiment, benchmark, sequences, …
+
+Status 0 for success, 1 for a failure told in one line on standard error, 2 for
+wrong usage, 130 after Ctrl-C. The engine is imported by the command that needs it.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+from app.command.flags import (
+    Arguments,
+    Benchmark,
+    Evaluate,
+    Experiment,
+    Parameters,
+    Render,
+    Sequences,
+    Serve,
+    Track,
+    describe_range,
+    parse,
+    show,
+)
+from app.command.terminal import Bar, CommandError, check_data, print_table, say
+from tracker import parameters as table
+from tracker.parameters import ParameterError
+
+FAILURE, USAGE, INTERRUPTED = 1, 2, 130
+
+TRACEBACK = "MULTIVIEW_PHD_TRACEBACK"
+"""Environment variable: with any value, an unexpected failure shows where it happened."""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run one command; returns the exit status."""
+    try:
+        return _run(parse(arguments))
+    except ParameterError as error:
+        say(str(error))
+        return USAGE
+    except BrokenPipeError:  # whoever read our output has enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except (Exception, KeyboardInterrupt) as error:
+        if _is_interruption(error):
+            say("interrupted; nothing was written")
+            return INTERRUPTED
+        if os.environ.get(TRACEBACK):
+            raise
+        say(_sentence(error))
+        return FAILURE
+
+
+def _run(command: Arguments) -> int:
+    match command:
+        case Serve():
+            return _serve(command)
+        case Track():
+            _track(command)
+        case Evaluate():
+            from app.command.evaluate import evaluate
+
+            evaluate(command)
+        case Experiment():
+            from app.command.experiment import experiment
+
+            experiment(command)
+        case Benchmark():
+            return _benchmark(command)
+        case Sequences():
+            _sequences(command)
+        case Render():
+            _render(command)
+        case Parameters():
+            _parameters()
+    return 0
+
+
+def _is_interruption(error: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind it: one heard inside a compiled kernel comes out as its failure."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__
+    return error is not None
+
+
+def _sentence(error: BaseException) -> str:
+    words = " ".join(str(error).split())
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    if isinstance(error, ValueError | CommandError):
+        return words
+    return f"unexpected {type(error).__name__}: {words}; set {TRACEBACK}=1 to see where"
+
+
+# serve
+
+
+def _serve(command: Serve) -> int:
+    if not 0 <= command.port <= 65535:
+        raise ParameterError(
+            "--port", f"expected 0 (any that is free) to 65535, got {command.port}"
+        )
+    check_data(command.data)
+    from app.state.jobs import locate
+    from app.web import server
+    from app.web.security import is_loopback
+    from tracker.sequences import library, rendering
+
+    place = locate(command.sequence, command.data)
+    if place not in rendering.ROOMS:
+        library.open_sequence(place)  # what cannot be read is told here, before a page is open
+    listener = _listen(command)
+    port = listener.getsockname()[1]
+    host = f"[{command.host}]" if ":" in command.host else command.host
+    shown = "127.0.0.1" if command.host == "0.0.0.0" else "[::1]" if host == "[::]" else host
+    address = f"http://{shown}:{port}"
+    if not is_loopback(command.host):
+        say(f"anyone who reaches {command.host} can change what you see")
+
+    def ready() -> None:
+        sys.stdout.write(f"multiview-phd: {address} (Ctrl-C ends it)\n")
+        sys.stdout.flush()
+        if command.open:
+            import webbrowser
+
+            threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+
+    app = server.create_app(
+        server.Settings(
+            host=command.host,
+            sequence=command.sequence,
+            data=command.data,
+            keep_on_disk=True,
+            say=say,
+        )
+    )
+    try:
+        server.serve(app, listener, ready)
+    except KeyboardInterrupt:
+        _leave(0)
+    return 0
+
+
+def _listen(command: Serve) -> Any:
+    from app.web import server
+
+    try:
+        return server.bind(command.host, command.port)
+    except OSError as error:
+        if error.errno != errno.EADDRINUSE:
+            raise CommandError(
+                f"cannot listen on {command.host}:{command.port}: {error.strerror}"
+            ) from None
+    for port in range(command.port + 1, min(command.port + 100, 65536)):
+        try:
+            server.bind(command.host, port).close()
+        except OSError:
+            continue
+        raise CommandError(f"port {command.port} is taken by another program; try --port {port}")
+    raise CommandError(f"port {command.port} is taken by another program; try --port 0")
+
+
+def _leave(status: int) -> None:
+    """End now, even where a thread is still in the middle of a step that nothing can interrupt."""
+    deadline = time.monotonic() + 0.2
+    while time.monotonic() < deadline:
+        if all(t.daemon or t is threading.main_thread() for t in threading.enumerate()):
+            return
+        time.sleep(0.02)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)
+
+
+# track
+
+
+def _track(command: Track) -> None:
+    changes = command.changes()
+    table.with_values(table.RunParameters(), changes)  # wrong usage shows before any work
+    _check_seed(command.seed)
+    output = command.output
+    if output.is_dir():
+        raise CommandError(f"--output {output}: expected a file to write, found a folder")
+    if not output.parent.is_dir():
+        raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
+
+    from app.state.compiling import WORDS
+    from tracker import export, pipeline
+    from tracker.kernels import compilation
+    from tracker.runs.stage_cache import StageCache
+    from tracker.sequences import library
+
+    with Bar("rendering", "frame") as rendering:
+        sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    parameters = table.with_values(pipeline.default_parameters(sequence), changes)
+    begin = time.perf_counter()
+    stages: set[table.Stage] = set()
+    is_told = False
+
+    def compiles() -> None:
+        nonlocal is_told
+        if not is_told:
+            is_told = True
+            say(WORDS)
+
+    def told(_: pipeline.Run, progress: pipeline.Progress) -> None:
+        stages.add(progress.stage)
+        tracking.at(progress.done, progress.total)
+
+    with Bar("tracking", "step") as tracking, compilation.followed(compiles):
+        tracking.at(0, sequence.frames)
+        run = pipeline.compute(
+            sequence,
+            parameters,
+            seed=command.seed,
+            cache=StageCache.on_disk() if command.cache else None,
+            on_progress=told,
+        )
+    seconds = time.perf_counter() - begin
+    export.save_tracks_csv(output, sequence, run.tracks, parameters, command.seed)
+    targets = len(set(run.tracks.ids.tolist()))
+    kept = "" if "single_view" in stages else "; stage 1 was kept from an earlier run"
+    say(
+        f"{sequence.frames} steps, {targets} tracks, {sequence.frames / seconds:.0f} steps/s "
+        f"({sequence.frames / seconds / sequence.fps:.1f} × real time{kept}), written to {output}"
+    )
+
+
+# the rest
+
+
+def _benchmark(command: Benchmark) -> int:
+    root = Path(__file__).resolve().parents[2]
+    if not (root / "tests" / "benchmarks" / "__main__.py").is_file():
+        raise CommandError(
+            "the benchmarks belong to the source, not to the installed package: get a checkout, "
+            'install it by `pip install --editable ".[test]"`, and run `multiview-phd benchmark` '
+            "from there"
+        )
+    line = [sys.executable, "-m", "tests.benchmarks", *command.names]
+    line += ["--short"] if command.short else []
+    line += ["--json", str(command.json.absolute())] if command.json is not None else []
+    return subprocess.run(line, cwd=root).returncode
+
+
+def _sequences(command: Sequences) -> None:
+    check_data(command.data)
+    from tracker.sequences import library
+
+    rows = [
+        (
+            entry.name,
+            entry.kind,
+            "" if entry.cameras is None else str(entry.cameras),
+            "" if entry.frames is None else str(entry.frames),
+            "no" if entry.error else "yes" if entry.ready else "when opened",
+            entry.error or entry.description,
+        )
+        for entry in library.available(command.data)
+    ]
+    print_table(("name", "kind", "cameras", "steps", "ready", "description"), rows)
+
+
+def _render(command: Render) -> None:
+    from tracker.sequences import rendering
+
+    if command.name not in rendering.ROOMS:
+        known = ", ".join(rendering.ROOMS)
+        raise ParameterError("NAME", f"expected one of {known}, got {command.name!r}")
+    _check_seed(command.seed)
+    if command.cameras not in (2, 3):
+        raise ParameterError("--cameras", f"expected 2 or 3, got {command.cameras}")
+    if command.folder.exists():
+        raise CommandError(f"{command.folder} exists; name a folder that does not")
+    with Bar("rendering", "frame") as bar:
+        rendering.render(
+            command.name,
+            command.folder,
+            cameras=command.cameras,
+            seed=command.seed,
+            progress=bar.at,
+        )
+    say(f"{command.name} with {command.cameras} cameras, written to {command.folder}")
+
+
+def _check_seed(seed: int) -> None:
+    if seed < 0:
+        raise ParameterError("--seed", f"expected a whole number from 0, got {seed}")
+
+
+def _parameters() -> None:
+    methods = {
+        "single_view": "Method of stage 1 (--single-view).",
+        "fusion_method": "Method of stage 2 (--fusion).",
+    }
+    defaults = table.RunParameters()
+    rows = [
+        (key, "", "|".join(choices), "", show(table.value(defaults, key)), methods[key])
+        for key, choices in table.METHODS.items()
+    ]
+    rows += [
+        (p.key, p.symbol, describe_range(p), p.unit, show(p.default), p.help)
+        for p in table.PARAMETERS.values()
+    ]
+    print_table(("key", "symbol", "range", "unit", "default", "help"), rows)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,1 +1,0 @@
-"""Tracks against the truth in the workbench: the command, the worker, the routes."""

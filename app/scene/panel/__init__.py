@@ -1,0 +1,1 @@
+"""viser's panel of sliders, made from the parameters' definitions."""

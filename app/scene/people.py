@@ -1,0 +1,212 @@
+"""What the run says in the 3D scene: components, estimates and trails of the shown step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import viser
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from app.colours import PALETTES, Palette
+from app.scene import geometry
+from app.scene.geometry import FUTURE_SECONDS, TRAIL_SECONDS
+from app.scene.nodes import Lines, Meshes, Tag, Tags
+from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.pipeline import Run
+from tracker.sequences.sequence import Sequence
+from tracker.trajectories import Trajectories
+
+TAGS = 16
+"""Made at once; a step with more people adds some for good."""
+UNREPORTED_WEIGHT = 0.02
+"""Below this a component without a track is not drawn: its ellipsoid would be large and mean
+next to nothing."""
+
+
+class PeopleNodes:
+    """Everything of the run that changes with the step."""
+
+    def __init__(self, server: viser.ViserServer, on_pick: Callable[[int], None]) -> None:
+        """Make the nodes, hidden.
+
+        Args:
+            server: Where they live.
+            on_pick: Called with the id of the track whose box or ellipsoid was clicked.
+        """
+        self._on_pick = on_pick
+        self._palette = PALETTES["dark"]
+        self._box_ids: Int[ndarray, " N"] = np.zeros(0, dtype=np.int64)
+        self._component_ids: Int[ndarray, " J"] = np.zeros(0, dtype=np.int64)
+        self._future = Lines(server, "/people/future", 1.0)
+        self._trails = Lines(server, "/people/trails", 1.75)
+        self._selected_trail = Lines(server, "/people/selected_trail", 2.5)
+        self._rays = Lines(server, "/people/rays", 1.0)
+        self._boxes = Lines(server, "/people/boxes", 1.5)
+        self._selected_box = Lines(server, "/people/selected_box", 2.25)
+        cube, sphere = geometry.unit_cube(), geometry.icosphere(2)
+        self._feet = Meshes(server, "/people/feet", *cube)
+        self._bodies = Meshes(server, "/people/bodies", *cube, on_click=self._pick_box)
+        self._ellipsoids = Meshes(
+            server, "/people/ellipsoids", *sphere, on_click=self._pick_component
+        )
+        self._tags = Tags(server, "/labels/people", TAGS, 1.0)
+
+    def _pick_box(self, index: int) -> None:
+        if index < len(self._box_ids):
+            self._on_pick(int(self._box_ids[index]))
+
+    def _pick_component(self, index: int) -> None:
+        if index < len(self._component_ids) and self._component_ids[index] > 0:
+            self._on_pick(int(self._component_ids[index]))
+
+    def show(
+        self,
+        sequence: Sequence,
+        run: Run | None,
+        step: int,
+        selected: int | None,
+        layers: Mapping[str, bool],
+        palette: Palette,
+    ) -> None:
+        """Draw one step.
+
+        Args:
+            sequence: Gives a person's size.
+            run: Has the step; None where it is not computed: nothing is drawn then.
+            step: 0-based.
+            selected: The track that is drawn stronger.
+            layers: Which of boxes, ellipsoids and trails are on, and whether tracks other
+                than the selected one are.
+            palette: Of the theme.
+        """
+        self._palette = palette
+        tracks = run.tracks if run is not None else Trajectories.empty(len(sequence.views))
+        alone = selected is not None and not layers["others"]
+        if alone:
+            tracks = tracks.take(tracks.ids == selected)
+        now = tracks.at(step)
+        ids, positions = tracks.ids[now], tracks.positions[now]
+        half = sequence.target_half_extents
+        boxes = layers["boxes"]
+        drawn = slice(None if boxes else 0)
+        self._show_boxes(ids[drawn], positions[drawn], half, selected)
+        self._show_rays(sequence, tracks, now, selected if boxes else None)
+        self._show_trails(
+            tracks if layers["trails"] else Trajectories.empty(len(sequence.views)),
+            step,
+            sequence.fps,
+            float(half[2]),
+            selected,
+        )
+        posterior = run.fused[step].posterior if run is not None else GaussianMixture.empty(3)
+        recent = slice(
+            int(np.searchsorted(tracks.frames, step - round(TRAIL_SECONDS * sequence.fps))),
+            now.stop,
+        )
+        known = dict(zip(tracks.labels[recent].tolist(), tracks.ids[recent].tolist(), strict=True))
+        if alone:
+            kept = [known.get(label) == selected for label in posterior.labels.tolist()]
+            posterior = posterior.take(np.array(kept, dtype=bool))
+        self._show_components(
+            posterior if layers["ellipsoids"] else GaussianMixture.empty(3), known, selected
+        )
+        named = boxes or layers["ellipsoids"]
+        above = np.array([0.0, 0.0, half[2] + 0.03])
+        self._tags.show(
+            [
+                Tag(
+                    tuple((position + above).tolist()),
+                    f"{track} · {existence:.2f}" if track == selected else f"{track}",
+                )
+                for track, position, existence in zip(
+                    ids, positions, tracks.existences[now], strict=True
+                )
+                if named
+            ]
+        )
+
+    def _show_boxes(
+        self,
+        ids: Int[ndarray, " N"],
+        positions: Float[ndarray, "N 3"],
+        half: Float[ndarray, " 3"],
+        selected: int | None,
+    ) -> None:
+        edges = geometry.box_edges(positions, half)
+        shades = self._palette.of(ids)
+        chosen = ids == (selected if selected is not None else -1)
+        for node, rows in ((self._boxes, ~chosen), (self._selected_box, chosen)):
+            node.show(edges[rows].reshape(-1, 2, 3), np.repeat(shades[rows], 12, axis=0)[:, None])
+        sizes = np.broadcast_to(half, positions.shape)
+        feet = positions - np.array([0.0, 0.0, half[2] - 0.005])
+        flat = np.broadcast_to(np.array([half[0], half[1], 1e-3]), positions.shape)
+        self._feet.show(feet, flat, shades, np.where(chosen, 0.34, 0.2))
+        self._box_ids = ids
+        self._bodies.show(positions, sizes, shades, np.where(chosen, 0.12, 0.03))
+
+    def _show_rays(
+        self, sequence: Sequence, tracks: Trajectories, now: slice, selected: int | None
+    ) -> None:
+        """From each camera that saw the selected one to where it was put."""
+        row = np.flatnonzero(tracks.ids[now] == (selected if selected is not None else -1))
+        if not len(row):
+            self._rays.show(np.zeros((0, 2, 3)), self._palette.line)
+            return
+        position = tracks.positions[now][row[0]]
+        eyes = [
+            camera.centre
+            for camera, seen in zip(sequence.cameras, tracks.seen[now][row[0]], strict=True)
+            if seen
+        ]
+        segments = np.array([[eye, position] for eye in eyes]).reshape(-1, 2, 3)
+        shade = self._palette.fade(self._palette.of(tracks.ids[now][row]), 0.5)
+        self._rays.show(segments, shade[None])
+
+    def _show_trails(
+        self, tracks: Trajectories, step: int, fps: float, drop: float, selected: int | None
+    ) -> None:
+        way = geometry.trails(tracks, step, TRAIL_SECONDS, fps, drop, FUTURE_SECONDS)
+        past = way.ages[:, 1] >= 0.0
+        span = np.where(past, TRAIL_SECONDS, -FUTURE_SECONDS)[:, None]
+        full = np.where(past, 0.92, 0.5)[:, None]
+        strength = full - (full - 0.12) * way.ages / span
+        shades = self._palette.of(way.ids)[:, None].repeat(2, axis=1)
+        shades = self._palette.fade(shades, strength)
+        chosen = way.ids == (selected if selected is not None else -1)
+        for node, rows in (
+            (self._future, ~past),
+            (self._trails, past & ~chosen),
+            (self._selected_trail, past & chosen),
+        ):
+            node.show(way.segments[rows], shades[rows])
+
+    def _show_components(
+        self, mixture: GaussianMixture, ids: Mapping[int, int], selected: int | None
+    ) -> None:
+        """Draw Gaussian components as the ellipsoids that hold a stated share of each.
+
+        Opacity grows with the weight; the colour is that of the component's track, grey
+        where it has none. Of those without a track the very light ones are left out.
+
+        Args:
+            mixture: The first three entries of its states are x, y, z in metres.
+            ids: Of the labels that are tracks.
+            selected: The track that is drawn stronger.
+        """
+        numbers = np.array([ids.get(label, 0) for label in mixture.labels.tolist()], np.int64)
+        drawn = (numbers > 0) | (mixture.weights > UNREPORTED_WEIGHT)
+        mixture, numbers = mixture.take(drawn), numbers[drawn]
+        wxyzs, axes = geometry.ellipsoids(mixture.covariances[:, :3, :3])
+        shades = np.where(
+            (numbers > 0)[:, None],
+            self._palette.of(numbers),
+            np.array(self._palette.line, dtype=np.uint8),
+        )
+        weights = np.clip(mixture.weights, 0.0, 1.0)
+        opacities = np.where(numbers > 0, 0.06 + 0.44 * weights, 0.04 + 0.3 * weights)
+        if selected is not None:
+            opacities = opacities + 0.15 * (numbers == selected)
+        self._component_ids = numbers
+        self._ellipsoids.show(mixture.means[:, :3], axes, shades, opacities, wxyzs)

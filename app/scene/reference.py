@@ -1,0 +1,87 @@
+"""What the run is held against in the 3D scene: the true positions, and the pinned run."""
+
+from __future__ import annotations
+
+import numpy as np
+import viser
+from jaxtyping import Float
+from numpy import ndarray
+
+from app.colours import Palette
+from app.scene import geometry
+from app.scene.nodes import Lines
+from app.state.pairs import GATE, pairs_at
+from tracker.sequences.sequence import Sequence
+from tracker.trajectories import Trajectories
+
+DASH = 0.18
+"""Of the largest half extent of a person: dashed is what this run did not see here."""
+NO_LINES = np.zeros((0, 2, 3))
+
+
+class ReferenceNodes:
+    """Dashed boxes of the truth and of the pinned run, and a line for each error."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        """Make the nodes, hidden."""
+        self._truth = Lines(server, "/people/truth", 1.0)
+        self._errors = Lines(server, "/people/errors", 3.0)
+        self._pinned = Lines(server, "/people/pinned", 1.25)
+        self._pinned_trails = Lines(server, "/people/pinned_trails", 1.0)
+
+    def show_truth(
+        self, sequence: Sequence, tracks: Trajectories, step: int | None, palette: Palette
+    ) -> None:
+        """Draw where people really are, and how far from there they were put.
+
+        Args:
+            sequence: Gives the truth and a person's size.
+            tracks: Of the run; what it does not have at the step gets no line.
+            step: 0-based; None draws nothing.
+            palette: Of the theme.
+        """
+        truth = sequence.ground_truth
+        if truth is None or step is None:
+            self._truth.show(NO_LINES, palette.truth)
+            self._errors.show(NO_LINES, palette.truth)
+            return
+        now = truth.at(step)
+        strength = np.where(truth.valid[now], 0.75, 0.35)
+        segments, owners = _dashed(truth.positions[now], sequence.target_half_extents)
+        shade = np.broadcast_to(np.array(palette.truth, dtype=np.uint8), (len(segments), 3))
+        self._truth.show(segments, palette.fade(shade, strength[owners])[:, None])
+        pairs = pairs_at(truth, tracks, step)
+        ends = (truth.positions[now][pairs.people], tracks.positions[tracks.at(step)])
+        lines = np.stack([ends[0], ends[1][pairs.estimates]], axis=1).reshape(-1, 2, 3)
+        self._errors.show(lines, palette.error(pairs.errors / GATE)[:, None])
+
+    def show_pinned(
+        self, sequence: Sequence, tracks: Trajectories | None, step: int, palette: Palette
+    ) -> None:
+        """Draw the pinned run's people and the way they came; None draws nothing."""
+        if tracks is None:
+            tracks = Trajectories.empty(len(sequence.views))
+        half = sequence.target_half_extents
+        segments, _ = _dashed(tracks.positions[tracks.at(step)], half)
+        shade = np.array(palette.pinned, dtype=np.uint8)
+        self._pinned.show(
+            segments, palette.fade(np.broadcast_to(shade, (len(segments), 1, 3)), 0.7)
+        )
+        way = geometry.trails(tracks, step, geometry.TRAIL_SECONDS, sequence.fps, float(half[2]))
+        ages = way.ages / geometry.TRAIL_SECONDS
+        shades = np.broadcast_to(shade, (len(way.segments), 2, 3))
+        # every second segment: dashed, like all that is not of this run
+        kept = np.arange(len(way.segments)) % 4 < 2
+        self._pinned_trails.show(
+            way.segments[kept], palette.fade(shades[kept], 0.6 - 0.5 * ages[kept])
+        )
+
+
+def _dashed(
+    centres: Float[ndarray, "N 3"], half: Float[ndarray, " 3"]
+) -> tuple[Float[ndarray, "S 2 3"], ndarray]:
+    """Dashed boxes, and whose each segment is."""
+    edges = geometry.box_edges(centres, half)
+    parts = [geometry.dashes(box, DASH * float(half.max())) for box in edges]
+    owners = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    return np.concatenate([NO_LINES, *parts]), owners

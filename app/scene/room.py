@@ -1,0 +1,193 @@
+"""What stands still in the 3D scene: floor, tracked volume, entrances, and the cameras' frusta."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import viser
+from jaxtyping import Float
+from numpy import ndarray
+
+from app import colours
+from app.colours import Palette
+from app.scene import geometry
+from app.scene.geometry import Pose
+from app.scene.nodes import Lines, Meshes, Tag, Tags
+from app.scene.pictures import StraightView
+from tracker.camera import Camera
+from tracker.sequences.sequence import Room
+
+GRID_CELL = 0.5
+"""Metres."""
+GRID_MARGIN = 1.0
+"""Metres that the floor reaches beyond the volume."""
+RIM_POINTS = 48
+FRUSTUM_WIDTH = 320
+"""Pixels of the picture on a frustum."""
+BACKDROP_WIDTH = 960
+"""Pixels of the picture of the camera that somebody looks through."""
+FRUSTA = 4
+"""Made at once; a sequence with more cameras adds some for good."""
+
+
+class RoomNodes:
+    """Floor, volume and entrances."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        """Make the nodes, hidden."""
+        self._minor = Lines(server, "/room/grid", 1.0)
+        self._major = Lines(server, "/room/grid_major", 1.0)
+        self._volume = Lines(server, "/room/volume", 1.0)
+        sphere = geometry.icosphere(2)
+        self._entrances = Meshes(server, "/room/entrances", *sphere)
+        self._rims = Lines(server, "/room/entrance_rims", 1.0)
+        self._names = Tags(server, "/labels/entrances", 4, 0.7)
+
+    def show(self, room: Room, palette: Palette, *, volume: bool, floor: bool) -> None:
+        """Draw a room.
+
+        Args:
+            room: Its volume and entrances.
+            palette: Of the theme.
+            volume: Whether that layer is on.
+            floor: Whether the grid is drawn, with the entrances on it.
+        """
+        low, high = room.minimum, room.maximum
+        height = float(low[2])
+        minor, major = geometry.floor_grid(
+            low[:2] - GRID_MARGIN, high[:2] + GRID_MARGIN, height, GRID_CELL
+        )
+        self._minor.show(minor[: None if floor else 0], palette.grid_minor)
+        self._major.show(major[: None if floor else 0], palette.grid_major)
+        edges = geometry.box_edges((low + high)[None] / 2.0, (high - low) / 2.0)[0]
+        self._volume.show(edges if volume else edges[:0], palette.volume)
+        entrances = room.entrances if volume and floor else ()
+        places = np.array([e.position for e in entrances]).reshape(-1, 3)
+        sigmas = np.array([e.sigma for e in entrances]).reshape(-1, 3)
+        places[:, 2] = height + 0.004  # on the floor, in front of its lines
+        radius = geometry.mass_radius(geometry.DEFAULT_MASS, 2)
+        axes = np.concatenate([sigmas[:, :2] * radius, np.full((len(sigmas), 1), 1e-3)], axis=1)
+        grey = np.broadcast_to(np.array(palette.line, dtype=np.uint8), places.shape)
+        self._entrances.show(places, axes, grey, np.full(len(places), 0.06))
+        self._rims.show(_rims(places, axes), palette.entrance)
+        self._names.show([Tag(tuple(place.tolist()), "entrance") for place in places])
+
+
+def _rims(centres: Float[ndarray, "N 3"], axes: Float[ndarray, "N 3"]) -> Float[ndarray, "S 2 3"]:
+    """The outlines of flat ellipses."""
+    angles = np.linspace(0.0, 2.0 * np.pi, RIM_POINTS + 1)
+    circle = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
+    points = centres[:, None] + circle * axes[:, None]
+    return np.stack([points[:, :-1], points[:, 1:]], axis=2).reshape(-1, 2, 3)
+
+
+class FrustumNodes:
+    """The cameras with their pictures."""
+
+    def __init__(self, server: viser.ViserServer, on_click: Callable[[int], None]) -> None:
+        """Make the nodes, hidden.
+
+        Args:
+            server: Where they live.
+            on_click: Called with the index of the camera that was clicked.
+        """
+        self._server = server
+        self._on_click = on_click
+        self._handles: list[viser.CameraFrustumHandle] = []
+        self._names = Tags(server, "/labels/cameras", FRUSTA, 0.85)
+        self._cameras: tuple[Camera, ...] = ()
+        self._size = 1.0
+        self._reach = 1.0
+        self._views: dict[tuple[int, int], StraightView] = {}
+        self._through: int | None = None
+        for _ in range(FRUSTA):
+            self._grow()
+
+    def _grow(self) -> None:
+        index = len(self._handles)
+        handle = self._server.scene.add_camera_frustum(
+            f"/cameras/{index:02d}",
+            fov=1.0,
+            aspect=1.0,
+            thickness=1.0,
+            thickness_units="screen",
+            color=colours.PALETTES["dark"].line,
+            jpeg_quality=80,
+            format="jpeg",
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=False,
+        )
+
+        @handle.on_click
+        def _(_: viser.SceneNodePointerEvent[viser.CameraFrustumHandle]) -> None:
+            self._on_click(index)
+
+        self._handles.append(handle)
+
+    def place(
+        self, cameras: tuple[Camera, ...], room: Room, through: int | None, palette: Palette
+    ) -> None:
+        """Put the frusta where the cameras are.
+
+        Args:
+            cameras: Those of the sequence.
+            room: Gives the measure of how large to draw them.
+            through: The one that is looked through: its picture stands behind the room.
+            palette: Of the theme.
+        """
+        if cameras != self._cameras:
+            self._cameras, self._views = cameras, {}
+        while len(self._handles) < len(cameras):
+            self._grow()
+        corners = geometry.box_corners(room.minimum, room.maximum)
+        self._size = 0.115 * float(np.linalg.norm(room.maximum - room.minimum))
+        self._through = through
+        tags: list[Tag] = []
+        for index, camera in enumerate(cameras):
+            handle, view = self._handles[index], self.view(index)
+            depth = self._size
+            if index == through:
+                depth = 1.2 * float(camera.to_camera(corners)[:, 2].max())
+            else:
+                above = camera.centre + np.array([0.0, 0.0, 0.18 * self._size])
+                tags.append(Tag((above[0], above[1], above[2]), camera.name))
+            handle.fov, handle.aspect = view.fov, view.aspect
+            handle.color = palette.line
+            handle.scale = depth / handle.compute_canonical_frustum_size()[2]
+            handle.position = camera.centre
+            handle.wxyz = geometry.quaternions(view.rotation.T[None])[0]
+            handle.visible = True
+        for handle in self._handles[len(cameras) :]:
+            handle.visible = False
+        self._names.show(tags)
+
+    def view(self, index: int) -> StraightView:
+        """The straight picture of a camera, as large as it is to be drawn now."""
+        width = BACKDROP_WIDTH if index == self._through else FRUSTUM_WIDTH
+        if (index, width) not in self._views:
+            self._views[index, width] = StraightView(self._cameras[index], width)
+        return self._views[index, width]
+
+    def show_picture(self, index: int, picture: ndarray) -> None:
+        """Put a straight picture (BGR) onto a frustum."""
+        self._handles[index].image = picture[:, :, ::-1]
+
+
+def pose_through(view: StraightView, distance: float, aspect: float) -> Pose:
+    """Where to look from to see just what a camera sees.
+
+    Args:
+        view: The camera's straight view.
+        distance: Metres ahead that the viewpoint turns around.
+        aspect: Width over height of the window; the whole picture fits into it.
+    """
+    camera = view.camera
+    slope = np.tan(view.fov / 2.0) * max(1.0, view.aspect / aspect) * 1.03
+    return Pose(
+        position=camera.centre,
+        look_at=camera.centre + distance * view.rotation[2],
+        up=-view.rotation[1],
+        fov=2.0 * float(np.arctan(slope)),
+    )

@@ -1,0 +1,253 @@
+"""The 3D view: the room, the cameras with their pictures, and what the run says of a step.
+
+The scene is a fixed set of named nodes that are updated in place by one thread, which
+always draws the newest state; see :mod:`app.scene.worker`. All that belongs to a step
+reaches the browsers together, the written step included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Set
+from functools import partial
+
+import numpy as np
+import viser
+
+from app.colours import PALETTES, Theme
+from app.scene import geometry
+from app.scene.geometry import Pose
+from app.scene.people import PeopleNodes
+from app.scene.reference import ReferenceNodes
+from app.scene.room import GRID_CELL, FrustumNodes, RoomNodes, pose_through
+from app.scene.views import Views
+from app.scene.worker import LatestWorker
+from app.state.snapshot import Change, Snapshot, View
+from app.state.workbench import Workbench
+from tracker.pipeline import Run
+from tracker.sequences.sequence import Room
+from tracker.trajectories import Trajectories
+
+
+class Scene:
+    """viser's scene, kept equal to the workbench's state."""
+
+    def __init__(self, server: viser.ViserServer, workbench: Workbench) -> None:
+        """Make all nodes and follow the workbench from now on.
+
+        Args:
+            server: Its scene, theme and viewpoints belong to this object.
+            workbench: What to show.
+        """
+        self._server = server
+        self._workbench = workbench
+        self._shown = Snapshot()
+        self._drawn: tuple[object, ...] = ()
+        self._looking: View = None
+        self._theme: Theme | None = None
+        server.scene.set_up_direction("+z")
+        server.scene.world_axes.visible = False
+        self._status = server.gui.add_html(status_html(self._shown, None))
+        self._room = RoomNodes(server)
+        self._frusta = FrustumNodes(server, self._look_through)
+        self._reference = ReferenceNodes(server)
+        self._people = PeopleNodes(server, self._pick)
+        self._views = Views(server, self._overview)
+        self._worker = LatestWorker("scene", self._work)
+        self._unsubscribe = workbench.subscribe(self._note)
+        self._worker.ask("sequence")
+
+    def wait(self, timeout: float) -> bool:
+        """Block until the newest state is drawn; whether it was within ``timeout`` seconds.
+
+        Raises:
+            Exception: What went wrong while drawing.
+        """
+        return self._worker.wait(timeout)
+
+    def close(self) -> None:
+        """Stop following; the nodes stay as they are."""
+        self._unsubscribe()
+        self._worker.close()
+        self._views.close()
+
+    # what happens elsewhere: these return at once
+
+    def _note(self, change: Change) -> None:
+        if change not in ("parameters", "opening"):
+            self._worker.ask(change)
+
+    def _pick(self, track: int) -> None:
+        selected = self._workbench.snapshot().selection
+        self._workbench.select(None if track == selected else track)
+
+    def _look_through(self, camera: int) -> None:
+        self._workbench.look(None if camera == self._looking else camera)
+
+    # the worker's thread
+
+    def _work(self, topics: Set[str]) -> None:
+        snapshot = self._workbench.snapshot()
+        themed = snapshot.theme != self._theme
+        if themed:
+            self._theme = snapshot.theme
+            self._server.gui.configure_theme(
+                dark_mode=snapshot.theme == "dark", show_logo=False, show_share_button=False
+            )
+        sequence = snapshot.sequence
+        if sequence is None:
+            return
+        before = self._shown.sequence
+        another = before is None or sequence.views is not before.views
+        taught = sequence is not before
+        turned = snapshot.view != self._looking
+        self._looking = snapshot.view
+        self._shown = snapshot
+        if taught or turned or themed or "layers" in topics:
+            palette, through = PALETTES[snapshot.theme], self._through
+            with self._server.atomic():
+                self._room.show(
+                    sequence.room,
+                    palette,
+                    volume=snapshot.layers["volume"],
+                    floor=through is None,
+                )
+                self._frusta.place(sequence.cameras, sequence.room, through, palette)
+        self._draw_step(snapshot, shown_run(snapshot))
+        if another:
+            self._set_home(snapshot)
+            self._views.home()
+        elif turned:
+            self._views.look(self._pose_of(snapshot), flies=snapshot.flies)
+
+    @property
+    def _through(self) -> int | None:
+        """The camera that is looked through."""
+        return self._looking if isinstance(self._looking, int) else None
+
+    def _draw_step(self, snapshot: Snapshot, run: Run | None) -> None:
+        sequence = snapshot.sequence
+        assert sequence is not None
+        step = snapshot.playhead
+        drawing = (
+            sequence, run, step, snapshot.selection, dict(snapshot.layers), self._looking,
+            snapshot.run_state.state, snapshot.theme, snapshot.scores.pinned,
+        )  # fmt: skip
+        if drawing == self._drawn:
+            return
+        self._drawn = ()
+        pictures = [self._picture(snapshot, run, camera) for camera in range(len(sequence.views))]
+        with self._server.atomic():
+            layers, palette = snapshot.layers, PALETTES[snapshot.theme]
+            self._people.show(sequence, run, step, snapshot.selection, layers, palette)
+            tracks = run.tracks if run is not None else Trajectories.empty(len(sequence.views))
+            self._reference.show_truth(sequence, tracks, step if layers["truth"] else None, palette)
+            self._reference.show_pinned(sequence, pinned_tracks(snapshot), step, palette)
+            for camera, picture in enumerate(pictures):
+                self._frusta.show_picture(camera, picture)
+            self._status.content = status_html(snapshot, run)
+        self._server.flush()
+        self._drawn = drawing
+
+    def _picture(self, snapshot: Snapshot, run: Run | None, camera: int) -> np.ndarray:
+        """A camera's picture of the shown step with the targets in it."""
+        sequence, step = snapshot.sequence, snapshot.playhead
+        assert sequence is not None
+        view = self._frusta.view(camera)
+        source = snapshot.reader.picture(camera, step) if snapshot.reader is not None else None
+        picture = view.picture(source)
+        if source is None and sequence.views[camera].has_pictures:
+            view.draw_note(picture, f"{view.camera.name}: no frame {step}")
+        if run is not None and snapshot.layers["boxes"] and camera != self._through:
+            now = run.tracks.at(step)
+            view.draw_boxes(
+                picture,
+                run.tracks.positions[now],
+                sequence.target_half_extents,
+                run.tracks.ids[now],
+                snapshot.selection,
+            )
+        return picture
+
+    def _overview(self, aspect: float) -> Pose | None:
+        sequence = self._shown.sequence
+        if sequence is None:
+            return None
+        room = sequence.room
+        eyes = np.array([camera.centre for camera in sequence.cameras]).reshape(-1, 3)
+        corners = geometry.box_corners(room.minimum, room.maximum)
+        centre = (room.minimum + room.maximum) / 2.0
+        return geometry.overview(np.concatenate([corners, eyes]), eyes, centre, aspect)
+
+    def _set_home(self, snapshot: Snapshot) -> None:
+        """Where viser's own "reset view" goes."""
+        pose = self._overview(1.0)
+        if pose is not None:
+            home = self._server.initial_camera
+            home.position, home.look_at, home.fov = pose.position, pose.look_at, pose.fov
+
+    def _pose_of(self, snapshot: Snapshot) -> Callable[[float], Pose] | None:
+        """The pose of the view that is chosen, for an aspect; None is the free view."""
+        assert snapshot.sequence is not None
+        room = snapshot.sequence.room
+        if snapshot.view is None:
+            return None
+        if snapshot.view == "top":
+            return partial(geometry.from_above, _margin_around(room))
+        view = self._frusta.view(snapshot.view)
+        middle = (room.minimum + room.maximum)[None] / 2.0
+        distance = max(0.5, float(view.camera.to_camera(middle)[0, 2]))
+        return partial(pose_through, view, distance)
+
+
+def _margin_around(room: Room) -> np.ndarray:
+    """The corners of a room and a little of the floor around it."""
+    beside = np.array([0.25, 0.25, 0.0])
+    return geometry.box_corners(room.minimum - beside, room.maximum + beside)
+
+
+def pinned_tracks(snapshot: Snapshot) -> Trajectories | None:
+    """What is drawn of the pinned run; nothing where it is the shown run itself."""
+    pinned = snapshot.scores.pinned
+    if pinned is None or not snapshot.layers["pinned"]:
+        return None
+    if snapshot.run is not None and pinned.key == snapshot.run.key:
+        return None
+    return pinned.tracks
+
+
+def shown_run(snapshot: Snapshot) -> Run | None:
+    """The run whose step may be drawn: the one that is asked for, once it has the step.
+
+    After a failure it is the last good one, which the page says too.
+    """
+    run = snapshot.run
+    if run is None or not snapshot.step_is_computed or snapshot.sequence is None:
+        return None
+    if run.sequence.digest != snapshot.sequence.digest:
+        return None
+    if run.key != snapshot.run_state.key and snapshot.run_state.state != "failed":
+        return None
+    return run
+
+
+def status_html(snapshot: Snapshot, run: Run | None) -> str:
+    """The shown step in words, for the head of the panel."""
+    sequence, step = snapshot.sequence, snapshot.playhead
+    if sequence is None:
+        return '<div class="mvp-status" data-state="empty">No sequence is open</div>'
+    if run is not None:
+        now = run.tracks.at(step)
+        count = now.stop - now.start
+        state, words = "computed", f"{count} {'person' if count == 1 else 'people'}"
+    elif snapshot.run_state.state == "computing":
+        state, words = "computing", "computing …"
+    else:
+        state, words = "missing", "not computed"
+    size = " × ".join(f"{side:.1f}" for side in sequence.room.maximum - sequence.room.minimum)
+    mass = round(100 * geometry.DEFAULT_MASS)
+    return (
+        f'<div class="mvp-status" data-step="{step}" data-state="{state}">'
+        f"<p><b>{step}</b> / {sequence.frames} · <b>{step / sequence.fps:.2f}</b> s"
+        f"<span>{words}</span></p>"
+        f"<small>grid {GRID_CELL:g} m · {size} m · ellipsoids hold {mass} %</small></div>"
+    )

@@ -1,0 +1,1 @@
+"""What the workbench knows: the open recording, its runs, and whoever works on them."""

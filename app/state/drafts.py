@@ -1,0 +1,63 @@
+"""What was taught and not saved, by the folder of its sequence: kept for the next start too."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+from pathlib import Path
+
+from app.state.json_files import write_json
+from tracker.sequences.writing.teaching import Values, changes
+
+logger = logging.getLogger("app")
+
+
+class Drafts:
+    """One draft a sequence folder: room and templates as saved, and as taught since."""
+
+    def __init__(self, folder: Path | None) -> None:
+        """Keep them in a folder, a file each; in memory for this start where there is none."""
+        self._folder = folder
+        self._kept: dict[Path, tuple[Values, Values]] = {}
+
+    def keep(self, sequence: Path, saved: Values, taught: Values) -> None:
+        """Keep what is not saved of a sequence, instead of what was before; nothing, if all is."""
+        if saved == taught:
+            self.forget(sequence)
+            return
+        self._kept[sequence] = saved, taught
+        if self._folder is None:
+            return
+        draft = {"sequence": str(sequence), "saved": saved, "taught": taught}
+        try:
+            write_json(self._file(sequence), draft)
+        except OSError as error:
+            logger.warning("what is not saved of %s would be lost at an end: %s", sequence, error)
+
+    def read(self, sequence: Path) -> tuple[Values, Values] | None:
+        """As saved and as taught; None where all was saved, or the file cannot be read."""
+        if self._folder is None or sequence in self._kept:
+            return self._kept.get(sequence)
+        path = self._file(sequence)
+        try:
+            draft = json.loads(path.read_text(encoding="utf-8"))
+            saved, taught = draft["saved"], draft["taught"]
+            changes(saved, taught)  # they are in another version's notation, if it fails
+            return saved, taught
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+            logger.warning("%s cannot be read and is left as it is: %s", path, error)
+            return None
+
+    def forget(self, sequence: Path) -> None:
+        """All of it is saved, or it cannot be taken up any more."""
+        self._kept.pop(sequence, None)
+        if self._folder is not None:
+            self._file(sequence).unlink(missing_ok=True)
+
+    def _file(self, sequence: Path) -> Path:
+        assert self._folder is not None
+        name = hashlib.sha256(str(sequence.absolute()).encode()).hexdigest()[:16]
+        return self._folder / f"{name}.json"

@@ -1,0 +1,97 @@
+"""The runs since the server was started: what each was made of, and the way back to it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from app.state.snapshot import Change, RunState
+from app.state.workbench import Workbench
+from tracker import parameters as table
+from tracker.parameters import ParameterError, RunParameters
+
+MOST_RUNS = 50
+"""Older ones are forgotten."""
+
+
+@dataclass(frozen=True, slots=True)
+class PastRun:
+    """One run, finished or not."""
+
+    number: int
+    """From 1 on."""
+    at: str
+    """When it began: the time of day."""
+    sequence: str
+    """Its name then."""
+    recording: str
+    """The same as long as it is open, under whatever name."""
+    parameters: RunParameters
+    changes: int
+    """How many parameters were not at their defaults."""
+    state: RunState
+    """How far it was when it was last heard of."""
+    taught: str
+    """The digest of the sequence with the templates and the room that it had."""
+
+
+class History:
+    """Writes down the runs of a workbench, newest first."""
+
+    def __init__(self, workbench: Workbench) -> None:
+        self._workbench = workbench
+        self._lock = threading.Lock()
+        self._runs: list[PastRun] = []
+        self._counted = 0
+        self.close = workbench.subscribe(self._note)
+
+    @property
+    def runs(self) -> list[PastRun]:
+        """All that are remembered, newest first."""
+        with self._lock:
+            return list(self._runs)
+
+    def use_again(self, number: int, restore: Callable[[str, Mapping[str, Any]], bool]) -> None:
+        """Set all parameters to those of a run, and what was taught, where it is still known.
+
+        Args:
+            number: The run's.
+            restore: Goes back to what was taught once and to values by key, in one change;
+                another sequence's it does not know.
+
+        Raises:
+            ParameterError: If there is no such run.
+        """
+        run = next((run for run in self.runs if run.number == number), None)
+        if run is None:
+            raise ParameterError("number", f"expected the number of a listed run, got {number}")
+        keys = (*table.METHODS, *table.PARAMETERS)
+        values = {key: table.value(run.parameters, key) for key in keys}
+        if not restore(run.taught, values):
+            self._workbench.set_parameters(values, "api")
+
+    def _note(self, change: Change) -> None:
+        if change not in ("run", "progress"):
+            return
+        with self._lock:
+            now = self._workbench.snapshot()
+            state, sequence = now.run_state, now.sequence
+            if not state.key or sequence is None:
+                return
+            for index, run in enumerate(self._runs):
+                if run.state.key == state.key:
+                    self._runs[index] = replace(run, state=state)
+                    return
+            # one that was overtaken before it showed anything is not worth a row
+            earlier = [r for r in self._runs if r.state.state != "computing" or r.state.done]
+            self._counted += 1
+            changes = len(table.changed(now.parameters, now.defaults))
+            at = time.strftime("%H:%M:%S")
+            new = PastRun(
+                self._counted, at, sequence.name, now.sequence_key, now.parameters, changes, state,
+                sequence.digest,
+            )  # fmt: skip
+            self._runs = [new, *earlier][:MOST_RUNS]

@@ -1,0 +1,319 @@
+"""The only owner of threads that work: opening a sequence, computing runs.
+
+Runs are coalesced, not queued: at most one is under way, the newest parameters
+win, the last always runs, and a superseded one stops between two steps.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+from app.errors import sentence
+from app.state.compiling import WORDS, Compiling
+from app.state.snapshot import Change, Opening, Snapshot
+from app.state.workbench import Workbench
+from tracker import pipeline
+from tracker.pipeline import Cancelled, Progress, Run
+from tracker.runs.stage_cache import StageCache
+from tracker.sequences import library
+from tracker.sequences.frames import FrameReader
+
+logger = logging.getLogger("app")
+
+NICENESS = 2
+"""Work on pictures yields to whoever scrubs: the kernel gives its threads what the server
+leaves. The fusion does not: it is short, and whoever moves a slider waits for it."""
+
+OPENING_TELLS_SECONDS = 0.1
+"""At most this often an opening tells how far it is."""
+
+CLOSING_SECONDS = 1.0
+"""How long what is under way may take to notice that it is to end."""
+
+SWITCH_SECONDS = 0.001
+"""A thread that computes gives the interpreter back this soon; Python's own 5 ms add up
+when a request needs it several times."""
+
+
+@dataclass(eq=False)
+class _Wanted:
+    """A run that is asked for."""
+
+    snapshot: Snapshot
+    key: str
+    cancelled: threading.Event = field(default_factory=threading.Event)
+    stopped_by_person: bool = False
+
+
+def locate(name: str, data: Path | None) -> str:
+    """The folder under the data folder that a name of the list stands for, else the name."""
+    if data is not None and (data / name / "sequence.toml").is_file():
+        return str(data / name)
+    return name
+
+
+class Jobs:
+    """Opens sequences and computes runs in threads of its own; reports to the workbench."""
+
+    def __init__(
+        self,
+        workbench: Workbench,
+        *,
+        data: Path | None = None,
+        seed: int = 0,
+        cache: StageCache | None = None,
+        compiling: Compiling | None = None,
+    ) -> None:
+        """Begin to follow the workbench.
+
+        Args:
+            workbench: Whom to serve.
+            data: Its folders are sequences by name.
+            seed: Of all runs.
+            cache: Where columns of runs are kept; in memory only, if none is given.
+            compiling: Whom to wait for before a sequence is shown, and before the first run;
+                closed with this.
+        """
+        self._workbench = workbench
+        self._data = data
+        self._seed = seed
+        self._condition = threading.Condition()
+        self._wanted: _Wanted | None = None
+        self._under_way: _Wanted | None = None
+        self._cache = cache or StageCache()
+        self._compiling = compiling
+        self._opening: threading.Event | None = None
+        self._openings: list[threading.Thread] = []
+        self._closed = False
+        self._unsubscribe = workbench.subscribe(self._on_change)
+        self._switch_interval = sys.getswitchinterval()
+        sys.setswitchinterval(SWITCH_SECONDS)
+        self._worker = threading.Thread(target=self._work, name="runs", daemon=True)
+        self._worker.start()
+
+    # opening
+
+    def open(self, name: str) -> Future[None]:
+        """Open a sequence, built-in or a folder, in the background; the newest request wins.
+
+        Returns:
+            Done when it is shown; its exception says why it is not. Whatever was
+            open stays open after a failure.
+        """
+        future: Future[None] = Future()
+        cancelled = threading.Event()
+        with self._condition:
+            if self._closed:
+                raise RuntimeError("the jobs are closed")
+            if self._opening is not None:
+                self._opening.set()
+            self._opening = cancelled
+            thread = threading.Thread(
+                target=self._open, args=(name, cancelled, future), name="opening", daemon=True
+            )
+            self._openings = [t for t in self._openings if t.is_alive()] + [thread]
+        self._workbench.set_opening(Opening(name, "reading"))
+        thread.start()
+        return future
+
+    def _open(self, name: str, cancelled: threading.Event, future: Future[None]) -> None:
+        be_nice()
+
+        told_at = 0.0
+
+        def progress(words: str, done: int, total: int) -> None:
+            nonlocal told_at
+            now = time.monotonic()
+            if cancelled.is_set():
+                return
+            if now - told_at >= OPENING_TELLS_SECONDS or done == total:
+                told_at = now
+                self._workbench.set_opening(Opening(name, words, done, total))
+
+        try:
+            sequence = library.open_sequence(
+                locate(name, self._data),
+                progress=partial(progress, "rendering"),
+                cancelled=cancelled.is_set,
+            )
+            if self._compiling is not None:
+                self._compiling.wait("shown", partial(progress, WORDS), cancelled.is_set)
+            parameters = pipeline.default_parameters(sequence)
+            reader = FrameReader(sequence)
+            with self._condition:
+                if cancelled.is_set():
+                    reader.close()
+                    raise Cancelled
+                self._opening = None
+            before = self._workbench.open(sequence, sequence.digest[:16], reader, parameters)
+        except Exception as error:
+            if cancelled.is_set():
+                future.set_exception(Cancelled("another sequence was asked for"))
+                return
+            if not isinstance(error, ValueError | OSError):
+                logger.exception("opening %s failed", name)
+            self._opening_failed(name, cancelled, error)
+            future.set_exception(error)
+        else:
+            if before is not None:
+                self._close_when_unused(before)
+            future.set_result(None)
+
+    def _opening_failed(self, name: str, cancelled: threading.Event, error: Exception) -> None:
+        with self._condition:
+            if cancelled.is_set():
+                return
+            self._opening = None
+        self._workbench.set_opening(None)
+        words = sentence(error).removeprefix(f"{name}: ")
+        self._workbench.notify(
+            "error", f"{name} cannot be opened: {words}", "What was open still is."
+        )
+
+    def _close_when_unused(self, reader: FrameReader) -> None:
+        """Close a reader as soon as the run that may decode from it is over."""
+        with self._condition:
+            self._condition.wait_for(
+                lambda: (
+                    self._closed
+                    or self._under_way is None
+                    or self._under_way.snapshot.reader is not reader
+                )
+            )
+        reader.close()
+
+    # running
+
+    def run_again(self) -> None:
+        """Go on with a run that was cancelled or failed."""
+        self._ask(again=True)
+
+    def cancel(self) -> None:
+        """Stop the run under way; its steps stay shown."""
+        with self._condition:
+            for wanted in (self._wanted, self._under_way):
+                if wanted is not None:
+                    wanted.stopped_by_person = True
+                    wanted.cancelled.set()
+
+    def _on_change(self, change: Change) -> None:
+        if change in ("sequence", "parameters", "taught"):
+            self._ask()
+
+    def _ask(self, *, again: bool = False) -> None:
+        with self._condition:
+            snapshot = self._workbench.snapshot()
+            if snapshot.sequence is None or self._closed:
+                return
+            key = pipeline.stage_keys(snapshot.sequence, snapshot.parameters, self._seed)["tracks"]
+            newest = self._wanted or self._under_way
+            if newest is not None and newest.key == key and not newest.cancelled.is_set():
+                return  # it is under way already
+            if newest is None and key == snapshot.run_state.key and not again:
+                return  # it is there already, or was stopped on purpose
+            if self._under_way is not None:
+                self._under_way.cancelled.set()
+            self._wanted = _Wanted(snapshot, key)
+            # told under the lock, so that of two changes at once the newer is told last;
+            # whoever is told only takes note
+            self._workbench.run_begins(key)
+            self._condition.notify_all()
+
+    def _work(self) -> None:
+        while True:
+            with self._condition:
+                self._under_way = None
+                self._condition.notify_all()
+                self._condition.wait_for(lambda: self._closed or self._wanted is not None)
+                if self._closed:
+                    return
+                wanted, self._wanted = self._wanted, None
+                self._under_way = wanted
+            assert wanted is not None
+            self._compute(wanted)
+
+    def _compute(self, wanted: _Wanted) -> None:
+        snapshot, workbench = wanted.snapshot, self._workbench
+        sequence = snapshot.sequence
+        assert sequence is not None
+
+        def on_progress(run: Run, progress: Progress) -> None:
+            if not wanted.cancelled.is_set():
+                workbench.run_progresses(run, progress)
+
+        def on_compiling(done: int, total: int) -> None:
+            if total and not wanted.cancelled.is_set():
+                workbench.run_waits(wanted.key, f"{WORDS}, {done} of {total}")
+
+        try:
+            if self._compiling is not None:
+                self._compiling.wait("ready", on_compiling, wanted.cancelled.is_set)
+            pipeline.compute(
+                sequence,
+                snapshot.parameters,
+                seed=self._seed,
+                reader=snapshot.reader,
+                cache=self._cache,
+                wanted=lambda: workbench.snapshot().playhead,
+                on_progress=on_progress,
+                cancelled=wanted.cancelled.is_set,
+                thread_begins=be_nice,
+            )
+        except Cancelled:
+            if wanted.stopped_by_person:
+                workbench.run_ends(wanted.key, "cancelled")
+        except Exception as error:
+            if not isinstance(error, ValueError | OSError):
+                logger.exception("a run failed")
+            workbench.run_ends(wanted.key, "failed", sentence(error))
+        else:
+            workbench.run_ends(wanted.key, "done")
+
+    def close(self) -> None:
+        """Stop everything; what is under way ends after its step."""
+        self._unsubscribe()
+        with self._condition:
+            self._closed = True
+            if self._opening is not None:
+                self._opening.set()
+            if self._under_way is not None:
+                self._under_way.cancelled.set()
+            self._condition.notify_all()
+        if self._compiling is not None:
+            self._compiling.close()
+        deadline = time.monotonic() + CLOSING_SECONDS
+        for thread in (self._worker, *self._openings):
+            if thread.ident is not None:
+                thread.join(timeout=max(0.0, deadline - time.monotonic()))
+        sys.setswitchinterval(self._switch_interval)
+        reader = self._workbench.snapshot().reader
+        if reader is not None:
+            reader.close()
+
+
+def in_background(work: Callable[[], object]) -> None:
+    """Do something that nobody waits for, and that may be cut short by the program's end."""
+
+    def nicely() -> None:
+        be_nice()
+        work()
+
+    threading.Thread(target=nicely, name="stage-files", daemon=True).start()
+
+
+def be_nice() -> None:
+    """Give this thread, and those it starts, less of a busy machine (where that can be said)."""
+    set_priority: Callable[[int, int, int], None] | None = getattr(os, "setpriority", None)
+    if set_priority is not None and sys.platform.startswith("linux"):
+        with contextlib.suppress(OSError):
+            set_priority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)

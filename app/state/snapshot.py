@@ -1,0 +1,168 @@
+"""What the workbench holds, as values that can be read from any thread, and its passing events."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any, Literal
+
+from app.colours import Theme
+from app.state.scores import Scores
+from tracker import parameters as table
+from tracker.parameters import RunParameters
+from tracker.pipeline import Run
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+
+Change = Literal[
+    "sequence", "opening", "parameters", "playhead", "selection", "layers", "view", "theme",
+    "run", "progress", "evaluation", "pinned", "presets", "taught", "editing",
+]  # fmt: skip
+"""What is another now: ``run`` is a run's beginning and its end, ``progress`` its new steps,
+``taught`` another room or other templates of the same recording."""
+
+RunPhase = Literal["idle", "computing", "done", "failed", "cancelled"]
+
+Level = Literal["info", "warn", "error"]
+
+LAYERS = ("boxes", "ellipsoids", "trails", "truth", "volume", "pinned", "others")
+"""The layers of the 3D view that can be switched; ``others`` are the tracks that are not
+selected, while one is."""
+
+View = int | Literal["top"] | None
+"""What the 3D view looks through: a camera by its index, from above, or freely."""
+
+Presets = Mapping[str, Mapping[str, Any]]
+"""A person's own presets: by name, the values by key that were not at their defaults."""
+
+CLAMPED_ORIGIN = "viser"
+"""Whose numbers are moved into their range rather than refused: viser clamps nothing itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunState:
+    """How far the run is that the parameters ask for."""
+
+    key: str = ""
+    """Of the run that is asked for; what is shown is of this run where its key is the same."""
+    state: RunPhase = "idle"
+    done: int = 0
+    total: int = 0
+    steps_per_second: float = 0.0
+    seconds_left: float | None = None
+    message: str = ""
+    error: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """A sequence that is being rendered or read."""
+
+    name: str
+    message: str
+    done: int = 0
+    total: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A key was pressed inside a 3D view in a window of its own."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """A sentence for the person in front of the page."""
+
+    level: Level
+    message: str
+    hint: str | None = None
+
+
+Event = Command | Notice
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """The whole state at one moment; a value that can be read from any thread."""
+
+    version: int = 0
+    """Grows with every change."""
+    sequence: Sequence | None = None
+    """That is open, with what it was taught since."""
+    saved: Sequence | None = None
+    """The same as its file has it."""
+    editing_room: bool = False
+    """Whether the 3D view has handles on the room."""
+    sequence_key: str = ""
+    """Another for every content, so that pictures may be kept for ever."""
+    reader: FrameReader | None = None
+    opening: Opening | None = None
+    parameters: RunParameters = field(default_factory=RunParameters)
+    defaults: RunParameters = field(default_factory=RunParameters)
+    """The values that a reset returns to: of methods, those that fit the sequence."""
+    parameters_origin: str = ""
+    """Who changed the parameters last, so that nobody is told their own news."""
+    presets: Presets = field(default_factory=lambda: MappingProxyType({}))
+    playhead: int = 0
+    playhead_origin: str = ""
+    selection: int | None = None
+    run: Run | None = None
+    """What is shown; steps below its ``done`` are there."""
+    run_state: RunState = RunState()
+    scores: Scores = field(default_factory=Scores)
+    """Runs against the truth, where there is one."""
+    layers: Mapping[str, bool] = field(
+        default_factory=lambda: MappingProxyType(dict.fromkeys(LAYERS, True))
+    )
+    view: View = None
+    flies: bool = True
+    """Whether the 3D view moves to another, or is there at once: somebody wants less motion."""
+    theme: Theme = "dark"
+    """Of the 3D view."""
+
+    @property
+    def preset(self) -> str | None:
+        """The preset, built in or saved, whose values the parameters have."""
+        own = table.changed(self.parameters, self.defaults)
+        single_view = {"single_view": self.parameters.single_view}
+        for name, values in {**table.PRESETS, **self.presets}.items():
+            meant = {**single_view, **values}
+            if not meant.keys() <= _KEYS:  # saved by another version
+                continue
+            if own == {k: v for k, v in meant.items() if v != table.value(self.defaults, k)}:
+                return name
+        return None
+
+    def named(self, sequence: Sequence) -> Sequence:
+        """What a run was made of, by its name now: it is another since a copy was saved."""
+        return sequence if self.sequence is None else replace(sequence, name=self.sequence.name)
+
+    @property
+    def step_is_computed(self) -> bool:
+        """Whether the shown run has the playhead's step."""
+        return self.run is not None and self.playhead < self.run.done
+
+
+_KEYS = {*table.METHODS, *table.PARAMETERS}
+
+
+def clamp(key: str, value: Any) -> Any:
+    """A number moved into the range of its parameter; what is no number is left to the check."""
+    parameter = table.PARAMETERS.get(key)
+    if parameter is None or parameter.kind not in ("float", "int"):
+        return value
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        return value
+    if not math.isfinite(number):
+        return value
+    if parameter.minimum is not None:
+        number = max(number, parameter.minimum)
+    if parameter.maximum is not None:
+        number = min(number, parameter.maximum)
+    return round(number) if parameter.kind == "int" else number

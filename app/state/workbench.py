@@ -1,0 +1,391 @@
+"""The one store: sequence, parameters, playhead, selection, layers and the current run.
+
+Whoever changes something calls a method here; whoever shows something subscribes
+and reads a :class:`~app.state.snapshot.Snapshot`. Two kinds of news: a *change* says that a part of
+the state is another now (read it again), an *event* is a passing request that
+leaves no trace in the state.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any, Literal
+
+from app.colours import Theme
+from app.state.scores import Scored, Scores
+from app.state.snapshot import (
+    CLAMPED_ORIGIN,
+    LAYERS,
+    Change,
+    Command,
+    Event,
+    Level,
+    Notice,
+    Opening,
+    Presets,
+    RunState,
+    Snapshot,
+    View,
+    clamp,
+)
+from tracker import parameters as table
+from tracker.parameters import ParameterError, RunParameters
+from tracker.pipeline import Progress, Run
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+
+
+class Workbench:
+    """Thread-safe store; see the module's words."""
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+        self._snapshot = Snapshot()
+        self._last_good: Run | None = None
+        self._pending: list[Change] = []
+        self._subscribers: list[Callable[[Change], None]] = []
+        self._listeners: list[Callable[[Event], None]] = []
+
+    def snapshot(self) -> Snapshot:
+        """The state now."""
+        return self._snapshot
+
+    def subscribe(self, callback: Callable[[Change], None]) -> Callable[[], None]:
+        """Be told of changes, from the thread that makes them: the callback must return fast.
+
+        Returns:
+            A function that ends the subscription.
+        """
+        return self._register(self._subscribers, callback)
+
+    def subscribe_events(self, callback: Callable[[Event], None]) -> Callable[[], None]:
+        """Be told of events, from the thread that makes them: the callback must return fast."""
+        return self._register(self._listeners, callback)
+
+    def _register(self, registry: list[Any], callback: Any) -> Callable[[], None]:
+        with self._lock:
+            registry.append(callback)
+
+        def end() -> None:
+            with self._lock:
+                if callback in registry:
+                    registry.remove(callback)
+
+        return end
+
+    # what a person does
+
+    def set_parameters(self, changes: Mapping[str, Any], origin: str) -> RunParameters:
+        """Change some values by key, all or none.
+
+        Args:
+            changes: By key, numbers or text.
+            origin: Who asks; numbers of viser's sliders are clamped to their range.
+
+        Raises:
+            ParameterError: If a key does not exist or a value does not fit.
+        """
+        if origin.startswith(CLAMPED_ORIGIN):
+            changes = {key: clamp(key, value) for key, value in changes.items()}
+        with self._edit() as now:
+            return self._put_parameters(table.with_values(now.parameters, changes), origin)
+
+    def reset_parameters(
+        self, keys: Iterable[str] | None = None, origin: str = ""
+    ) -> RunParameters:
+        """Return some values, or all and the methods too, to what they are by default."""
+        with self._edit() as now:
+            wanted = (*table.METHODS, *table.PARAMETERS) if keys is None else tuple(keys)
+            for key in wanted:
+                if key not in table.METHODS and key not in table.PARAMETERS:
+                    table.with_values(now.parameters, {key: None})  # says what is wrong
+            changes = {key: table.value(now.defaults, key) for key in wanted}
+            return self._put_parameters(table.with_values(now.parameters, changes), origin)
+
+    def apply_preset(self, name: str, origin: str = "") -> RunParameters:
+        """Take a preset's values, and the defaults where it has none.
+
+        The single-view method stays where the preset names none: it follows from what the
+        sequence has.
+
+        Raises:
+            ParameterError: If there is no such preset.
+        """
+        with self._edit() as now:
+            presets = {**now.presets, **table.PRESETS}
+            if name not in presets:
+                known = ", ".join(presets)
+                raise ParameterError("preset", f"expected one of {known}, got {name!r}")
+            changes = {"single_view": now.parameters.single_view, **presets[name]}
+            return self._put_parameters(table.with_values(now.defaults, changes), origin)
+
+    def set_presets(self, presets: Presets) -> None:
+        """Have these presets besides the built-in ones."""
+        with self._edit():
+            self._put("presets", presets=MappingProxyType(dict(presets)))
+
+    def _put_parameters(self, parameters: RunParameters, origin: str) -> RunParameters:
+        if parameters != self._snapshot.parameters:
+            self._put("parameters", parameters=parameters, parameters_origin=origin)
+        return parameters
+
+    def seek(self, step: int, origin: str = "") -> int:
+        """Move the playhead, as far as the sequence goes; the step it is at now."""
+        with self._edit() as now:
+            sequence = now.sequence
+            last = sequence.frames - 1 if sequence is not None else 0
+            step = max(0, min(int(step), last))
+            if step != now.playhead:
+                self._put("playhead", playhead=step, playhead_origin=origin)
+            return step
+
+    def select(self, target: int | None) -> None:
+        """Select a track by its id, or none."""
+        with self._edit() as now:
+            if target != now.selection:
+                self._put("selection", selection=target)
+
+    @property
+    def layers(self) -> dict[str, bool]:
+        """The layers of the 3D view and whether each is on."""
+        return dict(self._snapshot.layers)
+
+    def set_layers(self, changes: Mapping[str, bool]) -> None:
+        """Switch some layers of the 3D view.
+
+        Raises:
+            ParameterError: If there is no such layer.
+        """
+        for name in changes:
+            if name not in LAYERS:
+                raise ParameterError(f"layers.{name}", f"expected one of {', '.join(LAYERS)}")
+        with self._edit() as now:
+            layers = {**now.layers, **{k: bool(v) for k, v in changes.items()}}
+            if layers != now.layers:
+                self._put("layers", layers=MappingProxyType(layers))
+
+    def pin(self) -> bool:
+        """Pin the shown run, to set others against it; whether it was a finished one."""
+        with self._edit() as now:
+            if now.run is None or not now.run.complete:
+                return False
+            self._put("pinned", scores=now.scores.pin(Scored.of(now.run)))
+            return True
+
+    def unpin(self) -> None:
+        """Nothing is pinned any more."""
+        with self._edit() as now:
+            if now.scores.pinned is not None:
+                self._put("pinned", scores=replace(now.scores, pinned=None))
+
+    def look(self, view: View) -> None:
+        """Have the 3D view look through a camera, from above, or freely.
+
+        Args:
+            view: A camera's index, from above, or None for the free view.
+
+        Raises:
+            ParameterError: If there is no such camera.
+        """
+        with self._edit() as now:
+            cameras = len(now.sequence.views) if now.sequence is not None else 0
+            if isinstance(view, int) and not 0 <= view < cameras:
+                raise ParameterError(
+                    "camera", f"expected an index below {cameras}, top or null, got {view}"
+                )
+            if view != now.view:
+                self._put("view", view=view)
+
+    def set_flies(self, flies: bool) -> None:
+        """Have the 3D view move to another view, or be there at once."""
+        with self._edit() as now:
+            if flies != now.flies:
+                self._put("view", flies=flies)
+
+    def teach(
+        self,
+        sequence: Sequence,
+        defaults: RunParameters | None = None,
+        changes: Mapping[str, Any] = MappingProxyType({}),
+    ) -> None:
+        """Have the open sequence with another room or other templates; its pictures stay.
+
+        Args:
+            sequence: Of the same recording; any other is refused silently, since the one it was
+                made of is not open any more.
+            defaults: Its default parameters; those before where none fit.
+            changes: Values by key that come with it: one change for whoever takes it back.
+
+        Raises:
+            ParameterError: If a key does not exist or a value does not fit; nothing changes then.
+        """
+        with self._edit() as now:
+            if now.sequence is None or sequence.views is not now.sequence.views:
+                return
+            parameters = table.with_values(now.parameters, changes)
+            if sequence is now.sequence:
+                self._put_parameters(parameters, "api")
+                return
+            taught = {"sequence": sequence, "defaults": defaults or now.defaults}
+            if parameters == now.parameters:
+                self._put("taught", **taught)
+            else:
+                self._put("taught", **taught, parameters=parameters, parameters_origin="api")
+                self._pending.append("parameters")
+
+    def mark_saved(self, saved: Sequence, shown: Sequence) -> None:
+        """What was taught is in a file now.
+
+        Args:
+            saved: As the file has it.
+            shown: What is open, in the folder that it was saved in.
+        """
+        with self._edit() as now:
+            if now.sequence is not None and shown.views is now.sequence.views:
+                self._put("taught", sequence=shown, saved=saved)
+
+    def edit_room(self, on: bool) -> None:
+        """Have the 3D view with handles on the room, or without."""
+        with self._edit() as now:
+            if on != now.editing_room:
+                self._put("editing", editing_room=on)
+
+    def set_theme(self, theme: Theme) -> None:
+        """Have the 3D view dark or light."""
+        with self._edit() as now:
+            if theme != now.theme:
+                self._put("theme", theme=theme)
+
+    def command(self, name: str) -> None:
+        """Relay a key that was pressed inside the 3D view to the pages."""
+        self._tell(Command(name))
+
+    def notify(self, level: Level, message: str, hint: str | None = None) -> None:
+        """Say one sentence to everyone who looks."""
+        self._tell(Notice(level, message, hint))
+
+    # what the jobs report
+
+    def set_opening(self, opening: Opening | None) -> None:
+        """How far the opening of a sequence is; None: it is over."""
+        with self._edit() as now:
+            if opening != now.opening:
+                self._put("opening", opening=opening)
+
+    def open(
+        self, sequence: Sequence, key: str, reader: FrameReader, parameters: RunParameters
+    ) -> FrameReader | None:
+        """Show another sequence, from its first step; the reader of the one before, to be closed.
+
+        Args:
+            sequence: It has been read and checked.
+            key: Another for every content.
+            reader: Its pictures.
+            parameters: Its default parameters.
+        """
+        with self._edit() as now:
+            before = now.reader
+            self._last_good = None
+            self._put(
+                "sequence",
+                sequence=sequence,
+                saved=sequence,
+                editing_room=False,
+                sequence_key=key,
+                reader=reader,
+                opening=None,
+                parameters=parameters,
+                defaults=parameters,
+                parameters_origin="",
+                playhead=0,
+                playhead_origin="",
+                selection=None,
+                view=None,
+                run=None,
+                run_state=RunState(total=sequence.frames),
+                scores=Scores(),
+            )
+            return before
+
+    def run_begins(self, key: str) -> None:
+        """The parameters ask for the run with this key: from now on only its news count."""
+        with self._edit() as now:
+            total = now.sequence.frames if now.sequence is not None else 0
+            self._put("run", run_state=RunState(key=key, state="computing", total=total))
+
+    def run_waits(self, key: str, message: str) -> None:
+        """The run with this key has not begun, and why."""
+        with self._edit() as now:
+            if key == now.run_state.key and message != now.run_state.message:
+                self._put("progress", run_state=replace(now.run_state, message=message))
+
+    def run_progresses(self, run: Run, progress: Progress) -> None:
+        """A run has new steps; from its first call on it is the one that is shown."""
+        with self._edit() as now:
+            if run.key != now.run_state.key:  # superseded
+                return
+            state = replace(
+                now.run_state,
+                done=progress.done,
+                total=progress.total,
+                steps_per_second=progress.steps_per_second,
+                seconds_left=progress.seconds_left,
+                message=progress.stage.replace("_", " "),
+            )
+            self._put("run" if now.run is not run else "progress", run=run, run_state=state)
+
+    def run_ends(
+        self, key: str, phase: Literal["done", "cancelled", "failed"], error: str | None = None
+    ) -> None:
+        """The run with this key is over; after a failure the last good one is shown again."""
+        with self._edit() as now:
+            if key != now.run_state.key:  # superseded
+                return
+            run = now.run
+            if phase == "failed":
+                run = self._last_good
+            elif phase == "done":
+                self._last_good = run
+            state = replace(now.run_state, state=phase, seconds_left=None, message="", error=error)
+            self._put("run", run=run, run_state=state)
+
+    def scored(self, scored: Scored) -> None:
+        """A run was scored against the truth."""
+        with self._edit() as now:
+            if now.sequence is None or scored.sequence.views is not now.sequence.views:
+                return
+            pinned = now.scores.pinned
+            if now.run is not None and scored.key == now.run.key:
+                self._put("evaluation", scores=now.scores.add(scored))
+            elif pinned is not None and scored.key == pinned.key:
+                self._put("evaluation", scores=now.scores.pin(scored))
+
+    @contextmanager
+    def _edit(self) -> Iterator[Snapshot]:
+        """Hold the lock while the state is changed, and tell of it when the lock is free again.
+
+        A subscriber may hold a lock of its own and come back here from another
+        thread; telling under our lock would let the two wait for each other.
+        """
+        pending: list[Change] = []
+        with self._lock:
+            self._pending = pending
+            yield self._snapshot
+            subscribers = list(self._subscribers)
+        for change in pending:
+            for callback in subscribers:
+                callback(change)
+
+    def _put(self, change: Change, **values: Any) -> None:
+        self._snapshot = replace(self._snapshot, version=self._snapshot.version + 1, **values)
+        self._pending.append(change)
+
+    def _tell(self, event: Event) -> None:
+        with self._lock:
+            listeners = list(self._listeners)
+        for callback in listeners:
+            callback(event)

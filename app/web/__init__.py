@@ -1,0 +1,1 @@
+"""What the page talks to: the server, its routes and its sockets."""

@@ -1,0 +1,334 @@
+"""The HTTP routes; ``/docs`` shows them with their types."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Query, Request, Response
+
+from app import models
+from app.errors import ApiError, ErrorBody, sentence
+from app.state.history import History
+from app.state.jobs import Jobs
+from app.state.presets import OwnPresets
+from app.state.teaching import Teaching
+from app.state.workbench import Workbench
+from app.web.pictures.jpegs import Pictures
+from app.web.views import results, steps
+from app.web.views.timeline import BUCKETS, Timelines, Window
+from tracker import export
+from tracker.pipeline import Cancelled
+from tracker.sequences import library
+
+FOR_EVER = "private, max-age=31536000, immutable"
+"""A picture's address names its content."""
+
+OPENING_SECONDS = 1.0
+"""How long a request to open waits, so that what fails at once is told in the answer."""
+
+ERRORS: dict[int | str, dict[str, Any]] = {
+    "4XX": {"model": ErrorBody, "description": "What was expected, what was found, what to do."},
+    "5XX": {"model": ErrorBody, "description": "The server failed; what was open still is."},
+}
+
+router = APIRouter(prefix="/api", responses=ERRORS)
+
+
+def _workbench(request: Request) -> Workbench:
+    workbench: Workbench = request.app.state.workbench
+    return workbench
+
+
+def _jobs(request: Request) -> Jobs:
+    jobs: Jobs = request.app.state.jobs
+    return jobs
+
+
+def _own_presets(request: Request) -> OwnPresets:
+    presets: OwnPresets = request.app.state.presets
+    return presets
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """The part of the steps that somebody looks at, and in how many values a curve."""
+
+    first: int
+    last: int | None
+    buckets: int
+
+    def window(self, frames: int) -> Window:
+        """As buckets of a sequence; bounds beyond it are its ends."""
+        return Window.of(frames, self.first, self.last, self.buckets)
+
+
+def _shown(
+    first: Annotated[int, Query(ge=0, description="First step.")] = 0,
+    last: Annotated[int | None, Query(ge=0, description="Last step, else the end.")] = None,
+    buckets: Annotated[int, Query(ge=1, le=1 << 14, description="Most values a curve.")] = BUCKETS,
+) -> Shown:
+    return Shown(first, last, buckets)
+
+
+Part = Annotated[Shown, Depends(_shown)]
+Bench = Annotated[Workbench, Depends(_workbench)]
+Own = Annotated[OwnPresets, Depends(_own_presets)]
+Work = Annotated[Jobs, Depends(_jobs)]
+
+
+@router.get("/state")
+async def state(bench: Bench) -> models.State:
+    """Everything that all pages share, but for the results themselves."""
+    return results.state_of(bench.snapshot())
+
+
+@router.get("/schema")
+async def schema() -> models.Schema:
+    """Every parameter with range, unit and help; the methods; the presets."""
+    return results.schema()
+
+
+@router.get("/sequences")
+def sequences(request: Request) -> models.SequenceList:
+    """The rendered rooms and the folders under the data folder."""
+    data: Path | None = request.app.state.settings.data
+    return models.SequenceList(
+        sequences=[
+            models.SequenceEntryInfo(
+                name=entry.name,
+                description=entry.description,
+                kind=entry.kind,
+                cameras=entry.cameras,
+                frames=entry.frames,
+                ready=entry.ready,
+                error=entry.error,
+            )
+            for entry in library.available(data)
+        ]
+    )
+
+
+@router.post("/sequence")
+async def open_sequence(wish: models.OpenRequest, bench: Bench, jobs: Work) -> models.State:
+    """Open another sequence, in the background where it takes longer; ``opening`` says so."""
+    future = asyncio.wrap_future(jobs.open(wish.name))
+    try:
+        await asyncio.wait_for(asyncio.shield(future), OPENING_SECONDS)
+    except TimeoutError:
+        future.add_done_callback(lambda done: done.cancelled() or done.exception())
+    except Cancelled as error:
+        raise ApiError(409, "superseded", f"{wish.name}: {error}.") from None
+    except (ValueError, OSError) as error:
+        raise ApiError(
+            422,
+            "cannot_open",
+            sentence(error),
+            field="name",
+            hint="What was open still is. GET /api/sequences lists what there is.",
+        ) from None
+    return results.state_of(bench.snapshot())
+
+
+@router.patch("/parameters")
+async def set_parameters(wish: models.ParameterChanges, bench: Bench) -> models.State:
+    """Change some values, all or none; what depends on them is computed anew."""
+    bench.set_parameters(wish.changes, wish.origin or "api")
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/parameters/reset")
+async def reset_parameters(bench: Bench, wish: models.ResetRequest | None = None) -> models.State:
+    """Return some values, or all, to their defaults."""
+    bench.reset_parameters(wish.keys if wish is not None else None, "api")
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/parameters/preset")
+async def apply_preset(wish: models.PresetRequest, bench: Bench) -> models.State:
+    """Take a preset's values, and the defaults where it has none."""
+    bench.apply_preset(wish.name, "api")
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/presets")
+def save_preset(wish: models.PresetName, own: Own, bench: Bench) -> models.State:
+    """Save what differs from the defaults now, under a name."""
+    own.save(wish.name)
+    return results.state_of(bench.snapshot())
+
+
+@router.patch("/presets/{name:path}")
+def rename_preset(name: str, wish: models.PresetName, own: Own, bench: Bench) -> models.State:
+    """Give a saved preset another name."""
+    own.rename(name, wish.name)
+    return results.state_of(bench.snapshot())
+
+
+@router.delete("/presets/{name:path}")
+def remove_preset(name: str, own: Own, bench: Bench) -> models.State:
+    """Forget a saved preset."""
+    own.remove(name)
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/run/cancel")
+async def cancel_run(bench: Bench, jobs: Work) -> models.State:
+    """Stop the run under way; its steps so far stay."""
+    jobs.cancel()
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/run")
+async def run_again(bench: Bench, jobs: Work) -> models.State:
+    """Go on with a run that was cancelled, or try a failed one again."""
+    jobs.run_again()
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/run/again/{number}")
+async def use_again(request: Request, number: int, bench: Bench) -> models.State:
+    """Set all values, and what was taught, to those of a run before, by its number in the table."""
+    history: History = request.app.state.history
+    teaching: Teaching = request.app.state.teaching
+    history.use_again(number, teaching.restore)
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/seek")
+async def seek(wish: models.SeekChange, bench: Bench) -> models.State:
+    """Move the playhead, as far as the sequence goes."""
+    bench.seek(wish.step, wish.origin)
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/select")
+async def select(wish: models.SelectChange, bench: Bench) -> models.State:
+    """Select a track, or none."""
+    bench.select(wish.id)
+    return results.state_of(bench.snapshot())
+
+
+@router.patch("/layers")
+async def set_layers(wish: models.LayerChanges, bench: Bench) -> models.State:
+    """Switch layers of the 3D view."""
+    bench.set_layers(wish.changes)
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/view")
+async def view(wish: models.ViewChange, bench: Bench) -> models.State:
+    """Look through a camera in 3D, from above, or freely again."""
+    bench.look(wish.camera)
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/theme")
+async def theme(wish: models.ThemeChange, bench: Bench) -> models.State:
+    """Have the 3D view dark or light, as the page is."""
+    bench.set_theme(wish.theme)
+    return results.state_of(bench.snapshot())
+
+
+@router.get(
+    "/picture/{sequence_key}/{camera}/{step}.jpg",
+    response_class=Response,
+    responses={200: {"content": {"image/jpeg": {}}, "description": "The picture."}},
+)
+async def picture(
+    request: Request,
+    sequence_key: str,
+    camera: int,
+    step: int,
+    w: Annotated[int | None, Query(ge=16, le=8192, description="A smaller width.")] = None,
+) -> Response:
+    """One camera's picture of one step."""
+    pictures: Pictures = request.app.state.pictures
+    jpeg = await pictures.get(sequence_key, camera, step, w)
+    return Response(jpeg, media_type="image/jpeg", headers={"cache-control": FOR_EVER})
+
+
+@router.get("/step/{step}")
+async def step(
+    step: int,
+    bench: Bench,
+    samples: Annotated[bool, Query(description="With each camera's samples.")] = False,
+    trails: Annotated[bool, Query(description="With the tracks' ways in the pictures.")] = False,
+) -> models.Step:
+    """One step of the shown run: what each camera found, the targets, the truth."""
+    snapshot = bench.snapshot()
+    sequence = snapshot.sequence
+    if sequence is None:
+        raise nothing_open()
+    if not 0 <= step < sequence.frames:
+        raise ApiError(
+            404,
+            "no_step",
+            f"There is no step {step}: {sequence.name} has 0 … {sequence.frames - 1}.",
+            field="step",
+        )
+    return steps.step_of(sequence, snapshot.run, step, with_samples=samples, with_trails=trails)
+
+
+@router.get("/timeline")
+def timeline(request: Request, bench: Bench, part: Part) -> models.Timeline:
+    """The shown run over time, as far as it is computed, at the width that it is drawn at."""
+    snapshot = bench.snapshot()
+    if snapshot.sequence is None:
+        raise nothing_open()
+    timelines: Timelines = request.app.state.timelines
+    window = part.window(snapshot.sequence.frames)
+    return timelines.of(snapshot.sequence, snapshot.run, window, snapshot.scores.pinned)
+
+
+@router.get(
+    "/export/tracks.csv",
+    response_class=Response,
+    responses={200: {"content": {"text/csv": {}}, "description": "The track file."}},
+)
+def export_tracks(bench: Bench) -> Response:
+    """The tracks of the shown run; ``X-Run-Partial`` says whether steps are missing."""
+    snapshot = bench.snapshot()
+    run = snapshot.run
+    if run is None or run.done == 0:
+        raise ApiError(
+            409,
+            "nothing_computed",
+            "There are no tracks yet: nothing has been computed.",
+            hint="Wait for the run's first steps, or start it again.",
+        )
+    done, tracks = run.done, run.tracks
+    sequence = snapshot.named(run.sequence)
+    name = file_name(sequence.name, "tracks.csv")
+    stream = io.StringIO(newline="")
+    export.write_tracks_csv(stream, sequence, tracks, run.parameters, run.seed, done=done)
+    return Response(
+        stream.getvalue(),
+        media_type="text/csv; charset=utf-8",
+        headers={
+            "content-disposition": f'attachment; filename="{name}"',
+            "cache-control": "no-store",
+            "x-run-key": run.key,
+            "x-run-partial": "false" if run.complete else "true",
+            "x-run-steps": f"{done}/{run.sequence.frames}",
+        },
+    )
+
+
+def nothing_open() -> ApiError:
+    """The answer to whoever asks for what only an open sequence has."""
+    return ApiError(
+        409,
+        "nothing_open",
+        "No sequence is open.",
+        hint="Open one with POST /api/sequence.",
+    )
+
+
+def file_name(name: str, ending: str) -> str:
+    """Of a download: plain letters only."""
+    plain = "".join(c if c.isascii() and (c.isalnum() or c in "-_.") else "-" for c in name)
+    return f"{plain}-{ending}"

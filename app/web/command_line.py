@@ -1,0 +1,40 @@
+"""What the page shows, as the command that computes the same tracks in a terminal."""
+
+from __future__ import annotations
+
+import shlex
+from typing import Any
+
+from app.state.snapshot import Snapshot
+from tracker import parameters as table
+from tracker.folders import cache_folder
+from tracker.sequences.sequence import Sequence
+
+
+def command_line(snapshot: Snapshot) -> str:
+    """The command, quoted for a POSIX shell; empty while no sequence is open.
+
+    Both methods are named, since what fits a sequence may be another one later; of the
+    values, those that are not at their defaults.
+    """
+    sequence, parameters = snapshot.sequence, snapshot.parameters
+    if sequence is None:
+        return ""
+    words = ["multiview-phd", "track", _named(sequence), "-o", "tracks.csv"]
+    words += ["--single-view", parameters.single_view, "--fusion", parameters.fusion_method]
+    for key, value in table.changed(parameters, snapshot.defaults).items():
+        if key not in table.METHODS:
+            words += ["--set", f"{key}={_written(value)}"]
+    if snapshot.run is not None and snapshot.run.seed:
+        words += ["--seed", str(snapshot.run.seed)]
+    return shlex.join(words)
+
+
+def _named(sequence: Sequence) -> str:
+    """A rendered room by its name, anything else by its folder."""
+    rendered = cache_folder() in sequence.folder.absolute().parents
+    return sequence.name if rendered else str(sequence.folder.absolute())
+
+
+def _written(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -1,0 +1,1 @@
+"""Tracks against the truth, as the page asks for them."""

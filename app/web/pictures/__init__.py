@@ -1,0 +1,1 @@
+"""Pictures on the wire: frames, and what a method sees in them."""

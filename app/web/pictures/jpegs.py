@@ -1,0 +1,109 @@
+"""Pictures for the page: decoded and encoded in threads, the last ones kept."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import OrderedDict
+from concurrent.futures import ThreadPoolExecutor
+
+import cv2
+
+from app.errors import ApiError
+from app.state.workbench import Workbench
+from tracker.sequences.frames import FrameReader
+
+KEPT_BYTES = 96 << 20
+QUALITY = 88
+THREADS = 4
+"""One request mostly waits for one camera's decoder; four cameras are asked at once."""
+
+Key = tuple[str, int, int, int]
+
+
+class Pictures:
+    """JPEGs of the open sequence. Lives on the event loop; only the work is done in threads."""
+
+    def __init__(self, workbench: Workbench) -> None:
+        self._workbench = workbench
+        self._pool = ThreadPoolExecutor(THREADS, "pictures")
+        self._kept: OrderedDict[Key, bytes] = OrderedDict()
+        self._bytes = 0
+        self._under_way: dict[Key, asyncio.Future[bytes | None]] = {}
+
+    async def get(self, sequence_key: str, camera: int, step: int, width: int | None) -> bytes:
+        """One picture as JPEG.
+
+        Args:
+            sequence_key: Of the sequence that the page believes to be open.
+            camera: Index.
+            step: 0-based.
+            width: Pixels, where the page wants it smaller than it is.
+
+        Raises:
+            ApiError: 404 where there is none.
+        """
+        snapshot = self._workbench.snapshot()
+        sequence, reader = snapshot.sequence, snapshot.reader
+        if sequence is None or reader is None or snapshot.sequence_key != sequence_key:
+            raise _missing("That sequence is not open any more.", "Load the page again.")
+        if not 0 <= camera < len(sequence.views):
+            raise _missing(
+                f"There is no camera {camera}: {sequence.name} has 0 … {len(sequence.views) - 1}."
+            )
+        if not 0 <= step < sequence.frames:
+            raise _missing(
+                f"There is no step {step}: {sequence.name} has 0 … {sequence.frames - 1}."
+            )
+        key = (sequence_key, camera, step, width or 0)
+        if key in self._kept:
+            self._kept.move_to_end(key)
+            return self._kept[key]
+        if key not in self._under_way:
+            loop = asyncio.get_running_loop()
+            job = loop.run_in_executor(self._pool, _encode, reader, camera, step, width)
+            self._under_way[key] = job
+            job.add_done_callback(lambda done: self._keep(key, done))
+        # a page that gives up must not cancel what another one waits for
+        try:
+            jpeg = await asyncio.shield(self._under_way[key])
+        except ValueError:  # closed meanwhile: another sequence is open now
+            raise _missing("That sequence is not open any more.", "Load the page again.") from None
+        if jpeg is None:
+            name = sequence.views[camera].camera.name
+            raise _missing(
+                f'Camera "{name}" has no picture of step {step}.',
+                "The sequence has none for this camera, or its file ends before.",
+            )
+        return jpeg
+
+    def _keep(self, key: Key, job: asyncio.Future[bytes | None]) -> None:
+        self._under_way.pop(key, None)
+        if job.cancelled() or job.exception() is not None:
+            return
+        jpeg = job.result()
+        if jpeg is None:
+            return
+        self._kept[key] = jpeg
+        self._bytes += len(jpeg)
+        while self._bytes > KEPT_BYTES:
+            _, oldest = self._kept.popitem(last=False)
+            self._bytes -= len(oldest)
+
+    def close(self) -> None:
+        """End the threads; what is being decoded is finished first."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _encode(reader: FrameReader, camera: int, step: int, width: int | None) -> bytes | None:
+    picture = reader.picture(camera, step)
+    if picture is None:
+        return None
+    if width is not None and width < picture.shape[1]:
+        height = max(1, round(picture.shape[0] * width / picture.shape[1]))
+        picture = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA)
+    done, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    return bytes(data) if done else None
+
+
+def _missing(message: str, hint: str | None = None) -> ApiError:
+    return ApiError(404, "no_picture", message, hint=hint)

@@ -1,0 +1,113 @@
+"""Likelihood maps as pictures: where a camera's picture looks like one of the templates."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+
+import cv2
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from app.errors import ApiError, sentence
+from app.state.snapshot import Snapshot
+from tracker.colour import ColourModel
+from tracker.parameters import ColourPhdParams
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.box_sizes import BoxSizes
+from tracker.single_view.colour.likelihood_map import likelihood_map
+from tracker.single_view.colour.templates import read_templates
+
+LOW, HIGH = (35, 119, 224), (190, 244, 255)
+"""Blue, green, red of a small and of the largest likelihood."""
+
+OPAQUE = 225
+"""Opacity of 255 where the colours are just a template's; what looks less like one is clearer."""
+
+
+def key_of(sequence: Sequence, parameters: ColourPhdParams) -> str:
+    """Names what a map depends on besides its picture, so that it may be kept for ever."""
+    parts = (
+        sequence.digest,
+        parameters.colour_space,
+        parameters.histogram_kernel,
+        parameters.likelihood_sigma,
+        parameters.acceptance_distance,
+    )
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
+
+
+def shown_colours(snapshot: Snapshot) -> ColourPhdParams:
+    """The numbers of the run that is shown, else those that are chosen."""
+    run = snapshot.run
+    return (run.parameters if run is not None else snapshot.parameters).colour_phd
+
+
+class Likelihoods:
+    """Makes the maps; keeps the colour model and the sizes of those asked for last."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._key = ""
+        self._model: ColourModel | None = None
+        self._sizes: dict[int, BoxSizes] = {}
+
+    def png(self, snapshot: Snapshot, camera: int, step: int) -> bytes:
+        """One map as a transparent PNG of a pixel a cell.
+
+        Raises:
+            ApiError: If there is no picture, or no template to compare it with.
+        """
+        sequence, reader = snapshot.sequence, snapshot.reader
+        assert sequence is not None
+        assert reader is not None
+        picture = reader.picture(camera, step)
+        if picture is None:
+            name = sequence.views[camera].camera.name
+            raise missing(f'Camera "{name}" has no picture of step {step}.')
+        parameters = shown_colours(snapshot)
+        model, sizes = self._prepared(sequence, reader, parameters, camera)
+        sigma = parameters.likelihood_sigma
+        least = -0.5 * (parameters.acceptance_distance / sigma) ** 2
+        return heat(likelihood_map(picture, model, sizes, sigma), least)
+
+    def _prepared(
+        self, sequence: Sequence, reader: FrameReader, parameters: ColourPhdParams, camera: int
+    ) -> tuple[ColourModel, BoxSizes]:
+        key = key_of(sequence, parameters)
+        with self._lock:
+            if key != self._key or self._model is None:
+                space, kernel = parameters.colour_space, parameters.histogram_kernel
+                try:
+                    self._model = read_templates(sequence, space, kernel, reader)
+                except ValueError as error:
+                    raise missing(sentence(error)) from None
+                self._key, self._sizes = key, {}
+            if camera not in self._sizes:
+                self._sizes[camera] = BoxSizes.of(
+                    sequence.cameras[camera], sequence.room, sequence.target_half_extents
+                )
+            return self._model, self._sizes[camera]
+
+
+def heat(values: Float[ndarray, "rows columns"], least: float) -> bytes:
+    """Log-likelihoods as a transparent PNG: the likelier, the brighter and the denser.
+
+    Args:
+        values: 0 at most.
+        least: What is at least so likely is seen; below 0.
+    """
+    share = np.clip(1.0 - values / least, 0.0, 1.0)[:, :, None]
+    picture = np.empty((*values.shape, 4), dtype=np.uint8)
+    picture[:, :, :3] = np.rint(np.array(LOW) * (1.0 - share) + np.array(HIGH) * share)
+    picture[:, :, 3] = np.rint(OPAQUE * share[:, :, 0])
+    done, data = cv2.imencode(".png", picture)
+    assert done, "a picture of four channels can be written as PNG"
+    return bytes(data)
+
+
+def missing(message: str, hint: str | None = None) -> ApiError:
+    """The answer where there is no map."""
+    return ApiError(404, "no_likelihood", message, hint=hint)

@@ -1,0 +1,279 @@
+"""The application: routes, page, 3D view and jobs, put together for as long as it runs."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket as sockets
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import uvicorn
+from fastapi import FastAPI, Request
+from fastapi.responses import Response
+from fastapi.staticfiles import StaticFiles
+from fastapi_offline import FastAPIOffline
+from starlette.types import Scope
+
+from app import errors
+from app.errors import sentence
+from app.paths import static_folder
+from app.state.compiling import Compiling
+from app.state.evaluator import Evaluator
+from app.state.history import History
+from app.state.jobs import Jobs, in_background
+from app.state.presets import OwnPresets
+from app.state.teaching import Teaching
+from app.state.workbench import Workbench
+from app.web import api, gateway, stream, teaching_routes
+from app.web.evaluation import routes as evaluation
+from app.web.gateway import Gateway
+from app.web.pictures import foreground, likelihood_routes
+from app.web.pictures.jpegs import Pictures
+from app.web.pictures.likelihood import Likelihoods
+from app.web.pictures.swatches import Swatches
+from app.web.security import CONTENT_POLICY, Guard, allowed_hosts, is_loopback
+from app.web.stream import Stream
+from app.web.tables import tables, teaching_tables
+from app.web.views.timeline import Timelines
+from tracker import __version__
+from tracker.folders import settings_folder
+from tracker.pipeline import Cancelled
+from tracker.runs.stage_cache import StageCache
+
+if TYPE_CHECKING:
+    import viser
+
+logger = logging.getLogger("app")
+
+LARGEST_SOCKET_MESSAGE = 64 << 20
+"""Bytes: viser's client may send a rendered picture of itself."""
+
+ASK_AGAIN = "no-cache"
+"""The page's files are kept by the browser but checked by their ETag each time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What a server is started with."""
+
+    host: str = "127.0.0.1"
+    sequence: str | None = None
+    """Opened at once, in the background."""
+    data: Path | None = None
+    """Its folders are sequences that can be chosen."""
+    seed: int = 0
+    with_viser: bool = True
+    keep_on_disk: bool = False
+    """Whether what was compiled and what the cameras found is kept for the next start."""
+    say: Callable[[str], None] = lambda words: None
+    """Told what somebody in front of the terminal should know."""
+
+
+def create_app(settings: Settings) -> FastAPI:
+    """The whole application; it owns threads from its start to its end."""
+    app: FastAPI = FastAPIOffline(
+        title="multiview-phd",
+        version=__version__,
+        description="Tracks of several people in 3D from calibrated cameras, and their tuning.",
+        redoc_url=None,
+        static_url="/docs-files",  # the page of the routes loads nothing from another host
+        lifespan=_lifespan,
+    )
+    app.state.settings = settings
+    app.add_middleware(
+        Guard,
+        hosts=allowed_hosts(settings.host),
+        addresses_are_fine=not is_loopback(settings.host),
+    )
+    errors.install(app)
+    app.include_router(api.router)
+    app.include_router(foreground.router)
+    app.include_router(likelihood_routes.router)
+    app.include_router(tables.router)
+    app.include_router(teaching_routes.router)
+    app.include_router(teaching_tables.router)
+    app.include_router(evaluation.router)
+    app.include_router(stream.router)
+    app.include_router(gateway.router)
+    files = _PageFiles(directory=static_folder())
+
+    @app.get("/", include_in_schema=False)
+    async def page(request: Request) -> Response:
+        response = await files.get_response("index.html", request.scope)
+        response.headers["content-security-policy"] = CONTENT_POLICY
+        return response
+
+    app.mount("/static", files, name="static")
+    return app
+
+
+class _PageFiles(StaticFiles):
+    """The page's files with an ETag, checked each time: an update shows at once."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        response = await super().get_response(path, scope)
+        response.headers["cache-control"] = ASK_AGAIN
+        return response
+
+
+@asynccontextmanager
+async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+    settings: Settings = app.state.settings
+    workbench = app.state.workbench = Workbench()
+    kept = settings.keep_on_disk
+    jobs = app.state.jobs = Jobs(
+        workbench,
+        data=settings.data,
+        seed=settings.seed,
+        cache=StageCache.on_disk(in_background) if kept else StageCache(),
+        compiling=Compiling(settings.say) if kept else None,
+    )
+    pictures = app.state.pictures = Pictures(workbench)
+    app.state.timelines = Timelines()
+    app.state.history = History(workbench)
+    own_presets = settings_folder() / "presets.json" if kept else None
+    app.state.presets = OwnPresets(workbench, own_presets)
+    app.state.likelihoods = Likelihoods()
+    app.state.swatches = Swatches()
+    teaching = app.state.teaching = Teaching(
+        workbench, settings.data, settings_folder() / "unsaved" if kept else None
+    )
+    evaluator = app.state.evaluator = Evaluator(workbench)
+    told = app.state.stream = Stream(workbench)
+    door = app.state.gateway = Gateway()
+    told.start()
+    room = _Room(workbench, teaching)
+    if settings.with_viser:
+        door.prepare()
+        # the page is served meanwhile; requests for the 3D view wait
+        starting = asyncio.create_task(_start_viser(room, door, workbench))
+    if settings.sequence is not None:
+        jobs.open(settings.sequence).add_done_callback(_say_failure(settings.sequence))
+    try:
+        yield
+    finally:
+        if settings.with_viser:
+            await asyncio.gather(starting, return_exceptions=True)
+        told.stop()
+        teaching.close()
+        pictures.close()
+        await asyncio.gather(*(asyncio.to_thread(part.close) for part in (jobs, evaluator, room)))
+
+
+def _say_failure(name: str) -> Callable[..., None]:
+    def say(future: object) -> None:
+        error = future.exception()  # type: ignore[attr-defined]
+        # an opening that another one or the end took over from has not failed
+        if error is not None and not isinstance(error, Cancelled):
+            logger.error("%s cannot be opened: %s", name, sentence(error))
+
+    return say
+
+
+async def _start_viser(room: _Room, door: Gateway, workbench: Workbench) -> None:
+    try:
+        door.started(await asyncio.to_thread(room.open))
+    except Exception as error:
+        logger.exception("the 3D view did not start")
+        workbench.notify(
+            "error",
+            f"The 3D view did not start: {sentence(error)}",
+            "Cameras, timeline and export work without it.",
+        )
+
+
+class _Room:
+    """viser's server with what is in it."""
+
+    def __init__(self, workbench: Workbench, teaching: Teaching) -> None:
+        self._workbench = workbench
+        self._teaching = teaching
+        self._parts: list[Callable[[], object]] = []
+
+    def open(self) -> viser.ViserServer:
+        """Start viser on a private loopback port and build scene and sliders in it."""
+        from app.scene.panel.controls import Controls
+        from app.scene.room_editing import RoomEditing
+        from app.scene.scene import Scene
+
+        server = gateway.start_viser()
+        self._parts.append(server.stop)
+        self._parts.append(Scene(server, self._workbench).close)
+        self._parts.append(RoomEditing(server, self._workbench, self._teaching).close)
+        self._parts.append(Controls(server, self._workbench).close)
+        return server
+
+    def close(self) -> None:
+        """Take it down in the opposite order."""
+        for part in reversed(self._parts):
+            part()
+
+
+def bind(host: str, port: int) -> sockets.socket:
+    """A listening socket.
+
+    Raises:
+        OSError: If the port is taken or the host is not this machine's.
+    """
+    family, _, _, _, address = sockets.getaddrinfo(
+        host, port, type=sockets.SOCK_STREAM, flags=sockets.AI_PASSIVE
+    )[0]
+    # asyncio switches off the collecting of small packets (40 ms of waiting for each answer)
+    # only on sockets that say they are TCP
+    listener = sockets.socket(family, sockets.SOCK_STREAM, sockets.IPPROTO_TCP)
+    try:
+        listener.setsockopt(sockets.SOL_SOCKET, sockets.SO_REUSEADDR, 1)
+        listener.bind(address)
+        listener.listen(128)
+    except OSError:
+        listener.close()
+        raise
+    return listener
+
+
+def serve(app: FastAPI, listener: sockets.socket, on_ready: Callable[[], None]) -> None:
+    """Serve until Ctrl-C, which ends it within a second or two.
+
+    Args:
+        app: From :func:`create_app`.
+        listener: From :func:`bind`.
+        on_ready: Called as soon as requests are answered.
+    """
+    build_routes(app)
+    config = uvicorn.Config(
+        app,
+        log_level="warning",
+        access_log=False,
+        lifespan="on",
+        ws="websockets-sansio",
+        # viser's messages are packed already, ours are small: compressing only costs time
+        ws_per_message_deflate=False,
+        ws_max_size=LARGEST_SOCKET_MESSAGE,
+        timeout_graceful_shutdown=1,
+        server_header=False,
+    )
+    _Server(config, on_ready).run(sockets=[listener])
+
+
+def build_routes(app: FastAPI) -> None:
+    """Have all routes built before another thread runs.
+
+    FastAPI builds a route when it is first needed, and silences a warning of pydantic's
+    meanwhile, with a filter that any other thread which handles warnings may take away.
+    """
+    app.openapi()
+
+
+class _Server(uvicorn.Server):
+    def __init__(self, config: uvicorn.Config, on_ready: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._on_ready = on_ready
+
+    async def startup(self, sockets: list[sockets.socket] | None = None) -> None:
+        await super().startup(sockets=sockets)
+        if self.started:
+            self._on_ready()

@@ -1,0 +1,269 @@
+"""The WebSocket to the pages: what has changed, newest first and nothing twice.
+
+Each page has a set of what it has not been told yet. Whoever is slow is told
+less often and then the newest; nothing piles up.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections import OrderedDict
+from collections.abc import Callable
+from typing import Any
+
+from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+from pydantic import TypeAdapter, ValidationError
+
+from app import models
+from app.state.snapshot import Change, Command, Event, Notice, Snapshot
+from app.state.workbench import Workbench
+from app.web.views import results, steps
+
+SECONDS_BETWEEN = {"progress": 0.1, "timeline": 0.25}
+"""How often at most a page is told how far the run is, and that the timeline has grown."""
+
+LARGEST_MESSAGE = 1 << 14
+"""Characters of a page's message."""
+
+KEPT_STEPS = 64
+MOST_NOTICES = 20
+
+router = APIRouter()
+
+FromPage = TypeAdapter[
+    models.StreamSeek | models.StreamSelect | models.StreamMotion | models.StreamPing
+](models.StreamSeek | models.StreamSelect | models.StreamMotion | models.StreamPing)
+
+
+class _Page:
+    """What one page has not been told yet."""
+
+    def __init__(self) -> None:
+        self.news: set[Change] = {"sequence", "playhead"}
+        self.flies = True
+        self.messages: list[str] = []
+        self.wake = asyncio.Event()
+        self.wake.set()
+        self.told_step: tuple[Any, ...] = ()
+        self.told_timeline: tuple[str, str, int] = ("", "", 0)
+        self.told_evaluation: tuple[str, int] | None = None
+        self.due: set[str] = set()
+        """Kinds of message that are held back for a moment."""
+        self.told_at = dict.fromkeys(SECONDS_BETWEEN, 0.0)
+        self.timer: asyncio.TimerHandle | None = None
+
+
+class Stream:
+    """All pages. Lives on the event loop; news come from any thread."""
+
+    def __init__(self, workbench: Workbench) -> None:
+        self._workbench = workbench
+        self._pages: set[_Page] = set()
+        self._last_error: str | None = None
+        self._unheard: str | None = None
+        """What was said last while there was no page, for the first that comes."""
+        self._state: tuple[int, str] = (-1, "")
+        self._steps: OrderedDict[tuple[Any, ...], str] = OrderedDict()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._ends: list[Callable[[], None]] = []
+
+    def start(self) -> None:
+        """Called on the event loop that serves."""
+        loop = self._loop = asyncio.get_running_loop()
+
+        def on_change(change: Change) -> None:
+            if not loop.is_closed():
+                loop.call_soon_threadsafe(self._note, change)
+
+        def on_event(event: Event) -> None:
+            if not loop.is_closed():
+                loop.call_soon_threadsafe(self._pass_on, event)
+
+        self._ends = [
+            self._workbench.subscribe(on_change),
+            self._workbench.subscribe_events(on_event),
+        ]
+
+    def stop(self) -> None:
+        """Hear no more news."""
+        for end in self._ends:
+            end()
+
+    def _note(self, change: Change) -> None:
+        if change == "sequence":
+            self._last_error = None
+        for page in self._pages:
+            page.news.add(change)
+            page.wake.set()
+
+    def _pass_on(self, event: Event) -> None:
+        match event:
+            case Command(name):
+                text = json.dumps({"type": "command", "name": name})
+            case Notice(level, message, hint):
+                notice = {"type": "notice", "level": level, "message": message, "hint": hint}
+                text = json.dumps(notice)
+                if level == "error":
+                    self._last_error = text  # also for a page that is not there yet
+                elif not self._pages:
+                    self._unheard = text
+        for page in self._pages:
+            page.messages = [*page.messages, text][-MOST_NOTICES:]
+            page.wake.set()
+
+    async def serve(self, socket: WebSocket) -> None:
+        """One page, until it goes."""
+        await socket.accept()
+        page = _Page()
+        page.messages += [text for text in (self._last_error, self._unheard) if text is not None]
+        self._unheard = None
+        self._pages.add(page)
+        sender = asyncio.create_task(self._tell(socket, page))
+        try:
+            while (message := await socket.receive())["type"] == "websocket.receive":
+                self._hear(page, message.get("text"))
+        except WebSocketDisconnect:
+            pass
+        finally:
+            self._pages.discard(page)
+            self._set_flies()
+            if page.timer is not None:
+                page.timer.cancel()
+            sender.cancel()
+            await asyncio.gather(sender, return_exceptions=True)
+
+    def _hear(self, page: _Page, text: str | None) -> None:
+        try:
+            if text is None or len(text) > LARGEST_MESSAGE:
+                raise ValueError(f"expected at most {LARGEST_MESSAGE} characters of text")
+            wish = FromPage.validate_json(text)
+        except ValueError as error:
+            words = str(error)
+            if isinstance(error, ValidationError):
+                words = "expected seek, select, motion or ping with their fields"
+            notice = {"type": "notice", "level": "warn", "message": words, "hint": None}
+            page.messages = [*page.messages, json.dumps(notice)][-MOST_NOTICES:]
+            page.wake.set()
+            return
+        match wish:
+            case models.StreamSeek():
+                self._workbench.seek(wish.step, wish.origin)
+            case models.StreamSelect():
+                self._workbench.select(wish.id)
+            case models.StreamMotion():
+                page.flies = wish.flies
+                self._set_flies()
+            case models.StreamPing():
+                page.messages = [*page.messages, '{"type":"pong"}'][-MOST_NOTICES:]
+                page.wake.set()
+
+    def _set_flies(self) -> None:
+        """A click in the 3D view does not say whose it was: one who wants less motion is enough."""
+        self._workbench.set_flies(all(page.flies for page in self._pages))
+
+    async def _tell(self, socket: WebSocket, page: _Page) -> None:
+        while True:
+            await page.wake.wait()
+            page.wake.clear()
+            messages, page.messages = page.messages, []
+            for text in messages:
+                await socket.send_text(text)
+            news, page.news = page.news, set()
+            snapshot = self._workbench.snapshot()
+            if "playhead" in news:  # first, so that the picture is asked for before the rest
+                origin = snapshot.playhead_origin
+                told = {"type": "playhead", "step": snapshot.playhead, "origin": origin}
+                await socket.send_text(json.dumps(told))
+            if news - {"playhead", "progress", "evaluation"}:
+                await socket.send_text(self._state_text(snapshot))
+            await self._tell_step(socket, page, snapshot)
+            await self._tell_evaluation(socket, page, snapshot)
+            await self._tell_progress(socket, page, news, snapshot)
+
+    async def _tell_step(self, socket: WebSocket, page: _Page, snapshot: Snapshot) -> None:
+        sequence, run, step = snapshot.sequence, snapshot.run, snapshot.playhead
+        if sequence is None:
+            return
+        computed = snapshot.step_is_computed
+        key = (snapshot.sequence_key, run.key if run is not None else "", step, computed)
+        if key == page.told_step:
+            return
+        text = self._steps.get(key)
+        if text is None:
+            message = steps.step_of(sequence, run, step)
+            text = _with_type("step", message)
+            if message.computed == computed:  # else it was computed this very moment
+                self._steps[key] = text
+                while len(self._steps) > KEPT_STEPS:
+                    self._steps.popitem(last=False)
+        page.told_step = key
+        await socket.send_text(text)
+
+    async def _tell_evaluation(self, socket: WebSocket, page: _Page, snapshot: Snapshot) -> None:
+        scored = snapshot.scores.shown
+        key = (scored.key, scored.steps) if scored is not None else None
+        if scored is not None and key != page.told_evaluation:
+            told = {
+                "type": "evaluation",
+                "run": scored.key,
+                "steps": scored.steps,
+                "partial": not scored.complete,
+            }
+            await socket.send_text(json.dumps(told))
+        page.told_evaluation = key
+
+    async def _tell_progress(
+        self, socket: WebSocket, page: _Page, news: set[Change], snapshot: Snapshot
+    ) -> None:
+        assert self._loop is not None
+        if "progress" in news:
+            page.due |= {"progress", "timeline"}
+        if news & {"run", "sequence"}:
+            page.due = {"timeline"}  # how far the run is was in the state
+            page.told_at["timeline"] = 0.0
+        shown = _shown(snapshot)
+        if shown == page.told_timeline:
+            page.due.discard("timeline")
+        now = self._loop.time()
+        for kind in sorted(page.due):
+            if now - page.told_at[kind] >= SECONDS_BETWEEN[kind]:
+                page.told_at[kind] = now
+                page.due.discard(kind)
+                if kind == "timeline":
+                    page.told_timeline = shown
+                    told: dict[str, Any] = {"run": shown[1], "done": shown[2]}
+                else:
+                    told = {"run": results.run_of(snapshot).model_dump(mode="json")}
+                await socket.send_text(json.dumps({"type": kind, **told}))
+        if page.due and page.timer is None:
+            when = min(page.told_at[kind] + SECONDS_BETWEEN[kind] for kind in page.due)
+            page.timer = self._loop.call_at(when, _remind, page)
+
+    def _state_text(self, snapshot: Snapshot) -> str:
+        if self._state[0] != snapshot.version:
+            state = results.state_of(snapshot).model_dump_json()
+            self._state = (snapshot.version, f'{{"type":"state","state":{state}}}')
+        return self._state[1]
+
+
+def _remind(page: _Page) -> None:
+    page.timer = None
+    page.wake.set()
+
+
+def _shown(snapshot: Snapshot) -> tuple[str, str, int]:
+    """What a timeline shows: of another sequence, run or length it is another."""
+    run = snapshot.run
+    key, done = (run.key, run.done) if run is not None else ("", 0)
+    return snapshot.sequence_key, key, done
+
+
+def _with_type(kind: str, message: models.Model) -> str:
+    return f'{{"type":"{kind}",{message.model_dump_json()[1:]}'
+
+
+@router.websocket("/api/stream")
+async def _stream(socket: WebSocket) -> None:
+    stream: Stream = socket.app.state.stream
+    await stream.serve(socket)

@@ -1,0 +1,218 @@
+"""The panel of teaching: templates with their colours, the room, entrances, and saving."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse
+
+from app.state.snapshot import Snapshot
+from app.state.teaching import Part, Side, Teaching
+from app.web.api import ERRORS, Bench, nothing_open
+from app.web.tables.markup import Cell, Markup, escaped, line, quiet, table
+from tracker.sequences.sequence import Sequence, Template
+from tracker.sequences.writing.teaching import AXES, changes, taught_values
+
+router = APIRouter(prefix="/api/tables", responses=ERRORS, default_response_class=HTMLResponse)
+
+SIDES: dict[Side, str] = {"min": "from", "max": "to"}
+
+
+@router.get("/teach")
+def teach_tables(request: Request, bench: Bench) -> str:
+    """What the sequence was taught; every field and button says where it is sent."""
+    teaching: Teaching = request.app.state.teaching
+    snapshot = bench.snapshot()
+    sequence = snapshot.sequence
+    if sequence is None:
+        raise nothing_open()
+    return (
+        _templates(snapshot, sequence)
+        + _numbers(sequence)
+        + _room(sequence)
+        + _entrances(sequence)
+        + _saving(snapshot, teaching)
+    )
+
+
+def _templates(snapshot: Snapshot, sequence: Sequence) -> str:
+    if not sequence.templates:
+        words = (
+            "No colour template yet: press C and drag a box around a person in a picture."
+            if sequence.has_pictures
+            else "No camera has pictures, so there are no colours to learn."
+        )
+        return line(words)
+    rows = [
+        (
+            _picture(snapshot, sequence, template, "swatch", "png"),
+            _field(f"template-{index}", f"Name of template {index + 1}", template.name,
+                   f"PATCH teach/templates/{index}"),
+            _picture(snapshot, sequence, template, "histogram", "svg"),
+            _send(f"{template.camera} · {template.frame}", "POST seek", {"step": template.frame},
+                  label=f"Go to step {template.frame}, camera {template.camera}"),
+            _send("remove", f"DELETE teach/templates/{index}",
+                  label=f"Remove template {index + 1}, {template.name}"),
+        )
+        for index, template in enumerate(sequence.templates)
+    ]  # fmt: skip
+    heads = ("Box", "Person", "Colours", "Seen at", "#")
+    return table("Colour templates", heads, rows) + _method(snapshot)
+
+
+def _method(snapshot: Snapshot) -> str:
+    """What to do where the run does not look at templates."""
+    parameters = snapshot.parameters
+    method = parameters.single_view
+    if method in ("colour_phd", "pseudo_particle"):
+        return ""
+    if method == "jpda" and parameters.jpda.measurements == "colour":
+        return ""
+    use = {"changes": {"single_view": "colour_phd"}}
+    return line(
+        f"The run's single-view method, {method}, looks at no templates. ",
+        _send("Use colour_phd", "PATCH parameters", use),
+    )
+
+
+def _picture(
+    snapshot: Snapshot, sequence: Sequence, template: Template, what: str, ending: str
+) -> Markup:
+    index = [camera.name for camera in sequence.cameras].index(template.camera)
+    box = ",".join(f"{side:g}" for side in template.box)
+    address = f"/api/teach/{what}/{snapshot.sequence_key}/{index}/{template.frame}/{box}.{ending}"
+    words = "Box" if what == "swatch" else "Colours"
+    label = f"{words} of {template.name}, {template.camera}, step {template.frame}"
+    size = "left, top, width, height: " + box.replace(",", ", ") + " px"
+    return Markup(
+        f'<img class="{what}" src="{escaped(address)}" alt="{escaped(label)}" title="{size}">'
+    )
+
+
+def _numbers(sequence: Sequence) -> str:
+    """A template without a mouse."""
+    if not sequence.has_pictures:
+        return ""
+    cameras = "".join(f"<option>{escaped(camera.name)}</option>" for camera in sequence.cameras)
+    sizes = "".join(
+        f'<label>{word}<input name="{word}" id="new-{word}" type="number" step="0.1" required>'
+        "</label>"
+        for word in ("left", "top", "width", "height")
+    )
+    return (
+        '<form class="row" data-send="POST teach/templates" aria-label="Template by numbers">'
+        f'<label>By numbers<select name="camera" aria-label="Camera">{cameras}</select></label>'
+        '<label>step<input name="step" id="new-step" type="number" min="0" '
+        f'max="{sequence.frames - 1}" placeholder="shown"></label>{sizes}'
+        '<button class="btn box">Add</button></form>'
+    )
+
+
+def _room(sequence: Sequence) -> str:
+    corners = {"min": sequence.room.minimum, "max": sequence.room.maximum}
+    return table(
+        "Room, in metres",
+        ("Room", *(f"#{axis}  m" for axis in AXES)),
+        [
+            (
+                words,
+                *(
+                    _field(
+                        f"room-{side}-{axis}",
+                        f"Room, {words} {AXES[axis]}, metres",
+                        f"{corners[side][axis]:g}",
+                        f"PATCH teach/room/{side}/{axis}",
+                        numeric=True,
+                    )
+                    for axis in range(3)
+                ),
+            )
+            for side, words in SIDES.items()
+        ],
+    )
+
+
+def _entrances(sequence: Sequence) -> str:
+    parts: tuple[Part, ...] = ("position", "sigma")
+    signs = {"position": "", "sigma": "± "}
+    rows: list[tuple[Cell, ...]] = [
+        (
+            index + 1,
+            *(
+                _field(
+                    f"entrance-{index}-{part}-{axis}",
+                    f"Entrance {index + 1}, {signs[part]}{AXES[axis]}, metres",
+                    f"{getattr(entrance, part)[axis]:g}",
+                    f"PATCH teach/entrances/{index}/{part}/{axis}",
+                    numeric=True,
+                )
+                for part in parts
+                for axis in range(3)
+            ),
+            _send("remove", f"DELETE teach/entrances/{index}",
+                  label=f"Remove entrance {index + 1}"),
+        )
+        for index, entrance in enumerate(sequence.room.entrances)
+    ]  # fmt: skip
+    heads = ("Entrance", *(f"#{signs[part]}{axis}  m" for part in parts for axis in AXES), "#")
+    add = _send("Add an entrance", "POST teach/entrances")
+    words = " People are born anywhere in the room." if not rows else ""
+    return (table("Entrances, in metres", heads, rows) if rows else "") + line(add, words)
+
+
+def _saving(snapshot: Snapshot, teaching: Teaching) -> str:
+    sequence, saved = snapshot.sequence, snapshot.saved
+    assert sequence is not None
+    assert saved is not None
+    found = changes(taught_values(saved), taught_values(sequence))
+    reason = teaching.why_not_in_place()
+    state = quiet("All is as the file has it.").html
+    buttons = ""
+    if found:
+        count = f"{len(found)} change{'s' if len(found) > 1 else ''} not saved"
+        words = escaped("; ".join(found))
+        state = (
+            f'<span class="dot warn"></span><b>{count}</b>'
+            f'<span class="words" title="{words}">{words}</span>'
+        )
+        buttons = _send("Discard", "POST teach/discard").html
+        if not reason:
+            place = f"{sequence.folder.name}/sequence.toml"
+            buttons += _send("Save", "POST teach/save", label=f"Save in {place}", main=True).html
+    label = "Copy in"
+    if reason:
+        rendered = "rendered" in reason
+        label = f"{'A rendered room' if rendered else 'Read only'}: save a copy in"
+    copy = (
+        '<form class="row" data-send="POST teach/copy">'
+        f'<label class="wide" title="{escaped(reason or "")}">{label}'
+        f'<input name="folder" id="copy-folder" value="{escaped(teaching.copy_folder())}" required>'
+        f'</label><button class="btn {"main" if reason and found else "box"}">Save a copy</button>'
+        "</form>"
+    )
+    return (
+        f'<div class="saving"><div class="row" role="status">{state}<span class="grow"></span>'
+        f"{buttons}</div>{copy}</div>"
+    )
+
+
+def _field(name: str, label: str, value: str, address: str, *, numeric: bool = False) -> Markup:
+    kind = 'type="number" step="0.05"' if numeric else 'type="text" maxlength="200"'
+    return Markup(
+        f'<input id="{escaped(name)}" aria-label="{escaped(label)}" {kind} name="value" '
+        f'value="{escaped(value)}" data-send="{escaped(address)}" autocomplete="off">'
+    )
+
+
+def _send(
+    words: str, address: str, body: Any = None, *, label: str = "", main: bool = False
+) -> Markup:
+    """A button that sends something somewhere."""
+    name = f' aria-label="{escaped(label)}"' if label else ""
+    content = escaped(json.dumps(body or {}))
+    return Markup(
+        f'<button class="btn {"main" if main else "box"}" data-send="{escaped(address)}" '
+        f'data-body="{content}"{name}>{escaped(words)}</button>'
+    )

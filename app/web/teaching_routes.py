@@ -1,0 +1,189 @@
+"""The routes of teaching: templates, the room, entrances; going back; saving."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path as FolderPath
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Path, Request, Response
+
+from app import models
+from app.errors import ApiError, sentence
+from app.models.teaching import (
+    CopyRequest,
+    EditingChange,
+    NewEntrance,
+    NewTemplate,
+    RestoreRequest,
+    TextChange,
+    ValueChange,
+)
+from app.state.teaching import Part, Side, Teaching
+from app.web.api import ERRORS, FOR_EVER, Bench, nothing_open
+from app.web.pictures.swatches import Swatches
+from app.web.views import results
+from tracker.sequences.sequence import SequenceError
+
+NOTHING_LOST = "Nothing was changed, and nothing is lost."
+
+router = APIRouter(prefix="/api/teach", responses=ERRORS)
+
+
+def _teaching(request: Request) -> Teaching:
+    teaching: Teaching = request.app.state.teaching
+    return teaching
+
+
+Teach = Annotated[Teaching, Depends(_teaching)]
+Axis = Annotated[int, Path(ge=0, le=2, description="0, 1, 2 for x, y, z.")]
+
+
+@contextmanager
+def _complaining(code: str = "cannot_teach") -> Iterator[None]:
+    """What does not fit, in the one shape of errors."""
+    try:
+        yield
+    except SequenceError as error:
+        words = sentence(error)
+        words = words[:1].upper() + words[1:] + "."
+        raise ApiError(422, code, words, hint=NOTHING_LOST) from None
+
+
+@router.post("/templates")
+def add_template(wish: NewTemplate, bench: Bench, teach: Teach) -> models.State:
+    """Add a box whose colours model a person; the run follows at once."""
+    snapshot = bench.snapshot()
+    if snapshot.sequence is None:
+        raise nothing_open()
+    step = snapshot.playhead if wish.step is None else wish.step
+    with _complaining():
+        box = (wish.left, wish.top, wish.width, wish.height)
+        teach.add_template(wish.camera, step, box, wish.name or None)
+    return results.state_of(bench.snapshot())
+
+
+@router.patch("/templates/{index}")
+def rename_template(index: int, wish: TextChange, bench: Bench, teach: Teach) -> models.State:
+    """Say whose colours a template models; templates of one name are of one person."""
+    with _complaining():
+        teach.rename_template(index, wish.value)
+    return results.state_of(bench.snapshot())
+
+
+@router.delete("/templates/{index}")
+def remove_template(index: int, bench: Bench, teach: Teach) -> models.State:
+    """Take a template away."""
+    with _complaining():
+        teach.remove_template(index)
+    return results.state_of(bench.snapshot())
+
+
+@router.patch("/room/{side}/{axis}")
+def set_face(side: Side, axis: Axis, wish: ValueChange, bench: Bench, teach: Teach) -> models.State:
+    """Move one of the room's six faces."""
+    with _complaining():
+        teach.set_face(side, axis, wish.value)
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/entrances")
+def add_entrance(wish: NewEntrance, bench: Bench, teach: Teach) -> models.State:
+    """Add an entrance, in the middle of the room where no place is given."""
+    with _complaining():
+        teach.add_entrance(wish.position)
+    return results.state_of(bench.snapshot())
+
+
+@router.patch("/entrances/{index}/{part}/{axis}")
+def set_entrance(
+    index: int, part: Part, axis: Axis, wish: ValueChange, bench: Bench, teach: Teach
+) -> models.State:
+    """Move an entrance along an axis, or make it wider."""
+    with _complaining():
+        teach.set_entrance(index, part, {axis: wish.value})
+    return results.state_of(bench.snapshot())
+
+
+@router.delete("/entrances/{index}")
+def remove_entrance(index: int, bench: Bench, teach: Teach) -> models.State:
+    """Take an entrance away."""
+    with _complaining():
+        teach.remove_entrance(index)
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/editing")
+async def edit_room(wish: EditingChange, bench: Bench) -> models.State:
+    """Have the 3D view with handles on the room, or without."""
+    bench.edit_room(wish.on)
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/restore")
+def restore(wish: RestoreRequest, bench: Bench, teach: Teach) -> models.State:
+    """Go back to room and templates, and values, as they were; what undo does."""
+    with _complaining():
+        if not teach.restore(wish.key, wish.changes):
+            raise ApiError(
+                404,
+                "unknown_state",
+                "Room and templates of that moment are not known any more.",
+                hint="They are known from the opening of a sequence on.",
+            )
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/discard")
+def discard(bench: Bench, teach: Teach) -> models.State:
+    """Have room and templates as the file has them; undo brings the changes back."""
+    with _complaining():
+        teach.discard()
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/save")
+def save(bench: Bench, teach: Teach) -> models.State:
+    """Write what was taught into the sequence's file, with a backup beside it."""
+    with _complaining("cannot_save"):
+        backup = teach.save()
+    bench.notify("info", f"Saved in {backup.parent.name}", f"What was there is in {backup.name}.")
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/copy")
+def save_copy(wish: CopyRequest, bench: Bench, teach: Teach) -> models.State:
+    """Write the sequence with what was taught into another folder, and go on in that."""
+    with _complaining("cannot_save"):
+        folder = teach.save_copy(FolderPath(wish.folder.strip()))
+    bench.notify("info", f"Saved a copy in {folder}", "The workbench is in the copy now.")
+    return results.state_of(bench.snapshot())
+
+
+@router.get(
+    "/swatch/{sequence_key}/{camera}/{step}/{box}.png",
+    response_class=Response,
+    responses={200: {"content": {"image/png": {}}, "description": "What the box holds."}},
+)
+def swatch(
+    request: Request, bench: Bench, sequence_key: str, camera: int, step: int, box: str
+) -> Response:
+    """The part of a picture in a box: ``left,top,width,height``."""
+    swatches: Swatches = request.app.state.swatches
+    png = swatches.crop(bench.snapshot(), sequence_key, camera, step, box)
+    return Response(png, media_type="image/png", headers={"cache-control": FOR_EVER})
+
+
+@router.get(
+    "/histogram/{sequence_key}/{camera}/{step}/{box}.svg",
+    response_class=Response,
+    responses={200: {"content": {"image/svg+xml": {}}, "description": "A bar a colour."}},
+)
+def histogram(
+    request: Request, bench: Bench, sequence_key: str, camera: int, step: int, box: str
+) -> Response:
+    """The colours in a box, as the colour methods weigh them: hues, then greys by value."""
+    swatches: Swatches = request.app.state.swatches
+    svg = swatches.histogram(bench.snapshot(), sequence_key, camera, step, box)
+    return Response(svg, media_type="image/svg+xml", headers={"cache-control": FOR_EVER})

@@ -1,0 +1,1 @@
+"""A run as messages: its steps, its timeline, its results."""

@@ -1,0 +1,129 @@
+"""A snapshot as the messages of :mod:`app.models`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+from numpy import ndarray
+
+from app import models
+from app.state.snapshot import Snapshot
+from app.web.command_line import command_line
+from tracker import parameters as table
+from tracker.sequences.sequence import Sequence
+from tracker.sequences.writing.teaching import changes, taught_values
+
+
+def state_of(snapshot: Snapshot) -> models.State:
+    """The shared state as the page gets it."""
+    parameters = snapshot.parameters
+    return models.State(
+        version=snapshot.version,
+        sequence=_sequence_of(snapshot.sequence, snapshot.sequence_key),
+        opening=None
+        if snapshot.opening is None
+        else models.OpeningInfo(**asdict(snapshot.opening)),
+        parameters={key: table.value(parameters, key) for key in table.PARAMETERS},
+        changed=list(table.changed(parameters, snapshot.defaults)),
+        command=command_line(snapshot),
+        methods=models.MethodsInfo(
+            single_view=parameters.single_view, fusion_method=parameters.fusion_method
+        ),
+        presets=list(snapshot.presets),
+        preset=snapshot.preset,
+        playhead=snapshot.playhead,
+        selection=snapshot.selection,
+        layers=dict(snapshot.layers),
+        view=snapshot.view,
+        theme=snapshot.theme,
+        run=run_of(snapshot),
+        pinned=_pinned_of(snapshot),
+        teaching=_teaching_of(snapshot),
+        viser=models.ViserInfo(),
+    )
+
+
+def run_of(snapshot: Snapshot) -> models.RunInfo:
+    """How far the run is."""
+    return models.RunInfo(**asdict(snapshot.run_state))
+
+
+def _teaching_of(snapshot: Snapshot) -> models.TeachingInfo:
+    sequence, saved = snapshot.sequence, snapshot.saved
+    unsaved = 0
+    if sequence is not None and saved is not None and sequence is not saved:
+        unsaved = len(changes(taught_values(saved), taught_values(sequence)))
+    return models.TeachingInfo(
+        key=sequence.digest if sequence is not None else "",
+        unsaved=unsaved,
+        editing_room=snapshot.editing_room,
+    )
+
+
+def _pinned_of(snapshot: Snapshot) -> models.PinnedInfo | None:
+    pinned = snapshot.scores.pinned
+    if pinned is None:
+        return None
+    values = pinned.parameters
+    return models.PinnedInfo(
+        key=pinned.key,
+        parameters={key: table.value(values, key) for key in (*table.METHODS, *table.PARAMETERS)},
+        changed=list(table.changed(values, snapshot.defaults)),
+        differs=list(table.changed(values, snapshot.parameters)),
+    )
+
+
+def schema() -> models.Schema:
+    """Every parameter, method and preset."""
+    return models.Schema(
+        groups=[models.GroupInfo(name=name, help=text) for name, text in table.GROUPS.items()],
+        parameters=[
+            models.ParameterInfo(
+                **{name: getattr(p, name) for name in models.ParameterInfo.model_fields}
+            )
+            for p in table.PARAMETERS.values()
+        ],
+        methods={key: list(choices) for key, choices in table.METHODS.items()},
+        presets=table.PRESETS,
+    )
+
+
+def _sequence_of(sequence: Sequence | None, key: str) -> models.SequenceInfo | None:
+    if sequence is None:
+        return None
+    room = sequence.room
+    return models.SequenceInfo(
+        key=key,
+        name=sequence.name,
+        description=sequence.description,
+        fps=sequence.fps,
+        frames=sequence.frames,
+        has_pictures=any(view.has_pictures for view in sequence.views),
+        has_detections=any(view.detections is not None for view in sequence.views),
+        has_truth=sequence.ground_truth is not None,
+        room=models.RoomInfo(
+            min=_vector(room.minimum),
+            max=_vector(room.maximum),
+            entrances=[
+                models.EntranceInfo(position=_vector(e.position), sigma=_vector(e.sigma))
+                for e in room.entrances
+            ],
+        ),
+        target=models.TargetInfo(half_extents=_vector(sequence.target_half_extents)),
+        cameras=[
+            models.CameraInfo(
+                name=view.camera.name,
+                width=view.camera.image_size[0],
+                height=view.camera.image_size[1],
+                has_pictures=view.has_pictures,
+                has_detections=view.detections is not None,
+            )
+            for view in sequence.views
+        ],
+        templates=len(sequence.templates),
+    )
+
+
+def _vector(values: ndarray) -> models.Vector:
+    x, y, z = values.tolist()
+    return x, y, z

@@ -1,0 +1,303 @@
+"""A run over time, summed up for the part and the width that somebody looks at.
+
+However long a recording is, a page gets a bounded number of values a curve: the lowest,
+the highest and the mean of as many steps as share one place of its axis.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+
+from app import models
+from app.state.pairs import alike
+from app.state.scores import Scored
+from tracker.pipeline import Run
+from tracker.sequences.sequence import Sequence
+from tracker.trajectories import Trajectories
+
+BUCKETS = 4096
+"""Values a curve at most, where nobody asks for fewer: more than a wide screen has pixels."""
+
+MOST_TRACKS = 400
+"""Lanes told at once; the rest is a number."""
+
+
+MOST_EVENTS = 4000
+"""Events told at most: the first ones."""
+
+LONG_MISS = 1.5
+"""Seconds without a box from any camera that make a miss long."""
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A part of the steps, cut into buckets of equal size."""
+
+    first: int
+    """The first step of the first bucket, a multiple of :attr:`stride`."""
+    end: int
+    """One past the last step."""
+    stride: int
+    """Steps a bucket; the last may have fewer."""
+
+    @staticmethod
+    def of(frames: int, first: int = 0, last: int | None = None, buckets: int = BUCKETS) -> Window:
+        """The buckets of the steps ``first`` … ``last``, as far as the sequence goes.
+
+        Buckets begin at multiples of their size, so that a view that moves sideways shows
+        the same values again.
+        """
+        end = frames if last is None else max(0, min(last + 1, frames))
+        first = max(0, min(first, end))
+        stride = max(1, -(-(end - first) // buckets))
+        while (end - first // stride * stride) > buckets * stride:
+            stride += 1  # the cut bucket in front was one too many
+        return Window(first // stride * stride, end, stride)
+
+    def starts(self, done: int) -> Int[ndarray, " B"]:
+        """The first step of each bucket that holds one of the first ``done`` steps."""
+        return np.arange(self.first, max(self.first, min(self.end, done)), self.stride)
+
+    def worst(self, values: Float[ndarray, " S"]) -> Int[ndarray, " B"]:
+        """The step with the greatest value of each bucket; not a number counts as least."""
+        starts = self.starts(len(values))
+        if self.stride == 1:
+            return starts
+        padded = np.full(len(starts) * self.stride, -np.inf)
+        known = np.nan_to_num(values[self.first : self.end], nan=-np.inf)
+        padded[: len(known)] = known
+        worst: ndarray = starts + padded.reshape(-1, self.stride).argmax(axis=1)
+        return worst
+
+
+def counts(values: Int[ndarray, " S"], window: Window) -> models.Counts:
+    """Whole numbers over time."""
+    low, high, mean = _summary(values, window)
+    return models.Counts(low=low.tolist(), high=high.tolist(), mean=mean.round(3).tolist())
+
+
+def numbers(values: Float[ndarray, " S"], window: Window) -> models.Numbers:
+    """Numbers over time, to four decimals."""
+    low, high, mean = (part.round(4).tolist() for part in _summary(values, window))
+    return models.Numbers(low=low, high=high, mean=mean)
+
+
+def _summary(values: ndarray, window: Window) -> tuple[ndarray, ndarray, ndarray]:
+    starts = window.starts(len(values)) - window.first
+    part = values[window.first : window.end]
+    if not len(starts):
+        return part, part, part.astype(float)
+    sizes = np.diff(np.append(starts, len(part)))
+    return (
+        np.minimum.reduceat(part, starts),
+        np.maximum.reduceat(part, starts),
+        np.add.reduceat(part.astype(float), starts) / sizes,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Spans:
+    """Consecutive steps of each track in which it is seen, or not seen, by any camera."""
+
+    ids: Int[ndarray, " N"]
+    first: Int[ndarray, " N"]
+    last: Int[ndarray, " N"]
+    seen: Bool[ndarray, " N"]
+    cameras: Int[ndarray, "N C"]
+    """In how many of the steps each camera saw it."""
+
+    @staticmethod
+    def of(tracks: Trajectories, done: int) -> _Spans:
+        """Of the first ``done`` steps, sorted by track and step."""
+        rows = slice(0, tracks.at(done).start)
+        frames, ids = tracks.frames[rows], tracks.ids[rows]
+        order = np.lexsort((frames, ids))
+        frames, ids, each = frames[order], ids[order], tracks.seen[rows][order]
+        seen = np.any(each, axis=1)
+        begins = np.ones(len(frames), dtype=bool)
+        begins[1:] = (np.diff(ids) != 0) | (np.diff(frames) != 1) | (seen[1:] != seen[:-1])
+        starts = np.flatnonzero(begins)
+        ends = np.append(starts[1:], len(frames))[: len(starts)]
+        before = np.zeros((len(frames) + 1, each.shape[1]), dtype=np.int64)
+        np.cumsum(each, axis=0, out=before[1:])
+        sights = before[ends] - before[starts]
+        return _Spans(ids[starts], frames[starts], frames[ends - 1], seen[starts], sights)
+
+
+class Timelines:
+    """Makes timelines; remembers what it counted of the run it was asked for last."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._run: Run | None = None
+        self._cardinality: list[float] = []
+        self._counted: tuple[int, _Spans, Int[ndarray, " D"]] | None = None
+        self._sequence: Sequence | None = None
+        self._truth: Int[ndarray, " S"] | None = None
+        self._alike: tuple[tuple[str, str, int], dict[int, int]] = (("", "", 0), {})
+
+    def of(
+        self, sequence: Sequence, run: Run | None, window: Window, pinned: Scored | None = None
+    ) -> models.Timeline:
+        """The shown run over time, as far as it is computed and as the window shows it.
+
+        Args:
+            sequence: That is open.
+            run: That is shown.
+            window: The part that somebody looks at.
+            pinned: The run that it is compared with, if there is one.
+        """
+        with self._lock:
+            return self._of(sequence, run, window, pinned)
+
+    def _of(
+        self, sequence: Sequence, run: Run | None, window: Window, pinned: Scored | None
+    ) -> models.Timeline:
+        if run is not self._run:
+            self._run, self._cardinality, self._counted = run, [], None
+        if sequence is not self._sequence:
+            self._sequence, self._truth = sequence, _truth_counts(sequence)
+        done, count = 0, np.zeros(0, dtype=np.int64)
+        lives: list[models.TrackLife] = []
+        events: list[models.LaneEvent] = []
+        left_out = 0
+        if run is not None:
+            done = run.done
+            self._cardinality.extend(
+                result.posterior.cardinality for result in run.fused[len(self._cardinality) : done]
+            )
+            if self._counted is None or self._counted[0] != done:
+                frames = run.tracks.frames
+                frames = frames[: int(np.searchsorted(frames, done))]
+                self._counted = (
+                    done, _Spans.of(run.tracks, done), np.bincount(frames, minlength=done)
+                )  # fmt: skip
+            _, spans, count = self._counted
+            shortest = math.ceil(LONG_MISS * sequence.fps)
+            lives, left_out = _lives(spans, window, shortest)
+            events = _events(spans, done, shortest)
+        return models.Timeline(
+            run=run.key if run is not None else "",
+            done=done,
+            frames=sequence.frames,
+            first=window.first,
+            stride=window.stride,
+            cardinality=numbers(np.array(self._cardinality), window),
+            count=counts(count, window),
+            truth=None if self._truth is None else counts(self._truth, window),
+            tracks=lives,
+            pinned=self._pinned(sequence, run, window, pinned),
+            events=events,
+            left_out=left_out,
+        )
+
+    def events(self, sequence: Sequence, run: Run) -> list[models.LaneEvent]:
+        """What happens to the tracks of the shown run, as far as it is computed."""
+        return self.of(sequence, run, Window.of(sequence.frames, 0, 0)).events
+
+    def _pinned(
+        self, sequence: Sequence, run: Run | None, window: Window, pinned: Scored | None
+    ) -> models.PinnedTimeline | None:
+        if pinned is None or run is None or pinned.key == run.key:
+            return None
+        done = min(run.done, pinned.steps)
+        key = (pinned.key, run.key, done)
+        if key != self._alike[0]:
+            self._alike = (key, alike(pinned.tracks, run.tracks, done))
+        like = self._alike[1]
+        spans = _Spans.of(pinned.tracks, pinned.steps)
+        lives, _ = _lives(spans, window, math.ceil(LONG_MISS * sequence.fps))
+        count = np.bincount(pinned.tracks.frames, minlength=pinned.steps)[: pinned.steps]
+        return models.PinnedTimeline(
+            run=pinned.key,
+            count=counts(count, window),
+            tracks=[
+                models.PinnedLife(**life.model_dump(), like=like.get(life.id)) for life in lives
+            ],
+        )
+
+
+def _truth_counts(sequence: Sequence) -> Int[ndarray, " S"] | None:
+    truth = sequence.ground_truth
+    if truth is None:
+        return None
+    counted = truth.frames[truth.valid]  # the others are neither missed nor false
+    return np.bincount(counted, minlength=sequence.frames)[: sequence.frames]
+
+
+def _events(spans: _Spans, done: int, shortest: int) -> list[models.LaneEvent]:
+    """Births after the first step, deaths before the newest one, and long misses, by step."""
+    if not len(spans.ids):
+        return []
+    heads = np.flatnonzero(np.diff(spans.ids, prepend=-1))
+    tails = np.append(heads[1:], len(spans.ids)) - 1
+    born = heads[spans.first[heads] > 0]
+    dead = tails[spans.last[tails] < done - 1]
+    lost = np.flatnonzero(~spans.seen & (spans.last - spans.first + 1 >= shortest))
+    kinds: tuple[Literal["birth", "death", "long miss"], ...] = ("birth", "death", "long miss")
+    steps = np.concatenate([spans.first[born], spans.last[dead], spans.first[lost]])
+    ids = np.concatenate([spans.ids[born], spans.ids[dead], spans.ids[lost]])
+    which = np.repeat(np.arange(3), [len(born), len(dead), len(lost)])
+    order = np.lexsort((ids, steps))[:MOST_EVENTS]
+    return [(int(steps[i]), int(ids[i]), kinds[which[i]]) for i in order]
+
+
+def _lives(spans: _Spans, window: Window, shortest: int) -> tuple[list[models.TrackLife], int]:
+    """The tracks that live in the window, and how many more there are."""
+    heads = np.flatnonzero(np.diff(spans.ids, prepend=-1))
+    tails = np.append(heads[1:], len(spans.ids))[: len(heads)]
+    inside = (spans.first[heads] < window.end) & (spans.last[tails - 1] >= window.first)
+    chosen = np.flatnonzero(inside)
+    lengths = spans.last[tails - 1] - spans.first[heads] + 1
+    if len(chosen) > MOST_TRACKS:  # the longest, in the order of their ids
+        chosen = np.sort(chosen[np.argsort(-lengths[chosen], kind="stable")[:MOST_TRACKS]])
+    lives = []
+    for i in chosen.tolist():
+        rows = slice(int(heads[i]), int(tails[i]))
+        steps = (spans.last[rows] - spans.first[rows] + 1)[spans.seen[rows]]
+        lives.append(
+            models.TrackLife(
+                id=int(spans.ids[heads[i]]),
+                first=int(spans.first[heads[i]]),
+                last=int(spans.last[tails[i] - 1]),
+                seen=round(float(steps.sum() / lengths[i]), 4),
+                cameras=(spans.cameras[rows].sum(axis=0) / lengths[i]).round(4).tolist(),
+                spans=_spans_of(spans, rows, window, shortest),
+            )
+        )
+    return lives, int(inside.sum()) - len(chosen)
+
+
+def _spans_of(spans: _Spans, rows: slice, window: Window, shortest: int) -> list[models.Span]:
+    """A track's spans within the window; what is shorter than a bucket joins its neighbour.
+
+    A joined span is what most of its steps are. So a lane has at most as many spans as
+    there are buckets, and none is lost where it is as long as a bucket.
+    """
+    shown: list[list[Any]] = []  # first, last, steps seen, whether a long miss is in it
+    firsts, lasts, sights = spans.first[rows], spans.last[rows], spans.seen[rows]
+    long = ~sights & (lasts - firsts + 1 >= shortest)
+    there = np.flatnonzero((lasts >= window.first) & (firsts < window.end))
+    for i in there.tolist():
+        first = max(int(firsts[i]), window.first)
+        last = min(int(lasts[i]), window.end - 1)
+        seen = last - first + 1 if sights[i] else 0
+        before = shown[-1] if shown else None
+        if before is not None and first - before[1] <= window.stride:
+            is_short = last - first + 1 < window.stride
+            if is_short or before[1] - before[0] + 1 < window.stride:
+                before[1:] = last, before[2] + seen, before[3] or bool(long[i])
+                continue
+        shown.append([first, last, seen, bool(long[i])])
+    kind: dict[bool, Literal["coasting", "long miss"]] = {False: "coasting", True: "long miss"}
+    return [
+        (first, last, "seen" if 2 * seen > last - first + 1 else kind[is_long])
+        for first, last, seen, is_long in shown
+    ]

@@ -1,0 +1,397 @@
+"""The command line: status, messages, flags, and the file that appears whole or not at all."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.command import main as cli
+from app.command.flags import Track, parse
+from tests.app.conftest import Runs
+from tests.app.folders import write_crossing
+from tracker import export, parameters, pipeline
+from tracker.parameters import PARAMETERS, ParameterError
+from tracker.pipeline import Run
+from tracker.sequences.reader import read_sequence
+
+P_D = "fusion.detection_probability"
+
+
+def engine_csv(crossing: Path, path: Path, changes: dict[str, Any], seed: int = 0) -> str:
+    sequence = read_sequence(crossing)
+    wanted = parameters.with_values(pipeline.default_parameters(sequence), changes)
+    computed = pipeline.compute(sequence, wanted, seed=seed)
+    export.save_tracks_csv(path, sequence, computed.tracks, wanted, seed)
+    return path.read_text(encoding="utf-8")
+
+
+def test_track_writes_the_engines_tracks(run: Runs, crossing: Path, tmp_path: Path) -> None:
+    out = tmp_path / "tracks.csv"
+    status, stdout, stderr = run("track", crossing, "-o", out, "--seed", 3)
+    assert (status, stdout) == (0, "")
+    summary = stderr.strip().splitlines()[-1]
+    assert summary.startswith("multiview-phd: 120 steps, ")
+    assert "steps/s" in summary
+    assert summary.endswith(f"written to {out}")
+    assert out.read_text(encoding="utf-8") == engine_csv(crossing, tmp_path / "own.csv", {}, 3)
+    assert len(export.read_tracks_csv(out).frames) > 100
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--set", "fusion.detection_probability=0.9", "--set", "fusion.motion=random_walk"],
+        ["--fusion.detection-probability", "0.9", "--fusion.motion", "random_walk"],
+        [
+            *("--set", "fusion.motion=constant_velocity", "--fusion.motion", "random_walk"),
+            *("--set", "fusion.detection_probability = 0.9"),
+        ],
+    ],
+)
+def test_parameters_by_set_and_by_flag(
+    run: Runs, crossing: Path, tmp_path: Path, arguments: list[str]
+) -> None:
+    out = tmp_path / "tracks.csv"
+    assert run("track", crossing, "-o", out, *arguments)[0] == 0
+    changes = {P_D: 0.9, "fusion.motion": "random_walk"}
+    assert out.read_text(encoding="utf-8") == engine_csv(crossing, tmp_path / "own.csv", changes)
+
+
+def test_methods_and_presets(run: Runs, crossing: Path, tmp_path: Path) -> None:
+    out = tmp_path / "tracks.csv"
+    chosen = ["--single-view", "none", "--fusion", "sequential_phd", "--preset", "published"]
+    assert run("track", crossing, "-o", out, *chosen)[0] == 0
+    changes = {**parameters.PRESETS["published"], "fusion_method": "sequential_phd"}
+    assert out.read_text(encoding="utf-8") == engine_csv(crossing, tmp_path / "own.csv", changes)
+
+
+def test_stage_1_is_kept_for_the_next_run_unless_told_otherwise(
+    run: Runs, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(tmp_path / "cache"))
+    out = tmp_path / "tracks.csv"
+    line = ("track", data / "numbers", "-o", out, "--colour-phd.samples", "60")
+    status, _, stderr = run(*line, "--no-cache")
+    assert status == 0
+    assert not (tmp_path / "cache").exists()
+    first = out.read_text(encoding="utf-8")
+    assert "was kept" not in run(*line)[2]
+    assert len(list((tmp_path / "cache").rglob("*.npz"))) == 1
+    out.unlink()
+    status, _, stderr = run(*line)
+    assert (status, "stage 1 was kept from an earlier run" in stderr) == (0, True)
+    assert out.read_text(encoding="utf-8") == first
+    assert "was kept" not in run(*line, "--no-cache")[2]
+
+
+def test_benchmarks_run_from_a_checkout(
+    run: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines: list[tuple[list[str], Path]] = []
+
+    def note(line: list[str], cwd: Path) -> subprocess.CompletedProcess[str]:
+        lines.append((line[1:], cwd))
+        return subprocess.CompletedProcess(line, 1)
+
+    monkeypatch.setattr(cli.subprocess, "run", note)
+    wanted = tmp_path / "figures.json"
+    assert run("benchmark", "kernels", "targets", "--short", "--json", wanted)[0] == 1
+    ((line, where),) = lines
+    assert line == [
+        *("-m", "tests.benchmarks", "kernels", "targets", "--short"),
+        *("--json", str(wanted)),
+    ]
+    assert (where / "tests" / "benchmarks" / "__main__.py").is_file()
+
+
+def test_an_installed_package_says_where_its_benchmarks_are(
+    run: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        cli, "__file__", str(tmp_path / "site-packages" / "app" / "command" / "main.py")
+    )
+    status, _, stderr = run("benchmark")
+    assert status == 1
+    assert "get a checkout" in stderr
+    assert len(stderr.strip().splitlines()) == 1
+
+
+def test_every_parameter_has_its_flag() -> None:
+    line = ["track", "room", "-o", "x.csv"]
+    for key, parameter in PARAMETERS.items():
+        default = parameter.default
+        text = str(default).lower() if parameter.kind == "bool" else str(default)
+        line += ["--" + key.replace("_", "-"), text]
+    command = parse(line)
+    assert isinstance(command, Track)
+    changes = command.changes()
+    assert list(changes) == list(PARAMETERS)
+    checked = parameters.with_values(parameters.RunParameters(), changes)
+    for key, parameter in PARAMETERS.items():
+        assert parameters.value(checked, key) == parameter.default
+
+
+def test_help_names_every_flag_with_range_and_default(run: Runs) -> None:
+    status, stdout, _ = run("track", "--help")
+    assert status == 0
+    text = " ".join(stdout.replace("│", " ").split())
+    for key, parameter in PARAMETERS.items():
+        assert "--" + key.replace("_", "-") in text
+        assert " ".join(parameter.help.split()) in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--set", "fusion.survival_probabilty=0.9"], "did you mean fusion.survival_probability?"),
+        (["--set", "fusion.survival_probability"], "--set: expected KEY=VALUE"),
+        (["--fusion.survival-probability", "2"], "must be between 0.5 and 1, got 2"),
+        (["--fusion.survival-probability", "much"], "expected a number, got 'much'"),
+        (["--preset", "magic"], "--preset: expected one of robust, published, got 'magic'"),
+        (["--fusion", "magic"], "expected one of sequential_phd"),
+        (["--single-view", "magic"], "expected one of colour_phd"),
+        (["--seed", "-1"], "--seed: expected a whole number from 0, got -1"),
+    ],
+)
+def test_a_wrong_value_is_wrong_usage(
+    run: Runs, crossing: Path, tmp_path: Path, arguments: list[str], words: str
+) -> None:
+    status, stdout, stderr = run("track", crossing, "-o", tmp_path / "x.csv", *arguments)
+    assert (status, stdout) == (2, "")
+    assert words in stderr
+    assert stderr.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [[], ["fly"], ["track"], ["track", "room"], ["track", "room", "-o", "x", "--wrong"]],
+)
+def test_wrong_usage(run: Runs, arguments: list[str]) -> None:
+    assert run(*arguments)[0] == 2
+
+
+def test_a_failure_is_one_line(run: Runs, crossing: Path, tmp_path: Path) -> None:
+    broken = write_crossing(tmp_path / "broken", 5)
+    (broken / "right.csv").write_text("frame,left,top\n0,1,2\n")
+    out = tmp_path / "x.csv"
+    for arguments, words in [
+        ((broken, "-o", out), "right.csv"),
+        ((tmp_path / "nowhere", "-o", out), "nowhere"),
+        (("nonsense", "-o", out), 'no sequence "nonsense"'),
+        ((crossing, "-o", tmp_path), "expected a file to write, found a folder"),
+        ((crossing, "-o", tmp_path / "no" / "x.csv"), "there is no folder"),
+        ((crossing, "-o", out, "--single-view", "colour_phd"), "pictures"),
+    ]:
+        status, stdout, stderr = run("track", *arguments)
+        assert (status, stdout) == (1, "")
+        assert words in stderr
+        assert stderr.startswith("multiview-phd: ")
+        assert stderr.count("\n") == 1
+        assert not out.exists()
+
+
+def test_a_surprise_is_one_line_too_unless_asked(
+    run: Runs, crossing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: Any, **__: Any) -> Run:
+        raise RuntimeError("a bug")
+
+    monkeypatch.setattr(pipeline, "compute", fail)
+    status, _, stderr = run("track", crossing, "-o", tmp_path / "x.csv")
+    assert status == 1
+    assert (
+        stderr.strip().splitlines()[-1].startswith("multiview-phd: unexpected RuntimeError: a bug")
+    )
+    monkeypatch.setenv(cli.TRACEBACK, "1")
+    with pytest.raises(RuntimeError, match="a bug"):
+        run("track", crossing, "-o", tmp_path / "x.csv")
+
+
+def test_a_failure_leaves_an_older_file_as_it_was(
+    run: Runs, crossing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "tracks.csv"
+    out.write_text("older")
+
+    def interrupt(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(export, "write_tracks_csv", interrupt)
+    status, _, stderr = run("track", crossing, "-o", out)
+    assert status == 130
+    assert stderr.strip().splitlines()[-1] == "multiview-phd: interrupted; nothing was written"
+    assert out.read_text() == "older"
+    assert list(tmp_path.iterdir()) == [out]
+
+
+def test_ctrl_c_in_the_middle_leaves_nothing(tmp_path: Path) -> None:
+    folder = write_crossing(tmp_path / "long", 6000)
+    out = tmp_path / "out"
+    out.mkdir()
+    process = subprocess.Popen(
+        [sys.executable, "-c", BARRED, "track", str(folder), "-o", str(out / "tracks.csv")],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "computing\n"
+    process.send_signal(signal.SIGINT)
+    begin = time.monotonic()
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert time.monotonic() - begin < 10.0
+    assert err.strip().splitlines()[-1] == "multiview-phd: interrupted; nothing was written"
+    assert "Traceback" not in err
+    assert not list(out.iterdir())
+
+
+def test_ctrl_c_inside_a_compiled_kernel(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Compiled code hands an interruption on as a failure that it caused, some levels down."""
+
+    def heard(_: object) -> int:
+        try:
+            try:
+                raise KeyboardInterrupt
+            except KeyboardInterrupt as interruption:
+                raise SystemError("unpickle: result with an exception") from interruption
+        except SystemError as error:
+            raise SystemError("update: result with an exception") from error
+
+    monkeypatch.setattr(cli, "_run", heard)
+    assert cli.main(["parameters"]) == 130
+    assert capsys.readouterr().err == "multiview-phd: interrupted; nothing was written\n"
+
+
+BARRED = """
+import sys
+from app.command import main as cli
+from tracker import pipeline
+real = pipeline.compute
+def compute(*args, on_progress, **kwargs):
+    told = []
+    def tell(run, progress):
+        if progress.done and not told:
+            told.append(1)
+            print("computing", flush=True)
+        on_progress(run, progress)
+    return real(*args, on_progress=tell, **kwargs)
+pipeline.compute = compute
+sys.exit(cli.main())
+"""
+"""The command line, saying when the first steps are there."""
+
+
+def test_sequences(run: Runs, data: Path) -> None:
+    status, stdout, stderr = run("sequences", "--data", data)
+    assert (status, stderr) == (0, "")
+    rows = {line.split()[0]: line for line in stdout.splitlines()}
+    assert rows["name"].split() == ["name", "kind", "cameras", "steps", "ready", "description"]
+    assert {"room24-2p", "room35-2p", "room44-3p", "crossing", "numbers"} <= set(rows)
+    assert rows["crossing"].split()[1:5] == ["folder", "3", "120", "yes"]
+    assert run("sequences", "--data", data / "nowhere")[0] == 1
+
+
+def test_parameters(run: Runs) -> None:
+    status, stdout, stderr = run("parameters")
+    assert (status, stderr) == (0, "")
+    lines = stdout.splitlines()
+    assert lines[0].split() == ["key", "symbol", "range", "unit", "default", "help"]
+    table = {line.split()[0]: line for line in lines[1:]}
+    assert set(table) == {*PARAMETERS, *parameters.METHODS}
+    for key, parameter in PARAMETERS.items():
+        assert parameter.symbol in table[key]
+        assert parameter.help in table[key]
+        if parameter.minimum is not None:
+            assert f"{parameter.minimum:g} … {parameter.maximum:g}" in table[key]
+
+
+def test_render_refuses_what_it_cannot_do(run: Runs, tmp_path: Path) -> None:
+    status, _, stderr = run("render", "room99", tmp_path / "new")
+    assert status == 2
+    assert "expected one of room24-2p, room35-2p, room44-3p, got 'room99'" in stderr
+    status, _, stderr = run("render", "room24-2p", tmp_path)
+    assert status == 1
+    assert "name a folder that does not" in stderr
+    status, _, stderr = run("render", "room24-2p", tmp_path / "new", "--cameras", 7)
+    assert status == 2
+    assert "--cameras: expected 2 or 3, got 7" in stderr
+    assert not (tmp_path / "new").exists()
+
+
+def test_render_writes_what_track_reads(
+    run: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from tracker.sequences import rendering
+
+    real = rendering.render
+    monkeypatch.setattr(
+        rendering, "render", lambda *args, **kwargs: real(*args, frames=3, **kwargs)
+    )
+    status, _, stderr = run("render", "room24-2p", tmp_path / "room", "--cameras", 3)
+    assert status == 0, stderr
+    sequence = read_sequence(tmp_path / "room")
+    assert len(sequence.views) == 3
+    assert sequence.frames == 3
+
+
+def test_changes_of_a_flag_beat_those_of_a_preset() -> None:
+    key, published = next(iter(parameters.PRESETS["published"].items()))
+    other = PARAMETERS[key].default
+    assert other != published
+    flag = "--" + key.replace("_", "-")
+    command = parse(["track", "r", "-o", "x", "--preset", "published", flag, str(other)])
+    assert isinstance(command, Track)
+    assert command.changes()[key] == str(other)
+    with pytest.raises(ParameterError):
+        Track(sequence="r", output=Path("x"), preset="magic").changes()
+
+
+def test_help_is_there_at_once_and_without_the_engine() -> None:
+    script = (
+        "import sys; from app.command import main as cli\n"
+        "try: cli.main(['--help'])\n"
+        "except SystemExit: pass\n"
+        "assert not {'numba', 'scipy', 'cv2', 'fastapi', 'viser'} & set(sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    for command in ("serve", "track", "sequences", "render", "parameters"):
+        assert command in done.stdout
+
+
+def test_python_m_app_is_the_same_program() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "app", "parameters"], capture_output=True, text=True
+    )
+    assert done.returncode == 0
+    assert P_D in done.stdout
+    done = subprocess.run([sys.executable, "-m", "app", "fly"], capture_output=True, text=True)
+    assert done.returncode == 2
+
+
+def test_whoever_has_read_enough_is_no_failure() -> None:
+    done = subprocess.run(
+        f"{sys.executable} -m app parameters | head -n 1",
+        shell=True,
+        capture_output=True,
+        text=True,
+    )
+    assert done.stderr == ""
+    assert done.stdout.startswith("key")
+
+
+@pytest.mark.parametrize("port", ["-1", "65536", "99999999"])
+def test_a_port_that_cannot_be_is_wrong_usage(run: Runs, port: str) -> None:
+    status, stdout, stderr = run("serve", "--port", port)
+    assert (status, stdout) == (2, "")
+    assert f"--port: expected 0 (any that is free) to 65535, got {port}" in stderr

@@ -1,0 +1,144 @@
+"""``multiview-phd evaluate``: its tables, its JSON, its report, and files that do not fit."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from app.command.flags import Evaluate, parse
+from tests.app.conftest import Runs
+from tests.app.folders import FRAMES, write_crossing
+from tracker import export, pipeline
+from tracker.evaluation import EvaluationSettings, evaluate_sequence
+from tracker.sequences.reader import read_sequence
+
+
+@pytest.fixture(scope="module")
+def tracks(crossing: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The track file of ``crossing``."""
+    path = tmp_path_factory.mktemp("tracks") / "tracks.csv"
+    sequence = read_sequence(crossing)
+    parameters = pipeline.default_parameters(sequence)
+    run = pipeline.compute(sequence, parameters)
+    export.save_tracks_csv(path, sequence, run.tracks, parameters, 0)
+    return path
+
+
+def test_the_table_says_what_was_measured_with_what(
+    run: Runs, crossing: Path, tracks: Path
+) -> None:
+    arguments = ["--gate", "0.75", "--cutoff", "2", "--order", "2", "--window", "5"]
+    status, stdout, stderr = run("evaluate", crossing, tracks, *arguments)
+    assert status == 0, stderr
+    settings = EvaluationSettings(gate=0.75, cutoff=2.0, order=2.0, window=5)
+    sequence = read_sequence(crossing)
+    expected = evaluate_sequence(sequence, export.read_tracks_csv(tracks), settings)
+    lines = stdout.splitlines()
+    for figure, line in zip(expected.figures, lines[1:], strict=False):
+        name = figure.definition.name
+        assert line.startswith(name)
+        rest = line[len(name) :].split("  ")
+        assert [cell.strip() for cell in rest if cell] == [
+            cell for cell in (figure.text, figure.unit, figure.stated) if cell
+        ]
+    assert "3D distance, cut-off 2 m, order 2, window 5 steps" in stdout
+    assert lines[-2].split()[:2] == ["1", str(expected.people[0].steps)]
+    assert stderr == f"multiview-phd: {FRAMES} steps\n"
+
+
+def test_json(run: Runs, crossing: Path, tracks: Path) -> None:
+    status, stdout, _ = run("evaluate", crossing, tracks, "--json", "--distance", "ground")
+    assert status == 0
+    found = json.loads(stdout)
+    sequence = read_sequence(crossing)
+    settings = EvaluationSettings(distance="ground")
+    expected = evaluate_sequence(sequence, export.read_tracks_csv(tracks), settings).to_json()
+    assert found["sequence"] == "crossing"
+    assert {key: found[key] for key in expected} == json.loads(json.dumps(expected))
+
+
+def test_report(run: Runs, crossing: Path, tracks: Path, tmp_path: Path) -> None:
+    report = tmp_path / "report.html"
+    status, stdout, stderr = run("evaluate", crossing, tracks, "--html", report)
+    assert status == 0
+    assert stdout.startswith("figure")
+    assert stderr.endswith(f"the report is in {report}\n")
+    assert "<h1>crossing</h1>" in report.read_text(encoding="utf-8")
+    assert "seed 0" in report.read_text(encoding="utf-8")
+    assert list(tmp_path.iterdir()) == [report]
+
+
+def test_a_partial_file_is_scored_as_far_as_it_goes(
+    run: Runs, crossing: Path, tmp_path: Path
+) -> None:
+    sequence = read_sequence(crossing)
+    parameters = pipeline.default_parameters(sequence)
+    computed = pipeline.compute(sequence, parameters, steps=50)
+    path = tmp_path / "part.csv"
+    export.save_tracks_csv(path, sequence, computed.tracks, parameters, 0, done=50)
+    assert export.read_tracks_csv(path).done == 50
+    status, stdout, stderr = run("evaluate", crossing, path, "--json")
+    assert status == 0
+    assert json.loads(stdout)["steps"] == 50
+    assert f"50 steps of {FRAMES} (the file is partial)" in stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--gate", "wide"], "--gate: expected a number, got 'wide'"),
+        (["--gate", "0"], "--gate: expected 0.01 … 100 m, got '0'"),
+        (["--gate", "nan"], "--gate: expected a number, got 'nan'"),
+        (["--window", "2.5"], "--window: expected a whole number, got '2.5'"),
+        (["--distance", "near"], "--distance: expected one of position, ground, box, got 'near'"),
+        (["--box-gate", "7"], "--box-gate: expected 0.01 … 1, got '7'"),
+    ],
+)
+def test_a_wrong_setting_is_wrong_usage(
+    run: Runs, crossing: Path, tracks: Path, arguments: list[str], words: str
+) -> None:
+    assert run("evaluate", crossing, tracks, *arguments) == (2, "", f"multiview-phd: {words}\n")
+
+
+@pytest.mark.parametrize("arguments", [[], ["room"], ["room", "tracks.csv", "--gates", "1"]])
+def test_wrong_usage(run: Runs, arguments: list[str]) -> None:
+    assert run("evaluate", *arguments)[0] == 2
+
+
+def test_files_that_do_not_fit(run: Runs, crossing: Path, tracks: Path, tmp_path: Path) -> None:
+    other = write_crossing(tmp_path / "other", 30, name="other")
+    short = write_crossing(tmp_path / "short", 30)
+    untrue = write_crossing(tmp_path / "untrue", 30)
+    toml = untrue / "sequence.toml"
+    toml.write_text(toml.read_text(encoding="utf-8").split("[ground_truth]")[0], encoding="utf-8")
+    foreign = tmp_path / "foreign.csv"
+    foreign.write_text("frame,id,x,y,z\n0,1,0,0,0\n")
+    for arguments, words in [
+        ((other, tracks), 'expected tracks of the sequence "other", found those of "crossing"'),
+        ((short, tracks), "expected steps 0 … 29 as crossing has them, found step"),
+        ((untrue, tracks), "there is no truth to evaluate against"),
+        ((crossing, foreign), "foreign.csv, line 1: expected a header"),
+        ((crossing, tmp_path / "none.csv"), "none.csv: cannot be read"),
+        ((tmp_path / "nowhere", tracks), "nowhere"),
+        ((crossing, tracks, "--html", tmp_path), "expected a file to write, found a folder"),
+        ((crossing, tracks, "--html", tmp_path / "no" / "r.html"), "there is no folder"),
+    ]:
+        status, stdout, stderr = run("evaluate", *arguments)
+        assert (status, stdout) == (1, "")
+        assert words in stderr
+        assert stderr.startswith("multiview-phd: ")
+        assert stderr.count("\n") == 1
+
+
+def test_every_setting_has_its_flag(run: Runs) -> None:
+    defaults = EvaluationSettings().model_dump()
+    text = " ".join(run("evaluate", "--help")[1].replace("│", " ").split())
+    for name, schema in EvaluationSettings.model_json_schema()["properties"].items():
+        flag = "--" + name.replace("_", "-")
+        assert flag in text
+        assert " ".join(schema["description"].split()) in text
+        command = parse(["evaluate", "room", "tracks.csv", flag, str(defaults[name])])
+        assert isinstance(command, Evaluate)
+        assert command.changes() == {name: str(defaults[name])}

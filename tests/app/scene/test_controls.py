@@ -1,0 +1,309 @@
+"""The sliders: each parameter has one, values go both ways, and nothing goes round in circles."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import pytest
+import viser
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.paths import static_folder
+from app.scene.keys import hotkeys
+from app.scene.panel.controls import ORIGIN, Controls
+from app.scene.panel.sliders import Scale, hint_text, label_text, number_text
+from app.state.workbench import Workbench
+from app.web import gateway
+from tests.app.scene import scene_case
+from tracker import parameters as table
+from tracker.parameters import PARAMETERS
+
+SECONDS = 20.0
+P_D = "fusion.detection_probability"
+NUMBERS = [p for p in PARAMETERS.values() if p.kind in ("float", "int")]
+
+
+@pytest.fixture(scope="module")
+def shared_server() -> Iterator[viser.ViserServer]:
+    server = gateway.start_viser()
+    yield server
+    server.stop()
+
+
+@pytest.fixture
+def workbench() -> Workbench:
+    return scene_case.opened(scene_case.sequence())
+
+
+@pytest.fixture
+def panel(shared_server: viser.ViserServer, workbench: Workbench) -> Iterator[Controls]:
+    shared_server.gui.reset()
+    made = Controls(shared_server, workbench)
+    assert made.wait(SECONDS)
+    yield made
+    made.close()
+
+
+def move(panel: Controls, key: str, place: Any) -> None:
+    """What viser does when a browser moves an input: any value, then the callbacks."""
+    handle = panel._inputs[key]
+    handle._impl.value = place
+    for callback in handle._impl.update_cb:
+        callback(viser.GuiEvent(None, 1, handle))  # type: ignore[arg-type]
+
+
+def take_preset(panel: Controls, name: str) -> None:
+    panel._presets._impl.value = name
+    panel._take_preset(viser.GuiEvent(None, 1, panel._presets))  # type: ignore[arg-type]
+
+
+def value(workbench: Workbench, key: str) -> Any:
+    return table.value(workbench.snapshot().parameters, key)
+
+
+# the scales
+
+
+@pytest.mark.parametrize("parameter", NUMBERS, ids=lambda p: p.key)
+def test_both_ends_and_the_default_stand_on_the_slider(parameter: table.Parameter) -> None:
+    scale = Scale(parameter)
+    assert scale.minimum < scale.maximum
+    assert 0 < scale.step < scale.maximum - scale.minimum
+    for number in (parameter.minimum, parameter.maximum, parameter.default):
+        assert scale.value(scale.place(number)) == pytest.approx(number, rel=1e-9)
+        assert scale.stands_at(scale.place(number), number)
+
+
+@given(st.sampled_from(NUMBERS), st.floats(-0.5, 1.5))
+def test_every_place_gives_a_value_that_is_allowed(
+    parameter: table.Parameter, share: float
+) -> None:
+    scale = Scale(parameter)
+    place = scale.minimum + share * (scale.maximum - scale.minimum)
+    number = scale.value(place)
+    changed = table.with_values(table.RunParameters(), {parameter.key: number})
+    assert table.value(changed, parameter.key) == number
+    # what was sent stands where it was put, unless it had to be moved into the range
+    if 0.0 <= share <= 1.0:
+        assert scale.stands_at(min(max(place, scale.minimum), scale.maximum), number)
+    elif share < -1e-6 or share > 1.0 + 1e-6:
+        assert not scale.stands_at(place, number)
+
+
+def test_a_logarithmic_slider_moves_by_decades() -> None:
+    scale = Scale(PARAMETERS["fusion.pruning_threshold"])
+    assert scale.place(1e-4) == pytest.approx(-4.0)
+    assert scale.value(-4.0) == 1e-4
+    assert scale.value(-4.005) == 9.89e-5
+    assert Scale(PARAMETERS["colour_phd.samples"]).value(2.5) == 316
+
+
+def test_a_slider_needs_a_range() -> None:
+    parameter = PARAMETERS["fusion.pruning_threshold"]
+    with pytest.raises(ValueError, match="both bounds"):
+        Scale(replace(parameter, maximum=None))
+    with pytest.raises(ValueError, match="above 0, got 0"):
+        Scale(replace(parameter, minimum=0.0))
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [
+        (1e-4, "1e-4"),
+        (2.5e-5, "2.5e-5"),
+        (0.02, "0.02"),
+        (0.9999, "0.9999"),
+        (400, "400"),
+        (50.0, "50"),
+        (0.0, "0"),
+    ],
+)
+def test_numbers_are_written_short(number: float, text: str) -> None:
+    assert number_text(number) == text
+
+
+@pytest.mark.parametrize("parameter", PARAMETERS.values(), ids=lambda p: p.key)
+def test_label_and_hint_say_what_it_is(parameter: table.Parameter) -> None:
+    label = label_text(parameter, changed=False)
+    assert parameter.label in label
+    assert parameter.symbol in label
+    assert parameter.unit in label
+    assert label_text(parameter, changed=True) == f"• {label}"
+    assert hint_text(parameter).startswith(parameter.help)
+    assert "efault" in hint_text(parameter)
+
+
+# the panel
+
+
+def test_every_parameter_and_method_has_one_input(panel: Controls) -> None:
+    assert set(panel._inputs) == {*PARAMETERS, *table.METHODS}
+    kinds = {
+        "float": viser.GuiSliderHandle,
+        "int": viser.GuiSliderHandle,
+        "bool": viser.GuiCheckboxHandle,
+        "choice": viser.GuiDropdownHandle,
+    }
+    for key, parameter in PARAMETERS.items():
+        assert isinstance(panel._inputs[key], kinds[parameter.kind])
+
+
+def test_an_edit_reaches_the_workbench(panel: Controls, workbench: Workbench) -> None:
+    move(panel, "fusion.survival_probability", 0.9)
+    move(panel, "fusion.pruning_threshold", -3.0)
+    move(panel, "fusion.max_components", 80)
+    assert panel.wait(SECONDS)
+    assert value(workbench, "fusion.survival_probability") == 0.9
+    assert value(workbench, "fusion.pruning_threshold") == 1e-3
+    assert value(workbench, "fusion.max_components") == 80
+    assert workbench.snapshot().parameters_origin == ORIGIN
+
+
+def test_many_edits_end_in_the_last(panel: Controls, workbench: Workbench) -> None:
+    for hundredth in range(50, 100):
+        move(panel, "fusion.survival_probability", hundredth / 100.0)
+    assert panel.wait(SECONDS)
+    assert value(workbench, "fusion.survival_probability") == 0.99
+
+
+def test_a_change_elsewhere_moves_the_slider_without_an_echo(
+    panel: Controls, workbench: Workbench
+) -> None:
+    news: list[str] = []
+    workbench.subscribe(news.append)
+    workbench.set_parameters(
+        {"fusion.pruning_threshold": 3.3e-5, "fusion.misses": "per_person"}, "page"
+    )
+    assert panel.wait(SECONDS)
+    assert 10.0 ** panel._inputs["fusion.pruning_threshold"].value == pytest.approx(3.3e-5)
+    assert panel._inputs["fusion.misses"].value == "per_person"
+    assert news == ["parameters"]
+    assert workbench.snapshot().parameters_origin == "page"
+    assert 'content: "3.3e-5"' in panel._values.content
+
+
+def test_a_slider_that_is_being_moved_is_not_written(panel: Controls, workbench: Workbench) -> None:
+    key = "fusion.pruning_threshold"
+    handle = panel._inputs[key]
+    handle._impl.value = -2.505  # further on than what the store knows
+    with panel._lock:
+        panel._moved.add(key)
+    workbench.set_parameters({key: 1e-6}, "page")
+    assert panel.wait(SECONDS)
+    assert handle.value == -2.505
+    panel._worker.ask("edit")
+    assert panel.wait(SECONDS)
+    assert handle.value == -2.505  # its own edit: 3.13e-3, rounded, is not written back
+    assert value(workbench, key) == 3.13e-3
+
+
+def test_what_is_out_of_range_is_clamped_and_written_back(
+    panel: Controls, workbench: Workbench
+) -> None:
+    move(panel, "fusion.survival_probability", 7.0)
+    assert panel.wait(SECONDS)
+    assert value(workbench, "fusion.survival_probability") == 1.0
+    assert panel._inputs["fusion.survival_probability"].value == 1.0
+
+
+def test_only_what_the_methods_read_is_shown(panel: Controls, workbench: Workbench) -> None:
+    def shown() -> set[str]:
+        return {g for g, folders in panel._groups.items() if any(f.visible for f in folders)}
+
+    assert "colour_phd" not in shown()
+    assert "fusion" in shown()
+    move(panel, "single_view", "colour_phd")
+    assert panel.wait(SECONDS)
+    assert value(workbench, "single_view") == "colour_phd"
+    assert "colour_phd" in shown()
+    assert "detection_boxes" not in shown()
+
+
+def test_of_a_shared_group_only_the_numbers_that_are_read_are_shown(
+    panel: Controls, workbench: Workbench
+) -> None:
+    def shown(key: str) -> bool:
+        group = panel._groups[key.split(".")[0]]
+        return bool(panel._inputs[key].visible) and any(folder.visible for folder in group)
+
+    assert not shown("jpda.gate_probability")
+    move(panel, "single_view", "jpda")
+    assert panel.wait(SECONDS)
+    assert shown("jpda.gate_probability")
+    assert shown("foreground.threshold")
+    assert not shown("colour_phd.bandwidth")
+    move(panel, "jpda.measurements", "colour")
+    assert panel.wait(SECONDS)
+    assert shown("colour_phd.bandwidth")
+    assert not shown("colour_phd.survival_probability")
+    move(panel, "jpda.measurements", "detections")
+    assert panel.wait(SECONDS)
+    assert shown("detection_boxes.pixel_sigma")
+    assert not shown("foreground.threshold")
+
+
+def test_changed_values_are_marked_and_can_be_reset(panel: Controls, workbench: Workbench) -> None:
+    key = "fusion.survival_probability"
+    assert not panel._reset_all.visible
+    move(panel, key, 0.9)
+    move(panel, "fusion.extraction_threshold", 0.6)
+    assert panel.wait(SECONDS)
+    assert panel._inputs[key].label.startswith("• ")
+    assert panel._resets["fusion"].visible
+    assert panel._reset_all.visible
+    panel._reset("fusion")
+    assert panel.wait(SECONDS)
+    assert value(workbench, key) == PARAMETERS[key].default
+    assert value(workbench, "fusion.extraction_threshold") == 0.6
+    assert not panel._inputs[key].label.startswith("• ")
+    assert not panel._resets["fusion"].visible
+    panel._reset(None)
+    assert panel.wait(SECONDS)
+    assert not panel._reset_all.visible
+
+
+def test_presets_of_ones_own_are_in_the_panel(panel: Controls, workbench: Workbench) -> None:
+    workbench.apply_preset("robust")
+    assert panel.wait(SECONDS)
+    assert panel._presets.value == "robust"
+    assert panel._presets.options == tuple(table.PRESETS)
+    workbench.set_presets({"quick": {P_D: 0.6}})
+    take_preset(panel, "quick")
+    assert panel.wait(SECONDS)
+    assert value(workbench, P_D) == 0.6
+    assert (panel._presets.value, panel._presets.options) == ("quick", (*table.PRESETS, "quick"))
+    workbench.set_parameters({P_D: 0.7}, "api")
+    assert panel.wait(SECONDS)
+    assert (panel._presets.value, panel._presets.options[0]) == ("own values", "own values")
+    take_preset(panel, "own values")
+    workbench.set_presets({})
+    assert panel.wait(SECONDS)
+    assert value(workbench, P_D) == 0.7
+    assert "quick" not in panel._presets.options
+
+
+def test_a_preset_moves_the_sliders(panel: Controls, workbench: Workbench) -> None:
+    take_preset(panel, "published")
+    assert panel.wait(SECONDS)
+    for key, wanted in table.PRESETS["published"].items():
+        assert value(workbench, key) == wanted
+        at = panel._inputs[key].value
+        assert at == wanted or panel._scales[key].stands_at(at, wanted)
+
+
+def test_keys_of_the_3d_view_are_those_of_the_page() -> None:
+    groups = json.loads((static_folder() / "commands.json").read_text(encoding="utf-8"))
+    page = {command["name"]: command["keys"] for rows in groups.values() for command in rows}
+    found = list(hotkeys())
+    for hotkey in found:
+        modifier = {None: "", "shift": "shift+", "cmd/ctrl": "ctrl+"}[hotkey.modifier]
+        assert f"{modifier}{hotkey.key.lower()}" in [key.lower() for key in page[hotkey.name]]
+    keys = [(hotkey.key, hotkey.modifier) for hotkey in found]
+    assert len(set(keys)) == len(keys)
+    assert not {"W", "A", "S", "D", "Q", "E", "arrowleft"} & {k for k, m in keys if m is None}
+    names = {hotkey.name for hotkey in found}
+    assert {"play", "first", "next-event", "previous-event", "camera-9", "palette"} <= names

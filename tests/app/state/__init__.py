@@ -1,0 +1,1 @@
+"""What the workbench keeps and who works on it."""

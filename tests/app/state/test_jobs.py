@@ -1,0 +1,282 @@
+"""Opening and computing in the background: newest wins, the last always runs, failures are told."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.state.jobs import Jobs
+from app.state.snapshot import Event, Notice, Snapshot
+from app.state.workbench import Workbench
+from tests.app.conftest import wait_until
+from tests.app.folders import write_crossing
+from tracker import pipeline
+from tracker.pipeline import Cancelled, Run
+from tracker.sequences.reader import read_sequence
+from tracker.sequences.sequence import SequenceError
+
+P_D = "fusion.detection_probability"
+
+
+class Desk:
+    """A workbench with its jobs."""
+
+    def __init__(self, data: Path) -> None:
+        self.bench = Workbench()
+        self.jobs = Jobs(self.bench, data=data)
+        self.notices: list[Notice] = []
+        self.bench.subscribe_events(self._hear)
+
+    def _hear(self, event: Event) -> None:
+        if isinstance(event, Notice):
+            self.notices.append(event)
+
+    @property
+    def now(self) -> Snapshot:
+        return self.bench.snapshot()
+
+    def open(self, name: str = "crossing") -> None:
+        self.jobs.open(name).result(30.0)
+        self.wait("done")
+
+    def wait(self, phase: str) -> None:
+        wait_until(lambda: self.now.run_state.state == phase)
+
+
+@pytest.fixture
+def desk(data: Path) -> Iterator[Desk]:
+    desk = Desk(data)
+    yield desk
+    desk.jobs.close()
+
+
+@pytest.fixture
+def slow(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
+    """Runs take a while, step by step; counts how many there were, and at once."""
+    counts = {"runs": 0, "now": 0, "most": 0}
+    real = pipeline.compute
+    lock = threading.Lock()
+
+    def compute(*args: Any, **kwargs: Any) -> Run:
+        cancelled = kwargs.pop("cancelled", lambda: False)
+
+        def slowly() -> bool:
+            time.sleep(0.002)
+            return bool(cancelled())
+
+        with lock:
+            counts["runs"] += 1
+            counts["now"] += 1
+            counts["most"] = max(counts["most"], counts["now"])
+        try:
+            return real(*args, cancelled=slowly, **kwargs)
+        finally:
+            with lock:
+                counts["now"] -= 1
+
+    monkeypatch.setattr(pipeline, "compute", compute)
+    return counts
+
+
+def engine(desk: Desk) -> Run:
+    """The same run, straight from the engine."""
+    assert desk.now.sequence is not None
+    return pipeline.compute(desk.now.sequence, desk.now.parameters, seed=0)
+
+
+def assert_same_tracks(run: Run | None, other: Run) -> None:
+    assert run is not None
+    assert run.key == other.key
+    for name in ("frames", "ids", "positions", "existences", "sigmas", "seen"):
+        np.testing.assert_array_equal(getattr(run.tracks, name), getattr(other.tracks, name))
+
+
+def test_opening_shows_a_sequence_and_runs_it(desk: Desk) -> None:
+    desk.open()
+    assert desk.now.sequence is not None
+    assert desk.now.sequence.name == "crossing"
+    assert desk.now.opening is None
+    assert desk.now.run_state.done == 120
+    assert len(set(engine(desk).tracks.ids.tolist())) >= 2
+    assert_same_tracks(desk.now.run, engine(desk))
+
+
+def test_twenty_changes_end_in_one_run_equal_to_the_engines(
+    desk: Desk, slow: dict[str, int]
+) -> None:
+    desk.open()
+    slow.update(runs=0, most=0)
+    for number in range(20):
+        desk.bench.set_parameters({P_D: 0.70 + 0.01 * number}, "test")
+    desk.wait("done")
+    assert desk.now.run_state.done == 120
+    assert slow["most"] == 1
+    assert slow["runs"] < 20, "superseded runs should have been skipped or stopped"
+    assert desk.now.parameters.fusion.detection_probability == pytest.approx(0.89)
+    assert_same_tracks(desk.now.run, engine(desk))
+    runs = slow["runs"]
+    time.sleep(0.05)
+    assert slow["runs"] == runs, "nothing may run after the last"
+
+
+def test_changes_from_many_threads_still_end_in_the_stores_parameters(
+    desk: Desk, slow: dict[str, int]
+) -> None:
+    desk.open()
+
+    def work(offset: int) -> None:
+        for number in range(8):
+            desk.bench.set_parameters({P_D: 0.5 + 0.01 * (4 * number + offset)}, "test")
+
+    threads = [threading.Thread(target=work, args=(n,)) for n in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert desk.now.sequence is not None
+    wanted = pipeline.stage_keys(desk.now.sequence, desk.now.parameters, 0)["tracks"]
+    wait_until(lambda: desk.now.run_state.state == "done" and desk.now.run_state.key == wanted)
+    assert slow["most"] == 1
+    assert_same_tracks(desk.now.run, engine(desk))
+
+
+def test_a_superseded_run_stops_soon(desk: Desk, slow: dict[str, int]) -> None:
+    desk.open()
+    desk.bench.set_parameters({P_D: 0.7}, "test")
+    wait_until(lambda: slow["now"] == 1)
+    asked = time.monotonic()
+    runs = slow["runs"]
+    desk.bench.set_parameters({P_D: 0.8}, "test")
+    wait_until(lambda: slow["runs"] == runs + 1)
+    assert time.monotonic() - asked < 0.5
+    desk.wait("done")
+
+
+def test_a_change_back_and_forth_needs_no_run_of_stages_that_are_there(desk: Desk) -> None:
+    desk.open()
+    assert desk.now.run is not None
+    before = desk.now.run
+    desk.bench.set_parameters({"fusion.extraction_threshold": 0.7}, "test")
+    desk.wait("done")
+    assert desk.now.run is not None
+    assert desk.now.run is not before
+    assert all(a is b for a, b in zip(desk.now.run.fused, before.fused, strict=True))
+    desk.bench.set_parameters({P_D: 0.7}, "test")
+    desk.wait("done")
+    assert all(a is b for a, b in zip(desk.now.run.views, before.views, strict=True))
+
+
+def test_a_parameter_that_nothing_depends_on_starts_nothing(
+    desk: Desk, slow: dict[str, int]
+) -> None:
+    desk.open()
+    assert desk.now.parameters.single_view == "none"
+    runs, run = slow["runs"], desk.now.run
+    desk.bench.set_parameters({"colour_phd.samples": 300}, "test")
+    time.sleep(0.05)
+    assert slow["runs"] == runs
+    assert desk.now.run is run
+    assert desk.now.run_state.state == "done"
+
+
+def test_cancel_keeps_the_steps_and_goes_on_when_asked(desk: Desk, slow: dict[str, int]) -> None:
+    desk.open()
+    desk.bench.set_parameters({P_D: 0.7}, "test")
+    wait_until(lambda: 0 < desk.now.run_state.done < 120)
+    desk.jobs.cancel()
+    desk.wait("cancelled")
+    run = desk.now.run
+    assert run is not None
+    assert 0 < run.done < 120
+    assert not run.complete
+    desk.jobs.run_again()
+    desk.wait("done")
+    assert_same_tracks(desk.now.run, engine(desk))
+
+
+def test_cancelling_nothing_does_nothing(desk: Desk) -> None:
+    desk.jobs.cancel()
+    desk.jobs.run_again()
+    desk.open()
+    desk.jobs.cancel()
+    assert desk.now.run_state.state == "done"
+
+
+def test_a_failed_run_is_told_in_a_sentence_and_the_last_good_one_stays(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    desk.open()
+    good = desk.now.run
+    real = pipeline.compute
+
+    def fail(*_: Any, **__: Any) -> Run:
+        raise ValueError("the numbers do not add up")
+
+    monkeypatch.setattr(pipeline, "compute", fail)
+    desk.bench.set_parameters({P_D: 0.7}, "test")
+    desk.wait("failed")
+    assert desk.now.run is good
+    assert desk.now.run_state.error == "the numbers do not add up"
+    assert desk.notices == []  # the state tells it, until a run that does not fail
+    monkeypatch.setattr(pipeline, "compute", real)
+    desk.bench.set_parameters({P_D: 0.75}, "test")
+    desk.wait("done")
+
+
+def test_what_cannot_be_opened_leaves_what_was_open(desk: Desk, tmp_path: Path) -> None:
+    desk.open()
+    before = desk.now
+    broken = write_crossing(tmp_path / "broken", 10)
+    (broken / "left.csv").write_text("frame,left,top,width,height,score\n0,1,2,x,4,1\n")
+    with pytest.raises(SequenceError, match=r"left\.csv"):
+        desk.jobs.open(str(broken)).result(10.0)
+    assert desk.now.sequence is before.sequence
+    assert desk.now.run is before.run
+    assert desk.now.opening is None
+    assert "left.csv" in desk.notices[-1].message
+    assert "line 2" in desk.notices[-1].message
+
+
+def test_of_two_openings_the_newer_wins(desk: Desk, tmp_path: Path) -> None:
+    slower = desk.jobs.open(str(write_crossing(tmp_path / "a", 40, name="a")))
+    newer = desk.jobs.open(str(write_crossing(tmp_path / "b", 30, name="b")))
+    newer.result(30.0)
+    if slower.exception(30.0) is not None:
+        assert isinstance(slower.exception(), Cancelled)
+    desk.wait("done")
+    assert desk.now.sequence is not None
+    assert desk.now.sequence.name == "b"
+    assert desk.now.run is not None
+    assert desk.now.run.sequence is desk.now.sequence
+
+
+def test_another_sequence_starts_from_its_own_defaults(desk: Desk, tmp_path: Path) -> None:
+    desk.open()
+    desk.bench.set_parameters({P_D: 0.7}, "test")
+    desk.bench.seek(100)
+    desk.bench.select(1)
+    desk.open(str(write_crossing(tmp_path / "short", 30)))
+    now = desk.now
+    assert (now.playhead, now.selection) == (0, None)
+    assert now.parameters == now.defaults
+    assert now.run_state.total == 30
+
+
+def test_closing_during_a_run_is_quick(data: Path, slow: dict[str, int]) -> None:
+    desk = Desk(data)
+    desk.jobs.open("crossing").result(30.0)
+    wait_until(lambda: slow["now"] == 1)
+    begin = time.monotonic()
+    desk.jobs.close()
+    assert time.monotonic() - begin < 1.5
+    wait_until(lambda: slow["now"] == 0)
+
+
+def test_the_sequences_of_the_data_folder_have_keys_of_their_own(crossing: Path) -> None:
+    assert read_sequence(crossing).digest

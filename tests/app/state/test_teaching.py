@@ -1,0 +1,344 @@
+"""Teaching over HTTP: the run follows, undo brings back, and what is saved reopens alike."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.state.drafts import Drafts
+from app.state.workbench import Workbench
+from app.web.server import Settings, create_app
+from app.web.views import results
+from tests.app.conftest import ADDRESS, connect, run_is, wait_until
+from tests.browser.walkers import write_walkers
+from tracker import pipeline
+from tracker.kernels.compilation import kernel_folder
+from tracker.sequences.reader import FILE, read_sequence
+
+BOX = {"camera": "cam1", "step": 5, "left": 40, "top": 30, "width": 24, "height": 48}
+
+
+@pytest.fixture
+def walkers(tmp_path: Path) -> Path:
+    """A recording with pictures, boxes and truth, and without a template."""
+    return write_walkers(tmp_path / "data" / "walkers")
+
+
+@pytest.fixture
+def client(walkers: Path) -> Iterator[TestClient]:
+    """The application with it open and computed."""
+    settings = Settings(sequence=str(walkers), data=walkers.parent, with_viser=False)
+    with TestClient(create_app(settings), base_url=ADDRESS) as client:
+        wait_until(run_is(client, "done"))
+        yield client
+
+
+def state(client: TestClient) -> dict[str, Any]:
+    return client.get("/api/state").json()
+
+
+def done(client: TestClient) -> dict[str, Any]:
+    """The state with the run that the sequence and the parameters ask for."""
+    wait_until(run_is(client, "done"))
+    return state(client)
+
+
+def tracks(client: TestClient) -> str:
+    text = client.get("/api/export/tracks.csv").text
+    return "\n".join(line for line in text.splitlines() if not line.startswith("#"))
+
+
+def complaint(answer: Any) -> str:
+    assert answer.status_code == 422, answer.text
+    error = answer.json()["error"]
+    assert error["hint"] == "Nothing was changed, and nothing is lost."
+    return str(error["message"])
+
+
+def test_the_first_template_makes_the_colour_methods_usable(client: TestClient) -> None:
+    before = state(client)
+    assert before["teaching"] == {
+        "key": before["teaching"]["key"], "unsaved": 0, "editing_room": False
+    }  # fmt: skip
+    client.patch("/api/parameters", json={"changes": {"single_view": "colour_phd"}})
+    wait_until(run_is(client, "failed"))
+    assert "no template" in state(client)["run"]["error"]
+    answer = client.post("/api/teach/templates", json=BOX)
+    assert answer.status_code == 200, answer.text
+    now = done(client)
+    assert now["sequence"]["templates"] == 1
+    assert now["sequence"]["key"] == before["sequence"]["key"]  # pictures stay in the browser
+    assert now["teaching"]["unsaved"] == 1
+    for method in ("pseudo_particle", "jpda"):
+        changes = {"single_view": method, "jpda.measurements": "colour"}
+        client.patch("/api/parameters", json={"changes": changes})
+        done(client)
+
+
+def test_a_run_used_again_brings_its_templates_back(client: TestClient) -> None:
+    before, first = state(client), tracks(client)
+    client.patch("/api/parameters", json={"changes": {"single_view": "colour_phd"}})
+    client.post("/api/teach/templates", json=BOX)
+    taught = done(client)
+    assert tracks(client) != first
+    bench: Workbench = client.app.state.workbench  # type: ignore[attr-defined]
+    told = []
+    end = bench.subscribe(lambda _: told.append(results.state_of(bench.snapshot())))
+    client.post("/api/run/again/1")
+    end()
+    both = {(now.teaching.key, now.methods.single_view) for now in told}
+    assert len(both) == 1, "one change, so that one undo takes it back"
+    again = done(client)
+    assert again["teaching"]["key"] == before["teaching"]["key"] != taught["teaching"]["key"]
+    assert again["sequence"]["templates"] == 0
+    assert again["parameters"] == before["parameters"]
+    assert tracks(client) == first
+    wish = {"key": taught["teaching"]["key"], "changes": {"single_view": "never"}}
+    assert client.post("/api/teach/restore", json=wish).status_code == 422
+    assert state(client)["teaching"]["key"] == before["teaching"]["key"]
+    wish["changes"] = {"single_view": "colour_phd"}
+    client.post("/api/teach/restore", json=wish)
+    assert done(client)["run"]["key"] == taught["run"]["key"]
+
+
+def test_a_template_is_named_renamed_removed_and_brought_back(client: TestClient) -> None:
+    keys = [state(client)["teaching"]["key"]]
+    for body in (BOX, {**BOX, "step": 6}, {**BOX, "step": 7, "name": "Bob"}):
+        answer = client.post("/api/teach/templates", json=body)
+        keys.append(answer.json()["teaching"]["key"])
+    client.patch("/api/teach/templates/0", json={"value": "Anna"})
+
+    def names() -> list[str]:
+        found = re.findall(
+            r'id="template-\d+"[^>]* value="([^"]*)"', client.get("/api/tables/teach").text
+        )
+        return [str(name) for name in found]
+
+    assert names() == ["Anna", "person2", "Bob"]
+    client.delete("/api/teach/templates/1")
+    assert names() == ["Anna", "Bob"]
+    client.post("/api/teach/restore", json={"key": keys[3]})
+    assert names() == ["person1", "person2", "Bob"]
+    answer = client.post("/api/teach/restore", json={"key": keys[0]})
+    assert answer.json()["teaching"]["unsaved"] == 0
+    assert names() == []
+    answer = client.post("/api/teach/restore", json={"key": "never"})
+    assert answer.status_code == 404
+
+
+def test_the_room_changes_the_run_and_undo_brings_it_back_at_once(client: TestClient) -> None:
+    before, first = state(client), tracks(client)
+    client.patch("/api/teach/room/max/0", json={"value": "0.2"})
+    client.patch("/api/teach/entrances/0/position/0", json={"value": -1.0})
+    changed = done(client)
+    assert changed["sequence"]["room"]["max"][0] == 0.2
+    assert changed["run"]["key"] != before["run"]["key"]
+    assert tracks(client) != first
+    client.post("/api/teach/restore", json={"key": before["teaching"]["key"]})
+    assert done(client)["run"]["key"] == before["run"]["key"]
+    assert tracks(client) == first
+
+
+def test_what_does_not_fit_says_so_and_changes_nothing(client: TestClient) -> None:
+    before = state(client)["teaching"]
+    post, patch = client.post, client.patch
+    small = {**BOX, "width": 2, "height": 2}
+    assert complaint(post("/api/teach/templates", json=small)) == (
+        "Walkers/sequence.toml, new template, box: expected at least 4 pixels a side inside the "
+        "picture, found 2 × 2; drag a larger one."
+    )
+    words = complaint(post("/api/teach/templates", json={**BOX, "camera": "cam7"}))
+    assert 'camera: expected one of cam1 and cam2, found "cam7"' in words
+    words = complaint(post("/api/teach/templates", json={**BOX, "step": 60}))
+    assert "frame: expected a whole number from 0 to 59, found 60" in words
+    words = complaint(patch("/api/teach/room/min/2", json={"value": 5}))
+    assert "[room], max: expected z above that of min, 5, found 2" in words
+    words = complaint(patch("/api/teach/entrances/4/sigma/0", json={"value": 1}))
+    assert words == "Entrances: expected one of 1, found number 5."
+    words = complaint(patch("/api/teach/entrances/0/sigma/0", json={"value": 0}))
+    assert "sigma: expected 3 positive numbers" in words
+    assert patch("/api/teach/room/max/0", json={"value": "NaN"}).status_code == 422
+    assert patch("/api/teach/room/up/0", json={"value": 1}).status_code == 422
+    assert state(client)["teaching"] == before
+
+
+def test_another_page_may_not_teach(client: TestClient) -> None:
+    headers = {"origin": "http://elsewhere.example"}
+    for method, path in (("POST", "copy"), ("POST", "save"), ("PATCH", "room/max/0")):
+        answer = client.request(method, f"/api/teach/{path}", json={}, headers=headers)
+        assert answer.status_code == 403
+
+
+def test_a_box_that_sticks_out_is_cut_at_the_border(client: TestClient) -> None:
+    client.post("/api/teach/templates", json={**BOX, "left": -10, "top": 120})
+    client.post("/api/teach/save")
+    folder = Path(str(client.app.state.workbench.snapshot().sequence.folder))  # type: ignore[attr-defined]
+    (template,) = read_sequence(folder).templates
+    assert template.box.tolist() == [0.0, 120.0, 14.0, 24.0]
+
+
+def test_saving_keeps_a_backup_and_reopens_to_the_same_run(
+    client: TestClient, walkers: Path
+) -> None:
+    text = (walkers / FILE).read_bytes()
+    client.post("/api/teach/templates", json=BOX)
+    client.patch("/api/teach/room/max/0", json={"value": 1.3})
+    client.post("/api/teach/entrances", json={})
+    use = {"single_view": "colour_phd"}
+    client.patch("/api/parameters", json={"changes": use})
+    key = done(client)["run"]["key"]
+    assert state(client)["teaching"]["unsaved"] == 3
+    saved = client.post("/api/teach/save").json()
+    assert saved["teaching"]["unsaved"] == 0
+    assert saved["run"]["key"] == key  # nothing is computed anew
+    assert (walkers / "sequence.toml.bak").read_bytes() == text
+    shown = tracks(client)
+    client.post("/api/sequence", json={"name": "walkers"})
+    wait_until(run_is(client, "done"))
+    client.patch("/api/parameters", json={"changes": use})
+    again = done(client)
+    assert again["sequence"]["room"]["max"][0] == 1.3
+    assert len(again["sequence"]["room"]["entrances"]) == 2
+    assert tracks(client) == shown
+
+
+def test_a_copy_leaves_the_original_and_goes_on_in_the_copy(
+    client: TestClient, walkers: Path
+) -> None:
+    text = (walkers / FILE).read_bytes()
+    client.post("/api/teach/templates", json=BOX)
+    shown = done(client)
+    answer = client.post("/api/teach/copy", json={"folder": "mine"}).json()
+    assert answer["sequence"]["name"] == "mine"
+    assert answer["teaching"]["unsaved"] == 0
+    assert (answer["run"]["key"], answer["run"]["state"]) == (shown["run"]["key"], "done")
+    exported = client.get("/api/export/tracks.csv")  # of the run before, by the name of the copy
+    assert 'filename="mine-tracks.csv"' in exported.headers["content-disposition"]
+    assert "# sequence = mine\n" in exported.text
+    assert "another sequence" not in client.get("/api/tables/runs").text
+    assert (walkers / FILE).read_bytes() == text
+    assert client.get("/api/step/3").json()["computed"]
+    client.delete("/api/teach/templates/0")
+    client.post("/api/teach/save")
+    assert "template" not in tomllib.loads((walkers.parent / "mine" / FILE).read_text("utf-8"))
+    words = complaint(client.post("/api/teach/copy", json={"folder": str(walkers)}))
+    assert "expected a new or an empty folder" in words
+
+
+def test_a_rendered_room_is_offered_as_a_copy(
+    client: TestClient, walkers: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(walkers.parent))
+    client.post("/api/teach/entrances", json={})
+    panel = client.get("/api/tables/teach").text
+    assert "A rendered room: save a copy in" in panel
+    assert 'data-send="POST teach/save"' not in panel
+    words = complaint(client.post("/api/teach/save"))
+    assert words.startswith("Walkers/sequence.toml: cannot be saved, since walkers is rendered")
+    assert state(client)["teaching"]["unsaved"] == 1
+
+
+def test_discard_is_the_file_again_and_undo_knows_what_was_discarded(client: TestClient) -> None:
+    client.post("/api/teach/templates", json=BOX)
+    key = state(client)["teaching"]["key"]
+    assert client.post("/api/teach/discard").json()["teaching"]["unsaved"] == 0
+    assert client.post("/api/teach/restore", json={"key": key}).json()["teaching"]["unsaved"] == 1
+
+
+def test_what_is_not_saved_is_there_again_after_another_sequence(
+    client: TestClient, walkers: Path
+) -> None:
+    write_walkers(walkers.parent / "others")
+    client.post("/api/teach/templates", json=BOX)
+    client.post("/api/sequence", json={"name": "others"})
+    wait_until(lambda: state(client)["opening"] is None)
+    assert state(client)["teaching"]["unsaved"] == 0
+    client.post("/api/sequence", json={"name": "walkers"})
+    wait_until(lambda: state(client)["teaching"]["unsaved"] == 1)
+    assert state(client)["sequence"]["templates"] == 1
+    done(client)
+
+
+def test_what_is_not_saved_outlives_the_server(
+    walkers: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MULTIVIEW_PHD_SETTINGS", str(tmp_path / "settings"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(kernel_folder()))  # they are the machine's
+    monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(tmp_path / "cache"))
+    settings = Settings(sequence=str(walkers), with_viser=False, keep_on_disk=True)
+
+    @contextmanager
+    def started() -> Iterator[tuple[TestClient, str]]:
+        """A server of its own, and what its first page is told."""
+        with TestClient(create_app(settings), base_url=ADDRESS) as client:
+            wait_until(lambda: state(client)["sequence"] is not None)
+            with connect(client) as socket:
+                heard = str(socket.receive_json())
+            yield client, heard
+
+    with started() as (client, _):
+        client.post("/api/teach/templates", json=BOX)
+        taught = done(client)
+    with started() as (client, heard):
+        assert "1 change of numbers not saved, as you left it" in heard
+        again = done(client)
+        assert again["teaching"] == taught["teaching"]
+        assert again["run"]["key"] == taught["run"]["key"]
+        client.post("/api/teach/discard")
+        assert list((tmp_path / "settings" / "unsaved").iterdir()) == []
+        client.post("/api/teach/restore", json={"key": taught["teaching"]["key"]})
+    text = (walkers / FILE).read_text("utf-8")
+    (walkers / FILE).write_text(
+        text.replace("min = [", "min = [-9.0, ", 1).replace(", 0.0]", "]", 1)
+    )
+    with started() as (client, heard):
+        assert "cannot be taken up" in heard
+        assert "template person1 added" in heard
+        assert state(client)["teaching"]["unsaved"] == 0
+    with started() as (client, heard):
+        assert "taken up" not in heard
+
+
+def test_a_draft_that_cannot_be_read_is_left_alone(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    drafts = Drafts(tmp_path)
+    values = {"room": {}, "template": []}
+    drafts.keep(tmp_path, values, {**values, "template": [1]})
+    assert Drafts(tmp_path).read(tmp_path) is None
+    assert "cannot be read and is left as it is" in caplog.text
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_a_template_shows_its_box_and_its_colours(client: TestClient) -> None:
+    client.post("/api/teach/templates", json=BOX)
+    panel = client.get("/api/tables/teach").text
+    crop, bars = re.findall(r'src="([^"]+)"', panel)
+    assert client.get(crop).content.startswith(b"\x89PNG")
+    svg = client.get(bars).text
+    assert svg.startswith("<svg")
+    assert 1 <= svg.count("<rect") <= 32
+    for wrong in (
+        crop.replace("/0/5/", "/9/5/"),
+        crop.replace("/0/5/", "/0/99/"),
+        re.sub(r"[^/]+\.png", "1,2,3.png", crop),
+        re.sub(r"[^/]+\.png", "900,900,20,20.png", crop),
+        crop.replace("swatch/", "swatch/other"),
+    ):
+        assert client.get(wrong).status_code == 404
+
+
+def test_defaults_follow_what_the_sequence_has_become(client: TestClient) -> None:
+    client.post("/api/teach/templates", json=BOX)
+    workbench = client.app.state.workbench  # type: ignore[attr-defined]
+    snapshot = workbench.snapshot()
+    assert snapshot.defaults == pipeline.default_parameters(snapshot.sequence)
+    assert state(client)["methods"]["single_view"] == "none"  # nobody's choice is taken away
+    assert "Use colour_phd" in client.get("/api/tables/teach").text

@@ -1,0 +1,1 @@
+"""Association probabilities and joint events."""

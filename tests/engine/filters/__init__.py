@@ -1,0 +1,1 @@
+"""Recursions and mixtures by themselves."""

@@ -1,0 +1,233 @@
+"""The hypothesis matrix, its best assignment, and who is new, vanished or returned."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy import ndarray
+
+from tracker.single_view.protocol import ViewEvent
+from tracker.single_view.pseudo_particle import hypotheses
+from tracker.single_view.pseudo_particle.hypotheses import best_hypothesis, somebody
+from tracker.single_view.pseudo_particle.register import Register, Targets, follow
+
+LIKELY, UNLIKELY = 0.2, 0.9
+
+
+def targets(boxes: list[list[float]], persons: list[int]) -> Targets:
+    """Confirmed ones at rest."""
+    count = len(boxes)
+    return Targets(
+        labels=np.arange(1, count + 1),
+        persons=np.array(persons, dtype=np.int64),
+        boxes=np.array(boxes).reshape(-1, 4),
+        velocities=np.zeros((count, 2)),
+        hits=np.full(count, 9),
+        misses=np.zeros(count, dtype=np.int64),
+        existences=np.ones(count),
+    )
+
+
+def matrix(
+    modes: ndarray, distances: ndarray, expected: Targets, vacant: ndarray, evidence: float = 0.0
+) -> ndarray:
+    return hypotheses.hypothesis_matrix(
+        modes,
+        distances,
+        np.full(len(modes), evidence),
+        expected,
+        vacant,
+        sharpness=20.0,
+        background_distance=0.5,
+        position_sigma=1.0,
+    )
+
+
+LEFT, RIGHT = [50.0, 60.0, 10.0, 14.0], [90.0, 60.0, 10.0, 14.0]
+
+
+def test_the_matrix_is_the_formula() -> None:
+    expected = targets([LEFT, RIGHT], [0, 1])
+    modes = np.array([[55.0, 67.0, 9.0, 12.0]])
+    found = matrix(modes, np.array([[0.3, 0.6]]), expected, np.array([1]), evidence=-0.7)
+    at_left, at_right = 0.5**2 + 0.5**2, 3.5**2 + 0.5**2
+    np.testing.assert_allclose(
+        found[0],
+        [
+            -0.7 - 20 * 0.3 - 0.5 * at_left,
+            -0.7 - 20 * 0.6 - 0.5 * at_right,
+            -0.7 - 20 * 0.6 - 4.5,
+            -20 * 0.5 - 4.5,
+        ],
+    )
+
+
+@given(st.integers(0, 4), st.integers(0, 4), st.integers(0, 10**6))
+def test_the_best_hypothesis_is_the_best_of_all(modes: int, columns: int, seed: int) -> None:
+    logs = np.random.default_rng(seed).normal(0.0, 3.0, (modes, columns + 1))
+    found = best_hypothesis(logs)
+    choices = [
+        choice
+        for choice in itertools.product(range(columns + 1), repeat=modes)
+        if all(choice.count(c) <= 1 for c in range(columns))
+    ]
+    totals = [sum(logs[m, c] for m, c in enumerate(choice)) for choice in choices]
+    assert tuple(found) in choices
+    assert sum(logs[m, c] for m, c in enumerate(found)) == pytest.approx(max(totals))
+
+
+def test_those_who_look_alike_are_told_apart_by_where_they_are() -> None:
+    expected = targets([LEFT, RIGHT], [0, 0])
+    modes = np.array([[87.0, 60.0, 10.0, 14.0], [52.0, 62.0, 10.0, 14.0]])
+    distances = np.full((2, 1), LIKELY)
+    found = best_hypothesis(matrix(modes, distances, expected, np.zeros(0, dtype=int)))
+    np.testing.assert_array_equal(found, [1, 0])
+
+
+def test_those_in_one_place_are_told_apart_by_their_colours() -> None:
+    expected = targets([LEFT, LEFT], [0, 1])
+    modes = np.array([LEFT, LEFT])
+    distances = np.array([[0.45, LIKELY], [LIKELY, 0.45]])
+    found = best_hypothesis(matrix(modes, distances, expected, np.zeros(0, dtype=int)))
+    np.testing.assert_array_equal(found, [1, 0])
+
+
+def test_what_looks_like_nobody_is_background_but_a_target_may_look_worse_for_a_while() -> None:
+    expected, vacant = targets([LEFT], [0]), np.array([1])
+    modes = np.array([LEFT, RIGHT, RIGHT])
+    for distance, columns in ((0.3, [0, 1, 2]), (0.6, [0, 2, 2]), (UNLIKELY, [2, 2, 2])):
+        distances = np.array([[distance, 1.0], [1.0, distance], [1.0, 1.0]])
+        found = best_hypothesis(matrix(modes, distances, expected, vacant))
+        np.testing.assert_array_equal(found, columns)
+
+
+def test_the_probability_of_somebody() -> None:
+    logs = np.log(np.array([[0.2, 0.3, 0.5], [1e-300, 1e-300, 1.0]]))
+    np.testing.assert_allclose(somebody(logs), [0.5, 0.0], atol=1e-12)
+    assert somebody(np.zeros((3, 1))).max() == 0.0
+    assert somebody(np.zeros((0, 4))).shape == (0,)
+    assert best_hypothesis(np.zeros((0, 4))).shape == (0,)
+
+
+def test_vacancies_are_what_each_person_has_left() -> None:
+    there = targets([LEFT, RIGHT, LEFT], [1, 1, 2])
+    np.testing.assert_array_equal(hypotheses.vacancies(there, 3, 2), [0, 0, 2])
+    np.testing.assert_array_equal(hypotheses.vacancies(there, 3, 1), [0])
+    np.testing.assert_array_equal(hypotheses.vacancies(Targets.nobody(), 2, 1), [0, 1])
+
+
+def test_a_newcomer_stands_apart_and_the_surer_of_two_stays() -> None:
+    modes = np.array([LEFT, [62.0, 60, 10, 14], [90.0, 60, 10, 14], [100.0, 60, 10, 14]])
+    # the first is target 0; the others would be newcomers of the columns 1, 2 and 3
+    columns = np.array([0, 1, 2, 3])
+    sureness = np.array([0.9, 0.99, 0.5, 0.8])
+    found = hypotheses.apart(modes, sureness, columns, 1, 4, 1.5)
+    np.testing.assert_array_equal(found, [0, 4, 4, 3])
+    np.testing.assert_array_equal(hypotheses.apart(modes, sureness, columns, 1, 4, 0.0), columns)
+
+
+# who is there
+
+
+class Story:
+    """Steps of one camera, told as the modes and persons that were found at each."""
+
+    def __init__(self, **changes: int) -> None:
+        self.register = Register.empty()
+        self.numbers = {"confirmation": 2, "patience": 3, "memory": 10, **changes}
+
+    def step(self, *modes: tuple[float, int]) -> list[ViewEvent]:
+        """Modes at these places along a line, of these persons."""
+        expected = self.register.targets.moved(0.0)
+        vacant = hypotheses.vacancies(expected, 2, 2)
+        boxes = np.array([[x, 60.0, 10.0, 14.0] for x, _ in modes]).reshape(-1, 4)
+        distances = np.full((len(modes), 2), UNLIKELY)
+        for row, (_, person) in enumerate(modes):
+            distances[row, person] = LIKELY
+        logs = matrix(boxes, distances, expected, vacant)
+        self.register, events = follow(
+            self.register,
+            expected,
+            boxes,
+            somebody(logs),
+            best_hypothesis(logs),
+            vacant,
+            **self.numbers,
+        )
+        return list(events)
+
+
+def event(kind: str, label: int) -> ViewEvent:
+    return ViewEvent(kind, (label,))  # type: ignore[arg-type]
+
+
+def test_somebody_comes_goes_and_returns() -> None:
+    story = Story()
+    assert story.step((50.0, 0)) == []  # seen once: not sure yet
+    assert story.step((51.0, 0)) == [event("new", 1)]
+    assert [story.step((52.0, 0)), story.step()] == [[], []]
+    kept = story.register.targets
+    np.testing.assert_allclose(kept.boxes[0, :2], [52.0, 60.0])
+    assert 0.0 < kept.existences[0] < 0.99
+    assert story.step((52.0, 0)) == []  # waited for, found again: nothing to tell
+    assert [story.step() for _ in range(3)] == [[]] * 3
+    assert story.step() == [event("vanished", 1)]
+    assert len(story.register.targets) == 0
+    assert story.step((200.0, 1), (90.0, 0)) == []
+    assert story.step((201.0, 1), (91.0, 0)) == [event("new", 2), event("returned", 1)]
+    assert len(story.register.departed.labels) == 0
+
+
+def test_nobody_is_remembered_for_ever() -> None:
+    story = Story(memory=4, confirmation=1, patience=0)
+    assert story.step((50.0, 0)) == [event("new", 1)]
+    assert story.step() == [event("vanished", 1)]
+    for _ in range(5):
+        story.step()
+    assert story.step((50.0, 0)) == [event("new", 2)]
+
+
+def test_of_two_alike_who_vanished_the_last_returns_first() -> None:
+    story = Story(confirmation=1, patience=0)
+    assert story.step((50.0, 0), (120.0, 0)) == [event("new", 1), event("new", 2)]
+    assert story.step((120.0, 0)) == [event("vanished", 1)]
+    assert story.step() == [event("vanished", 2)]
+    assert story.step((50.0, 0)) == [event("returned", 2)]
+    assert story.step((50.0, 0), (120.0, 0)) == [event("returned", 1)]
+
+
+def test_what_is_seen_once_is_forgotten_without_an_event() -> None:
+    story = Story(confirmation=3)
+    assert story.step((50.0, 0)) == []
+    assert [story.step(), story.step()] == [[], []]
+    assert len(story.register.targets) == 0
+    assert story.register.next_label == 1
+
+
+def test_a_label_is_given_once() -> None:
+    rng = np.random.default_rng(3)
+    story, given = Story(patience=1), []
+    for _ in range(200):
+        modes = [(float(x), int(rng.integers(2))) for x in rng.choice(12, 3, replace=False) * 40]
+        given += [e.labels[0] for e in story.step(*modes) if e.kind == "new"]
+        labels = story.register.targets.labels
+        sure = labels[story.register.targets.confirmed]
+        assert len(set(sure)) == len(sure)
+        assert np.all(np.bincount(story.register.targets.persons, minlength=2) <= 2)
+    assert len(given) > 5
+    assert given == list(range(1, len(given) + 1))
+
+
+def test_a_target_that_walks_is_expected_further_on() -> None:
+    story = Story()
+    for x in range(50, 90, 2):
+        story.step((float(x), 0))
+    walker = story.register.targets
+    assert walker.velocities[0, 0] == pytest.approx(2.0, abs=0.1)
+    ahead = walker.moved(0.5)
+    assert ahead.boxes[0, 0] - walker.boxes[0, 0] == pytest.approx(1.0, abs=0.05)
+    np.testing.assert_array_equal(walker.moved(0.0).boxes, walker.boxes)

@@ -1,0 +1,108 @@
+"""Motion, birth and clutter: what a sequence and its frame rate determine."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.linalg import expm
+
+from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, ROOM, look_at
+from tracker.filters import models
+from tracker.sequences.sequence import Room
+
+NO_DOORS = Room(ROOM.minimum, ROOM.maximum)
+
+
+@pytest.mark.parametrize("dimension", [1, 3, 6])
+def test_a_random_walk_strays_the_same_at_any_frame_rate(dimension: int) -> None:
+    second = models.random_walk_noise(0.4, 1.0, dimension)
+    assert_allclose(second, 0.16 * np.eye(dimension))
+    for fps in (4.0, 25.0):
+        assert_allclose(fps * models.random_walk_noise(0.4, 1.0 / fps, dimension), second)
+
+
+@pytest.mark.parametrize("memory", [0.1, 2.0, 100.0])
+@pytest.mark.parametrize("fps", [4.0, 25.0, 60.0])
+def test_constant_velocity_is_the_integral_of_its_equation(fps: float, memory: float) -> None:
+    sigmas, dt = np.array([1.0, 1.5, 0.2]), 1.0 / fps
+    transition, noise = models.constant_velocity(sigmas, dt, memory)
+    drift = np.zeros((6, 6))
+    drift[:3, 3:] = np.eye(3)
+    drift[3:, 3:] = -np.eye(3) / memory
+    diffusion = np.zeros((6, 6))
+    diffusion[3:, 3:] = np.diag(sigmas**2)
+    # F and Q at once from one matrix exponential (Van Loan)
+    block = expm(np.block([[-drift, diffusion], [np.zeros((6, 6)), drift.T]]) * dt)
+    assert_allclose(transition, block[6:, 6:].T, atol=1e-12)
+    assert_allclose(noise, block[6:, 6:].T @ block[:6, 6:], rtol=1e-4, atol=1e-16)
+    assert_array_equal(noise, noise.T)
+    assert (np.linalg.eigvalsh(noise) > 0.0).all()
+
+
+def test_two_steps_of_constant_velocity_are_one_of_twice_the_length() -> None:
+    sigmas = np.array([1.0, 1.0, 0.2])
+    f1, q1 = models.constant_velocity(sigmas, 0.04, 2.0)
+    f2, q2 = models.constant_velocity(sigmas, 0.08, 2.0)
+    assert_allclose(f1 @ f1, f2, atol=1e-12)
+    assert_allclose(f1 @ q1 @ f1.T + q1, q2, atol=1e-12)
+
+
+def test_everybody_is_born_at_an_entrance() -> None:
+    births = models.entrance_births(ROOM, 0.02)
+    assert births.size == len(ROOM.entrances)
+    assert_array_equal(births.weights, [0.02, 0.02])
+    for j, entrance in enumerate(ROOM.entrances):
+        assert_array_equal(births.means[j], entrance.position)
+        assert_allclose(births.covariances[j], np.diag(entrance.sigma**2))
+
+
+def test_a_room_without_entrances_has_births_all_over() -> None:
+    births = models.entrance_births(NO_DOORS, 0.02)
+    assert births.size == 1
+    points = np.random.default_rng(0).uniform(ROOM.minimum, ROOM.maximum, (200_000, 3))
+    assert_allclose(births.means[0], points.mean(axis=0), atol=0.01)
+    assert_allclose(births.covariances[0], np.cov(points.T), atol=0.01)
+
+
+def test_each_birth_has_a_label_of_its_own() -> None:
+    births = models.entrance_births(ROOM, 0.02)
+    assert_array_equal(models.label_births(births, 41).labels, [41, 42])
+    assert_array_equal(births.labels, [0, 0])
+
+
+def test_the_visible_area_is_that_of_the_room_in_the_picture() -> None:
+    width, height = CAMERAS[0].image_size
+    for camera in CAMERAS:
+        area = models.visible_area(camera, ROOM)
+        # counted pixel by pixel: those whose ray meets the room's volume
+        across, down = np.meshgrid(np.arange(0.0, width, 2.0), np.arange(0.0, height, 2.0))
+        rays = camera.back_project(np.stack([across, down], axis=-1).reshape(-1, 2))
+        with np.errstate(divide="ignore"):
+            near = (ROOM.minimum - camera.centre) / rays
+            far = (ROOM.maximum - camera.centre) / rays
+        entry = np.minimum(near, far).max(axis=1)
+        leaving = np.maximum(near, far).min(axis=1)
+        counted = 4.0 * float(((entry < leaving) & (leaving > 0.0)).sum())
+        assert area == pytest.approx(counted, rel=0.05)
+        assert area <= width * height
+
+
+def test_a_camera_that_looks_elsewhere_still_has_an_area() -> None:
+    away = look_at("away", (-3.4, -3.2, 2.6), (-9.0, -9.0, 1.0))
+    assert models.visible_area(away, ROOM) == pytest.approx(0.01 * 360 * 288)
+    assert not away.project_boxes(np.array([[0.0, 0.0, 1.0]]), HALF_EXTENTS)[1].any()
+
+
+def test_a_camera_within_the_room_sees_at_most_its_picture() -> None:
+    inside = look_at("inside", (0.0, -1.0, 1.2), (0.0, 1.0, 1.0))
+    area = models.visible_area(inside, ROOM)
+    assert 0.5 * 360 * 288 < area <= 360 * 288
+
+
+@pytest.mark.parametrize("size", [2, 3, 4])
+def test_the_space_of_boxes_grows_with_what_is_measured(size: int) -> None:
+    camera = CAMERAS[0]
+    volume = models.measurement_volume(camera, ROOM, size)
+    factors = [288 / 2, 360 / 2][: size - 2]
+    assert volume == pytest.approx(models.visible_area(camera, ROOM) * np.prod(factors))

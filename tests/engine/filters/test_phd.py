@@ -1,0 +1,326 @@
+"""The PHD update: its laws, and the Kalman filter as its simplest case."""
+
+# mypy: disable-error-code="import-untyped"
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from filterpy.kalman import ExtendedKalmanFilter, KalmanFilter
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy import ndarray
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.stats import chi2
+
+from tests.engine.mixtures import (
+    assert_positive_definite,
+    mixtures,
+    random_covariances,
+    random_mixture,
+    reference_update,
+)
+from tests.engine.synthetic import CAMERAS, walk
+from tracker.filters import gaussian_mixture, phd
+from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.kernels import kalman as update_kernels
+
+seeds = st.integers(0, 2**32 - 1)
+DIMENSIONS = (1, 2, 4, 6)
+
+
+class Linear:
+    """A random linear measurement of a mixture, with some measurements near and some far."""
+
+    def __init__(self, mixture: GaussianMixture, seed: int, *, count: int | None = None) -> None:
+        self.rng = np.random.default_rng(seed)
+        rng, d = self.rng, mixture.dimension
+        size = int(rng.integers(1, d + 1))
+        self.matrix = rng.normal(size=(size, d))
+        self.expected = mixture.means @ self.matrix.T
+        self.jacobians = np.broadcast_to(self.matrix, (mixture.size, size, d))
+        count = int(rng.integers(0, 6)) if count is None else count
+        self.noise = random_covariances(rng, count if rng.random() < 0.5 else 1, size)
+        chosen = rng.integers(0, max(mixture.size, 1), count)
+        near = self.expected[chosen] if mixture.size else np.zeros((count, size))
+        self.measurements = near + rng.normal(size=(count, size)) * 3.0
+
+    def update(
+        self,
+        mixture: GaussianMixture,
+        detection_probability: float | ndarray,
+        clutter_intensity: float | ndarray,
+        gate: float = np.inf,
+    ) -> phd.PhdUpdate:
+        """The update under test."""
+        return phd.update(
+            mixture,
+            self.measurements,
+            expected=self.expected,
+            jacobians=self.jacobians,
+            noise=self.noise,
+            detection_probability=detection_probability,
+            clutter_intensity=clutter_intensity,
+            gate=gate,
+        )
+
+
+@given(mixtures(), seeds)
+def test_without_detection_the_intensity_stays_as_it_is(
+    mixture: GaussianMixture, seed: int
+) -> None:
+    updated = Linear(mixture, seed).update(mixture, 0.0, 0.3)
+    assert_array_equal(updated.posterior.weights, mixture.weights)
+    assert_array_equal(updated.posterior.means, mixture.means)
+    assert_array_equal(updated.posterior.covariances, mixture.covariances)
+    assert_array_equal(updated.posterior.labels, mixture.labels)
+    assert_array_equal(updated.measurements, np.full(mixture.size, -1))
+    assert not updated.measurement_weights.any()
+
+
+@given(mixtures(most=12), seeds, st.sampled_from((0.9, 0.999, 1.0)))
+def test_update_agrees_with_the_recursion_pair_by_pair(
+    mixture: GaussianMixture, seed: int, gate_probability: float
+) -> None:
+    linear = Linear(mixture, seed)
+    p_d = linear.rng.uniform(0.0, 1.0, mixture.size) * (linear.rng.random(mixture.size) < 0.8)
+    gate = float(chi2.ppf(gate_probability, df=len(linear.matrix)))
+    updated = linear.update(mixture, p_d, 0.01, gate)
+    reference = reference_update(
+        mixture,
+        linear.measurements,
+        linear.expected,
+        linear.jacobians,
+        linear.noise,
+        p_d,
+        0.01,
+        gate,
+    )
+    pairs = list(zip(updated.parents.tolist(), updated.measurements.tolist(), strict=True))
+    assert len(set(pairs)) == len(pairs)
+    assert set(pairs) == set(reference)
+    assert pairs[: mixture.size] == [(j, -1) for j in range(mixture.size)]
+    for k, pair in enumerate(pairs):
+        weight, mean, covariance = reference[pair]
+        assert_allclose(updated.posterior.weights[k], weight, rtol=1e-7, atol=1e-200)
+        assert_allclose(updated.posterior.means[k], mean, rtol=1e-7, atol=1e-6)
+        assert_allclose(updated.posterior.covariances[k], covariance, rtol=1e-5, atol=1e-6)
+    assert_array_equal(updated.posterior.labels, mixture.labels[updated.parents])
+
+
+@given(mixtures(), seeds, st.floats(0.0, 1.0), st.sampled_from((0.0, 1e-30, 0.1, 10.0)))
+def test_one_measurement_makes_at_most_one_target(
+    mixture: GaussianMixture, seed: int, p_d: float, clutter: float
+) -> None:
+    linear = Linear(mixture, seed)
+    updated = linear.update(mixture, p_d, clutter)
+    posterior = updated.posterior
+    assert np.isfinite(posterior.weights).all()
+    assert (posterior.weights >= 0.0).all()
+    assert (updated.measurement_weights <= 1.0 + 1e-12).all()
+    for z in range(len(linear.measurements)):
+        share = posterior.weights[updated.measurements == z].sum()
+        assert_allclose(updated.measurement_weights[z], share, atol=1e-15)
+    if clutter == 0.0 and p_d > 0.0 and mixture.size:
+        assert_allclose(updated.measurement_weights, 1.0)
+    missed = (1.0 - p_d) * mixture.cardinality
+    expected = missed + updated.measurement_weights.sum()
+    assert_allclose(posterior.cardinality, expected, rtol=1e-12, atol=1e-15)
+
+
+@given(mixtures(least=1), seeds)
+def test_covariances_stay_symmetric_positive_and_shrink(
+    mixture: GaussianMixture, seed: int
+) -> None:
+    posterior = Linear(mixture, seed, count=4).update(mixture, 0.9, 0.1)
+    assert_positive_definite(posterior.posterior.covariances)
+    before = np.trace(mixture.covariances[posterior.parents], axis1=1, axis2=2)
+    after = np.trace(posterior.posterior.covariances, axis1=1, axis2=2)
+    assert (after <= before * (1.0 + 1e-12)).all()
+
+
+@given(mixtures(least=1), seeds, st.permutations(range(4)))
+def test_the_order_of_measurements_does_not_matter(
+    mixture: GaussianMixture, seed: int, order: list[int]
+) -> None:
+    linear = Linear(mixture, seed, count=4)
+    before = linear.update(mixture, 0.9, 0.1)
+    linear.measurements = linear.measurements[order]
+    linear.noise = linear.noise[order] if len(linear.noise) > 1 else linear.noise
+    after = linear.update(mixture, 0.9, 0.1)
+    assert_allclose(after.measurement_weights, before.measurement_weights[order], rtol=1e-12)
+
+
+def test_a_gate_that_is_wide_enough_changes_nothing() -> None:
+    mixture = random_mixture(np.random.default_rng(2), 12, 4)
+    linear = Linear(mixture, 5, count=5)
+    free, gated = linear.update(mixture, 0.9, 0.1), linear.update(mixture, 0.9, 0.1, gate=1e9)
+    for name in ("weights", "means", "covariances", "labels"):
+        assert_array_equal(getattr(free.posterior, name), getattr(gated.posterior, name))
+    assert len(free.posterior.weights) == 12 * (1 + 5)
+    shut = linear.update(mixture, 0.9, 0.1, gate=0.0)
+    assert shut.posterior.size == 12
+    assert_array_equal(shut.measurement_weights, np.zeros(5))
+
+
+def test_a_component_that_cannot_be_detected_is_left_alone() -> None:
+    mixture = random_mixture(np.random.default_rng(2), 3, 2)
+    linear = Linear(mixture, 5, count=2)
+    p_d = np.array([0.9, 0.0, 1.0])
+    updated = linear.update(mixture, p_d, 0.1)
+    assert_allclose(updated.posterior.weights[:3], (1.0 - p_d) * mixture.weights)
+    assert set(updated.parents[3:].tolist()) == {0, 2}
+    # what it weighs takes nothing from the others' share
+    others = linear.update(
+        GaussianMixture(
+            mixture.weights * [1, 50, 1], mixture.means, mixture.covariances, mixture.labels
+        ),
+        p_d,
+        0.1,
+    )
+    assert_array_equal(others.posterior.weights[3:], updated.posterior.weights[3:])
+
+
+@pytest.mark.parametrize("distance", [1e2, 1e6, 1e12, 1e160])
+def test_a_measurement_far_from_everybody_gives_no_nonsense(distance: float) -> None:
+    mixture = GaussianMixture(
+        np.array([0.5, 0.5]),
+        np.array([[0.0, 0.0], [1.0, 0.0]]),
+        np.stack([np.eye(2)] * 2),
+        np.array([1, 2]),
+    )
+    for clutter in (0.0, 1e-300, 1.0):
+        updated = phd.update(
+            mixture,
+            np.array([[distance, 0.0]]),
+            expected=mixture.means,
+            jacobians=np.stack([np.eye(2)] * 2),
+            noise=np.eye(2)[None],
+            detection_probability=0.9,
+            clutter_intensity=clutter,
+        )
+        assert np.isfinite(updated.posterior.weights).all()
+        if clutter > 0.0:
+            assert updated.measurement_weights[0] < 1e-200
+        elif distance < 1e10:  # nothing but a target could have made it: the nearest takes it
+            assert updated.measurement_weights[0] == pytest.approx(1.0)
+            assert updated.posterior.weights[-1] > 0.999
+
+
+def test_clutter_may_differ_from_measurement_to_measurement() -> None:
+    mixture = random_mixture(np.random.default_rng(2), 5, 2)
+    linear = Linear(mixture, 5, count=3)
+    kappa = np.array([0.0, 0.2, 1e6])
+    together = linear.update(mixture, 0.7, kappa)
+    for z in range(3):
+        alone = linear.update(mixture, 0.7, float(kappa[z]))
+        assert_allclose(together.measurement_weights[z], alone.measurement_weights[z])
+
+
+def test_nobody_and_nothing() -> None:
+    nobody, nothing = GaussianMixture.empty(4), np.zeros((0, 2))
+    updated = Linear(nobody, 1, count=3).update(nobody, 0.9, 0.1)
+    assert updated.posterior.size == 0
+    assert_array_equal(updated.measurement_weights, np.zeros(3))
+    mixture = random_mixture(np.random.default_rng(2), 5, 4)
+    updated = phd.update(
+        mixture,
+        nothing,
+        expected=np.zeros((5, 2)),
+        jacobians=np.zeros((5, 2, 4)),
+        noise=np.zeros((0, 2, 2)),
+        detection_probability=0.9,
+        clutter_intensity=0.1,
+    )
+    assert_allclose(updated.posterior.weights, 0.1 * mixture.weights)
+    assert updated.measurement_weights.shape == (0,)
+    assert phd.extract(nobody, 0.5).shape == (0,)
+
+
+def test_extraction_lists_what_is_above_the_threshold_heaviest_first() -> None:
+    mixture = random_mixture(np.random.default_rng(2), 5, 1)
+    weights = np.array([0.5, 0.9, 0.51, 0.2, 1.7])
+    mixture = GaussianMixture(weights, mixture.means, mixture.covariances, mixture.labels)
+    assert_array_equal(phd.extract(mixture, 0.5), [4, 1, 2])
+
+
+@pytest.mark.parametrize("d", DIMENSIONS)
+def test_one_sure_target_is_the_kalman_filter(d: int) -> None:
+    rng = np.random.default_rng(d)
+    m = (d + 1) // 2
+    transition = np.eye(d) + 0.1 * rng.normal(size=(d, d))
+    noise, measurement_noise = random_covariances(rng, 1, d)[0], random_covariances(rng, 1, m)
+    matrix = rng.normal(size=(m, d))
+    oracle = KalmanFilter(dim_x=d, dim_z=m)
+    oracle.F, oracle.Q, oracle.H, oracle.R = transition, noise, matrix, measurement_noise[0]
+    oracle.x, oracle.P = rng.normal(size=d), random_covariances(rng, 1, d)[0]
+    mixture = GaussianMixture(np.ones(1), oracle.x[None].copy(), oracle.P[None], np.array([4]))
+    for _ in range(30):
+        z = rng.normal(size=m) * 3.0
+        oracle.predict()
+        oracle.update(z)
+        mixture = gaussian_mixture.predict(mixture, transition, noise, 1.0)
+        updated = phd.update(
+            mixture,
+            z[None],
+            expected=mixture.means @ matrix.T,
+            jacobians=matrix[None],
+            noise=measurement_noise,
+            detection_probability=1.0,
+            clutter_intensity=0.0,
+        )
+        mixture, _ = gaussian_mixture.reduce(
+            updated.posterior, pruning_threshold=1e-9, merging_threshold=4.0, max_components=5
+        )
+        assert_array_equal(mixture.labels, [4])
+        assert_allclose(mixture.weights, [1.0])
+        assert_allclose(mixture.means[0], oracle.x, rtol=1e-9, atol=1e-9)
+        assert_allclose(mixture.covariances[0], oracle.P, rtol=1e-9, atol=1e-9)
+
+
+def test_one_sure_target_before_a_camera_is_the_extended_kalman_filter() -> None:
+    rng = np.random.default_rng(8)
+    camera = CAMERAS[0]
+    noise, measurement_noise = 0.02**2 * np.eye(3), np.diag([1.5**2, 1.2**2])
+    path = walk((-1.0, -0.8, 1.0), (1.0, 0.9, 1.2), 60)
+    oracle = ExtendedKalmanFilter(dim_x=3, dim_z=2)
+    oracle.x, oracle.P = path[0] + [0.2, -0.1, 0.05], 0.3**2 * np.eye(3)
+    oracle.F, oracle.Q, oracle.R = np.eye(3), noise, measurement_noise
+    mixture = GaussianMixture(np.ones(1), oracle.x[None].copy(), oracle.P[None], np.array([1]))
+    for place in path:
+        z = camera.project(place[None])[0][0] + rng.normal(size=2)
+        oracle.predict()
+        oracle.update(
+            z,
+            HJacobian=lambda x: camera.project_with_jacobian(x[None])[1][0],
+            Hx=lambda x: camera.project(x[None])[0][0],
+        )
+        mixture = gaussian_mixture.predict(mixture, np.eye(3), noise, 1.0)
+        expected, jacobians, _ = camera.project_with_jacobian(mixture.means)
+        updated = phd.update(
+            mixture,
+            z[None],
+            expected=expected,
+            jacobians=jacobians,
+            noise=measurement_noise[None],
+            detection_probability=1.0,
+            clutter_intensity=0.0,
+        )
+        mixture = updated.posterior.take(np.array([1]))
+        assert_allclose(updated.posterior.weights, [0.0, 1.0])
+        assert_allclose(mixture.means[0], oracle.x, atol=1e-9)
+        assert_allclose(mixture.covariances[0], oracle.P, atol=1e-12)
+
+
+def test_a_noise_that_is_no_covariance_is_refused() -> None:
+    with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
+        update_kernels.kalman_pairs(
+            np.zeros((1, 2)),
+            np.zeros((1, 2, 2)),
+            np.zeros((1, 2)),
+            np.eye(2)[None],
+            np.zeros((1, 2)),
+            np.zeros((1, 2, 2)),
+            np.zeros((0, 2, 2)),
+            np.inf,
+        )

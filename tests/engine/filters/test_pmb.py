@@ -1,0 +1,205 @@
+"""The multi-Bernoulli update against exact Bayes, and the algebra of existence."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy import ndarray
+from numpy.testing import assert_allclose
+
+from tests.engine.association.test_association import exact
+from tracker.filters import pmb
+from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.kernels.kalman import Alternative
+
+H = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
+R = 0.3 * np.eye(2)
+
+
+def tracks(existences: list[float], seed: int = 0) -> GaussianMixture:
+    """Random people near the origin: position and velocity in the plane."""
+    rng = np.random.default_rng(seed)
+    count = len(existences)
+    spread = rng.normal(size=(count, 4, 4))
+    return GaussianMixture(
+        np.array(existences),
+        rng.normal(0.0, 0.5, (count, 4)),
+        spread @ spread.transpose(0, 2, 1) / 4.0 + 0.1 * np.eye(4),
+        np.arange(count) + 5,
+    )
+
+
+def update(
+    before: GaussianMixture, boxes: ndarray, p_d: float | ndarray = 0.9, rho: float = 0.05
+) -> pmb.PmbUpdate:
+    """One linear camera."""
+    return pmb.update(
+        before,
+        boxes,
+        expected=before.means @ H.T,
+        jacobians=np.tile(H, (before.size, 1, 1)),
+        noise=R[None],
+        detection_probability=np.broadcast_to(np.asarray(p_d, dtype=float), (before.size,)).copy(),
+        unexplained_intensity=np.full(len(boxes), rho),
+        gate=np.inf,
+    )
+
+
+def likelihood(before: GaussianMixture, boxes: ndarray) -> ndarray:
+    """q_i(z_j) by the formula of the normal density."""
+    values = np.empty((before.size, len(boxes)))
+    for i in range(before.size):
+        s = H @ before.covariances[i] @ H.T + R
+        offsets = boxes - before.means[i] @ H.T
+        distance = np.einsum("na,ab,nb->n", offsets, np.linalg.inv(s), offsets)
+        values[i] = np.exp(-distance / 2.0) / (2.0 * np.pi * np.sqrt(np.linalg.det(s)))
+    return values
+
+
+def kalman(mean: ndarray, covariance: ndarray, z: ndarray) -> tuple[ndarray, ndarray]:
+    """The textbook update."""
+    gain = covariance @ H.T @ np.linalg.inv(H @ covariance @ H.T + R)
+    return mean + gain @ (z - H @ mean), (np.eye(4) - gain @ H) @ covariance
+
+
+@given(st.integers(0, 10_000), st.integers(0, 3), st.floats(0.01, 1.0), st.floats(0.05, 0.99))
+def test_one_person_is_the_bernoulli_filter(seed: int, count: int, r: float, p_d: float) -> None:
+    before = tracks([r], seed)
+    boxes = np.random.default_rng(seed + 1).normal(0.0, 1.0, (count, 2))
+    after = update(before, boxes, p_d).tracks
+    # exact Bayes over: not there, there and missed, there and one of the boxes
+    weights = np.array([r * (1 - p_d), *(r * p_d * likelihood(before, boxes)[0] / 0.05)])
+    assert after.weights[0] == pytest.approx(weights.sum() / (1 - r + weights.sum()), rel=1e-4)
+    parts = [(before.means[0], before.covariances[0])]
+    parts += [kalman(before.means[0], before.covariances[0], z) for z in boxes]
+    share = weights / weights.sum()
+    mean = sum(w * m for w, (m, _) in zip(share, parts, strict=True))
+    second = sum(
+        w * (c + np.outer(m - mean, m - mean)) for w, (m, c) in zip(share, parts, strict=True)
+    )
+    assert_allclose(after.means[0], mean, atol=1e-4)
+    assert_allclose(after.covariances[0], second, atol=1e-4)
+
+
+@given(st.integers(0, 10_000))
+def test_two_people_and_one_box_are_exact(seed: int) -> None:
+    before = tracks([0.9, 0.6], seed)
+    boxes = np.random.default_rng(seed).normal(0.0, 0.5, (1, 2))
+    p_d = np.array([0.8, 0.95])
+    found = update(before, boxes, p_d)
+    r = before.weights
+    missed = 1 - r * p_d
+    rows, columns = exact(missed, (r * p_d)[:, None] * likelihood(before, boxes), np.full(1, 0.05))
+    assert_allclose(found.marginals.detected, rows[:, 1:], atol=1e-5)
+    assert_allclose(found.marginals.unexplained, columns, atol=1e-5)
+    expected = rows[:, 1] + rows[:, 0] * r * (1 - p_d) / missed
+    assert_allclose(found.tracks.weights, expected, atol=1e-5)
+
+
+@given(st.lists(st.floats(0.001, 1.0), min_size=1, max_size=4), st.floats(0.0, 0.999))
+def test_a_miss_lowers_existence_by_bayes_rule(existences: list[float], p_d: float) -> None:
+    before = tracks(existences)
+    after = update(before, np.zeros((0, 2)), p_d).tracks
+    r = before.weights
+    assert_allclose(after.weights, r * (1 - p_d) / (1 - r * p_d), rtol=1e-9)
+    assert_allclose(after.means, before.means)
+    # far boxes say no more than none
+    far = update(before, np.full((2, 2), 80.0), p_d).tracks
+    assert_allclose(far.weights, after.weights, atol=1e-6)
+
+
+@given(st.lists(st.floats(0.05, 0.95), min_size=2, max_size=5), st.integers(0, 100))
+def test_misses_ask_for_no_order_of_the_cameras(chances: list[float], seed: int) -> None:
+    def after(order: list[float]) -> float:
+        state = tracks([0.97])
+        for p_d in order:
+            state = update(state, np.zeros((0, 2)), p_d).tracks
+        return float(state.weights[0])
+
+    shuffled = np.random.default_rng(seed).permutation(chances).tolist()
+    assert after(shuffled) == pytest.approx(after(chances), rel=1e-9)
+
+
+def test_a_hit_and_a_miss_ask_for_no_order_either() -> None:
+    before = tracks([0.9])
+    box = before.means[:, :2]
+    hit_first = update(update(before, box, 0.95).tracks, np.zeros((0, 2)), 0.5).tracks
+    miss_first = update(update(before, np.zeros((0, 2)), 0.5).tracks, box, 0.95).tracks
+    assert hit_first.weights[0] == pytest.approx(miss_first.weights[0], abs=2e-4)
+
+
+@given(st.integers(0, 10_000), st.integers(0, 5), st.integers(0, 5))
+def test_existence_stays_a_probability_and_covariances_stay_positive(
+    seed: int, people: int, count: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    before = tracks(rng.uniform(0.01, 1.0, people).tolist(), seed)
+    found = update(before, rng.normal(0.0, 1.0, (count, 2)), rng.uniform(0.0, 1.0, people))
+    assert ((found.tracks.weights >= 0.0) & (found.tracks.weights <= 1.0)).all()
+    assert found.tracks.labels.tolist() == before.labels.tolist()
+    assert people == 0 or np.linalg.eigvalsh(found.tracks.covariances).min() > 0.0
+    assert found.marginals.detected.shape == (people, count)
+
+
+def test_outside_every_picture_nothing_changes() -> None:
+    before = tracks([0.7, 0.2])
+    after = update(before, np.zeros((3, 2)), 0.0).tracks
+    assert_allclose(after.weights, before.weights)
+    assert_allclose(after.means, before.means)
+    assert_allclose(after.covariances, before.covariances)
+
+
+def test_what_a_component_adds_to_the_noise_counts_as_noise() -> None:
+    before, box = tracks([0.9]), np.array([[0.4, -0.2]])
+    more = 0.2 * np.eye(2)
+    common = {
+        "expected": before.means @ H.T,
+        "jacobians": H[None],
+        "detection_probability": np.array([0.9]),
+        "unexplained_intensity": np.array([0.05]),
+        "gate": np.inf,
+    }
+    spread = pmb.update(before, box, noise=R[None], spread=more[None], **common)
+    noisy = pmb.update(before, box, noise=(R + more)[None], **common)
+    assert_allclose(spread.tracks.means, noisy.tracks.means)
+    assert_allclose(spread.tracks.covariances, noisy.tracks.covariances)
+    assert_allclose(spread.tracks.weights, noisy.tracks.weights)
+
+
+def test_a_box_of_two_kinds_is_bayes_over_both() -> None:
+    rng = np.random.default_rng(5)
+    before, box = tracks([0.7], 3), rng.normal(0.0, 0.5, (1, 2))
+    share, drift, more = 0.3, np.diag([0.2, 0.0, 0.0, 0.0]), 0.4 * np.eye(2)
+    shifted = before.means @ H.T + [0.3, -0.2]
+    found = pmb.update(
+        before,
+        box,
+        expected=before.means @ H.T,
+        jacobians=H[None],
+        noise=R[None],
+        detection_probability=np.array([0.9]),
+        unexplained_intensity=np.array([0.05]),
+        gate=np.inf,
+        other=Alternative(shifted, 2.0 * H[None], more[None], drift, share),
+    ).tracks
+    parts, weights = [(before.means[0], before.covariances[0])], [0.7 * 0.1]
+    for expected, slope, noise, spread, part in (
+        (before.means[0] @ H.T, H, R, before.covariances[0], 1.0 - share),
+        (shifted[0], 2.0 * H, R + more, before.covariances[0] + drift, share),
+    ):
+        s = slope @ spread @ slope.T + noise
+        offset = box[0] - expected
+        density = np.exp(-offset @ np.linalg.inv(s) @ offset / 2.0)
+        weights.append(0.7 * 0.9 * part * density / np.sqrt(np.linalg.det(2.0 * np.pi * s)) / 0.05)
+        gain = spread @ slope.T @ np.linalg.inv(s)
+        parts.append((before.means[0] + gain @ offset, spread - gain @ s @ gain.T))
+    total = sum(weights)
+    assert found.weights[0] == pytest.approx(total / (0.3 + total), rel=1e-6)
+    mean = sum(w * m for w, (m, _) in zip(weights, parts, strict=True)) / total
+    second = sum(
+        w * (c + np.outer(m - mean, m - mean)) for w, (m, c) in zip(weights, parts, strict=True)
+    )
+    assert_allclose(found.means[0], mean, atol=1e-9)
+    assert_allclose(found.covariances[0], second / total, atol=1e-9)

@@ -1,0 +1,130 @@
+"""People with templates keep their labels by their looks: laws, and a return after long absence."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy import ndarray
+
+from tests.engine.standing import RECOMMENDED, fuse, ids_of, line, watch
+from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.fusion.multi_bernoulli import MultiBernoulli
+from tracker.fusion.names import Names, recognise
+from tracker.fusion.protocol import Associations
+from tracker.single_view.protocol import ViewResult
+
+NOBODY = np.zeros(0, dtype=np.int64)
+
+
+def step(
+    names: Names, labels: list[int], looks: list[list[float]], seconds: float = 0.2
+) -> tuple[dict[int, int], Names]:
+    """One camera sees one box of each sure track, with these likenesses."""
+    count = len(labels)
+    boxes = np.ones((count, 4))
+    view = ViewResult.of_boxes(boxes, np.ones(count), boxes)
+    people = len(looks[0]) if looks else 2
+    view = replace(view, likenesses=np.array(looks).reshape(count, people))
+    posterior = GaussianMixture(
+        np.full(count, 0.99), np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1)),
+        np.array(labels, dtype=np.int64),
+    )  # fmt: skip
+    own = np.arange(count, dtype=np.int32)
+    pairs = Associations(np.zeros(count, dtype=np.int32), own, own, np.ones(count, np.float32))
+    return recognise(names, posterior, pairs, [view], NOBODY, seconds)
+
+
+def watched(names: Names, labels: list[int], looks: list[list[float]], steps: int) -> Names:
+    """Many steps in which no label changes."""
+    for _ in range(steps):
+        renamed, names = step(names, labels, looks)
+        assert renamed == {}
+    return names
+
+
+FIRST, SECOND, EITHER = [0.95, 0.05], [0.05, 0.95], [0.5, 0.5]
+
+
+def test_who_returns_after_long_absence_gets_his_label_back_once_it_is_sure() -> None:
+    names = watched(Names.none(), [1, 2], [FIRST, SECOND], 30)
+    assert names.owners.tolist() == [1, 2]
+    names = watched(names, [2], [SECOND], 300)
+    renamed, names = step(names, [2, 7], [SECOND, FIRST])
+    assert renamed == {}, "a fifth of a second is not enough to be sure"
+    for _ in range(20):
+        renamed, names = step(names, [2, 7], [SECOND, FIRST])
+        if renamed:
+            break
+    assert renamed == {7: 1}
+
+
+def test_a_stranger_is_not_named_by_exclusion() -> None:
+    names = watched(Names.none(), [1, 2], [FIRST, SECOND], 30)
+    names = watched(names, [2], [SECOND], 20)
+    watched(names, [2, 7], [SECOND, EITHER], 100)
+
+
+def test_two_tracks_that_were_exchanged_are_exchanged_back() -> None:
+    names = watched(Names.none(), [1, 2], [FIRST, SECOND], 20)
+    renamed: dict[int, int] = {}
+    for _ in range(60):
+        renamed, names = step(names, [1, 2], [SECOND, FIRST])
+        if renamed:
+            break
+    assert renamed == {1: 2, 2: 1}
+    watched(names, [2, 1], [SECOND, FIRST], 40)
+
+
+def test_people_who_look_alike_keep_their_labels() -> None:
+    names = watched(Names.none(), [1, 2], [EITHER, EITHER], 200)
+    assert names.owners.tolist() == [-1, -1]
+
+
+def test_without_two_people_to_tell_apart_nothing_is_done() -> None:
+    for looks in ([[1.0], [1.0]], [[], []]):
+        renamed, names = step(Names.none(), [1, 2], looks)
+        assert renamed == {}
+        assert len(names.labels) == 0
+
+
+@given(st.integers(0, 10_000))
+def test_labels_stay_unique_and_what_is_kept_is_bounded(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    names, labels, free = Names.none(), [1, 2, 3], 4
+    for _ in range(40):
+        looks = rng.dirichlet([0.3, 0.3, 0.3], len(labels)).tolist()
+        renamed, names = step(names, labels, looks, seconds=0.5)
+        labels = [renamed.get(label, label) for label in labels]
+        assert len(set(labels)) == len(labels)
+        assert len(names.labels) == len(labels)
+        owned = names.owners[names.owners >= 0].tolist()
+        assert len(set(owned)) == len(owned)
+        if rng.random() < 0.2:
+            labels[int(rng.integers(3))], free = free, free + 1
+
+
+def two_visits() -> tuple[ndarray, list[tuple[ViewResult, ...]]]:
+    """Somebody walks out by one side and comes in at the other eight seconds later."""
+    out = line([(-1.8, -1.8), (0.0, 0.0), (2.9, 0.0)], [0, 3, 6], 10.0)
+    back = line([(-2.6, 1.0), (0.5, 1.0), (0.5, 0.5)], [0, 4, 7], 10.0)
+    path = np.concatenate([out, np.full((80, 3), np.nan), back])
+    views = watch(path[:, None], seed=3, clutter_rate=0.0, miss_rate=0.0)
+    told = [
+        tuple(replace(view, likenesses=np.tile([0.9, 0.1], (len(view.boxes), 1))) for view in row)
+        for row in views
+    ]
+    return path, told
+
+
+def test_recognition_gives_the_id_back_and_can_be_switched_off() -> None:
+    path, views = two_visits()
+    _, tracks = fuse(MultiBernoulli, views)
+    ids = ids_of(tracks, path)
+    assert ids[-1] == ids[40] > 0
+    off = RECOMMENDED.model_copy(update={"recognition": False})
+    _, tracks = fuse(MultiBernoulli, views, parameters=off)
+    ids = ids_of(tracks, path)
+    assert ids[-1] != ids[40]

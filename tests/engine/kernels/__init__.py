@@ -1,0 +1,1 @@
+"""Compiled kernels against plain NumPy, and how they are compiled."""

@@ -1,0 +1,169 @@
+"""Kernels are compiled once a machine, into a folder that can be written to, and all of them."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import pytest
+
+from tracker.kernels import compilation
+
+
+def python(code: str, cache: Path, **environment: str) -> str:
+    """What a fresh interpreter prints, with a cache folder of its own."""
+    inherited = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)],
+        env={**inherited, "MULTIVIEW_PHD_CACHE": str(cache), **environment},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stdout.strip()
+
+
+USE = """
+    import sys
+    sys.path.insert(0, {folder!r})
+    from tracker.kernels import compilation
+    compiled = []
+    import some_kernels
+    with compilation.followed(lambda: compiled.append(1)):
+        assert some_kernels.quadruple(3.0) == {result}
+    print(len(compiled) > 0, compilation.counts(), compilation.without_signature())
+"""
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """A folder with two files of kernels, one of which calls the other's."""
+    folder = tmp_path / "read-only"
+    folder.mkdir()
+    (folder / "other_kernels.py").write_text(
+        "from tracker.kernels.compilation import kernel\n"
+        "@kernel\ndef double(x):\n    return 2 * x\n",
+        encoding="utf-8",
+    )
+    (folder / "some_kernels.py").write_text(
+        "from tracker.kernels.compilation import kernel\n"
+        "from other_kernels import double\n"
+        "@kernel\n"
+        "def quadruple(x):\n"
+        "    return double(double(x))\n",
+        encoding="utf-8",
+    )
+    return folder
+
+
+def test_a_read_only_package_compiles_once(package: Path, tmp_path: Path) -> None:
+    package.chmod(0o555)
+    code = USE.format(folder=str(package), result=12.0)
+    assert python(code, tmp_path / "cache").startswith("True (2, 2) []")
+    assert python(code, tmp_path / "cache").startswith("False")
+    assert not (package / "__pycache__" / "some_kernels.quadruple-3.py311.nbi").exists()
+    assert list((tmp_path / "cache" / "kernels").rglob("*.nbi"))
+    # another folder by numba's own variable
+    own = {"NUMBA_CACHE_DIR": str(tmp_path / "own")}
+    assert python(code, tmp_path / "cache", **own).startswith("True")
+    assert python(code, tmp_path / "cache", **own).startswith("False")
+
+
+def test_without_any_place_to_write_it_still_works(package: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    code = USE.format(folder=str(package), result=12.0)
+    assert python(code, tmp_path / "file").startswith("True")
+
+
+@pytest.mark.parametrize(
+    "importing",
+    [
+        "from tracker.b_kernels import x",
+        "from tracker import b_kernels",
+        "from tracker import (\n    b_kernels as b,\n)",
+        "import tracker.b_kernels",
+        "def late():\n    from tracker import b_kernels",
+    ],
+)
+def test_the_digest_follows_imports(
+    importing: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = tmp_path / "tracker"
+    root.mkdir()
+    monkeypatch.setattr(compilation, "_ROOT", root)
+    files = {
+        "a_kernels.py": f"{importing}\n@kernel\ndef f(): ...\n",
+        "b_kernels.py": "from tracker.plain import y\n@kernel\ndef g(): ...\n",
+        "plain.py": "from tracker.c_kernels import z\n",
+        "c_kernels.py": "@kernel\ndef h(): ...\n",
+    }
+    for name, text in files.items():
+        (root / name).write_text(text, encoding="utf-8")
+
+    def digest() -> str:
+        known = compilation._with_used(root / "a_kernels.py", set())
+        assert {path.name for path in known} == {"a_kernels.py", "b_kernels.py"}
+        return compilation._digest(known)
+
+    before = digest()
+    (root / "c_kernels.py").write_text("@kernel\ndef other(): ...\n", encoding="utf-8")
+    assert digest() == before
+    (root / "b_kernels.py").write_text(files["b_kernels.py"] + "# changed\n", encoding="utf-8")
+    assert digest() != before
+
+
+def test_what_was_not_used_for_long_is_deleted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    compilation._mark.cache_clear()
+    long_ago = time.time() - compilation._KEPT_SECONDS - 60.0
+    for name in ("0123456789abcdef", "fedcba9876543210", "somebody-elses"):
+        (tmp_path / name).mkdir()
+    for name in ("0123456789abcdef", "somebody-elses"):
+        os.utime(tmp_path / name, (long_ago, long_ago))
+    try:
+        assert not compilation.is_compiled()
+        compilation.mark_compiled()
+        assert compilation.is_compiled()
+    finally:
+        compilation._mark.cache_clear()
+    left = sorted(path.name for path in tmp_path.iterdir() if path.is_dir())
+    assert left == ["fedcba9876543210", "somebody-elses"]
+
+
+def test_the_warm_up_calls_every_kernel_that_a_run_may_call() -> None:
+    # in a fresh interpreter; what is read from disk brings the kernels that it calls with it
+    code = """
+        from tracker import warm_up
+        from tracker.kernels import compilation
+        compilation.mark_compiled = lambda: None
+        told = []
+        warm_up.compile_kernels(lambda *counts: told.append(counts), lambda: told.append("ready"))
+        assert told.count("ready") == 1
+        kernels = {id(each.py_func): each.py_func for each in compilation._KERNELS}
+        reached = {id(each.py_func) for each in compilation._KERNELS if each.signatures}
+        open_ones = list(reached)
+        while open_ones:
+            function = kernels[open_ones.pop()]
+            for name in function.__code__.co_names:
+                called = getattr(function.__globals__.get(name), "py_func", None)
+                if id(called) in kernels and id(called) not in reached:
+                    reached.add(id(called))
+                    open_ones.append(id(called))
+        print(",".join(kernels[name].__name__ for name in kernels.keys() - reached))
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=True
+    )
+    # these are for those who use the engine as a library: no method of a run calls them
+    library_only = {
+        *("report", "pay_for_measurements", "subset_marginals"),
+        *("best_matchings", "assign", "augment"),
+        *("disjoint_matchings", "_nearest", "_augment", "_push", "_pop"),
+    }
+    assert set(done.stdout.strip().split(",")) <= library_only

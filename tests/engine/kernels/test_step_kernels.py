@@ -1,0 +1,181 @@
+"""The compiled step over all cameras against one camera after another."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy import ndarray
+from numpy.testing import assert_allclose, assert_array_equal
+
+from tests.engine.synthetic import CAMERAS, people
+from tracker.camera import stacked
+from tracker.filters import gaussian_mixture
+from tracker.filters.gaussian_mixture import GaussianMixture, concatenate
+from tracker.fusion.target_model import TargetModel
+from tracker.kernels import linear_algebra
+from tracker.kernels.kalman import Alternative
+from tracker.kernels.labelled import camera_update, step
+
+CLUTTER = np.array([1e-6, 3e-6, 2e-6])
+GATE, P_D, P_S, CONFIRMED, STRENGTH, NEAR, COVERED = 30.0, 0.9, 0.98, 0.5, 0.8, 0.3, 0.2
+TOLERANCE, ITERATIONS, TOLD, LEAST = 1e-6, 200, 0.01, 1e-4
+FACTOR = 1.3
+TRANSITION = np.eye(6) + 0.1 * np.eye(6, k=3)
+NOISE = np.diag([1e-3, 1e-3, 1e-4, 0.01, 0.01, 1e-3])
+
+
+def seen(
+    model: TargetModel, places: ndarray, rng: np.random.Generator
+) -> tuple[list[ndarray], list[ndarray]]:
+    """In each camera the boxes of all places, blurred, and one of nobody; σ of each."""
+    boxes = []
+    for camera in CAMERAS:
+        corners = model.expected(camera, places).boxes
+        middles, halves = (
+            (corners[:, :2] + corners[:, 2:]) / 2,
+            (corners[:, 2:] - corners[:, :2]) / 2,
+        )
+        whole = np.concatenate([middles, halves], axis=1)
+        whole += rng.normal(0.0, 2.0, whole.shape)
+        boxes.append(np.concatenate([whole, whole[:1] + 25.0]))
+    return boxes, [np.full((len(one), 4), 3.0) for one in boxes]
+
+
+def one_by_one(
+    model: TargetModel,
+    tracks: GaussianMixture,
+    undetected: GaussianMixture,
+    births: GaussianMixture,
+    boxes: list[ndarray],
+    sigmas: list[ndarray],
+    next_label: int,
+) -> dict[str, Any]:
+    """The same step in Python, camera after camera."""
+    tracks = gaussian_mixture.predict(tracks, TRANSITION, NOISE, P_S)
+    unseen = concatenate([gaussian_mixture.predict(undetected, TRANSITION, NOISE, P_S), births])
+    occluding = np.where(tracks.weights > CONFIRMED, tracks.weights, 0.0)
+    columns: dict[str, list[ndarray]] = {name: [] for name in ("p_d", "by", "best", "share")}
+    told, unexplained = [], []
+    for c, camera in enumerate(CAMERAS):
+        transform, _ = model.transforms
+        values = boxes[c] @ transform.T
+        noises = np.einsum("pa,ma,qa->mpq", transform, (FACTOR * sigmas[c]) ** 2, transform)
+        expected = model.expected(
+            camera,
+            np.concatenate([unseen.means, tracks.means]),
+            np.concatenate([unseen.covariances, tracks.covariances]),
+        )
+        (
+            existences, means, covariances, p_d, by, best, share,
+            left, newcomer, born_means, born_covariances, free, who, what, chance,
+        ) = camera_update.update_by_camera(
+            *(unseen.weights, unseen.means, unseen.covariances),
+            *(tracks.weights, tracks.means, tracks.covariances, tracks.labels, occluding),
+            *(values, noises, CLUTTER[c], GATE),
+            *(expected.values, expected.jacobians, expected.spreads),
+            *(expected.boxes, expected.depths, expected.valid),
+            *(expected.other or Alternative.none(model.size, 6)),
+            *(camera.image_size, True, P_D, CONFIRMED, STRENGTH, NEAR, COVERED),
+            *(TOLERANCE, ITERATIONS, TOLD),
+        )  # fmt: skip
+        born = np.flatnonzero(free * newcomer > LEAST)
+        labels = next_label + np.arange(len(born))
+        next_label += len(born)
+        told += zip([c] * len(who), tracks.labels[who], what, chance, strict=True)
+        told += [
+            (c, label, z, free[z] * newcomer[z])
+            for label, z in zip(labels, born, strict=True)
+            if free[z] * newcomer[z] >= TOLD
+        ]
+        newborn = GaussianMixture(
+            (free * newcomer)[born], born_means[born], born_covariances[born], labels
+        )
+        tracks = GaussianMixture(existences, means, covariances, tracks.labels)
+        tracks = concatenate([tracks, newborn])
+        occluding = np.append(occluding, np.zeros(len(born)))
+        unseen = GaussianMixture(left, unseen.means, unseen.covariances, unseen.labels)
+        for name, old, new in (
+            ("p_d", p_d, np.full(len(born), P_D)),
+            ("by", by, np.full(len(born), -1)),
+            ("best", best, born),
+            ("share", share, np.ones(len(born))),
+        ):
+            columns[name].append(np.append(old, new))
+        unexplained.append(free)
+    blank = {"p_d": 0.0, "by": -1, "best": -1, "share": 0.0}
+    table = {
+        name: np.array(
+            [np.append(row, np.full(tracks.size - len(row), blank[name])) for row in rows]
+        )
+        for name, rows in columns.items()
+    }
+    return {
+        "tracks": tracks, "unseen": unseen, "next": next_label, **table,
+        "told": told, "free": np.concatenate(unexplained),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("update", ["extended", "unscented"])
+@pytest.mark.parametrize(("tracks", "unseen"), [(3, 2), (0, 2), (4, 0)])
+@pytest.mark.parametrize("low_share", [0.0, 0.1])
+def test_one_call_is_all_cameras(update: Any, tracks: int, unseen: int, low_share: float) -> None:
+    rng = np.random.default_rng(7 + tracks)
+    model = TargetModel(np.array([0.3, 0.3, 0.84]), "box", update, low_share)
+    known, undetected, births = people(rng, tracks, 10), people(rng, unseen, 0), people(rng, 2, 0)
+    births = GaussianMixture(np.full(2, 0.2), births.means, births.covariances, births.labels)
+    places = np.concatenate([known.means, undetected.means, births.means[:1]])
+    boxes, sigmas = seen(model, places, rng)
+    starts = np.cumsum([0, *(len(one) for one in boxes)])
+    (
+        existences, means, covariances, labels, next_label, left, unseen_means, unseen_covariances,
+        p_d, by, best, share, cameras, names, what, chance, values, noises, free,
+    ) = step.predict_and_update(
+        *(known.weights, known.means, known.covariances, known.labels, 20),
+        *(undetected.weights, undetected.means, undetected.covariances),
+        *(np.concatenate(boxes), np.concatenate(sigmas), starts, TRANSITION, NOISE[None], P_S),
+        *(births.weights, births.means, births.covariances),
+        *(FACTOR, *model.transforms, model.unscented, *model.numbers, model.drift(6), low_share),
+        *(*stacked(CAMERAS), CLUTTER, GATE, True, P_D, CONFIRMED, STRENGTH, NEAR, COVERED),
+        *(TOLERANCE, ITERATIONS, TOLD, LEAST),
+    )  # fmt: skip
+    wanted = one_by_one(model, known, undetected, births, boxes, sigmas, 20)
+    assert len(existences) > tracks, "somebody is new"
+    assert next_label == wanted["next"]
+    assert_array_equal(labels, wanted["tracks"].labels)
+    for one, other in (
+        (existences, wanted["tracks"].weights), (means, wanted["tracks"].means),
+        (covariances, wanted["tracks"].covariances), (left, wanted["unseen"].weights),
+        (unseen_means, wanted["unseen"].means),
+        (unseen_covariances, wanted["unseen"].covariances),
+        (p_d, wanted["p_d"]), (by, wanted["by"]), (best, wanted["best"]),
+        (share, wanted["share"]), (free, wanted["free"]),
+        (np.column_stack([cameras, names, what, chance]), np.array(wanted["told"])),
+    ):  # fmt: skip
+        assert_allclose(one, other, rtol=1e-8, atol=1e-10)
+    transform, _ = model.transforms
+    assert_allclose(values, np.concatenate(boxes) @ transform.T, rtol=1e-12)
+    assert noises.shape == (len(values), 3, 3)
+
+
+def test_the_kept_are_neither_faint_nor_strayed_nor_doubles_nor_too_many() -> None:
+    rng = np.random.default_rng(3)
+    low, high = np.full(3, -1.0), np.full(3, 1.0)
+    for _ in range(30):
+        count = int(rng.integers(0, 12))
+        means = rng.uniform(-1.2, 1.2, (count, 6))
+        existences, labels = rng.random(count), rng.permutation(count)
+        sources = rng.integers(-1, 3, (2, count))
+        alive = [
+            i for i in range(count) if existences[i] >= 0.2 and (np.abs(means[i, :3]) <= 1.0).all()
+        ]
+        order = np.array(sorted(alive, key=lambda i: -existences[i])[:5], dtype=np.int64)
+        double = linear_algebra.doubles(
+            means[order], existences[order], labels[order],
+            np.ascontiguousarray(sources[:, order]), 0.8, CONFIRMED,
+        )  # fmt: skip
+        found = step.kept_tracks(
+            existences, means, labels, sources, 0.2, low, high, 5, 0.8, CONFIRMED
+        )
+        assert found.tolist() == order[~double].tolist()

@@ -1,0 +1,1 @@
+"""Whole runs, what is kept of them, their parameters."""

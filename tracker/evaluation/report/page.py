@@ -1,0 +1,173 @@
+"""One HTML file that holds a whole evaluation and needs nothing from anywhere else."""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+from collections.abc import Mapping
+from pathlib import Path
+
+from plotly.offline import get_plotlyjs
+
+from tracker import __version__
+from tracker.evaluation.figures import SOURCES
+from tracker.evaluation.matching import Tracks
+from tracker.evaluation.report.figures import DARK, over_time, top_view
+from tracker.evaluation.report.tables import (
+    camera_table,
+    escaped,
+    figure_table,
+    parameter_table,
+    people_table,
+    track_table,
+)
+from tracker.evaluation.result import Evaluation
+from tracker.parameters import RunParameters
+from tracker.sequences.sequence import Sequence
+
+_HERE = Path(__file__).parent
+
+
+def write_report(
+    path: Path | str,
+    sequence: Sequence,
+    tracks: Tracks,
+    parameters: RunParameters | Mapping[str, str] | None,
+    evaluation: Evaluation,
+    *,
+    reference: Evaluation | None = None,
+    seed: int | None = None,
+) -> None:
+    """Write the report: wholly or not at all, whatever interrupts it.
+
+    Args:
+        path: An ``.html`` file, replaced if it is there.
+        sequence: What was tracked.
+        tracks: What was found.
+        parameters: With which it was found; or the settings that a track file states;
+            None where they are not known.
+        evaluation: Of these tracks.
+        reference: An earlier evaluation that the figures are set against.
+        seed: Of the run.
+
+    Raises:
+        OSError: With a sentence, if the file cannot be written.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise IsADirectoryError(f"{path}: expected a file to write, found a folder; add a name")
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"{path}: there is no folder {path.parent} to write it to")
+    text = report_html(sequence, tracks, parameters, evaluation, reference=reference, seed=seed)
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    try:
+        temporary.write_text(text, encoding="utf-8")
+        os.replace(temporary, path)
+    except OSError as error:
+        raise OSError(f"{path}: cannot be written ({error.strerror or error})") from None
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def report_html(
+    sequence: Sequence,
+    tracks: Tracks,
+    parameters: RunParameters | Mapping[str, str] | None,
+    evaluation: Evaluation,
+    *,
+    reference: Evaluation | None = None,
+    seed: int | None = None,
+) -> str:
+    """The report as text; see :func:`write_report`."""
+    figures = {
+        "figure-time": over_time(evaluation),
+        "figure-top": top_view(sequence, tracks, evaluation),
+    }
+    embedded = "".join(
+        f'<script type="application/json" id="{name}">{_in_script(figure.to_json())}</script>'
+        for name, figure in figures.items()
+    )
+    title = f"{sequence.name}: tracks against truth"
+    script = (_HERE / "report.js").read_text(encoding="utf-8")
+    style = (_HERE / "report.css").read_text(encoding="utf-8")
+    near = "Truth is dotted, tracks are lines, false tracks are faint; a line breaks at a gap."
+    sections = (
+        ("figures", "Figures", figure_table(evaluation, reference)),
+        ("time", "Over time", _plot("figure-time", "All series over the steps")),
+        (
+            "paths",
+            "From above",
+            f"<p class='muted'>{near}</p>" + _plot("figure-top", "Paths on the floor"),
+        ),
+        ("people", "People", people_table(evaluation)),
+        ("tracks", "Tracks", track_table(tracks, evaluation)),
+        ("cameras", "Cameras", camera_table(evaluation)),
+        ("parameters", "Parameters", parameter_table(parameters)),
+    )
+    body = "\n".join(_section(*section) for section in sections)
+    return f"""<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="generator" content="multiview-phd {__version__}">
+<title>{escaped(title)}</title>
+<style>{style}</style>
+</head>
+<body>
+{_head(sequence, evaluation, seed)}
+{_headline(evaluation)}
+{body}
+<footer>multiview-phd {__version__}. {_sources()}</footer>
+{embedded}
+<script type="application/json" id="dark-colours">{json.dumps(DARK)}</script>
+<script>{get_plotlyjs()}</script>
+<script>{script}</script>
+</body>
+</html>
+"""
+
+
+def _in_script(text: str) -> str:
+    """JSON that no text inside can end early."""
+    return text.replace("<", "\\u003c")
+
+
+def _section(name: str, title: str, body: str) -> str:
+    return f'<section id="{name}"><h2>{title}</h2>{body}</section>'
+
+
+def _plot(figure: str, label: str) -> str:
+    return f'<div class="plot" data-figure="{figure}" role="img" aria-label="{label}"></div>'
+
+
+def _head(sequence: Sequence, evaluation: Evaluation, seed: int | None) -> str:
+    steps = evaluation.steps
+    done = f"{steps} steps" if steps == sequence.frames else f"{steps} of {sequence.frames} steps"
+    facts = [done, f"{sequence.fps:g} a second", f"{len(sequence.views)} cameras"]
+    if seed is not None:
+        facts.append(f"seed {seed}")
+    links = ("figures", "time", "paths", "people", "tracks", "cameras", "parameters")
+    return (
+        f"<header><h1>{escaped(sequence.name)}</h1>"
+        f"<p>{escaped(sequence.description)}</p><p class='muted'>{escaped(' · '.join(facts))}</p>"
+        + "".join(f"<p>{escaped(note)}</p>" for note in evaluation.notes)
+        + "<nav>"
+        + "".join(f'<a href="#{link}">{link.capitalize()}</a>' for link in links)
+        + "</nav></header>"
+    )
+
+
+def _headline(evaluation: Evaluation) -> str:
+    tiles = "".join(
+        f"<div title='{escaped(f.definition.help)} {escaped(f.stated)}'>"
+        f"<dt>{f.definition.name}</dt><dd>{f.text} <small>{f.unit}</small></dd></div>"
+        for f in evaluation.figures
+        if f.definition.headline
+    )
+    return f'<dl class="headline">{tiles}</dl>'
+
+
+def _sources() -> str:
+    return "Sources: " + "; ".join(escaped(source) for source in SOURCES.values()) + "."

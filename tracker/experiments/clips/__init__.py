@@ -1,0 +1,1 @@
+"""Short clips made for one claim each, with their truth."""

@@ -1,0 +1,67 @@
+"""An experiment's figure and numbers on disk, whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+from pathlib import Path
+from typing import Any
+
+from tracker import __version__
+from tracker.experiments.laboratory.experiment import Experiment, Result
+
+
+def document(experiment: Experiment, result: Result, *, quick: bool) -> dict[str, Any]:
+    """Everything that was found, as JSON takes it."""
+    return {
+        "experiment": experiment.name,
+        "version": __version__,
+        "quick": quick,
+        "claim": experiment.claim,
+        "findings": [
+            {"claim": f.claim, "found": f.found, "verdict": f.verdict} for f in result.findings
+        ],
+        "table": {
+            "head": [name.removeprefix(">") for name in result.head],
+            "rows": [list(row) for row in result.rows],
+        },
+        "notes": list(result.notes),
+        "numbers": result.numbers,
+    }
+
+
+def write(
+    experiment: Experiment, result: Result, folder: Path, *, quick: bool = False
+) -> list[Path]:
+    """Write ``NAME.json`` and, where there is a figure, ``NAME.png``.
+
+    Args:
+        experiment: Which one.
+        result: What it found.
+        folder: Made where it is not there.
+        quick: Whether it was shortened.
+
+    Returns:
+        The files.
+
+    Raises:
+        OSError: If they cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(
+        document(experiment, result, quick=quick), indent=1, ensure_ascii=False, allow_nan=False
+    )
+    contents = {folder / f"{experiment.name}.json": (text + "\n").encode()}
+    if result.figure is not None:
+        from tracker.experiments.laboratory.drawing import png
+
+        contents[folder / f"{experiment.name}.png"] = png(result.figure)
+    for path, content in contents.items():
+        temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+        try:
+            temporary.write_bytes(content)
+            os.replace(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    return list(contents)

@@ -1,0 +1,224 @@
+"""An intensity as a weighted sum of Gaussians: predict, prune, merge, cap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from tracker.kernels import linear_algebra
+from tracker.kernels.intensity import merging
+from tracker.kernels.intensity import mixture as mixture_kernels
+
+_NOBODY = np.zeros(0, dtype=np.int64)
+"""Instead of owners, where no component has one."""
+
+
+@dataclass(frozen=True, slots=True)
+class GaussianMixture:
+    """An intensity as a weighted sum of J Gaussians over a d-dimensional state.
+
+    The weights are expected numbers of targets, not probabilities: they sum to
+    the expected cardinality, and one weight may exceed 1.
+    """
+
+    weights: Float[ndarray, " J"]
+    means: Float[ndarray, "J d"]
+    covariances: Float[ndarray, "J d d"]
+    labels: Int[ndarray, " J"]
+    """The birth that each component descends from; components may share one."""
+
+    def __post_init__(self) -> None:
+        size, dimension = self.means.shape
+        if (
+            self.weights.shape != (size,)
+            or self.labels.shape != (size,)
+            or self.covariances.shape != (size, dimension, dimension)
+        ):
+            raise ValueError(
+                "weights, means, covariances and labels must have shapes (J,), (J, d), (J, d, d) "
+                f"and (J,), got {self.weights.shape}, {self.means.shape}, "
+                f"{self.covariances.shape} and {self.labels.shape}"
+            )
+
+    @staticmethod
+    def empty(dimension: int) -> GaussianMixture:
+        """The intensity of nobody, over a state of the given dimension."""
+        return GaussianMixture(
+            weights=np.zeros(0),
+            means=np.zeros((0, dimension)),
+            covariances=np.zeros((0, dimension, dimension)),
+            labels=np.zeros(0, dtype=np.int64),
+        )
+
+    @property
+    def size(self) -> int:
+        """The number of components J."""
+        return len(self.weights)
+
+    @property
+    def dimension(self) -> int:
+        """The dimension d of the state."""
+        return int(self.means.shape[1])
+
+    @property
+    def cardinality(self) -> float:
+        """The expected number of targets: the sum of the weights."""
+        return float(self.weights.sum())
+
+    def take(self, indices: ndarray | slice) -> GaussianMixture:
+        """The components at ``indices`` (integers, a mask or a slice), in that order."""
+        if isinstance(indices, slice):
+            return GaussianMixture(
+                self.weights[indices],
+                self.means[indices],
+                self.covariances[indices],
+                self.labels[indices],
+            )
+        if indices.dtype == np.bool_:
+            indices = indices.nonzero()[0]
+        # several times faster than brackets, which prepare for any kind of index
+        return GaussianMixture(
+            self.weights.take(indices),
+            self.means.take(indices, 0),
+            self.covariances.take(indices, 0),
+            self.labels.take(indices),
+        )
+
+    def renamed(self, names: dict[int, int]) -> GaussianMixture:
+        """The same components; each label that is a key becomes what it stands for."""
+        labels = np.array([names.get(n, n) for n in self.labels.tolist()], dtype=np.int64)
+        return GaussianMixture(self.weights, self.means, self.covariances, labels)
+
+
+def concatenate(mixtures: Sequence[GaussianMixture]) -> GaussianMixture:
+    """The sum of intensities over the same state: all their components, in order."""
+    return GaussianMixture(
+        np.concatenate([m.weights for m in mixtures]),
+        np.concatenate([m.means for m in mixtures]),
+        np.concatenate([m.covariances for m in mixtures]),
+        np.concatenate([m.labels for m in mixtures]),
+    )
+
+
+def predict(
+    mixture: GaussianMixture,
+    transition: Float[ndarray, "d d"],
+    noise: Float[ndarray, "*J d d"],
+    survival_probability: float | Float[ndarray, " J"],
+) -> GaussianMixture:
+    """Move every component one step ahead through a linear motion model.
+
+    w ← p_S w,  m ← F m,  P ← F P Fᵀ + Q: eq. (25)–(27) of [VM06]_ without births.
+
+    Args:
+        mixture: J components. Labels are kept.
+        transition: F.
+        noise: Q, in squared state units per step, one for all or one a component.
+        survival_probability: p_S, one for all or one a component.
+    """
+    means, covariances = mixture_kernels.predict(
+        mixture.means,
+        mixture.covariances,
+        np.ascontiguousarray(transition, dtype=float),
+        np.ascontiguousarray(noise, dtype=float).reshape(-1, *transition.shape),
+    )
+    return GaussianMixture(
+        mixture.weights * survival_probability, means, covariances, mixture.labels
+    )
+
+
+def prune(mixture: GaussianMixture, threshold: float) -> Int[ndarray, " K"]:
+    """Indices of the components whose weight is at least ``threshold``, in order."""
+    return (mixture.weights >= threshold).nonzero()[0]
+
+
+def merge(
+    mixture: GaussianMixture, threshold: float, owners: Int[ndarray, " J"] | None = None
+) -> tuple[GaussianMixture, Int[ndarray, " K"]]:
+    """Merge components that lie close to a heavier one, keeping the first two moments.
+
+    Starting from the heaviest component l, every component i with
+
+        (m_i - m_l)ᵀ P_i⁻¹ (m_i - m_l) <= threshold
+
+    is absorbed by it, as in Table II of [VM06]_. The expected cardinality and
+    the mean and second moment of the whole mixture do not change. The label is
+    the one of the heaviest component.
+
+    Args:
+        mixture: J components. An empty mixture is returned as it is.
+        threshold: Squared Mahalanobis distance U >= 0, without unit.
+        owners: A component that has one (0 or more) is absorbed by components of the
+            same owner only; without any, everybody may absorb everybody.
+
+    Returns:
+        At most J components, the heaviest leader first, and for each the index
+        of the component that led it, so that what was known of the leader can
+        be carried along.
+
+    Raises:
+        ValueError: If ``threshold`` is negative.
+        numpy.linalg.LinAlgError: If a covariance is not positive definite.
+    """
+    _check(threshold)
+    if mixture.size == 0:
+        return mixture, np.zeros(0, dtype=np.int64)
+    order = mixture_kernels.heaviest_first(mixture.weights)
+    group, leaders = merging.merge_groups(
+        mixture.means,
+        mixture.covariances,
+        order,
+        _NOBODY if owners is None else owners,
+        threshold,
+    )
+    weights, means, covariances = linear_algebra.merge_moments(
+        mixture.weights, mixture.means, mixture.covariances, group, len(leaders)
+    )
+    return GaussianMixture(weights, means, covariances, mixture.labels.take(leaders)), leaders
+
+
+def reduce(
+    mixture: GaussianMixture,
+    *,
+    pruning_threshold: float,
+    merging_threshold: float,
+    max_components: int,
+    owners: Int[ndarray, " J"] | None = None,
+) -> tuple[GaussianMixture, Int[ndarray, " K"]]:
+    """Prune, merge and cap: the step that keeps the recursion bounded (Table II of [VM06]_).
+
+    Where more than J_max components are left, the heaviest stay and take over the weight
+    of the others in proportion: what is expected of all is expected of fewer. Without
+    that, a crowd that needs more components than it may have fades away.
+
+    Args:
+        mixture: J components.
+        pruning_threshold: T, the least weight a component must have.
+        merging_threshold: U, the squared Mahalanobis distance of :func:`merge`.
+        max_components: J_max.
+        owners: Who may absorb whom, as in :func:`merge`.
+
+    Returns:
+        The reduced mixture, heaviest first, and the index into ``mixture`` of
+        the component that led each.
+    """
+    _check(merging_threshold)
+    weights, means, covariances, leaders = merging.reduce_mixture(
+        mixture.weights,
+        mixture.means,
+        mixture.covariances,
+        _NOBODY if owners is None else owners,
+        pruning_threshold,
+        merging_threshold,
+        max_components,
+    )
+    return GaussianMixture(weights, means, covariances, mixture.labels.take(leaders)), leaders
+
+
+def _check(threshold: float) -> None:
+    if threshold < 0.0:
+        raise ValueError(f"threshold must be >= 0 (squared Mahalanobis distance), got {threshold}")

@@ -1,0 +1,167 @@
+"""Motion, birth and clutter: the parts of the model that a sequence determines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.camera import Camera
+from tracker.filters import gaussian_mixture
+from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.parameters import FusionParams
+from tracker.sequences.sequence import Room
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """A linear motion model over one step: position, and velocity where it has one."""
+
+    transition: Float[ndarray, "d d"]
+    noise: Float[ndarray, "d d"]
+    start_velocity: float
+    """Standard deviation of a newcomer's velocity along each axis, m/s."""
+
+    @staticmethod
+    def of(parameters: FusionParams, step_time: float) -> Motion:
+        """The motion model that the parameters name."""
+        if parameters.motion == "random_walk":
+            noise = random_walk_noise(parameters.motion_sigma, step_time, 3)
+            return Motion(np.eye(3), noise, 0.0)
+        transition, noise = constant_velocity(
+            parameters.acceleration_sigma * np.array([1.0, 1.0, parameters.vertical_share]),
+            step_time,
+            parameters.velocity_memory,
+        )
+        return Motion(transition, noise, parameters.start_velocity)
+
+    @property
+    def dimension(self) -> int:
+        """d: 3 for a random walk, 6 with velocity."""
+        return len(self.transition)
+
+    def predict(self, mixture: GaussianMixture, survival_probability: float) -> GaussianMixture:
+        """Every component one step ahead."""
+        return gaussian_mixture.predict(mixture, self.transition, self.noise, survival_probability)
+
+    def at_rest(self, mixture: GaussianMixture) -> GaussianMixture:
+        """Components over positions as components over the whole state: velocity 0, unsure."""
+        extra = self.dimension - mixture.dimension
+        if extra == 0:
+            return mixture
+        covariances = np.zeros((mixture.size, self.dimension, self.dimension))
+        covariances[:, :3, :3] = mixture.covariances
+        covariances[:, 3:, 3:] = self.start_velocity**2 * np.eye(extra)
+        means = np.concatenate([mixture.means, np.zeros((mixture.size, extra))], axis=1)
+        return GaussianMixture(mixture.weights, means, covariances, mixture.labels)
+
+
+def constant_velocity(
+    sigmas: Float[ndarray, " 3"], step_time: float, memory: float
+) -> tuple[Float[ndarray, "6 6"], Float[ndarray, "6 6"]]:
+    """F and Q of nearly constant velocity that is forgotten slowly.
+
+    The velocity follows dv = −v/τ dt + σ dW (an Ornstein-Uhlenbeck process), so
+    that a hidden person is not carried through the wall. For τ → ∞ this is white
+    acceleration: F = [[I, Δt I], [0, I]], Q = σ² [[Δt³/3, Δt²/2], [Δt²/2, Δt]].
+
+    Args:
+        sigmas: σ along x, y and z, in m/s per √s.
+        step_time: Δt in seconds.
+        memory: τ in seconds.
+    """
+    dt, tau = step_time, memory
+    kept = np.exp(-dt / tau)
+    reach = tau * (1.0 - kept)
+    velocity = tau / 2.0 * (1.0 - kept**2)
+    cross = tau**2 / 2.0 * (1.0 - kept) ** 2
+    position = tau**2 * (dt - 2.0 * tau * (1.0 - kept) + tau / 2.0 * (1.0 - kept**2))
+    transition = np.eye(6)
+    transition[:3, 3:] = reach * np.eye(3)
+    transition[3:, 3:] = kept * np.eye(3)
+    variances = np.diag(sigmas**2)
+    noise = np.block(
+        [[position * variances, cross * variances], [cross * variances, velocity * variances]]
+    )
+    return transition, noise
+
+
+def random_walk_noise(sigma: float, step_time: float, dimension: int) -> Float[ndarray, "d d"]:
+    """Q = σ² Δt I: the covariance of one step of a random walk.
+
+    Args:
+        sigma: Spread after one second, along each axis, in m/√s.
+        step_time: Δt in seconds, so that the frame rate does not change the walk.
+        dimension: d.
+    """
+    return sigma**2 * step_time * np.eye(dimension)
+
+
+def entrance_births(room: Room, weight: float) -> GaussianMixture:
+    """The birth intensity γ: one component at each entrance, without labels yet.
+
+    A room without entrances gives one broad component over its whole volume, so
+    that people are still found.
+
+    Args:
+        room: Entrances with mean and standard deviation in metres.
+        weight: Expected number of newcomers at each entrance in one step.
+    """
+    if room.entrances:
+        means = np.array([entrance.position for entrance in room.entrances])
+        sigmas = np.array([entrance.sigma for entrance in room.entrances])
+    else:
+        means = (room.minimum + room.maximum)[None] / 2.0
+        sigmas = (room.maximum - room.minimum)[None] / np.sqrt(12.0)  # of a uniform density
+    return GaussianMixture(
+        weights=np.full(len(means), weight),
+        means=means,
+        covariances=sigmas[:, :, None] ** 2 * np.eye(3),
+        labels=np.zeros(len(means), dtype=np.int64),
+    )
+
+
+def label_births(births: GaussianMixture, first_label: int) -> GaussianMixture:
+    """The same births, each with a label of its own, counted from ``first_label``."""
+    labels = np.arange(first_label, first_label + births.size)
+    return GaussianMixture(births.weights, births.means, births.covariances, labels)
+
+
+@lru_cache(maxsize=64)
+def visible_area(camera: Camera, room: Room) -> float:
+    """Area of the picture that the room's volume fills, in squared pixels.
+
+    False boxes are taken as uniform over it ([ZW21] §2.4: clutter uniform over
+    the volume, as this camera sees it). Never less than one per cent of the
+    picture, so that the clutter intensity stays finite for a camera that looks
+    elsewhere. Of the same camera and room it is found once: every run asks for it.
+    """
+    axes = np.linspace(room.minimum, room.maximum, 12).T
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    pixels, _ = camera.project(grid)
+    pixels = pixels[camera.contains(pixels)]
+    width, height = camera.image_size
+    if len(pixels) < 3:
+        return 0.01 * width * height
+    hull = cv2.convexHull(pixels.astype(np.float32))
+    return max(float(cv2.contourArea(hull)), 0.01 * width * height)
+
+
+def measurement_volume(camera: Camera, room: Room, size: int) -> float:
+    """Volume of the space of possible boxes, in pixels to the power of ``size``.
+
+    The centre may fall anywhere that :func:`visible_area` counts. A box's height
+    and width, where they are measured, are taken as uniform up to half of the
+    picture's: that is what a detector's false boxes look like.
+    """
+    width, height = camera.image_size
+    volume = visible_area(camera, room)
+    if size >= 3:
+        volume *= height / 2.0
+    if size >= 4:
+        volume *= width / 2.0
+    return volume

@@ -1,0 +1,225 @@
+"""Newcomers from the boxes of several cameras, compiled: where rays meet, and what fits best."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy import ndarray
+
+from tracker.kernels.boxes import expected_boxes
+from tracker.kernels.compilation import kernel
+from tracker.kernels.linear_algebra import factorise, solve, squared_length
+
+
+@kernel
+def free_boxes(unexplained: ndarray, starts: ndarray, least: float) -> tuple[ndarray, ndarray, int]:
+    """The boxes that nobody explains.
+
+    Args:
+        unexplained: (B,), probability that nobody made each box.
+        starts: (C + 1,), where each camera's boxes begin.
+        least: A box is free above this probability.
+
+    Returns:
+        (F,) indices of the free boxes, (C + 1,) where each camera's begin among them, and how
+        many cameras have any.
+    """
+    free = np.flatnonzero(unexplained > least)
+    begins = np.searchsorted(free, starts)
+    cameras = 0
+    for c in range(len(starts) - 1):
+        cameras += begins[c + 1] > begins[c]
+    return free, begins, cameras
+
+
+@kernel
+def meeting_points(
+    rays: ndarray, starts: ndarray, centres: ndarray, largest_gap: float
+) -> tuple[ndarray, ndarray]:
+    """The middles between rays of two cameras that pass close by each other, ahead of both.
+
+    Args:
+        rays: (B, 3) unit directions, camera after camera, world axes.
+        starts: (C + 1,), where each camera's begin.
+        centres: (C, 3) of the cameras' lenses, world metres.
+        largest_gap: Metres between two rays that count as meeting.
+
+    Returns:
+        (N, 3) points, world metres, and (N,) the gaps there.
+    """
+    cameras = len(centres)
+    room = 0
+    for a in range(cameras):
+        room += (starts[a + 1] - starts[a]) * (starts[cameras] - starts[a + 1])
+    points, gaps = np.empty((room, 3)), np.empty(room)
+    count = 0
+    for a in range(cameras):
+        for b in range(a + 1, cameras):
+            base = centres[b] - centres[a]
+            for i in range(starts[a], starts[a + 1]):
+                u_base = base[0] * rays[i, 0] + base[1] * rays[i, 1] + base[2] * rays[i, 2]
+                for j in range(starts[b], starts[b + 1]):
+                    uv, v_base = 0.0, 0.0
+                    for axis in range(3):
+                        uv += rays[i, axis] * rays[j, axis]
+                        v_base += base[axis] * rays[j, axis]
+                    denominator = max(1.0 - uv * uv, 1e-6)
+                    along_a = (u_base - uv * v_base) / denominator
+                    along_b = (uv * u_base - v_base) / denominator
+                    if along_a <= 0.1 or along_b <= 0.1:
+                        continue
+                    gap = 0.0
+                    for axis in range(3):
+                        on_a = centres[a, axis] + along_a * rays[i, axis]
+                        on_b = centres[b, axis] + along_b * rays[j, axis]
+                        points[count, axis] = (on_a + on_b) / 2.0
+                        gap += (on_a - on_b) ** 2
+                    gap = math.sqrt(gap)
+                    if gap < largest_gap:
+                        gaps[count] = gap
+                        count += 1
+    return points[:count].copy(), gaps[:count].copy()
+
+
+@kernel
+def fit_places(
+    seeds: ndarray,
+    start_sigma: float,
+    refinements: int,
+    values: ndarray,
+    noises: ndarray,
+    free: ndarray,
+    starts: ndarray,
+    gate: float,
+    half_height: float,
+    half_width: float,
+    image_sizes: ndarray,
+    rotations: ndarray,
+    translations: ndarray,
+    intrinsics: ndarray,
+    distortions: ndarray,
+    nearest_depth: float,
+    largest_radii: ndarray,
+) -> tuple[ndarray, ndarray, ndarray, ndarray]:
+    """Move each seed to the place that explains the nearest free box of every camera best.
+
+    Gauss-Newton over the boxes' residuals, bound loosely to the seed; each pass chooses
+    the nearest boxes anew.
+
+    Args:
+        seeds: (N, 3), world metres.
+        start_sigma: Metres; how loosely a seed binds.
+        refinements: Passes.
+        values: (B, m) measurements, camera after camera, pixels.
+        noises: (B, m, m).
+        free: (B,), whether a box may be a newcomer's.
+        starts: (C + 1,), where each camera's boxes begin.
+        gate: Squared Mahalanobis distance of a box that belongs to the place.
+        half_height: As the further ones, of :func:`tracker.kernels.boxes.expected_boxes`,
+            one row a camera.
+
+    Returns:
+        (N, 3) places, (N, 3, 3) covariances, (C, N) the box in each camera, counted within
+        it, -1 for none; and (C, N) log N(z; h(x), R) of that box at the final place.
+    """
+    count, size, cameras = len(seeds), values.shape[1], len(rotations)
+    positions = seeds.copy()
+    covariances = np.zeros((count, 3, 3))
+    for n in range(count):
+        for axis in range(3):
+            covariances[n, axis, axis] = start_sigma**2
+    information, pull = np.empty((count, 3, 3)), np.empty((count, 3))
+    sources = np.full((cameras, count), -1, dtype=np.int64)
+    lower, spread, own = np.zeros((size, size)), np.empty((size, size)), np.empty((size, size))
+    residual, solved = np.empty(size), np.empty(size)
+    lower3, unit, column = np.zeros((3, 3)), np.zeros(3), np.empty(3)
+    for _ in range(refinements):
+        for n in range(count):
+            for a in range(3):
+                for b in range(3):
+                    information[n, a, b] = 1.0 / start_sigma**2 if a == b else 0.0
+                pull[n, a] = seeds[n, a] / start_sigma**2
+        for c in range(cameras):
+            if starts[c] == starts[c + 1]:
+                continue
+            expected, slopes, _, _, valid = expected_boxes(
+                positions, half_height, half_width, size,
+                (image_sizes[c, 0], image_sizes[c, 1]), rotations[c], translations[c],
+                intrinsics[c], distortions[c], nearest_depth, largest_radii[c],
+            )  # fmt: skip
+            for n in range(count):
+                sources[c, n] = -1
+                if not valid[n]:
+                    continue
+                for p in range(size):
+                    for q in range(size):
+                        total = 0.0
+                        for a in range(3):
+                            for b in range(3):
+                                total += slopes[n, p, a] * covariances[n, a, b] * slopes[n, q, b]
+                        own[p, q] = total
+                least = gate
+                for box in range(starts[c], starts[c + 1]):
+                    near = free[box]
+                    for p in range(size):
+                        residual[p] = values[box, p] - expected[n, p]
+                        for q in range(size):
+                            spread[p, q] = noises[box, p, q] + own[p, q]
+                        # no number of a box alone may be beyond the gate
+                        near = near and residual[p] ** 2 <= gate * spread[p, p]
+                    if not near:
+                        continue
+                    factorise(spread, lower)
+                    distance = squared_length(residual, lower)
+                    if distance < least or (distance == least and sources[c, n] < 0):
+                        least = distance
+                        sources[c, n] = box - starts[c]
+                if sources[c, n] < 0:
+                    continue
+                box = starts[c] + sources[c, n]
+                factorise(noises[box], lower)
+                for p in range(size):
+                    residual[p] = values[box, p] - expected[n, p]
+                    for a in range(3):
+                        residual[p] += slopes[n, p, a] * positions[n, a]
+                solve(lower, residual, solved)
+                for a in range(3):
+                    for p in range(size):
+                        pull[n, a] += slopes[n, p, a] * solved[p]
+                for b in range(3):
+                    for p in range(size):
+                        residual[p] = slopes[n, p, b]
+                    solve(lower, residual, solved)
+                    for a in range(3):
+                        for p in range(size):
+                            information[n, a, b] += slopes[n, p, a] * solved[p]
+        for n in range(count):
+            factorise(information[n], lower3)
+            solve(lower3, pull[n], positions[n])
+            for a in range(3):
+                unit[:] = 0.0
+                unit[a] = 1.0
+                solve(lower3, unit, column)
+                for b in range(3):
+                    covariances[n, b, a] = column[b]
+    fits = np.zeros((cameras, count))
+    for c in range(cameras):
+        if starts[c] == starts[c + 1]:
+            continue
+        expected, _, _, _, _ = expected_boxes(
+            positions, half_height, half_width, size,
+            (image_sizes[c, 0], image_sizes[c, 1]), rotations[c], translations[c],
+            intrinsics[c], distortions[c], nearest_depth, largest_radii[c],
+        )  # fmt: skip
+        for n in range(count):
+            if sources[c, n] < 0:
+                continue
+            box = starts[c] + sources[c, n]
+            log_determinant = factorise(noises[box], lower)
+            for p in range(size):
+                residual[p] = values[box, p] - expected[n, p]
+            fits[c, n] = -0.5 * (
+                squared_length(residual, lower) + log_determinant + size * math.log(2.0 * math.pi)
+            )
+    return positions, covariances, sources, fits

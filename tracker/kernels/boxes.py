@@ -1,0 +1,209 @@
+"""What a camera should see of upright targets, compiled: their boxes, and who hides whom."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy import ndarray
+
+from tracker.kernels.compilation import kernel
+from tracker.kernels.lens import project_points
+
+
+@kernel
+def expected_boxes(
+    states: ndarray,
+    half_height: float,
+    half_width: float,
+    size: int,
+    image_size: tuple[int, int],
+    rotation: ndarray,
+    translation: ndarray,
+    intrinsics: ndarray,
+    distortion: ndarray,
+    nearest_depth: float,
+    largest_radius: float,
+) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
+    """The box that a camera should give of each upright target, and its derivative.
+
+    Args:
+        states: (J, d), position first, world metres.
+        half_height: Of the target, metres.
+        half_width: Of the target, metres.
+        size: How much of a box is measured: 2 for its centre, 3 for horizontal centre,
+            top and bottom, 4 for the width as well.
+        image_size: Width and height, pixels.
+        rotation: As the further ones, of :func:`tracker.kernels.lens.project_points`.
+
+    Returns:
+        (J, m) values and (J, m, d) derivatives, pixels and pixels a metre; (J, 4) left,
+        top, right and bottom, not clipped; (J,) distance from the lens; (J,) whether
+        middle, head and foot lie in front of it.
+    """
+    count, dimension = states.shape
+    points = np.empty((3 * count, 3))
+    for j in range(count):
+        for part in range(3):
+            for axis in range(3):
+                points[3 * j + part, axis] = states[j, axis]
+        points[3 * j + 1, 2] -= half_height
+        points[3 * j + 2, 2] += half_height
+    pixels, slopes, ahead = project_points(
+        points,
+        rotation,
+        translation,
+        intrinsics,
+        distortion,
+        nearest_depth,
+        largest_radius,
+        True,
+    )
+    values = np.zeros((count, size))
+    jacobians = np.zeros((count, size, dimension))
+    boxes = np.zeros((count, 4))
+    depths = np.empty(count)
+    valid = np.zeros(count, dtype=np.bool_)
+    share = half_width / half_height
+    last = image_size[1] - 1.0
+    for j in range(count):
+        total = 0.0
+        for a in range(3):
+            along = translation[a]
+            for b in range(3):
+                along += rotation[a, b] * states[j, b]
+            total += along * along
+        depths[j] = math.sqrt(total)
+        middle, foot, head = 3 * j, 3 * j + 1, 3 * j + 2
+        if not (ahead[middle] and ahead[foot] and ahead[head]):
+            continue
+        valid[j] = True
+        across = (pixels[head, 0] + pixels[foot, 0]) / 2.0
+        top, bottom = pixels[head, 1], pixels[foot, 1]
+        width = abs(bottom - top) * share
+        boxes[j, 0], boxes[j, 1] = across - width / 2.0, top
+        boxes[j, 2], boxes[j, 3] = across + width / 2.0, bottom
+        if size == 2:
+            for row in range(2):
+                values[j, row] = pixels[middle, row]
+                for a in range(3):
+                    jacobians[j, row, a] = slopes[middle, row, a]
+            continue
+        # a box ends at the picture's edge, and what lies beyond tells nothing of depth
+        values[j, 0] = across
+        values[j, 1] = min(max(top, 0.0), last)
+        values[j, 2] = min(max(bottom, 0.0), last)
+        for a in range(3):
+            jacobians[j, 0, a] = (slopes[head, 0, a] + slopes[foot, 0, a]) / 2.0
+            if values[j, 1] == top:
+                jacobians[j, 1, a] = slopes[head, 1, a]
+            if values[j, 2] == bottom:
+                jacobians[j, 2, a] = slopes[foot, 1, a]
+        if size == 4:
+            sign = share if bottom >= top else -share
+            values[j, 3] = width
+            for a in range(3):
+                jacobians[j, 3, a] = sign * (slopes[foot, 1, a] - slopes[head, 1, a])
+    return values, jacobians, boxes, depths, valid
+
+
+@kernel
+def inside_probability(
+    boxes: ndarray,
+    jacobians: ndarray,
+    covariances: ndarray,
+    valid: ndarray,
+    image_size: tuple[int, int],
+    soft: bool,
+) -> ndarray:
+    """Probability that the middle of each target falls inside the picture.
+
+    Args:
+        boxes: (J, 4) left, top, right, bottom, pixels.
+        jacobians: (J, m, d), of which the first row belongs to x and the second to y.
+        covariances: (J, d, d).
+        valid: (J,), False where there is nothing to see.
+        image_size: Width and height, pixels.
+        soft: Whether the target's uncertainty counts, and a pixel more; else it is 0 or 1.
+    """
+    count = len(boxes)
+    dimension = covariances.shape[1]
+    result = np.zeros(count)
+    for j in range(count):
+        if not valid[j]:
+            continue
+        product = 1.0
+        for row in range(2):
+            middle = (boxes[j, row] + boxes[j, row + 2]) / 2.0
+            low, high = -0.5 - middle, image_size[row] - 0.5 - middle
+            if not soft:
+                product *= 1.0 if low <= 0.0 < high else 0.0
+                continue
+            variance = 0.0
+            for a in range(dimension):
+                for b in range(dimension):
+                    variance += jacobians[j, row, a] * covariances[j, a, b] * jacobians[j, row, b]
+            scale = (math.sqrt(max(variance, 0.0)) + 1.0) * math.sqrt(2.0)
+            product *= (math.erfc(-high / scale) - math.erfc(-low / scale)) / 2.0
+        result[j] = product
+    return result
+
+
+@kernel
+def hide(
+    chances: ndarray,
+    boxes: ndarray,
+    depths: ndarray,
+    means: ndarray,
+    labels: ndarray,
+    occluders: ndarray,
+    weights: ndarray,
+    near: float,
+    strength: float,
+    worth_telling: float,
+) -> tuple[ndarray, ndarray]:
+    """Lower each detection probability where other targets stand in front.
+
+        p_j ← p_j Π_l (1 − ρ w_l a(j, l))
+        a(j, l) = [l is nearer to the lens than j] · area(box_j ∩ box_l) / area(box_j)
+
+    Args:
+        chances: (J,), p_j without occlusion.
+        boxes: (J, 4) left, top, right, bottom, pixels.
+        depths: (J,) metres.
+        means: (J, d), position first.
+        labels: (J,).
+        occluders: (L,), indices of those that may hide others.
+        weights: (L,), their existence; at most 1 counts.
+        near: Metres within which an occluder may be the target's double: it hides nothing.
+        strength: ρ.
+        worth_telling: Share from which an occluder is named.
+
+    Returns:
+        (J,) probabilities and (J,) the label of the strongest occluder, -1 for none.
+    """
+    count = len(chances)
+    result = chances.copy()
+    hidden_by = np.full(count, -1, dtype=np.int64)
+    for j in range(count):
+        area = max((boxes[j, 2] - boxes[j, 0]) * (boxes[j, 3] - boxes[j, 1]), 1e-9)
+        strongest = worth_telling
+        for k in range(len(occluders)):
+            other = occluders[k]
+            if labels[other] == labels[j] or not depths[other] < depths[j]:
+                continue
+            distance = 0.0
+            for a in range(3):
+                distance += (means[j, a] - means[other, a]) ** 2
+            if distance <= near * near:
+                continue
+            across = min(boxes[j, 2], boxes[other, 2]) - max(boxes[j, 0], boxes[other, 0])
+            down = min(boxes[j, 3], boxes[other, 3]) - max(boxes[j, 1], boxes[other, 1])
+            if across <= 0.0 or down <= 0.0:
+                continue
+            effect = min(weights[k], 1.0) * across * down / area
+            result[j] *= max(1.0 - strength * effect, 0.0)
+            if effect > strongest:
+                strongest = effect
+                hidden_by[j] = labels[other]
+    return result, hidden_by

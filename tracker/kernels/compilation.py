@@ -1,0 +1,162 @@
+"""How kernels are compiled: once a machine, into a folder that can be written to.
+
+numba keeps machine code beside the source, where an installed package may be read-only,
+and looks at the file of a kernel only, not at those of the kernels that it calls. So the
+code goes to the cache folder, under the hash of the kernel's file and of those that it
+takes kernels from: a change leaves nothing stale behind, and what does not depend on it
+stays. ``NUMBA_CACHE_DIR`` names another place.
+"""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import hashlib
+import os
+import re
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+from numba.core import event
+
+from tracker.folders import cache_folder
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+_KERNELS: list[Any] = []
+"""Every kernel of the modules that have been imported, in the order of definition."""
+
+_KEPT_SECONDS = 30 * 86400.0
+"""Machine code that was not used for so long is deleted."""
+
+_config: Any = numba.config
+
+_ROOT = Path(__file__).resolve().parents[1]
+_HAS_KERNELS = re.compile(rb"^@kernel$", re.MULTILINE)
+
+
+def kernel(function: _F) -> _F:
+    """Compile on the first call, keep the machine code on disk, release the interpreter."""
+    compiled = compiled_later(function)
+    _KERNELS.append(compiled)
+    return compiled
+
+
+def compiled_later(function: _F, **options: Any) -> _F:
+    """As :func:`kernel` with options of numba's own, and not counted among the kernels."""
+    before = _config.CACHE_DIR
+    _config.CACHE_DIR = str(_folder_of(Path(function.__code__.co_filename)))
+    try:
+        compiled = numba.njit(cache=True, nogil=True, **options)(function)
+    except RuntimeError:  # nowhere to write to: it is compiled at every start
+        compiled = numba.njit(nogil=True, **options)(function)
+    finally:
+        _config.CACHE_DIR = before
+    return cast(_F, compiled)
+
+
+def kernel_folder() -> Path:
+    """Where machine code is kept: ``$NUMBA_CACHE_DIR``, else in the cache folder."""
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    return Path(given) if given else cache_folder() / "kernels"
+
+
+@cache
+def _folder_of(file: Path) -> Path:
+    """Where the machine code of a file's kernels is kept; it is marked as used."""
+    folder = kernel_folder() / _digest(_with_used(file, set()))
+    with contextlib.suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+    return folder
+
+
+def _with_used(file: Path, known: set[Path]) -> set[Path]:
+    """A file and those with kernels that it imports from, however far."""
+    if file not in known and file.is_file():
+        text = file.read_bytes()
+        if not known or _HAS_KERNELS.search(text):
+            known.add(file)
+            for name in _imported(text):
+                path = _ROOT.parent.joinpath(*name.split("."))
+                _with_used(path.with_suffix(".py"), known)
+                _with_used(path / "__init__.py", known)
+    return known
+
+
+def _imported(source: bytes) -> Iterator[str]:
+    """Every module of the engine that a source may import, in whatever way it says so."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+        else:
+            continue
+        yield from (name for name in names if name.split(".")[0] == _ROOT.name)
+
+
+def _digest(files: Iterable[Path]) -> str:
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
+    for file in sorted(files):
+        digest.update(file.name.encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@cache
+def _mark() -> Path:
+    """A file that says that all kernels were compiled."""
+    with_kernels = [p for p in _ROOT.rglob("*.py") if _HAS_KERNELS.search(p.read_bytes())]
+    return kernel_folder() / f"{_digest(with_kernels)}.complete"
+
+
+def is_compiled() -> bool:
+    """Whether every kernel has been compiled on this machine."""
+    return _mark().is_file()
+
+
+def mark_compiled() -> None:
+    """Remember that every kernel was compiled; forget those of versions long out of use."""
+    with contextlib.suppress(OSError):
+        _mark().parent.mkdir(parents=True, exist_ok=True)
+        _mark().touch()
+        for other in kernel_folder().iterdir():
+            is_ours = re.fullmatch(r"[0-9a-f]{16}(\.complete)?", other.name)
+            if is_ours and time.time() - other.stat().st_mtime > _KEPT_SECONDS:
+                shutil.rmtree(other) if other.is_dir() else other.unlink()
+
+
+def counts() -> tuple[int, int]:
+    """How many kernels are ready for some arguments, and how many there are."""
+    return sum(1 for each in _KERNELS if each.signatures), len(_KERNELS)
+
+
+def without_signature() -> list[str]:
+    """The names of the kernels that nobody has called."""
+    return [each.py_func.__qualname__ for each in _KERNELS if not each.signatures]
+
+
+@contextmanager
+def followed(told: Callable[[], None]) -> Iterator[None]:
+    """Tell whenever a kernel has been compiled rather than read from disk."""
+
+    class Listener(event.Listener):
+        def on_start(self, _: object) -> None:
+            told()
+
+        def on_end(self, _: object) -> None:
+            told()
+
+    listener = Listener()
+    event.register("numba:compile", listener)  # type: ignore[no-untyped-call]
+    try:
+        yield
+    finally:
+        event.unregister("numba:compile", listener)  # type: ignore[no-untyped-call]

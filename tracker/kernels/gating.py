@@ -1,0 +1,201 @@
+"""Which measurements lie within the gates of which components, compiled."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy import ndarray
+
+from tracker.kernels.compilation import kernel
+
+
+@kernel
+def _widest_axis(values: ndarray, reach: ndarray) -> int:
+    """The axis along which values (N, d) lie furthest apart, measured by the mean reach (J, d)."""
+    best = 0
+    most = -1.0
+    for a in range(values.shape[1]):
+        low = math.inf
+        high = -math.inf
+        total = 0.0
+        for i in range(values.shape[0]):
+            low = min(low, values[i, a])
+            high = max(high, values[i, a])
+        for i in range(reach.shape[0]):
+            total += reach[i, a]
+        width = (high - low) / max(total, 1e-300)
+        if width > most:
+            most = width
+            best = a
+    return best
+
+
+@kernel
+def factor_innovation(
+    own: ndarray, j: int, noises: ndarray, n: int, lower: ndarray, place: int, rows: Sequence[int]
+) -> float:
+    """Cholesky factor of S = own + R into ``lower[place]``, and log of 1 / √det(2π S).
+
+    On its diagonal is 1 / L_pp instead of L_pp: whoever solves with it multiplies.
+
+    Args:
+        rows: Of the measurement: a range, or, so that loops are unrolled, a tuple of as many.
+    """
+    constant: float = -0.5 * len(rows) * math.log(2.0 * math.pi)
+    product = 1.0
+    for p in range(len(rows)):
+        for q in range(p):
+            total = own[j, p, q] + noises[n, p, q]
+            for r in range(q):
+                total -= lower[place, p, r] * lower[place, q, r]
+            lower[place, p, q] = total * lower[place, q, q]
+        total = own[j, p, p] + noises[n, p, p]
+        for r in range(p):
+            total -= lower[place, p, r] * lower[place, p, r]
+        if not total > 0.0:
+            raise np.linalg.LinAlgError("H P H' + R is not positive definite")
+        lower[place, p, p] = 1.0 / math.sqrt(total)
+        product *= lower[place, p, p]
+    return constant + math.log(product)
+
+
+@kernel
+def gated_pairs(
+    expected: ndarray,
+    measurements: ndarray,
+    noises: ndarray,
+    own: ndarray,
+    gate: float,
+    lower: ndarray,
+) -> tuple[ndarray, ndarray, ndarray]:
+    """Component, measurement and log-likelihood of each pair inside its gate.
+
+    What lies within the gate of S lies within √(gate S_pp) along every axis p: only such
+    measurements are looked at, found by bisection along one axis. The result is that of
+    looking at all.
+
+    Args:
+        expected: (J, m).
+        measurements: (M, m).
+        noises: (1, m, m) for all, or (M, m, m).
+        own: (J, m, m), what each component adds to the noise.
+        gate: Squared Mahalanobis distance.
+        lower: (J, m, m) with one noise for all, else (1, m, m): takes what
+            :func:`factor_innovation` gives for each component, or at last.
+
+    Returns:
+        (P,) each, measurement by measurement.
+    """
+    size, order = expected.shape
+    count = len(measurements)
+    if size == 0 or count == 0:
+        nothing = np.empty(0, dtype=np.int64)
+        return nothing, nothing, np.empty(0)
+    if order == 2:
+        found = _gated(expected, measurements, noises, own, gate, lower, (0, 1))
+    else:
+        found = _gated(expected, measurements, noises, own, gate, lower, range(order))
+    return _by_measurement(found[0], found[1], found[2], count)
+
+
+@kernel
+def _gated(
+    expected: ndarray,
+    measurements: ndarray,
+    noises: ndarray,
+    own: ndarray,
+    gate: float,
+    lower: ndarray,
+    rows: Sequence[int],
+) -> tuple[ndarray, ndarray, ndarray]:
+    """:func:`gated_pairs`, component by component; rows as of :func:`factor_innovation`."""
+    size, order = expected.shape
+    count = len(measurements)
+    shared = noises.shape[0] == 1
+    reach = np.empty((size, order))
+    for p in range(len(rows)):
+        noise = noises[:, p, p].max()
+        for j in range(size):
+            if not own[j, p, p] + noise > 0.0:
+                raise np.linalg.LinAlgError("H P H' + R is not positive definite")
+            # a little more than the bound, so that rounding excludes nothing
+            reach[j, p] = math.sqrt(gate * (own[j, p, p] + noise)) * (1.0 + 1e-9)
+    axis = _widest_axis(measurements, reach)
+    by_axis = np.argsort(measurements[:, axis])
+    ordered = np.empty(measurements.shape)
+    coordinates = np.empty(count)
+    for k in range(count):
+        coordinates[k] = measurements[by_axis[k], axis]
+        for p in range(len(rows)):
+            ordered[k, p] = measurements[by_axis[k], p]
+
+    capacity = 4 * (size + count)
+    component = np.empty(capacity, dtype=np.int64)
+    measured = np.empty(capacity, dtype=np.int64)
+    likelihood = np.empty(capacity)
+    hits = np.empty(count + 1, dtype=np.int64)
+    solved = np.empty(order)
+    constant = 0.0
+    n = place = pairs = 0
+    for j in range(size):
+        first = np.searchsorted(coordinates, expected[j, axis] - reach[j, axis])
+        last = np.searchsorted(coordinates, expected[j, axis] + reach[j, axis], "right")
+        found = 0
+        for k in range(first, last):
+            # without a branch, which nobody could foresee
+            near = True
+            for p in range(len(rows)):
+                near &= abs(ordered[k, p] - expected[j, p]) <= reach[j, p]
+            hits[found] = k
+            found += int(near)
+        if shared:
+            place = j
+            constant = factor_innovation(own, j, noises, n, lower, place, rows)
+        for hit in range(found):
+            k = hits[hit]
+            z = by_axis[k]
+            if not shared:
+                n = z
+                constant = factor_innovation(own, j, noises, n, lower, place, rows)
+            distance = 0.0
+            for p in range(len(rows)):
+                total = ordered[k, p] - expected[j, p]
+                for r in range(p):
+                    total -= lower[place, p, r] * solved[r]
+                solved[p] = total * lower[place, p, p]
+                distance += solved[p] * solved[p]
+            if not distance <= gate or distance == math.inf:
+                continue
+            if pairs == capacity:
+                component = np.concatenate((component, np.empty_like(component)))
+                measured = np.concatenate((measured, np.empty_like(measured)))
+                likelihood = np.concatenate((likelihood, np.empty_like(likelihood)))
+                capacity *= 2
+            component[pairs] = j
+            measured[pairs] = z
+            likelihood[pairs] = constant - 0.5 * distance
+            pairs += 1
+    return component[:pairs], measured[:pairs], likelihood[:pairs]
+
+
+@kernel
+def _by_measurement(
+    component: ndarray, measured: ndarray, likelihood: ndarray, count: int
+) -> tuple[ndarray, ndarray, ndarray]:
+    """The same pairs, measurement by measurement; in the order they had where it is one."""
+    place_of = np.zeros(count + 1, dtype=np.int64)
+    for z in measured:
+        place_of[z + 1] += 1
+    for z in range(count):
+        place_of[z + 1] += place_of[z]
+    components, measurements = np.empty_like(component), np.empty_like(measured)
+    likelihoods = np.empty_like(likelihood)
+    for pair in range(len(measured)):
+        place = place_of[measured[pair]]
+        place_of[measured[pair]] += 1
+        components[place] = component[pair]
+        measurements[place] = measured[pair]
+        likelihoods[place] = likelihood[pair]
+    return components, measurements, likelihoods

@@ -1,0 +1,1 @@
+"""Kernels over the components of an intensity, for the PHD recursions."""

@@ -1,0 +1,341 @@
+"""The hot loops of reducing a Gaussian mixture: prune, merge, cap.
+
+Merging does not look at every pair. Whatever lies within a squared Mahalanobis distance U
+of a component with the covariance P lies within √(U P_aa) of it along every axis a: only
+the cells of a grid over two axes that this box touches are searched, and what is too far
+along another axis is left after one subtraction. The bounds are exact: the result is that
+of comparing all.
+
+[VM06] B.-N. Vo, W.-K. Ma, "The Gaussian mixture probability hypothesis density
+filter", IEEE Transactions on Signal Processing 54(11), 2006.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy import ndarray
+
+from tracker.kernels.compilation import kernel
+from tracker.kernels.intensity.mixture import heaviest_first
+from tracker.kernels.linear_algebra import merge_moments
+
+_CLASSES = 16
+"""Components whose reach agrees within a factor of two share a grid: a few very wide ones do
+not make the search wide for all."""
+
+
+@kernel
+def _factor(covariances: ndarray, which: ndarray, lower: ndarray, axes: Sequence[int]) -> None:
+    """Cholesky factors of the covariances at ``which`` into ``lower``, with 1 / L_aa for L_aa.
+
+    Args:
+        axes: Of the state: a range, or, so that loops are unrolled, a tuple of as many.
+    """
+    for i in which:
+        for a in range(len(axes)):
+            for b in range(a):
+                total = covariances[i, a, b]
+                for c in range(b):
+                    total -= lower[i, a, c] * lower[i, b, c]
+                lower[i, a, b] = total * lower[i, b, b]
+            total = covariances[i, a, a]
+            for c in range(a):
+                total -= lower[i, a, c] * lower[i, a, c]
+            # what rounding leaves of a singular matrix is no variance
+            if not total > 1e-14 * covariances[i, a, a]:
+                raise np.linalg.LinAlgError("a covariance is not positive definite")
+            lower[i, a, a] = 1.0 / math.sqrt(total)
+
+
+@kernel
+def _factors(covariances: ndarray, which: ndarray) -> ndarray:
+    """Cholesky factors (J, d, d) of the covariances at ``which``, with 1 / L_aa for L_aa.
+
+    Raises:
+        numpy.linalg.LinAlgError: If one is not positive definite.
+    """
+    lower = np.empty(covariances.shape)
+    dimension = covariances.shape[1]
+    if dimension == 4:
+        _factor(covariances, which, lower, (0, 1, 2, 3))
+    else:
+        _factor(covariances, which, lower, range(dimension))
+    return lower
+
+
+@kernel
+def _widest_axes(means: ndarray, covariances: ndarray, which: ndarray) -> tuple[int, int]:
+    """The two axes along which components lie furthest apart, measured by their variances."""
+    first = second = 0
+    most = more = -1.0
+    for a in range(means.shape[1]):
+        low = high = means[which[0], a]
+        total = 0.0
+        for i in which:
+            low = min(low, means[i, a])
+            high = max(high, means[i, a])
+            total += covariances[i, a, a]
+        width = (high - low) ** 2 / total
+        if width > most:
+            second, more = first, most
+            first, most = a, width
+        elif width > more:
+            second, more = a, width
+    return first, second
+
+
+@kernel
+def _grids(
+    places: ndarray,
+) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
+    """A grid over two axes for each class of reach, its cells about half as wide as the reach.
+
+    Args:
+        places: (N, 4), the coordinates along the two axes and the reach along them.
+
+    Returns:
+        The components cell by cell (N,); where each cell of all grids begins among them;
+        for each class that has components its first cell, and one more; rows and columns;
+        and, (6), the lowest coordinate, the number of cells a metre and the greatest reach
+        along either axis.
+    """
+    size = len(places)
+    # the exponent of a floating-point number is the whole part of its logarithm
+    classes = (places[:, 2] / places[:, 2].min()).view(np.int64) >> 52
+    classes -= classes.min()
+    members = np.zeros(_CLASSES, dtype=np.int64)
+    low = np.full((_CLASSES, 2), math.inf)
+    high = np.full((_CLASSES, 2), -math.inf)
+    sides = np.zeros((_CLASSES, 6))
+    for i in range(size):
+        c = classes[i] = min(classes[i], _CLASSES - 1)
+        members[c] += 1
+        for k in range(2):
+            low[c, k] = min(low[c, k], places[i, k])
+            high[c, k] = max(high[c, k], places[i, k])
+            sides[c, 4 + k] = max(sides[c, 4 + k], places[i, 2 + k])
+    counts = np.zeros((_CLASSES, 2), dtype=np.int64)
+    first_cell = np.zeros(_CLASSES + 1, dtype=np.int64)
+    used = 0
+    number = np.zeros(_CLASSES, dtype=np.int64)
+    fit = np.empty(2)
+    for c in range(_CLASSES):
+        if members[c] == 0:
+            continue
+        for k in range(2):
+            fit[k] = max(1.0, 2.0 * (high[c, k] - low[c, k]) / sides[c, 4 + k])
+        # no more cells than a few a component, whatever the extent
+        shrink = max(1.0, math.sqrt(fit[0] * fit[1] / (4.0 * members[c])))
+        for k in range(2):
+            counts[used, k] = max(1, min(int(fit[k] / shrink), 4 * members[c]))
+            side = max((high[c, k] - low[c, k]) / counts[used, k], 0.5 * sides[c, 4 + k])
+            sides[used, k] = low[c, k]
+            sides[used, 2 + k] = 1.0 / side
+            sides[used, 4 + k] = sides[c, 4 + k]
+        first_cell[used + 1] = first_cell[used] + counts[used, 0] * counts[used, 1]
+        number[c] = used
+        used += 1
+    begins = np.zeros(first_cell[used] + 1, dtype=np.int64)
+    cells = np.empty(size, dtype=np.int64)
+    for i in range(size):
+        c = number[classes[i]]
+        row = min(int((places[i, 0] - sides[c, 0]) * sides[c, 2]), counts[c, 0] - 1)
+        column = min(int((places[i, 1] - sides[c, 1]) * sides[c, 3]), counts[c, 1] - 1)
+        cells[i] = first_cell[c] + row * counts[c, 1] + column
+        begins[cells[i] + 1] += 1
+    for cell in range(len(begins) - 1):
+        begins[cell + 1] += begins[cell]
+    place = begins.copy()
+    by_cell = np.empty(size, dtype=np.int64)
+    for i in range(size):
+        by_cell[place[cells[i]]] = i
+        place[cells[i]] += 1
+    return by_cell, begins, first_cell[: used + 1], counts, sides
+
+
+@kernel
+def _search(
+    here: float,
+    there: float,
+    beside: ndarray,
+    begins: ndarray,
+    first_cell: ndarray,
+    counts: ndarray,
+    sides: ndarray,
+    hits: ndarray,
+) -> int:
+    """Find who reaches a place along both axes of the grids.
+
+    Args:
+        here: Along the first axis, as ``there`` along the second.
+        beside: (N, 4), as the places of :func:`_grids`, from which the further ones are,
+            cell by cell. Who has a negative reach is not found.
+        hits: (N + 1,), takes the rows of ``beside`` that were found.
+
+    Returns:
+        How many were found.
+    """
+    found = 0
+    for c in range(len(first_cell) - 1):
+        # whoever reaches the place lies in one of these cells; the last holds its far edge
+        from_row, to_row = _reached(here - sides[c, 0], sides[c, 4], sides[c, 2], counts[c, 0])
+        from_column, to_column = _reached(
+            there - sides[c, 1], sides[c, 5], sides[c, 3], counts[c, 1]
+        )
+        for row in range(from_row, to_row + 1):
+            cell = first_cell[c] + row * counts[c, 1]
+            for k in range(begins[cell + from_column], begins[cell + to_column + 1]):
+                # without a branch, which nobody could foresee
+                hits[found] = k
+                found += int(
+                    (abs(beside[k, 0] - here) <= beside[k, 2])
+                    & (abs(beside[k, 1] - there) <= beside[k, 3])
+                )
+    return found
+
+
+@kernel
+def _reached(offset: float, reach: float, cells_a_metre: float, count: int) -> tuple[int, int]:
+    """The first and the last of ``count`` cells in a row whose members may reach an offset."""
+    first = min(max((offset - reach) * cells_a_metre - 1e-6, 0.0), count - 1.0)
+    last = min(max((offset + reach) * cells_a_metre + 1e-6, -1.0), count - 1.0)
+    return int(first), math.floor(last)
+
+
+@kernel
+def _squared_distance(
+    means: ndarray, lower: ndarray, i: int, leader: int, solved: ndarray, axes: Sequence[int]
+) -> float:
+    """(m_i − m_l)ᵀ P_i⁻¹ (m_i − m_l), by a factor and for axes as of :func:`_factor`."""
+    distance = 0.0
+    for a in range(len(axes)):
+        total = means[i, a] - means[leader, a]
+        for b in range(a):
+            total -= lower[i, a, b] * solved[b]
+        solved[a] = total * lower[i, a, a]
+        distance += solved[a] * solved[a]
+    return distance
+
+
+@kernel
+def merge_groups(
+    means: ndarray, covariances: ndarray, order: ndarray, owners: ndarray, threshold: float
+) -> tuple[ndarray, ndarray]:
+    """Group components around the heaviest ones left (Table II of [VM06]).
+
+    A component i joins the leader l where (m_i − m_l)ᵀ P_i⁻¹ (m_i − m_l) <= threshold.
+
+    Args:
+        means: (J, d).
+        covariances: (J, d, d), positive definite.
+        order: (N,) indices of those to be grouped, heaviest first.
+        owners: (J,); a component with an owner (0 or more) joins its owner's only. (0,) where
+            nobody has one.
+        threshold: Squared Mahalanobis distance.
+
+    Returns:
+        The group of each component (J,), -1 for those that are not in ``order``, and the
+        leader of each group (K,).
+
+    Raises:
+        numpy.linalg.LinAlgError: If a covariance is not positive definite.
+    """
+    dimension = means.shape[1]
+    group = np.full(len(means), -1, dtype=np.int64)
+    leaders = np.empty(len(order), dtype=np.int64)
+    if len(order) == 0:
+        return group, leaders
+    group[order] = -2
+    which = np.flatnonzero(group == -2)
+    lower = _factors(covariances, which)
+    first, second = _widest_axes(means, covariances, which)
+    places = np.empty((len(which), 4))
+    # a little more than the bound, so that rounding excludes nobody
+    bound = threshold * (1.0 + 1e-9)
+    for k in range(len(which)):
+        i = which[k]
+        places[k, 0], places[k, 1] = means[i, first], means[i, second]
+        places[k, 2] = math.sqrt(bound * covariances[i, first, first]) + 1e-300
+        places[k, 3] = math.sqrt(bound * covariances[i, second, second]) + 1e-300
+    by_cell, begins, first_cell, counts, sides = _grids(places)
+    # place and reach in the order of the cells; nobody reaches out of -1
+    beside = np.empty(places.shape)
+    slot = np.empty(len(means), dtype=np.int64)
+    for k in range(len(by_cell)):
+        for side in range(4):
+            beside[k, side] = places[by_cell[k], side]
+        by_cell[k] = which[by_cell[k]]
+        slot[by_cell[k]] = k
+    hits = np.empty(len(which) + 1, dtype=np.int64)
+    solved = np.empty(dimension)
+    count = 0
+    for leader in order:
+        if group[leader] >= 0:
+            continue
+        group[leader] = count
+        beside[slot[leader], 2] = -1.0
+        found = _search(
+            means[leader, first], means[leader, second],
+            beside, begins, first_cell, counts, sides, hits,
+        )  # fmt: skip
+        for k in hits[:found]:
+            i = by_cell[k]
+            if len(owners) and owners[i] >= 0 and owners[i] != owners[leader]:
+                continue
+            if dimension == 4:
+                distance = _squared_distance(means, lower, i, leader, solved, (0, 1, 2, 3))
+            else:
+                distance = _squared_distance(means, lower, i, leader, solved, range(dimension))
+            if distance <= threshold:
+                group[i] = count
+                beside[k, 2] = -1.0
+        leaders[count] = leader
+        count += 1
+    return group, leaders[:count].copy()
+
+
+@kernel
+def reduce_mixture(
+    weights: ndarray,
+    means: ndarray,
+    covariances: ndarray,
+    owners: ndarray,
+    pruning_threshold: float,
+    merging_threshold: float,
+    max_components: int,
+) -> tuple[ndarray, ndarray, ndarray, ndarray]:
+    """Prune, merge and cap: :func:`tracker.filters.gaussian_mixture.reduce`.
+
+    Only the moments of what stays are computed, and nothing is moved in between.
+
+    Args:
+        weights: (J,).
+        means: (J, d).
+        covariances: (J, d, d).
+        owners: (J,), or (0,), of :func:`merge_groups`.
+        pruning_threshold: The least weight.
+        merging_threshold: Squared Mahalanobis distance.
+        max_components: How many may stay.
+
+    Returns:
+        (K,) weights, heaviest first, (K, d) means, (K, d, d) covariances and (K,) leaders.
+    """
+    kept = np.flatnonzero(weights >= pruning_threshold)
+    order = kept[heaviest_first(weights[kept])]
+    group, leaders = merge_groups(means, covariances, order, owners, merging_threshold)
+    sums = np.zeros(len(leaders))
+    for i in kept:
+        sums[group[i]] += weights[i]
+    heaviest = heaviest_first(sums)[:max_components]
+    place = np.full(len(leaders), -1, dtype=np.int64)
+    for k in range(len(heaviest)):
+        place[heaviest[k]] = k
+    for i in kept:
+        group[i] = place[group[i]]
+    merged = merge_moments(weights, means, covariances, group, len(heaviest))
+    if len(heaviest) < len(leaders):
+        merged[0][:] *= sums.sum() / merged[0].sum()
+    return merged[0], merged[1], merged[2], leaders[heaviest]

@@ -1,0 +1,1 @@
+"""Kernels of the labelled fusion: a step, a camera, its association marginals."""

@@ -1,0 +1,230 @@
+"""The hot loops, compiled by numba: plain functions of arrays, called without the interpreter.
+
+Every kernel has a NumPy or SciPy counterpart in the tests that it must agree with.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy import ndarray
+
+from tracker.kernels.compilation import kernel
+
+
+@kernel
+def factorise(matrix: ndarray, lower: ndarray) -> float:
+    """Cholesky factor of a symmetric positive definite matrix, and its log determinant.
+
+    Raises:
+        numpy.linalg.LinAlgError: If the matrix is not positive definite.
+    """
+    log_determinant = 0.0
+    for p in range(len(matrix)):
+        for q in range(p + 1):
+            total = matrix[p, q]
+            for r in range(q):
+                total -= lower[p, r] * lower[q, r]
+            if p == q:
+                if not total > 0.0:
+                    raise np.linalg.LinAlgError("a covariance is not positive definite")
+                lower[p, p] = math.sqrt(total)
+                log_determinant += math.log(total)
+            else:
+                lower[p, q] = total / lower[q, q]
+    return log_determinant
+
+
+@kernel
+def solve(lower: ndarray, right: ndarray, solution: ndarray) -> None:
+    """The vector x with L Lᵀ x = b, for a Cholesky factor L."""
+    size = len(lower)
+    for p in range(size):
+        total = right[p]
+        for r in range(p):
+            total -= lower[p, r] * solution[r]
+        solution[p] = total / lower[p, p]
+    for p in range(size - 1, -1, -1):
+        total = solution[p]
+        for r in range(p + 1, size):
+            total -= lower[r, p] * solution[r]
+        solution[p] = total / lower[p, p]
+
+
+@kernel
+def squared_length(residual: ndarray, lower: ndarray) -> float:
+    """Squared Mahalanobis length of a vector, by the Cholesky factor of its covariance."""
+    total, solved = 0.0, np.empty(len(residual))
+    for p in range(len(residual)):
+        value = residual[p]
+        for r in range(p):
+            value -= lower[p, r] * solved[r]
+        solved[p] = value / lower[p, p]
+        total += solved[p] * solved[p]
+    return total
+
+
+@kernel
+def merge_moments(
+    weights: ndarray, means: ndarray, covariances: ndarray, group: ndarray, count: int
+) -> tuple[ndarray, ndarray, ndarray]:
+    """Weight, mean and covariance (spread of the means included) of each group.
+
+    In a group without any weight all count the same. Who is in the group -1 is left out.
+    """
+    size, dimension = means.shape
+    merged_weights = np.zeros(count)
+    merged_means = np.zeros((count, dimension))
+    merged_covariances = np.zeros((count, dimension, dimension))
+    members = np.zeros(count)
+    for i in range(size):
+        if group[i] >= 0:
+            merged_weights[group[i]] += weights[i]
+            members[group[i]] += 1.0
+    for i in range(size):
+        g = group[i]
+        if g < 0:
+            continue
+        share = weights[i] / merged_weights[g] if merged_weights[g] > 0.0 else 1.0 / members[g]
+        for a in range(dimension):
+            merged_means[g, a] += share * means[i, a]
+    for i in range(size):
+        g = group[i]
+        if g < 0:
+            continue
+        share = weights[i] / merged_weights[g] if merged_weights[g] > 0.0 else 1.0 / members[g]
+        for a in range(dimension):
+            difference_a = means[i, a] - merged_means[g, a]
+            for b in range(dimension):
+                merged_covariances[g, a, b] += share * (
+                    covariances[i, a, b] + difference_a * (means[i, b] - merged_means[g, b])
+                )
+    return merged_weights, merged_means, merged_covariances
+
+
+@kernel
+def group_labels(labels: ndarray) -> tuple[ndarray, ndarray]:
+    """The distinct labels, ascending, and for each of (J,) labels its place among them."""
+    order = np.argsort(labels, kind="mergesort")
+    distinct = np.empty(len(labels), dtype=np.int64)
+    place = np.empty(len(labels), dtype=np.int64)
+    count = 0
+    for j in order:
+        if count == 0 or labels[j] != distinct[count - 1]:
+            distinct[count] = labels[j]
+            count += 1
+        place[j] = count - 1
+    return distinct[:count].copy(), place
+
+
+@kernel
+def inside_bounds(points: ndarray, low: ndarray, high: ndarray) -> ndarray:
+    """Indices of the points (N, d), of which the first coordinates count, within bounds."""
+    inside = np.empty(len(points), dtype=np.int64)
+    count = 0
+    for i in range(len(points)):
+        within = True
+        for axis in range(len(low)):
+            within &= low[axis] <= points[i, axis] <= high[axis]
+        if within:
+            inside[count] = i
+            count += 1
+    return inside[:count].copy()
+
+
+@kernel
+def doubles(
+    means: ndarray,
+    weights: ndarray,
+    labels: ndarray,
+    sources: ndarray,
+    near: float,
+    confirmed: float,
+) -> ndarray:
+    """Which of n people only repeat a surer or older one at the same place.
+
+    Args:
+        means: (n, d), position first.
+        weights: (n,).
+        labels: (n,); the smaller one is older.
+        sources: (C, n), the box that each camera gave each, -1 for none.
+        near: Two nearer than this are one, unless some camera gave each a box of its own; two
+            nearer than half of it even so.
+        confirmed: Whoever has more weight is sure, and is never displaced by an unsure one.
+    """
+    size, cameras = len(means), len(sources)
+    double = np.zeros(size, dtype=np.bool_)
+    for i in range(size):
+        for j in range(size):
+            if i == j:
+                continue
+            sure, other_sure = weights[i] > confirmed, weights[j] > confirmed
+            yields = labels[i] > labels[j] if sure == other_sure else other_sure
+            if not yields:
+                continue
+            distance = 0.0
+            for axis in range(3):
+                distance += (means[i, axis] - means[j, axis]) ** 2
+            if not distance < near * near:
+                continue
+            parted = False
+            for c in range(cameras):
+                if sources[c, i] >= 0 and sources[c, j] >= 0 and sources[c, i] != sources[c, j]:
+                    parted = True
+            if not parted or distance < (near / 2.0) * (near / 2.0):
+                double[i] = True
+                break
+    return double
+
+
+@kernel
+def sum_pairs(
+    labels: ndarray, cameras: ndarray, of_pairs: ndarray, boxes: ndarray, weights: ndarray
+) -> tuple[ndarray, ndarray, ndarray, ndarray]:
+    """Sum the pairs of one camera, component and box; pairs of absent labels are left out.
+
+    Args:
+        labels: (J,) of the components; of several with one label the first stands for it.
+        cameras: (A,) of the pairs, as the further ones.
+        of_pairs: (A,) labels.
+        boxes: (A,).
+        weights: (A,).
+
+    Returns:
+        (K,) camera, component, box and sum, at most 1, of each pair, in the order of the first
+        three: as int32 and float32.
+    """
+    count = len(of_pairs)
+    width = 1
+    for pair in range(count):
+        width = max(width, boxes[pair] + 1)
+    keys = np.empty(count, dtype=np.int64)
+    kept = 0
+    which = np.empty(count, dtype=np.int64)
+    for pair in range(count):
+        for component in range(len(labels)):
+            if labels[component] == of_pairs[pair]:
+                # camera, component and box as the digits of one number
+                keys[kept] = (cameras[pair] * len(labels) + component) * width + boxes[pair]
+                which[kept] = pair
+                kept += 1
+                break
+    order = np.argsort(keys[:kept], kind="mergesort")
+    found = np.empty(kept, dtype=np.int64)
+    sums = np.zeros(kept)
+    distinct = 0
+    for place in order:
+        if distinct == 0 or keys[place] != found[distinct - 1]:
+            found[distinct] = keys[place]
+            distinct += 1
+        sums[distinct - 1] += weights[which[place]]
+    found = found[:distinct]
+    rest = found // width
+    size = max(len(labels), 1)
+    return (
+        (rest // size).astype(np.int32),
+        (rest % size).astype(np.int32),
+        (found % width).astype(np.int32),
+        np.minimum(sums[:distinct], 1.0).astype(np.float32),
+    )

@@ -1,0 +1,111 @@
+"""The hot loops over particles, compiled by numba: plain functions of arrays.
+
+Every kernel has a NumPy counterpart in the tests that it must agree with.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy import ndarray
+
+from tracker.kernels.compilation import kernel
+
+
+@kernel
+def epanechnikov_climb(
+    boxes: ndarray,
+    counts: ndarray,
+    groups: ndarray,
+    bandwidth: float,
+    iterations: int,
+    tolerance: float,
+) -> tuple[ndarray, ndarray]:
+    """Climb from every box to a fixed point of the mean shift with the Epanechnikov kernel.
+
+    The density is Σ_i c_i max(0, 1 - r_i²), r_i the distance between the centres in units of
+    bandwidth × half size of where one stands. Its gradient points to the mean of the boxes
+    with r_i < 1, so that is where each step goes.
+
+    Args:
+        boxes: (S, 4), centre x, centre y, half width, half height.
+        counts: (S,), how many particles each stands for; those of 0 are not there.
+        groups: (S,); the boxes of other groups are not there either.
+        bandwidth: In half sizes.
+        iterations: At most so many steps.
+        tolerance: Stop when a step is shorter than this many half sizes.
+
+    Returns:
+        (S, 4) fixed points, and (S,) densities there.
+    """
+    size = len(boxes)
+    points = boxes.copy()
+    densities = np.zeros(size)
+    shifted = np.empty(4)
+    for k in range(size):
+        if not counts[k] > 0.0:
+            continue
+        for _ in range(iterations):
+            scale_x = 1.0 / (bandwidth * points[k, 2])
+            scale_y = 1.0 / (bandwidth * points[k, 3])
+            shifted[:] = 0.0
+            total, density = 0.0, 0.0
+            for i in range(size):
+                if groups[i] != groups[k] or not counts[i] > 0.0:
+                    continue
+                u = (boxes[i, 0] - points[k, 0]) * scale_x
+                v = (boxes[i, 1] - points[k, 1]) * scale_y
+                distance = u * u + v * v
+                if distance >= 1.0:
+                    continue
+                total += counts[i]
+                density += counts[i] * (1.0 - distance)
+                for a in range(4):
+                    shifted[a] += counts[i] * boxes[i, a]
+            densities[k] = density
+            if not total > 0.0:
+                break  # the kernel shrank away from all boxes: this is no mode
+            for a in range(4):
+                shifted[a] /= total
+            u = (shifted[0] - points[k, 0]) / points[k, 2]
+            v = (shifted[1] - points[k, 1]) / points[k, 3]
+            points[k] = shifted
+            if u * u + v * v < tolerance * tolerance:
+                break
+    return points, densities
+
+
+@kernel
+def join_modes(
+    points: ndarray, counts: ndarray, order: ndarray, distance: float
+) -> tuple[ndarray, ndarray]:
+    """Fixed points that lie close to a denser one belong to its mode.
+
+    Args:
+        points: (S, 4), fixed points.
+        counts: (S,), how many particles climbed to each; those of 0 have no mode.
+        order: (S,) indices, densest first.
+        distance: In half sizes of the denser one, between the centres.
+
+    Returns:
+        The mode of each point (S,), -1 for none, and the point of each mode (M,).
+    """
+    size = len(points)
+    owners = np.full(size, -1, dtype=np.int64)
+    leaders = np.empty(size, dtype=np.int64)
+    modes = 0
+    for rank in range(size):
+        i = order[rank]
+        if not counts[i] > 0.0:
+            continue
+        for m in range(modes):
+            leader = leaders[m]
+            u = (points[i, 0] - points[leader, 0]) / points[leader, 2]
+            v = (points[i, 1] - points[leader, 1]) / points[leader, 3]
+            if u * u + v * v < distance * distance:
+                owners[i] = m
+                break
+        if owners[i] < 0:
+            owners[i] = modes
+            leaders[modes] = i
+            modes += 1
+    return owners, leaders[:modes].copy()

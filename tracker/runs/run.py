@@ -1,0 +1,103 @@
+"""A run: the columns of its stages, its keys, and how far it is."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, field
+from typing import Any
+
+from tracker import parameters as parameter_table
+from tracker.fusion.protocol import FusionResult
+from tracker.parameters import RunParameters, Stage
+from tracker.runs.numbers_version import numbers_version
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.protocol import ViewResult
+from tracker.trajectories import Trajectories
+
+
+class Cancelled(Exception):
+    """The run was superseded or stopped; what was computed stays usable."""
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a run is."""
+
+    stage: Stage
+    """The first stage that had to be computed: the one that takes the time."""
+    done: int
+    """Steps whose tracks are ready, from step 0 on."""
+    total: int
+    seconds: float
+    """Since the run began."""
+    fresh: int
+    """Steps that this run computed itself, rather than took from an earlier one."""
+    preparing: float = 0.0
+    """Seconds until the first of them was there: a background to learn, kernels to load."""
+
+    @property
+    def steps_per_second(self) -> float:
+        """Mean speed so far, from the first step on: the preparation does not come again."""
+        if self.fresh > 1 and self.seconds > self.preparing:
+            return (self.fresh - 1) / (self.seconds - self.preparing)
+        return self.fresh / self.seconds if self.seconds > 0.0 else 0.0
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Estimated from the mean speed; None before the first step."""
+        return (self.total - self.done) / self.steps_per_second if self.fresh else None
+
+
+@dataclass(eq=False)
+class Run:
+    """One run: the columns of the three stages, filled step by step from step 0.
+
+    One thread appends; any thread may read what is below :attr:`done`.
+    """
+
+    sequence: Sequence
+    parameters: RunParameters
+    seed: int
+    keys: dict[Stage, str]
+    """The cache key of each stage."""
+    views: list[tuple[ViewResult, ...]] = field(default_factory=list)
+    """Stage 1 of each step, one result a camera."""
+    fused: list[FusionResult] = field(default_factory=list)
+    """Stage 2 of each step."""
+    tracks: Trajectories = field(init=False)
+    """Stage 3 of the steps below :attr:`done`."""
+    done: int = 0
+    """Steps whose three stages are ready."""
+    view_states: tuple[Any, ...] | None = None
+    """State of stage 1, one a camera, after the last step of :attr:`views`; None where that is
+    the last of the sequence."""
+    costly: bool = False
+    """Whether stage 1 looked at pictures."""
+    fusion_state: Any = None
+    """State of stage 2 after the last step of :attr:`fused`."""
+
+    def __post_init__(self) -> None:
+        self.tracks = Trajectories.empty(len(self.sequence.views))
+
+    @property
+    def key(self) -> str:
+        """Hash of the sequence, all parameters, the seed and the version of the code's numbers."""
+        return self.keys["tracks"]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every step is there."""
+        return self.done == self.sequence.frames
+
+
+def stage_keys(sequence: Sequence, parameters: RunParameters, seed: int) -> dict[Stage, str]:
+    """The cache key of each stage: a hash of the sequence, the seed, the code, and of the
+    parameters of the stage itself and of those before it."""
+    keys: dict[Stage, str] = {}
+    values: list[Any] = [sequence.digest, seed]
+    stages: tuple[Stage, ...] = ("single_view", "fusion", "tracks")
+    for stage in stages:
+        values += [numbers_version(stage), parameter_table.stage_values(parameters, stage)]
+        keys[stage] = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
+    return keys

@@ -1,0 +1,159 @@
+"""Stage 1 of all cameras side by side: each in a thread of its own, handed over in order."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Hashable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from tracker import single_view
+from tracker.runs.run import Cancelled, Run
+from tracker.sequences.frames import FrameReader, Picture
+from tracker.single_view.colour.likeness import Likeness
+from tracker.single_view.protocol import SingleViewMethod, ViewResult
+
+BLOCK = 5
+"""Steps that a camera does at a time: few enough to stream, enough to pay."""
+
+Cancel = Callable[[], bool]
+
+_Made = TypeVar("_Made")
+
+
+class SingleViews:
+    """Stage 1 from where a run's column ends, step by step: results and states, one a camera."""
+
+    def __init__(
+        self,
+        run: Run,
+        reader: FrameReader,
+        cancelled: Cancel,
+        thread_begins: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Prepare the threads.
+
+        Args:
+            run: Whose columns.
+            reader: Of the pictures.
+            cancelled: Asked before every picture, by the threads of the cameras.
+            thread_begins: What each of these does first.
+        """
+        self._run = run
+        self._cancelled = cancelled
+        self._stopped = False
+        self._reader = _StoppingReader(reader, self._is_stopped)
+        self._pools = [
+            ThreadPoolExecutor(1, f"single-view-{view.camera.name}", thread_begins)
+            for view in run.sequence.views
+        ]
+
+    def __enter__(self) -> Iterator[tuple[tuple[ViewResult, ...], tuple[Any, ...]]]:
+        return self._iterate()
+
+    def __exit__(self, *_: object) -> None:
+        self._stopped = True  # what is under way ends before its next picture
+        for pool in self._pools:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+    def _iterate(self) -> Iterator[tuple[tuple[ViewResult, ...], tuple[Any, ...]]]:
+        preparing = [pool.submit(self._prepare, c) for c, pool in enumerate(self._pools)]
+        workers = [future.result() for future in preparing]
+        blocks: deque[list[Future[list[tuple[ViewResult, Any]]]]] = deque()
+
+        def order_block(steps: int = BLOCK) -> None:
+            pairs = zip(self._pools, workers, strict=True)
+            blocks.append([pool.submit(worker.block, steps) for pool, worker in pairs])
+
+        order_block(1)  # somebody waits for the first
+        left = self._run.sequence.frames - len(self._run.views)
+        while left > 0:
+            order_block()  # is computed while the one before is fused
+            parts = [future.result() for future in blocks.popleft()]
+            if self._cancelled():
+                raise Cancelled
+            for step in zip(*parts, strict=True):
+                yield tuple(result for result, _ in step), tuple(state for _, state in step)
+            left -= len(parts[0])
+
+    def _is_stopped(self) -> bool:
+        return self._stopped or self._cancelled()
+
+    def _prepare(self, camera: int) -> _CameraWorker:
+        run = self._run
+        method = single_view.create(
+            run.parameters.single_view, run.sequence, camera, run.parameters, self._reader
+        )
+        run.costly = run.costly or method.needs_pictures
+        state = run.view_states[camera] if run.view_states is not None else method.start()
+        return _CameraWorker(method, state, camera, run, self._reader, self._is_stopped)
+
+
+class _CameraWorker:
+    """Stage 1 of one camera, from where the run's column ends."""
+
+    def __init__(
+        self,
+        method: SingleViewMethod,
+        state: Any,
+        camera: int,
+        run: Run,
+        reader: FrameReader,
+        stopped: Cancel,
+    ) -> None:
+        self._method = method
+        self._state = state
+        self._camera = camera
+        self._frame = len(run.views)
+        self._frames = run.sequence.frames
+        self._seed = run.seed
+        self._stopped = stopped
+        self._pictures = reader.iterate(camera, self._frame) if method.needs_pictures else None
+        self._likeness = Likeness.of(run.sequence, reader) if method.needs_pictures else None
+
+    def block(self, steps: int) -> list[tuple[ViewResult, Any]]:
+        """The next few steps: result and state of each; none at the end."""
+        done: list[tuple[ViewResult, Any]] = []
+        while len(done) < steps and self._frame < self._frames and not self._stopped():
+            picture = next(self._pictures, None) if self._pictures is not None else None
+            rng = np.random.default_rng((self._seed, self._camera, self._frame))
+            self._state, result = self._method.step(self._state, self._frame, picture, rng)
+            if picture is not None and self._likeness is not None:
+                likenesses = self._likeness.of_boxes(picture, result.boxes)
+                result = replace(result, likenesses=likenesses)
+            done.append((result, self._state))
+            self._frame += 1
+        return done
+
+
+class _StoppingReader(FrameReader):
+    """The pictures of another reader, until the run is to stop: then :class:`Cancelled` is raised.
+
+    A background or the templates take many pictures before the first step: nobody waits for
+    the rest of them.
+    """
+
+    def __init__(self, reader: FrameReader, stopped: Cancel) -> None:
+        self._reader = reader
+        self._stopped = stopped
+
+    def picture(self, camera: int, step: int) -> Picture | None:
+        self.check()
+        return self._reader.picture(camera, step)
+
+    def iterate(self, camera: int, first: int = 0) -> Iterator[Picture | None]:
+        return self._reader.iterate(camera, first)
+
+    def once(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
+        self.check()
+        return self._reader.once(name, make)
+
+    def check(self) -> None:
+        if self._stopped():
+            raise Cancelled
+
+    def close(self) -> None:
+        """Whoever opened the other one closes it."""

@@ -1,0 +1,1 @@
+"""Who plays in a rendered room: bodies, gait, paths, doors."""

@@ -1,0 +1,1 @@
+"""What a rendered room is made of: surfaces, furniture, paint."""

@@ -1,0 +1,1 @@
+"""Changing a sequence that is there: teaching it, and saving it with its comments."""

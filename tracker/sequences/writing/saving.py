@@ -1,0 +1,186 @@
+"""What was taught, written back: into the sequence's own file, or into a copy of its folder.
+
+A file is replaced in one go, and what was there before is kept beside it; a copy appears
+whole or not at all.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import tempfile
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from tracker.folders import cache_folder
+from tracker.sequences.reader import FILE, read_sequence
+from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.writing.rewriting import rewritten
+
+BACKUP = f"{FILE}.bak"
+"""What a file was before it was saved over; later ones have a number."""
+
+
+def why_not_in_place(folder: Path) -> str | None:
+    """Why a sequence cannot be saved where it is, in one sentence; None where it can."""
+    if folder.is_relative_to(cache_folder()):
+        return f"{folder.name} is rendered by the program, which may render it again at any time"
+    if not os.access(folder, os.W_OK) or not os.access(folder / FILE, os.W_OK):
+        return f"{folder} is a place that you may only read"
+    return None
+
+
+def save(sequence: Sequence, saved: Sequence) -> Path:
+    """Write room and templates into the sequence's own file.
+
+    Args:
+        sequence: What is to be in the file.
+        saved: What is in it, as it was read or saved last.
+
+    Returns:
+        The backup: what the file was before.
+
+    Raises:
+        SequenceError: If the file may not be written, or somebody else changed what was
+            taught in it meanwhile; it is then as it was.
+    """
+    folder, where = sequence.folder, f"{sequence.folder.name}/{FILE}"
+    reason = why_not_in_place(folder)
+    if reason is not None:
+        raise SequenceError(f"{where}: cannot be saved, since {reason}; save a copy")
+    path = (folder / FILE).resolve()
+    with _complaining(path):
+        before = path.read_bytes()
+        text = rewritten(before.decode("utf-8-sig"), saved, sequence, where)
+        backup = _keep(folder, before)
+        mark = b"\xef\xbb\xbf" if before.startswith(b"\xef\xbb\xbf") else b""
+        _replace(path, mark + text.encode("utf-8"))
+    return backup
+
+
+def save_copy(sequence: Sequence, saved: Sequence, folder: Path) -> Sequence:
+    """Write a sequence with all its files into another folder, under that folder's name.
+
+    Pictures and videos are hard links where the file system has them, and so take no room;
+    tables are copied, so that nobody alters the original by editing the copy.
+
+    Args:
+        sequence: What is to be in the copy's file.
+        saved: What is in the original's.
+        folder: A new or an empty one.
+
+    Returns:
+        The copy, read from there.
+
+    Raises:
+        SequenceError: If it cannot be written there; nothing is left then.
+    """
+    source = sequence.folder
+    folder = folder.expanduser().absolute()
+    _check_place(folder, source)
+    with _complaining(folder):
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        building = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+        try:
+            building.chmod(0o777 & ~_mask())
+            text = (source / FILE).read_bytes().decode("utf-8-sig")
+            text = rewritten(text, saved, sequence, f"{source.name}/{FILE}", name=folder.name)
+            for path in _files(sequence, tomllib.loads(text)):
+                place = building / path.relative_to(source)
+                place.parent.mkdir(parents=True, exist_ok=True)
+                _copy(path, place, link=path.suffix.lower() != ".csv")
+            (building / FILE).write_bytes(text.encode("utf-8"))
+            read_sequence(building)
+            os.replace(building, folder)
+        except BaseException:
+            shutil.rmtree(building, ignore_errors=True)
+            raise
+    return read_sequence(folder)
+
+
+def _check_place(folder: Path, source: Path) -> None:
+    """Whether a copy may go there, before anything is written."""
+    if folder.resolve().is_relative_to(source):
+        raise SequenceError(
+            f"{folder}: expected a folder beside the sequence, found one inside it; choose another"
+        )
+    if folder.is_file():
+        raise SequenceError(f"{folder}: expected a new folder, found a file; choose another name")
+    if folder.is_dir() and any(folder.iterdir()):
+        raise SequenceError(
+            f"{folder}: expected a new or an empty folder, found one with "
+            f"{len(list(folder.iterdir()))} files in it; choose another name"
+        )
+
+
+def _files(sequence: Sequence, values: dict[str, Any]) -> Iterator[Path]:
+    """Every file that the sequence is made of, but for its ``sequence.toml``."""
+    for view, camera in zip(sequence.views, values["camera"], strict=True):
+        if view.video is not None:
+            yield view.video
+        yield from view.images
+        if "detections" in camera:
+            yield sequence.folder / camera["detections"]
+    if "ground_truth" in values:
+        yield sequence.folder / values["ground_truth"]["file"]
+
+
+def _copy(path: Path, place: Path, *, link: bool) -> None:
+    if place.exists():  # two cameras may name one file
+        return
+    if link:
+        with contextlib.suppress(OSError):
+            os.link(path.resolve(), place)
+            return
+    shutil.copyfile(path, place)
+
+
+def _keep(folder: Path, data: bytes) -> Path:
+    """A backup beside the file; one that is there already is never written over."""
+    number = 1
+    while True:
+        path = folder / (BACKUP if number == 1 else f"{BACKUP}{number}")
+        try:
+            with path.open("xb") as file:
+                file.write(data)
+            return path
+        except FileExistsError:
+            number += 1
+
+
+def _replace(path: Path, data: bytes) -> None:
+    """Have a file hold this, all of it or nothing."""
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        shutil.copymode(path, name)
+        os.replace(name, path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def _mask() -> int:
+    """Which rights new files of this process do not get."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+@contextlib.contextmanager
+def _complaining(path: Path) -> Iterator[None]:
+    """A failure of the disk in one sentence."""
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise SequenceError(
+            f"{error.filename or path}: cannot be written ({reason}); choose another folder, "
+            "or make room there"
+        ) from None

@@ -1,0 +1,144 @@
+"""A sequence that was taught: with another room or other templates than its file has.
+
+What is taught are plain values in the notation of ``sequence.toml``::
+
+    {"room": {"min": […], "max": […], "entrances": [{"position": […], "sigma": […]}, …]},
+     "template": [{"name": …, "camera": …, "frame": …, "box": […]}, …]}
+
+metres in the world, pixels in a picture. They are checked by what checks the file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from numpy import ndarray
+
+from tracker.sequences.fields import Fields
+from tracker.sequences.sequence import Sequence
+from tracker.sequences.writing.taught_fields import read_room, read_templates
+
+Values = dict[str, Any]
+
+FACES = tuple((side, axis) for side in ("min", "max") for axis in range(3))
+"""The six faces of the room: whose corner's coordinate each is."""
+
+AXES = "xyz"
+
+Pairs = list[tuple[int | None, int | None]]
+"""Which of the old is which of the new, by index: None where it is gone, or new."""
+
+
+def taught_values(sequence: Sequence) -> Values:
+    """Room and templates of a sequence as plain values."""
+    room = sequence.room
+    return {
+        "room": {
+            "min": _numbers(room.minimum),
+            "max": _numbers(room.maximum),
+            "entrances": [
+                {"position": _numbers(entrance.position), "sigma": _numbers(entrance.sigma)}
+                for entrance in room.entrances
+            ],
+        },
+        "template": [
+            {
+                "name": template.name,
+                "camera": template.camera,
+                "frame": template.frame,
+                "box": _numbers(template.box),
+            }
+            for template in sequence.templates
+        ],
+    }
+
+
+def _numbers(vector: ndarray) -> list[float]:
+    return [float(value) for value in vector]
+
+
+def with_taught(opened: Sequence, values: Values, where: str) -> Sequence:
+    """A sequence with this room and these templates, and the rest as it was opened.
+
+    Its digest follows from the one that was opened and from the values, so that what was
+    computed of the same ones is found again.
+
+    Args:
+        opened: As its file was read.
+        values: Room and templates.
+        where: The file, as the messages begin.
+
+    Raises:
+        SequenceError: If a value does not fit; file, field, expected, found.
+    """
+    fields = Fields(where, values, ("room", "template"))
+    room = read_room(fields)
+    templates = read_templates(fields, opened.views, opened.frames)
+    digest = opened.digest
+    if values != taught_values(opened):
+        text = digest + json.dumps(values, sort_keys=True)
+        digest = hashlib.sha256(text.encode()).hexdigest()[:16]
+    return replace(opened, room=room, templates=templates, digest=digest)
+
+
+def changes(before: Values, after: Values) -> list[str]:
+    """What differs, one short sentence each; none where nothing does."""
+    words: list[str] = []
+    for old, new in paired_templates(before["template"], after["template"]):
+        if old is None and new is not None:
+            words.append(f"template {after['template'][new]['name']} added")
+        elif old is not None and new is None:
+            words.append(f"template {before['template'][old]['name']} removed")
+        elif old is not None and new is not None:
+            was, now = before["template"][old]["name"], after["template"][new]["name"]
+            if was != now:
+                words.append(f"template {was} renamed {now}")
+    for side, axis in FACES:
+        low, high = before["room"][side][axis], after["room"][side][axis]
+        if low != high:
+            words.append(f"room, {side} {AXES[axis]}: {low:g} to {high:g} m")
+    old_places, new_places = before["room"]["entrances"], after["room"]["entrances"]
+    for old, new in paired_entrances(old_places, new_places):
+        if old is None and new is not None:
+            words.append(f"entrance {new + 1} added")
+        elif new is None and old is not None:
+            words.append(f"entrance {old + 1} removed")
+        elif old is not None and new is not None and old_places[old] != new_places[new]:
+            words.append(f"entrance {new + 1} moved")
+    return words
+
+
+def paired_templates(before: list[Values], after: list[Values]) -> Pairs:
+    """Which template is which: of the same box, whatever it is called."""
+
+    def place(template: Values) -> Any:
+        return template["camera"], template["frame"], template["box"]
+
+    return _paired(before, after, lambda old, new: place(old) == place(new))
+
+
+def paired_entrances(before: list[Values], after: list[Values]) -> Pairs:
+    """Which entrance is which: the same one, else the next in order that is left over."""
+    pairs = _paired(before, after, lambda old, new: old == new)
+    gone = [old for old, new in pairs if new is None]
+    come = [new for old, new in pairs if old is None]
+    moved: Pairs = list(zip(gone, come, strict=False))
+    kept: Pairs = [pair for pair in pairs if None not in pair]
+    removed: Pairs = [(old, None) for old in gone[len(moved) :]]
+    added: Pairs = [(None, new) for new in come[len(moved) :]]
+    return sorted([*kept, *moved, *added], key=lambda pair: pair[1] or 0) + removed
+
+
+def _paired(before: list[Values], after: list[Values], same: Callable[[Any, Any], bool]) -> Pairs:
+    left = list(range(len(before)))
+    pairs: Pairs = []
+    for new, value in enumerate(after):
+        old = next((index for index in left if same(before[index], value)), None)
+        if old is not None:
+            left.remove(old)
+        pairs.append((old, new))
+    return [*pairs, *((old, None) for old in left)]

@@ -1,0 +1,1 @@
+"""Foreground objects by association matrices, Chang, Ma & Qiao 2007."""

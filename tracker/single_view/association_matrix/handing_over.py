@@ -1,0 +1,256 @@
+"""One step of the objects: decided by matrices, tracks handed over, newcomers named.
+
+[CMQ07] Chang, Ma, Qiao, "Human oriented multi-target tracking algorithm in video
+sequence", Control and Decision 22(4), 2007.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray
+from scipy.optimize import linear_sum_assignment
+
+from tracker.blobs import Blobs
+from tracker.parameters import AssociationMatrixParams
+from tracker.single_view.association_matrix import decision_matrices
+from tracker.single_view.association_matrix.following import coefficients
+from tracker.single_view.association_matrix.moving_objects import MovingObject, Situation, Track
+from tracker.single_view.protocol import ViewEvent
+
+STRAYING = 0.1
+"""How much further a lost object may be found with every step, as a share of its reach."""
+
+
+def decide(
+    situation: Situation, seen: Blobs, parameters: AssociationMatrixParams
+) -> tuple[Bool[ndarray, "I J"], Float[ndarray, "I J"]]:
+    """The decision matrix R, and the pixels that the objects of both steps share.
+
+    While the count stays, by distance; where it changes, or where not each object has
+    its own by distance, by overlap.
+    """
+    objects, p = situation.objects, parameters
+    before = np.array([one.box for one in objects]).reshape(-1, 4)
+    if p.overlap == "boxes" or situation.owners is None:
+        shared = decision_matrices.box_overlaps(before, seen.boxes)
+    else:
+        shared = decision_matrices.pixel_overlaps(
+            situation.owners, seen.owners, len(objects), seen.size
+        ).astype(float)
+    if len(objects) == seen.size:
+        expected = np.array([one.expected for one in objects]).reshape(-1, 2)
+        reach = p.reach * np.array([one.size for one in objects])
+        near = decision_matrices.decide_by_distance(
+            decision_matrices.distances(expected, seen.boxes[:, :2]), reach
+        )
+        if decision_matrices.is_one_to_one(near):
+            return near, shared
+    return shared > p.overlap_area, shared
+
+
+def advance(
+    situation: Situation,
+    seen: Blobs,
+    histograms: Float[ndarray, "J bins"],
+    parameters: AssociationMatrixParams,
+) -> tuple[Situation, list[ViewEvent]]:
+    """Hand the tracks of the objects before to the objects now ([CMQ07]).
+
+    Args:
+        situation: After the step before.
+        seen: This step's objects.
+        histograms: Their colours.
+        parameters: The numbers.
+
+    Returns:
+        The situation, in which those who are followed apart are still where they were;
+        and what happened.
+    """
+    work = _Step(situation, seen, histograms, parameters)
+    for rows, columns in decision_matrices.families(work.decision):
+        if not columns:
+            work.lost += [situation.objects[row] for row in rows]
+        elif not rows:
+            work.unknown += columns
+        else:
+            work.hand_over(rows, columns)
+    work.take_back()
+    work.name_newcomers()
+    return work.result()
+
+
+class _Step:
+    """One step's bookkeeping."""
+
+    def __init__(
+        self,
+        situation: Situation,
+        seen: Blobs,
+        histograms: Float[ndarray, "J bins"],
+        parameters: AssociationMatrixParams,
+    ) -> None:
+        self.before = situation
+        self.seen = seen
+        self.histograms = histograms
+        self.parameters = parameters
+        self.decision, self.shared = decide(situation, seen, parameters)
+        self.labels: list[list[int]] = [[] for _ in range(seen.size)]
+        self.sources: list[set[int]] = [set() for _ in range(seen.size)]
+        """Which objects before each one's tracks come from."""
+        self.lost: list[MovingObject] = list(situation.lost)
+        self.unknown: list[int] = []
+        self.next_label = situation.next_label
+        self.events: list[ViewEvent] = []
+        self.partings: list[list[int]] = []
+        """The objects that each one that split became."""
+
+    def tell(self, kind: str, labels: Iterable[int]) -> None:
+        self.events.append(ViewEvent(kind, tuple(sorted(set(labels)))))  # type: ignore[arg-type]
+
+    def hand_over(self, rows: list[int], columns: list[int]) -> None:
+        """The tracks of a family: all to its one object now, or each to the one it fits best."""
+        owners = [(label, row) for row in rows for label in self.before.objects[row].labels]
+        if len(columns) == 1:
+            for label, row in owners:
+                self.give(label, row, columns[0])
+            return
+        benefit = np.array([self.benefit(label, row, columns) for label, row in owners])
+        first, own = linear_sum_assignment(benefit, maximize=True)
+        chosen = dict(zip(first.tolist(), own.tolist(), strict=True))
+        for index, (label, row) in enumerate(owners):
+            self.give(label, row, columns[chosen.get(index, int(benefit[index].argmax()))])
+        self.unknown += [column for column in columns if not self.labels[column]]
+        for row in rows:
+            if decision_matrices.row_case(self.decision, row) == "splits":
+                self.partings.append(np.flatnonzero(self.decision[row]).tolist())
+
+    def benefit(self, label: int, row: int, columns: list[int]) -> Float[ndarray, " J"]:
+        """How well each object now fits a track, 0 … 1: by place if he was alone, else by colour.
+
+        [CMQ07]: after a split an object is the track's whose histogram before the merge
+        is most like its own.
+        """
+        if len(self.before.objects[row].labels) == 1:
+            pixels = self.shared[row, columns]
+            return np.asarray(pixels / max(float(pixels.sum()), 1.0))
+        own = self.before.tracks[label].histogram[None, :]
+        return np.asarray(coefficients(own, self.histograms[columns])[0])
+
+    def give(self, label: int, row: int, column: int) -> None:
+        self.labels[column].append(label)
+        self.sources[column].add(row)
+
+    def take_back(self) -> None:
+        """Objects that continue nobody may be somebody who was lost, near and of his colours."""
+        if not self.unknown or not self.lost:
+            return
+        p = self.parameters
+        alike = np.array(
+            [
+                coefficients(
+                    np.array([self.before.tracks[label].histogram for label in one.labels]),
+                    self.histograms[self.unknown],
+                ).max(axis=0)
+                for one in self.lost
+            ]
+        )
+        apart = decision_matrices.distances(
+            np.array([one.expected for one in self.lost]), self.seen.boxes[self.unknown, :2]
+        )
+        reach = [p.reach * one.size * (1.0 + STRAYING * one.missing) for one in self.lost]
+        alike[(apart > np.array(reach)[:, None]) | (alike < p.return_similarity)] = -1.0
+        rows, columns = linear_sum_assignment(alike, maximize=True)
+        found = [(r, c) for r, c in zip(rows.tolist(), columns.tolist(), strict=True)
+                 if alike[r, c] >= 0.0]  # fmt: skip
+        for row, column in found:
+            back = self.lost[row]
+            self.labels[self.unknown[column]] += back.labels
+            if back.missing:
+                self.tell("returned", back.labels)
+        self.lost = [one for row, one in enumerate(self.lost) if row not in {r for r, _ in found}]
+        taken = {column for _, column in found}
+        self.unknown = [one for index, one in enumerate(self.unknown) if index not in taken]
+
+    def name_newcomers(self) -> None:
+        """Everything else is somebody new."""
+        for column in self.unknown:
+            self.labels[column] = [self.next_label]
+            self.next_label += 1
+
+    def result(self) -> tuple[Situation, list[ViewEvent]]:
+        """Objects and tracks after this step; who is gone for too long has ended."""
+        objects: list[MovingObject] = []
+        tracks: dict[int, Track] = {}
+        for column in range(self.seen.size):
+            self.labels[column] = self._settled(self.labels[column])
+            objects.append(self._object(column))
+            tracks.update((track.label, track) for track in self._tracks(column, objects[-1]))
+        for became in self.partings:
+            held = [[one for one in self.labels[c] if self._sure(tracks[one])] for c in became]
+            if sum(len(labels) > 0 for labels in held) > 1:
+                self.tell("split", [label for labels in held for label in labels])
+        lost = []
+        for gone in self.lost:
+            known = [self.before.tracks[label] for label in gone.labels]
+            if not any(self._sure(track) for track in known):
+                continue
+            if gone.missing >= self.parameters.interrupted_steps:
+                self.tell("vanished", gone.labels)
+                continue
+            lost.append(replace(gone, missing=gone.missing + 1, followed=False))
+            tracks.update((track.label, track) for track in known)
+        after = Situation(tracks, tuple(objects), tuple(lost), self.seen.owners, self.next_label)
+        return after, self.events
+
+    def _sure(self, track: Track) -> bool:
+        """Whether he was alone for long enough to be somebody."""
+        return track.age >= self.parameters.confirmation_steps
+
+    def _settled(self, labels: list[int]) -> list[int]:
+        """Of those who come together the sure ones; of unsure ones alone the oldest.
+
+        A piece of somebody that comes off for a moment is no second person when it is
+        one with him again.
+        """
+        if len(labels) < 2:
+            return labels
+        known = [self.before.tracks[label] for label in sorted(labels)]
+        sure = [track.label for track in known if self._sure(track)]
+        return sure or [max(known, key=lambda track: track.age).label]
+
+    def _object(self, column: int) -> MovingObject:
+        labels, p = tuple(sorted(self.labels[column])), self.parameters
+        sources = [self.before.objects[row] for row in sorted(self.sources[column])]
+        sources = [source for source in sources if set(source.labels) & set(labels)]
+        box, area = self.seen.boxes[column], int(self.seen.areas[column])
+        velocity, followed = np.zeros(2), False
+        if len(sources) == 1 and sources[0].labels == labels:
+            velocity = 0.5 * (sources[0].velocity + box[:2] - sources[0].box[:2])
+            followed = sources[0].followed
+        elif len(sources) > 1:
+            self.tell("merged", labels)
+            alone = len(labels) == 2 and all(len(source.labels) == 1 for source in sources)
+            both = sum(self.before.tracks[label].area for label in labels)
+            followed = p.follow_mild and alone and area > p.mild_share * both
+            if not followed:
+                self.tell("occluded", labels)
+        return MovingObject(labels, box, area, velocity, followed=followed)
+
+    def _tracks(self, column: int, one: MovingObject) -> list[Track]:
+        """The tracks of an object: alone they learn, followed apart they stay, else they move."""
+        known = [self.before.tracks.get(label) for label in one.labels]
+        if len(known) == 1:
+            histogram, area, age = self.histograms[column], float(one.area), 1
+            if known[0] is not None:
+                age, rate = known[0].age + 1, self.parameters.histogram_rate
+                histogram = known[0].histogram + rate * (histogram - known[0].histogram)
+                area = known[0].area + rate * (area - known[0].area)
+            if age == self.parameters.confirmation_steps:
+                self.tell("new", one.labels)
+            return [Track(one.labels[0], one.box, area, histogram, age)]
+        there = [track for track in known if track is not None]
+        return there if one.followed else [replace(track, box=one.box) for track in there]

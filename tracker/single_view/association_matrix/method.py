@@ -1,0 +1,243 @@
+"""The tracker of foreground objects by association matrices: merge, split, new, vanished.
+
+[CMQ07] Chang, Ma, Qiao, "Human oriented multi-target tracking algorithm in video
+sequence", Control and Decision 22(4), 2007.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8, UInt16
+from numpy import ndarray
+
+from tracker import colour
+from tracker.blobs import Blobs, blobs
+from tracker.colour import BINS
+from tracker.foreground import ForegroundModel, learn, pack
+from tracker.parameters import AssociationMatrixParams, ForegroundParams
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.association_matrix.following import follow, object_histograms
+from tracker.single_view.association_matrix.handing_over import advance
+from tracker.single_view.association_matrix.joining import join
+from tracker.single_view.association_matrix.moving_objects import MovingObject, Situation
+from tracker.single_view.association_matrix.silhouettes import Fits, Silhouettes
+from tracker.single_view.protocol import ViewEvent, ViewResult
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AssociationMatrixState:
+    """Objects and tracks after a step, and the foreground model's state."""
+
+    situation: Situation
+    foreground: Any
+
+
+class AssociationMatrix:
+    """Tracks of foreground objects in one camera ([CMQ07]).
+
+    Per step: the foreground's pieces are the objects. A decision matrix R says which
+    object of the step before is which now: by distance while their count stays, by
+    overlap where it changes. A column of R that sums to 0 is somebody new, to 1 goes
+    on, to more is a merge; a row that sums to 0 is interrupted, and ended after N
+    steps, to more is a split. Two who merge and stay mostly visible are followed apart
+    by mean shift on their HSI histograms until their centres meet; else the merged
+    object carries all its tracks. After a split each object goes to the track whose
+    histogram before the merge is most like its own.
+
+    Beyond the paper: an object that continues nobody may be somebody interrupted, near
+    and of his colours. And an object is all of a person, or several, where the fusion
+    asks for targets, perhaps only heads: what it gets are the target boxes that the
+    objects' outlines fit, as many as an object has tracks, more where an outline says
+    so. The preset ``published`` hands over the objects themselves.
+    """
+
+    needs_pictures = True
+
+    def __init__(
+        self,
+        sequence: Sequence,
+        camera_index: int,
+        parameters: AssociationMatrixParams,
+        foreground: ForegroundParams,
+        reader: FrameReader,
+    ) -> None:
+        """Learn the background.
+
+        Raises:
+            ValueError: If the camera has no pictures.
+        """
+        view = sequence.views[camera_index]
+        if not view.has_pictures:
+            raise ValueError(
+                f'camera "{view.camera.name}" of {sequence.name} has no pictures; give it a video '
+                "or images in sequence.toml, or choose single_view none to use its detections"
+            )
+        self._parameters = parameters
+        self._minimum_area = foreground.minimum_area
+        self._foreground: ForegroundModel | None = learn(sequence, camera_index, reader, foreground)
+        reader.check()
+        self._silhouettes = Silhouettes(view.camera, sequence.room, sequence.target_half_extents)
+
+    def start(self) -> AssociationMatrixState:
+        """Nobody is in the picture."""
+        state = None if self._foreground is None else self._foreground.start()
+        return AssociationMatrixState(Situation.start(), state)
+
+    def step(
+        self,
+        state: AssociationMatrixState,
+        frame: int,
+        picture: UInt8[ndarray, "h w 3"] | None,
+        rng: np.random.Generator,
+    ) -> tuple[AssociationMatrixState, ViewResult]:
+        """One step; without a picture everything stays as it is and nothing is found."""
+        if picture is None or self._foreground is None:
+            return state, self._nothing(state.situation)
+        background, segmentation = self._foreground.step(state.foreground, picture)
+        mask = segmentation.mask
+        seen = blobs(mask, self._minimum_area)
+        if self._parameters.join_gap > 0.0:
+            heights = 2.0 * self._silhouettes.half_heights(seen.boxes[:, :2])
+            seen = join(seen, self._parameters.join_gap * heights)
+        bins = colour.bin_map(picture, "hsi")
+        histograms = object_histograms(bins, seen.owners, seen.size, BINS["hsi"])
+        situation, events = advance(state.situation, seen, histograms, self._parameters)
+        situation, met = self._follow(situation, seen, bins)
+        result = self._result(situation, seen, mask, [*events, *met])
+        result.information["threshold"] = float(segmentation.thresholds.mean())
+        return AssociationMatrixState(situation, background), result
+
+    def _follow(
+        self, situation: Situation, seen: Blobs, bins: UInt16[ndarray, "h w"]
+    ) -> tuple[Situation, list[ViewEvent]]:
+        """Move those who are followed apart; who cannot be told apart any more are one object."""
+        tracks, objects, events = dict(situation.tracks), list(situation.objects), []
+        for index, one in enumerate(situation.objects):
+            if not one.followed:
+                continue
+            moving = seen.owners == index
+            for label in one.labels:
+                track = tracks[label]
+                centre = follow(bins, moving, track.box, track.histogram)
+                tracks[label] = replace(track, box=np.concatenate([centre, track.box[2:]]))
+            first, second = (tracks[label].box for label in one.labels)
+            near = self._parameters.occlusion_distance * (first[2] + second[2]) / 2.0
+            if np.hypot(*(first[:2] - second[:2])) <= near:
+                objects[index] = replace(one, followed=False)
+                events.append(ViewEvent("occluded", one.labels))
+                for label in one.labels:
+                    tracks[label] = replace(tracks[label], box=one.box)
+        after = replace(situation, tracks=tracks, objects=tuple(objects))
+        return after, events
+
+    def _result(
+        self,
+        situation: Situation,
+        seen: Blobs,
+        mask: UInt8[ndarray, "h w"],
+        events: list[ViewEvent],
+    ) -> ViewResult:
+        objects, p = situation.objects, self._parameters
+        wanted = np.array([len(one.labels) for one in objects], dtype=np.int64)
+        if p.output == "targets":
+            fits = self._silhouettes.fit(
+                mask,
+                seen,
+                wanted,
+                acceptance=p.acceptance,
+                further_acceptance=p.further_acceptance,
+                spare_acceptance=p.spare_acceptance,
+            )
+            boxes, weights = fits.boxes, np.exp(np.minimum(fits.scores, 0.0))
+            labels = _labels_of_fits(fits, situation)
+        else:
+            boxes, labels = _apart(situation)
+            weights = np.ones(len(boxes))
+        estimates, estimate_labels = _estimates(situation, p.confirmation_steps)
+        return ViewResult(
+            boxes=boxes,
+            weights=weights,
+            labels=labels,
+            sigmas=self._sigmas(boxes),
+            estimates=estimates,
+            estimate_weights=np.ones(len(estimates)),
+            estimate_labels=estimate_labels,
+            measurements=seen.boxes,
+            measurement_scores=np.ones(seen.size),
+            samples=np.zeros((0, 4), np.float32),
+            sample_weights=np.zeros(0, np.float32),
+            information={
+                "objects": float(len(objects)),
+                "merged objects": float(sum(len(one.labels) > 1 for one in objects)),
+                "interrupted": float(len(situation.lost)),
+                "foreground share": float(mask.mean()),
+            },
+            events=tuple(events),
+            gates=self._gates(objects),
+            foreground=pack(mask),
+        )
+
+    def _nothing(self, situation: Situation) -> ViewResult:
+        """Without a picture."""
+        estimates, labels = _estimates(situation, self._parameters.confirmation_steps)
+        none = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
+        return replace(
+            none,
+            estimates=estimates,
+            estimate_weights=np.ones(len(labels)),
+            estimate_labels=labels,
+        )
+
+    def _sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
+        p, half_sizes = self._parameters, np.maximum(boxes[:, 2:], 0.5)
+        return np.concatenate([p.centre_sigma * half_sizes, p.size_sigma * half_sizes], axis=1)
+
+    def _gates(self, objects: tuple[MovingObject, ...]) -> Float[ndarray, "G 5"]:
+        """How far each object may be found in the next step."""
+        gates = np.zeros((len(objects), 5))
+        for index, one in enumerate(objects):
+            gates[index, :2] = one.expected
+            gates[index, [2, 4]] = (self._parameters.reach * one.size) ** 2
+        return gates
+
+
+def _estimates(
+    situation: Situation, confirmation: int
+) -> tuple[Float[ndarray, "E 4"], Int[ndarray, " E"]]:
+    """Every confirmed track that has an object: his own box if alone, else the merged object's."""
+    held = sorted(label for one in situation.objects for label in one.labels)
+    labels = [label for label in held if situation.tracks[label].age >= confirmation]
+    boxes = np.array([situation.tracks[label].box for label in labels]).reshape(-1, 4)
+    return boxes, np.array(labels, dtype=np.int64)
+
+
+def _apart(situation: Situation) -> tuple[Float[ndarray, "N 4"], Int[ndarray, " N"]]:
+    """The objects; two who are followed apart are two; who is merged has no label."""
+    boxes: list[ndarray] = []
+    labels: list[int] = []
+    for one in situation.objects:
+        alone = one.followed or len(one.labels) == 1
+        boxes += [situation.tracks[label].box for label in one.labels] if alone else [one.box]
+        labels += one.labels if alone else [-1]
+    return np.array(boxes).reshape(-1, 4), np.array(labels, dtype=np.int64)
+
+
+def _labels_of_fits(fits: Fits, situation: Situation) -> Int[ndarray, " N"]:
+    """Whose each fitted box is: the best of a lone track's object is his; -1 where unknown.
+
+    Of two who are followed apart each has the box nearest across the picture, if both have one.
+    """
+    labels = np.full(len(fits.boxes), -1, dtype=np.int64)
+    for index, one in enumerate(situation.objects):
+        mine = np.flatnonzero(fits.owners == index)
+        if len(one.labels) == 1:
+            labels[mine[:1]] = one.labels[0]
+        elif one.followed and len(mine) >= 2:
+            centres = [situation.tracks[label].box[0] for label in one.labels]
+            in_order = mine[:2][np.argsort(fits.boxes[mine[:2], 0], kind="stable")]
+            labels[in_order] = np.array(one.labels)[np.argsort(centres, kind="stable")]
+    return labels

@@ -1,0 +1,1 @@
+"""What the colour methods share: templates, likelihood and its peaks."""

@@ -1,0 +1,179 @@
+"""What people look like to one camera: their colours against the templates, and the foreground.
+
+Boxes are ``centre_x, centre_y, half_width, half_height`` in pixels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8, UInt16
+from numpy import ndarray
+
+from tracker import colour
+from tracker.colour import ColourSpaceName, KernelName
+from tracker.foreground import ForegroundModel, integral, learn, shape_scores
+from tracker.parameters import ForegroundParams
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.box_sizes import BoxSizes
+from tracker.single_view.colour.templates import read_templates
+
+SIZE_JITTER = 0.1
+"""Relative spread around the size that the target has at a place of the room: people differ."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """One picture, prepared for the comparison of many boxes."""
+
+    bins: UInt16[ndarray, "h w"]
+    """The histogram bin of each pixel."""
+    mask: UInt8[ndarray, "h w"] | None
+    """1 on the foreground; None where no background was learnt."""
+    sums: Int[ndarray, "h1 w1"] | None
+    """The mask's integral."""
+
+    @property
+    def foreground_share(self) -> float:
+        """Of the picture; 0 where no background was learnt."""
+        if self.mask is None or self.sums is None:
+            return 0.0
+        return float(self.sums[-1, -1]) / self.mask.size
+
+
+class Appearance:
+    """The templates' colours, the foreground model and the sizes that a target can have.
+
+    Made once per camera and run. What changes from step to step is the foreground
+    model's state, which the method carries.
+    """
+
+    def __init__(
+        self,
+        sequence: Sequence,
+        camera_index: int,
+        reader: FrameReader,
+        *,
+        colour_space: ColourSpaceName,
+        histogram_kernel: KernelName,
+        foreground: ForegroundParams | None,
+    ) -> None:
+        """Read the templates and learn the background.
+
+        Args:
+            sequence: Its templates and target.
+            camera_index: Whose pictures.
+            reader: Of the pictures.
+            colour_space: The histograms' bins.
+            histogram_kernel: How the pixels of a box count.
+            foreground: Numbers of the foreground model; None where none is needed.
+
+        Raises:
+            ValueError: If there are no pictures or templates, or a template cannot be read.
+        """
+        view = sequence.views[camera_index]
+        if not view.has_pictures:
+            raise ValueError(
+                f'camera "{view.camera.name}" of {sequence.name} has no pictures; give it a video '
+                "or images in sequence.toml, or choose single_view none to use its detections"
+            )
+        self.model = read_templates(sequence, colour_space, histogram_kernel, reader)
+        camera, room, half_extents = view.camera, sequence.room, sequence.target_half_extents
+        # no parameter has a say in it, so that a moved slider does not wait for it again
+        numbers = (*camera.numbers, room.minimum, room.maximum, half_extents)
+        self.sizes = reader.once(
+            ("sizes", camera.image_size, *(number.tobytes() for number in numbers)),
+            lambda: BoxSizes.of(camera, room, half_extents),
+        )
+        self._image_size = view.camera.image_size
+        self._foreground: ForegroundModel | None = None
+        if foreground is not None:
+            self._foreground = learn(sequence, camera_index, reader, foreground)
+
+    def start(self) -> Any:
+        """The state of the foreground model before the first picture."""
+        return None if self._foreground is None else self._foreground.start()
+
+    def look(self, state: Any, picture: UInt8[ndarray, "h w 3"]) -> tuple[Any, Scene]:
+        """Prepare a picture.
+
+        Args:
+            state: Of the foreground model, from :meth:`start` or the picture before.
+            picture: BGR.
+        """
+        bins = colour.bin_map(picture, self.model.space)
+        if self._foreground is None:
+            return state, Scene(bins, None, None)
+        state, found = self._foreground.step(state, picture)
+        return state, Scene(bins, found.mask, integral(found.mask))
+
+    def distances(self, scene: Scene, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N G"]:
+        """Bhattacharyya distance D of each box to each person's nearest template."""
+        return self.model.distances(scene.bins, boxes)
+
+    def shape_scores(
+        self,
+        scene: Scene,
+        boxes: Float[ndarray, "N 4"],
+        *,
+        inside_weight: float,
+        around_weight: float,
+    ) -> tuple[Float[ndarray, " N"], Float[ndarray, " N"]]:
+        """What the foreground says of each box: log factors of the likelihood, and shares inside.
+
+        As :func:`tracker.foreground.shape_scores`; without a foreground model the factors
+        are 0 and the shares 1.
+
+        Args:
+            scene: The picture.
+            boxes: Pixels.
+            inside_weight: a.
+            around_weight: b.
+        """
+        if scene.sums is None:
+            return np.zeros(len(boxes)), np.ones(len(boxes))
+        return shape_scores(
+            scene.sums, boxes, inside_weight=inside_weight, around_weight=around_weight
+        )
+
+    def draw_on_foreground(
+        self, count: int, scene: Scene, rng: np.random.Generator
+    ) -> Float[ndarray, "N 4"]:
+        """Boxes centred on foreground pixels, of the sizes that a target can have there.
+
+        Fewer than ``count`` where no target can be; none without foreground.
+        """
+        if scene.mask is None or count == 0:
+            return np.zeros((0, 4))
+        pixels = scene.mask.view(np.bool_).ravel().nonzero()[0]
+        if not len(pixels):
+            return np.zeros((0, 4))
+        rows, columns = np.divmod(rng.choice(pixels, count), scene.mask.shape[1])
+        return self._with_sizes(np.stack([columns, rows], axis=1), rng)
+
+    def draw_anywhere(self, count: int, rng: np.random.Generator) -> Float[ndarray, "N 4"]:
+        """Boxes centred anywhere in the picture, of the sizes that a target can have there.
+
+        Fewer than ``count`` where no target can be.
+        """
+        width, height = self._image_size
+        return self._with_sizes(rng.integers(0, [width, height], (count, 2)), rng)
+
+    def _with_sizes(
+        self, pixels: Int[ndarray, "N 2"], rng: np.random.Generator
+    ) -> Float[ndarray, "N 4"]:
+        centres = pixels + rng.uniform(-0.5, 0.5, pixels.shape)
+        sizes, possible = self.sizes.draw(centres, rng)
+        sizes *= np.exp(SIZE_JITTER * rng.standard_normal((len(pixels), 1)))
+        return np.concatenate([centres[possible], sizes[possible]], axis=1)
+
+    def within(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
+        """The boxes whose centre is in the picture, with sizes that a target can have."""
+        clipped = boxes.copy()
+        clipped[:, 2:] = np.clip(boxes[:, 2:], self.sizes.smallest, self.sizes.largest)
+        last = np.array(self._image_size) - 1
+        inside = ((clipped[:, :2] >= 0.0) & (clipped[:, :2] <= last)).all(axis=1)
+        return np.asarray(clipped[inside])

@@ -1,0 +1,211 @@
+"""Peaks of the colour likelihood: where in a picture somebody of the templates' colours is.
+
+[ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
+density filtering", 2021, §2.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, UInt8
+from numpy import ndarray
+
+from tracker import mean_shift
+from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.parameters import ColourPeakParams, ForegroundParams
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.box_sizes import BoxSizes
+from tracker.single_view.colour.appearance import Appearance, Scene
+
+MERGE_DISTANCE = 0.8
+"""Peaks closer than this, in half sizes, are one."""
+
+SAME_PERSON_DISTANCE = 1.5
+"""Peaks of the same person's colours closer than this, in half sizes, are one."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Peaks:
+    """What was found in one picture, and from which samples."""
+
+    boxes: Float[ndarray, "M 4"]
+    scores: Float[ndarray, " M"]
+    """Likelihood of each relative to that of a template's own colours, 0 … 1."""
+    samples: Float[ndarray, "S 4"]
+    sample_weights: Float[ndarray, " S"]
+    """Relative to the largest."""
+    mask: UInt8[ndarray, "h w"] | None
+    """The foreground, where it was asked for."""
+    information: dict[str, float]
+
+
+class PeakFinder:
+    """Finds the peaks in the pictures of one camera, by mean shift over weighted samples.
+
+    Boxes are sampled from an intensity and weighted by the likelihood, ṽ = l_z(x) v(x);
+    the peaks of ṽ that look enough like a person are kept, one at each place. Where
+    the parameters ask for it, part of the samples is drawn from the foreground, with
+    the sizes that the calibrated camera allows there, and the likelihood is multiplied
+    by what the foreground says of the box.
+    """
+
+    def __init__(
+        self,
+        sequence: Sequence,
+        camera_index: int,
+        parameters: ColourPeakParams,
+        foreground: ForegroundParams,
+        reader: FrameReader,
+    ) -> None:
+        """Read the templates and learn the background.
+
+        Raises:
+            ValueError: If there are no pictures or templates, or a template cannot be read.
+        """
+        self._parameters = p = parameters
+        asked = (
+            p.acceptance_foreground,
+            p.foreground_weight,
+            p.surroundings_weight,
+            p.foreground_samples,
+        )
+        self._appearance = Appearance(
+            sequence,
+            camera_index,
+            reader,
+            colour_space=p.colour_space,
+            histogram_kernel=p.histogram_kernel,
+            foreground=foreground if max(asked) > 0.0 else None,
+        )
+
+    @property
+    def sizes(self) -> BoxSizes:
+        """The sizes that a target can have."""
+        return self._appearance.sizes
+
+    def start(self) -> Any:
+        """The state of the foreground model before the first picture."""
+        return self._appearance.start()
+
+    def find(
+        self,
+        state: Any,
+        picture: UInt8[ndarray, "h w 3"],
+        intensity: GaussianMixture,
+        rng: np.random.Generator,
+    ) -> tuple[Any, Peaks]:
+        """The peaks of one picture.
+
+        Args:
+            state: Of the foreground model.
+            picture: BGR.
+            intensity: Where people are expected, over boxes.
+            rng: Draws the samples.
+
+        Returns:
+            The state for the next picture, and what was found.
+        """
+        state, scene = self._appearance.look(state, picture)
+        samples = self._sample(intensity, scene, rng)
+        scores, _, _ = self._score(scene, samples)
+        candidates = self._climb(samples, scores)
+        boxes, distances = self._accept(scene, candidates)
+        return state, Peaks(
+            boxes=boxes,
+            scores=np.exp(-0.5 * (distances / self._parameters.likelihood_sigma) ** 2),
+            samples=samples,
+            sample_weights=(
+                np.exp(scores.max(axis=1) - scores.max()) if len(scores) else np.zeros(0)
+            ),
+            mask=scene.mask,
+            information={
+                "peaks before acceptance": float(len(candidates)),
+                "least distance": float(distances.min()) if len(distances) else 1.0,
+                "foreground share": scene.foreground_share,
+            },
+        )
+
+    def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
+        """Standard deviations of peaks: proportional to the box."""
+        p = self._parameters
+        half_sizes = np.maximum(boxes[:, 2:], 0.5)
+        return np.concatenate([p.centre_sigma * half_sizes, p.size_sigma * half_sizes], axis=1)
+
+    def _sample(
+        self, intensity: GaussianMixture, scene: Scene, rng: np.random.Generator
+    ) -> Float[ndarray, "S 4"]:
+        """Boxes from the intensity and from the foreground."""
+        p = self._parameters
+        everywhere = round(p.samples * p.foreground_samples)
+        if intensity.size == 0 and p.foreground_samples > 0.0:
+            everywhere = p.samples
+        parts = [self._appearance.draw_on_foreground(everywhere, scene, rng)]
+        count = p.samples - everywhere
+        if intensity.size and count:
+            chosen = rng.choice(
+                intensity.size, count, p=intensity.weights / intensity.weights.sum()
+            )
+            factors = np.linalg.cholesky(intensity.covariances)
+            offsets = np.einsum("nab,nb->na", factors[chosen], rng.standard_normal((count, 4)))
+            parts.append(intensity.means[chosen] + offsets)
+        return self._appearance.within(np.concatenate(parts))
+
+    def _score(
+        self, scene: Scene, boxes: Float[ndarray, "N 4"]
+    ) -> tuple[Float[ndarray, "N G"], Float[ndarray, "N G"], Float[ndarray, " N"]]:
+        """Log-likelihood and distance D of each box for each person, and share of foreground."""
+        p = self._parameters
+        distances = self._appearance.distances(scene, boxes)
+        if not p.peaks_per_person:
+            distances = distances.min(axis=1, keepdims=True)
+        scores = -0.5 * (distances / p.likelihood_sigma) ** 2
+        factors, inside = self._appearance.shape_scores(
+            scene,
+            boxes,
+            inside_weight=p.foreground_weight,
+            around_weight=p.surroundings_weight,
+        )
+        return scores + factors[:, None], distances, inside
+
+    def _climb(
+        self, samples: Float[ndarray, "S 4"], scores: Float[ndarray, "S G"]
+    ) -> Float[ndarray, "M 4"]:
+        """The peaks of the weighted samples, by each person's colours for themselves."""
+        p = self._parameters
+        found = [np.zeros((0, 4))]
+        for person in range(scores.shape[1] if len(samples) else 0):
+            weights = np.exp(scores[:, person] - scores[:, person].max())
+            starts = mean_shift.starts(
+                samples, weights, p.mean_shift_starts, spread=p.spread_starts
+            )
+            peaks, _ = mean_shift.modes(
+                samples,
+                weights,
+                samples[starts],
+                bandwidth=p.bandwidth,
+                merge_distance=MERGE_DISTANCE,
+            )
+            found.append(peaks)
+        return np.concatenate(found)
+
+    def _accept(
+        self, scene: Scene, candidates: Float[ndarray, "M 4"]
+    ) -> tuple[Float[ndarray, "K 4"], Float[ndarray, " K"]]:
+        """The peaks that look enough like a person, and their distances; one at each place."""
+        p = self._parameters
+        scores, distances, inside = self._score(scene, candidates)
+        best, nearest, person = scores.max(axis=1), distances.min(axis=1), scores.argmax(axis=1)
+        good = best >= -0.5 * (p.acceptance_distance / p.likelihood_sigma) ** 2
+        if scene.mask is not None:
+            good &= inside >= p.acceptance_foreground
+        kept: list[int] = []
+        for i in np.argsort(-best, kind="stable"):
+            apart = (candidates[kept, :2] - candidates[i, :2]) / candidates[kept, 2:]
+            least = np.where(person[kept] == person[i], SAME_PERSON_DISTANCE, MERGE_DISTANCE)
+            if good[i] and np.all((apart**2).sum(axis=1) >= least**2):
+                kept.append(int(i))
+        return candidates[kept], nearest[kept]

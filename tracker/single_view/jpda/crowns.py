@@ -1,0 +1,166 @@
+"""Targets in a foreground mask of whom nothing is known: the tops of its pieces.
+
+People stand; what a camera sees of them from the side has their crown on top, however
+many of them one piece of foreground shows and whatever hides their legs. Of a target
+whose height above the floor is roughly known the calibrated camera tells the size.
+
+Of pieces of which it is known how many people they show,
+:mod:`~tracker.single_view.association_matrix.silhouettes` finds as
+many: it takes poorer boxes of those who are expected, and no more than very good ones of
+others.
+
+Boxes are ``centre_x, centre_y, half_width, half_height`` in pixels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+from numpy import ndarray
+from scipy.ndimage import minimum_filter1d
+
+from tracker.blobs import Blobs, blobs
+from tracker.camera import Camera
+from tracker.foreground import integral, shape_shares
+from tracker.sequences.sequence import Room
+from tracker.single_view.box_sizes import BELOW_FLOOR, BoxSizes
+
+HEIGHT_SIGMAS = 2.0
+"""Targets move within so many standard deviations of the heights they come in at."""
+
+CRACK = 0.5
+"""Cracks across a piece, between head and shirt for instance, of up to so many half heights."""
+
+TOP_REACH = 1.2
+"""The pixels under a top that are taken for the target's: so many half widths either side."""
+
+LEAST_INSIDE, MOST_ABOVE, MOST_BESIDE = 0.4, 0.5, 0.8
+"""Shares of foreground in a target's box, above it, and beside its upper part."""
+
+SAME_ACROSS, SAME_DOWN = 1.0, 1.5
+"""A top so many half widths beside and half heights under another is that target's shoulder."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Crowns:
+    """The targets of one mask."""
+
+    boxes: Float[ndarray, "N 4"]
+    inside: Float[ndarray, " N"]
+    """Share of foreground in each box."""
+    pieces: Float[ndarray, "N 4"]
+    """The box of the piece of foreground that each is the top of."""
+
+
+class TargetSizes:
+    """The middle size of a target at each place of a picture.
+
+    Of targets whose centres are as high above the floor as where people come in; of lower
+    ones, who sit or bend, where none of those can be. What is higher, an open door for
+    instance, is nobody. A room without entrances says nothing of heights.
+    """
+
+    def __init__(self, camera: Camera, room: Room, half_extents: Float[ndarray, " 3"]) -> None:
+        upright, lower = (
+            BoxSizes.of(camera, part, half_extents)
+            for part in _walked(room, float(half_extents[2]))
+        )
+        self._grid, places = lower, lower.places()
+        standing, there = upright.typical(places)
+        self._table = np.where(there[:, None], standing, lower.typical(places)[0])
+        somewhere = np.isfinite(self._table[:, 0])
+        self.middle = np.median(self._table[somewhere], axis=0) if somewhere.any() else np.ones(2)
+        """Half width and half height in the middle of all places, pixels."""
+
+    def at(self, centres: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
+        """Half width and half height of a target there, NaN where none can be."""
+        return np.asarray(self._table[self._grid.cells(centres)])
+
+    def under(self, tops: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
+        """The sizes of targets whose crowns are there."""
+        half_heights = np.full(len(tops), self.middle[1])
+        for _ in range(2):
+            sizes = self.at(np.stack([tops[:, 0], tops[:, 1] + half_heights], axis=1))
+            half_heights = np.where(np.isfinite(sizes[:, 1]), sizes[:, 1], half_heights)
+        return sizes
+
+
+def _walked(room: Room, half_height: float) -> tuple[Room, Room]:
+    """The parts of the room's volume that the centres of upright, and of all, targets are in."""
+    if not room.entrances:
+        return room, room
+    heights = np.array([entrance.position[2] for entrance in room.entrances])
+    sigmas = np.array([entrance.sigma[2] for entrance in room.entrances])
+    low, high = room.minimum.copy(), room.maximum.copy()
+    # the volume of box sizes begins where a target stands on its floor
+    low[2] = (heights - HEIGHT_SIGMAS * sigmas).min() - half_height + BELOW_FLOOR
+    high[2] = (heights + HEIGHT_SIGMAS * sigmas).max()
+    return Room(low, high), Room(room.minimum, high)
+
+
+def crowns(mask: UInt8[ndarray, "h w"], sizes: TargetSizes, minimum_area: int) -> Crowns:
+    """The targets that a mask shows from above the shoulders.
+
+    Cracks across a piece are closed. A column of a piece is a top where its first pixel
+    is the highest within a target's half width; of neighbours the middle one. A
+    target's box hangs from the top, centred on the pixels of its upper half. Boxes that
+    hold too little foreground, or have too much above or beside them, are nobody;
+    nor is a top that lies where a higher one's shoulders are.
+
+    Args:
+        mask: Foreground is what is not 0.
+        sizes: Of targets in this camera.
+        minimum_area: Smaller pieces are nobody.
+    """
+    crack = max(3, round(CRACK * float(sizes.middle[1])) | 1)
+    closed = cv2.morphologyEx(
+        (mask != 0).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((crack, 3), np.uint8)
+    )
+    pieces = blobs(closed, minimum_area)
+    found = [_tops(pieces, piece, sizes) for piece in range(pieces.size)]
+    boxes = np.concatenate([np.zeros((0, 4)), *found])
+    owners = np.repeat(np.arange(pieces.size), [len(tops) for tops in found])
+    inside, above, beside = shape_shares(integral(closed), boxes)
+    good = (inside >= LEAST_INSIDE) & (above <= MOST_ABOVE) & (beside <= MOST_BESIDE)
+    kept: list[int] = []
+    for i in np.argsort(boxes[:, 1] - boxes[:, 3], kind="stable").tolist():
+        apart = boxes[i, :2] - boxes[kept, :2]
+        across = np.abs(apart[:, 0]) / np.maximum(boxes[kept, 2], boxes[i, 2])
+        same = (across < SAME_ACROSS) & (apart[:, 1] < SAME_DOWN * boxes[kept, 3])
+        if good[i] and not same.any():
+            kept.append(i)
+    return Crowns(boxes[kept], inside[kept], pieces.boxes[owners[kept]])
+
+
+def _tops(pieces: Blobs, piece: int, sizes: TargetSizes) -> Float[ndarray, "N 4"]:
+    """The boxes of targets under every top of one piece."""
+    x, y, half_width, half_height = pieces.boxes[piece]
+    left, top = round(x - half_width + 0.5), round(y - half_height + 0.5)
+    width, height = round(2.0 * half_width), round(2.0 * half_height)
+    pixels = pieces.owners[top : top + height, left : left + width] == piece
+    first = pixels.argmax(axis=0)
+    half_sizes = sizes.under(np.stack([left + np.arange(width), top + first], axis=1).astype(float))
+    possible = np.isfinite(half_sizes[:, 0])
+    if not possible.any():
+        return np.zeros((0, 4))
+    reach = max(1, round(float(np.median(half_sizes[possible, 0]))))
+    highest = (first == minimum_filter1d(first, 2 * reach + 1, mode="nearest")) & possible
+    boxes = []
+    for start, end in _runs(highest):
+        column = (start + end - 1) // 2
+        across, down = half_sizes[column]
+        rows = slice(first[column], int(first[column] + down) + 1)
+        begin = max(0, int(column - TOP_REACH * across))
+        upper = pixels[rows, begin : int(column + TOP_REACH * across) + 1].sum(axis=0)
+        centre = left + begin + float(upper @ np.arange(len(upper))) / upper.sum()
+        boxes.append([centre, top + first[column] + down - 0.5, across, down])
+    return np.array(boxes).reshape(-1, 4)
+
+
+def _runs(flags: ndarray) -> Int[ndarray, "R 2"]:
+    """First and one past the last index of each run of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    return edges.reshape(-1, 2)

@@ -1,0 +1,1 @@
+"""The pseudo particle filter, Sun & Guo 2008."""

@@ -1,0 +1,122 @@
+"""Which mode of the particles is which target: the hypothesis matrix and its best assignment.
+
+[SG08] Sun, Guo, "Multiple object tracking with a pseudo particle filter", 2008.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+from scipy.optimize import linear_sum_assignment
+from scipy.special import logsumexp
+
+from tracker.single_view.pseudo_particle.register import Targets
+
+GATE = 3.0
+"""Standard deviations: a target at an unknown place is as likely as one this far off."""
+
+
+def vacancies(targets: Targets, persons: int, per_person: int) -> Int[ndarray, " A"]:
+    """Whom a mode may be besides the targets: each person as often as there may be more."""
+    taken = np.bincount(targets.persons, minlength=persons)
+    return np.repeat(np.arange(persons), np.maximum(per_person - taken, 0))
+
+
+def hypothesis_matrix(
+    modes: Float[ndarray, "M 4"],
+    distances: Float[ndarray, "M G"],
+    evidence: Float[ndarray, " M"],
+    expected: Targets,
+    vacant: Int[ndarray, " A"],
+    *,
+    sharpness: float,
+    background_distance: float,
+    position_sigma: float,
+) -> Float[ndarray, "M columns"]:
+    """Logarithms of how likely each mode is each target, a newcomer, or background ([SG08]).
+
+        h(m, t) = ε_m exp(-λ d(m, t)) exp(-½ |(x_m - x_t) / (σ_a H_t)|²)   of T targets
+        h(m, a) = ε_m exp(-λ d(m, a)) exp(-½ 3²)                          of A newcomers
+        h(m, 0) = exp(-λ d_0) exp(-½ 3²)                                  of the background
+
+    A newcomer's and the background's place is unknown; they count as three standard
+    deviations off, so that a target that is followed may look a little worse than they.
+
+    Args:
+        modes: Pixels.
+        distances: d of each mode to the colours of each of G persons.
+        evidence: ln ε_m, what else speaks for a mode being a person.
+        expected: The targets, where they are expected.
+        vacant: Persons that newcomers may be.
+        sharpness: λ.
+        background_distance: d_0.
+        position_sigma: σ_a, in half sizes H_t of a target.
+
+    Returns:
+        T + A + 1 columns; the background is the last.
+    """
+    colours = evidence[:, None] - sharpness * distances
+    apart = modes[:, None, :2] - expected.boxes[None, :, :2]
+    apart = apart / (position_sigma * np.maximum(expected.boxes[None, :, 2:], 0.5))
+    unknown = -0.5 * GATE**2
+    return np.concatenate(
+        [
+            colours[:, expected.persons] - 0.5 * (apart**2).sum(axis=2),
+            colours[:, vacant] + unknown,
+            np.full((len(modes), 1), unknown - sharpness * background_distance),
+        ],
+        axis=1,
+    )
+
+
+def best_hypothesis(matrix: Float[ndarray, "M columns"]) -> Int[ndarray, " M"]:
+    """The column of each mode in the likeliest assignment; the background takes any number.
+
+    Every other column is given away once at most, and the sum of the logarithms is the
+    greatest there is.
+    """
+    count, columns = matrix.shape
+    background = np.repeat(matrix[:, -1:], count, axis=1)
+    rows, chosen = linear_sum_assignment(
+        np.concatenate([matrix[:, :-1], background], axis=1), maximize=True
+    )
+    best = np.full(count, columns - 1)
+    best[rows] = np.minimum(chosen, columns - 1)
+    return best
+
+
+def apart(
+    modes: Float[ndarray, "M 4"],
+    existences: Float[ndarray, " M"],
+    columns: Int[ndarray, " M"],
+    known: int,
+    background: int,
+    separation: float,
+) -> Int[ndarray, " M"]:
+    """The same columns, with newcomers who stand too near to somebody sent to the background.
+
+    Args:
+        modes: Pixels.
+        existences: The surer of two newcomers stays.
+        columns: Of the hypothesis matrix, one a mode.
+        known: Number of the columns that are targets.
+        background: The background's column.
+        separation: In half sizes of whoever is there.
+    """
+    result = np.where(columns < known, columns, background)
+    for mode in np.argsort(-existences, kind="stable"):
+        if not known <= columns[mode] < background:
+            continue
+        there = modes[result < background]
+        offsets = (there[:, :2] - modes[mode, :2]) / there[:, 2:]
+        if np.all((offsets**2).sum(axis=1) >= separation**2):
+            result[mode] = columns[mode]
+    return result
+
+
+def somebody(matrix: Float[ndarray, "M columns"]) -> Float[ndarray, " M"]:
+    """The probability that each mode is not background: 1 - h(m, 0) / Σ h(m, ·)."""
+    if not len(matrix):
+        return np.zeros(0)
+    return np.asarray(-np.expm1(matrix[:, -1] - logsumexp(matrix, axis=1)))

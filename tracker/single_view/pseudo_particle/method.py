@@ -1,0 +1,308 @@
+"""The pseudo particle filter: one set of particles whose clusters are the targets.
+
+[SG08] Sun, Guo, "Multiple object tracking with a pseudo particle filter", 2008.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Float32, Int, UInt8
+from numpy import ndarray
+from scipy.special import expit
+
+from tracker import particles as particle_set
+from tracker.foreground import pack
+from tracker.parameters import ForegroundParams, PseudoParticleParams
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.colour.appearance import Scene
+from tracker.single_view.protocol import ViewEvent, ViewResult
+from tracker.single_view.pseudo_particle import hypotheses
+from tracker.single_view.pseudo_particle.hypotheses import GATE
+from tracker.single_view.pseudo_particle.particles import ColourParticles
+from tracker.single_view.pseudo_particle.register import UNCONFIRMED, Register, Targets, follow
+
+MERGE_DISTANCE = 1.0
+"""Modes closer than this, in half sizes, are one."""
+
+CLASSICAL_LABEL = 1
+"""Of the one estimate that the classical filter has."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PseudoParticleState:
+    """What one step leaves to the next."""
+
+    particles: Float[ndarray, "S 4"]
+    """Around the targets, or the classical filter's posterior; all of the same weight."""
+    register: Register
+    """Targets of the pseudo particle filter; the classical one has none."""
+    foreground: Any
+    """Of the foreground model."""
+
+
+class PseudoParticle:
+    """Particle filters on colour in one camera ([SG08]).
+
+    A particle is a box; random walk. Its weight is exp(-λ d), d the Bhattacharyya
+    distance between its histogram and the nearest of all targets' colours. One
+    multinomial resampling for all targets together leaves clusters, whose modes are
+    fixed points of the mean shift with the Epanechnikov kernel; small clusters are
+    dropped. The hypothesis matrix says which mode is which target, or background, and
+    the particles of the next step are drawn around each target anew. Some particles
+    look for newcomers.
+
+    The classical filter, for contrast, has one posterior and its mean.
+
+    Beyond the paper, and switched off by the preset ``published``: bins of hue and
+    saturation; what the foreground says of a box; newcomers looked for on it; each
+    target's particles resampled for themselves, and clusters for each person's colours;
+    targets that keep some of their velocity; newcomers who stand apart; all modes, not
+    the confirmed targets, go to the fusion.
+    """
+
+    needs_pictures = True
+
+    def __init__(
+        self,
+        sequence: Sequence,
+        camera_index: int,
+        parameters: PseudoParticleParams,
+        foreground: ForegroundParams,
+        reader: FrameReader,
+    ) -> None:
+        """Read the templates and learn the background.
+
+        Raises:
+            ValueError: If there are no pictures or templates, or a template cannot be read.
+        """
+        self._parameters = parameters
+        self._model = ColourParticles(sequence, camera_index, parameters, foreground, reader)
+        self._step_time = sequence.step_time
+
+    def start(self) -> PseudoParticleState:
+        """Nobody is in the picture."""
+        return PseudoParticleState(np.zeros((0, 4)), Register.empty(), self._model.start())
+
+    def step(
+        self,
+        state: PseudoParticleState,
+        frame: int,
+        picture: UInt8[ndarray, "h w 3"] | None,
+        rng: np.random.Generator,
+    ) -> tuple[PseudoParticleState, ViewResult]:
+        """One step; without a picture the particles only move."""
+        moved = self._model.move(state.particles, rng)
+        if picture is None:
+            return replace(state, particles=moved), self._unseen(state)
+        foreground, scene = self._model.look(state.foreground, picture)
+        if self._parameters.filter == "classical":
+            particles, result = self._classical(moved, scene, rng)
+            after = PseudoParticleState(particles, state.register, foreground)
+        else:
+            particles, register, result = self._pseudo(state.register, moved, scene, rng)
+            after = PseudoParticleState(particles, register, foreground)
+        mask = None if scene.mask is None else pack(scene.mask)
+        return after, replace(result, foreground=mask)
+
+    def _pseudo(
+        self,
+        register: Register,
+        moved: Float[ndarray, "S 4"],
+        scene: Scene,
+        rng: np.random.Generator,
+    ) -> tuple[Float[ndarray, "S 4"], Register, ViewResult]:
+        """Clusters, the hypothesis matrix, drawing anew: particles, targets and result."""
+        p = self._parameters
+        samples = np.concatenate([moved, self._model.newcomers(p.samples - len(moved), scene, rng)])
+        expected = register.targets.moved(p.velocity_share)
+        scores, persons = self._model.scores(scene, samples)
+        weights = (
+            particle_set.normalised(scores)
+            if p.resampling == "together"
+            else particle_set.normalised_by_group(scores, self._nearest(samples, expected))
+        )
+        counts = particle_set.resample(weights, p.samples, rng)
+        found = particle_set.clusters(
+            samples,
+            counts,
+            persons if p.clusters == "each" else np.zeros_like(persons),
+            bandwidth=p.bandwidth,
+            merge_distance=MERGE_DISTANCE,
+        )
+        modes = found.modes[found.shares >= p.smallest_cluster]
+        distances = self._model.distances(scene, modes)
+        evidence, inside = self._model.evidence(scene, modes)
+        good = inside >= p.acceptance_foreground
+        modes, distances, evidence = modes[good], distances[good], evidence[good]
+
+        vacant = hypotheses.vacancies(expected, self._model.persons, p.targets_per_person)
+        matrix = hypotheses.hypothesis_matrix(
+            modes,
+            distances,
+            evidence,
+            expected,
+            vacant,
+            sharpness=p.sharpness,
+            background_distance=p.acceptance_distance,
+            position_sigma=p.position_sigma,
+        )
+        existences = hypotheses.somebody(matrix)
+        background = matrix.shape[1] - 1
+        columns = hypotheses.apart(
+            modes,
+            existences,
+            hypotheses.best_hypothesis(matrix),
+            len(expected),
+            background,
+            p.separation,
+        )
+        after, events = follow(
+            register,
+            expected,
+            modes,
+            existences,
+            columns,
+            vacant,
+            confirmation=p.confirmation,
+            patience=self._steps(p.patience),
+            memory=self._steps(p.memory),
+        )
+        particles = self._around(after.targets, np.repeat(samples, counts, axis=0), rng)
+        taken = columns < background
+        labels = np.concatenate([expected.labels, np.full(len(vacant), -1)])[columns[taken]]
+        result = self._result(
+            after.targets,
+            modes=modes[taken],
+            scores=existences[taken],
+            labels=np.where(labels == UNCONFIRMED, -1, labels),
+            samples=samples,
+            sample_weights=_relative(weights),
+            gates=self._gates(expected),
+            events=events,
+            information={
+                "clusters": float(len(found.modes)),
+                "modes": float(len(modes)),
+                "effective particles": particle_set.effective_number(weights),
+                "foreground share": scene.foreground_share,
+            },
+        )
+        return particles, after, result
+
+    def _classical(
+        self, moved: Float[ndarray, "S 4"], scene: Scene, rng: np.random.Generator
+    ) -> tuple[Float[ndarray, "S 4"], ViewResult]:
+        """Sampling, importance weights, resampling: one posterior, and its mean."""
+        p = self._parameters
+        samples = moved if len(moved) else self._model.newcomers(p.samples, scene, rng)
+        weights = particle_set.normalised(self._model.scores(scene, samples)[0])
+        counts = particle_set.resample(weights, p.samples if len(samples) else 0, rng)
+        mean = (weights @ samples)[None] if len(samples) else np.zeros((0, 4))
+        scores, _ = self._model.scores(scene, mean)
+        existence = expit(scores + p.sharpness * p.acceptance_distance)
+        labels = np.full(len(mean), CLASSICAL_LABEL)
+        result = ViewResult(
+            boxes=mean,
+            weights=existence,
+            labels=labels,
+            sigmas=self._model.sigmas(mean),
+            estimates=mean,
+            estimate_weights=existence,
+            estimate_labels=labels,
+            measurements=mean,
+            measurement_scores=existence,
+            samples=samples.astype(np.float32),
+            sample_weights=_relative(weights),
+            information={"effective particles": particle_set.effective_number(weights)},
+        )
+        return np.repeat(samples, counts, axis=0), result
+
+    def _nearest(self, boxes: Float[ndarray, "S 4"], targets: Targets) -> Int[ndarray, " S"]:
+        """Of each box the target within whose gate it lies, the nearest; T outside all gates."""
+        if not len(targets):
+            return np.zeros(len(boxes), dtype=np.int64)
+        apart = boxes[:, None, :2] - targets.boxes[None, :, :2]
+        reach = GATE * self._parameters.position_sigma * np.maximum(targets.boxes[:, 2:], 0.5)
+        squared = ((apart / reach) ** 2).sum(axis=2)
+        return np.asarray(np.where(squared.min(axis=1) < 1.0, squared.argmin(axis=1), len(targets)))
+
+    def _around(
+        self, targets: Targets, resampled: Float[ndarray, "S 4"], rng: np.random.Generator
+    ) -> Float[ndarray, "S 4"]:
+        """The particles that the next step begins with: anew around targets, or the resampled."""
+        p = self._parameters
+        if not len(targets):
+            return np.zeros((0, 4))
+        count = p.samples - round(p.newcomer_share * p.samples)
+        if p.redistribution == 0.0:
+            return np.asarray(rng.permutation(resampled)[:count])
+        expected = targets.moved(p.velocity_share)
+        # one that is not seen may be anywhere that it has strayed to since
+        strayed = p.motion_sigma**2 * self._step_time * targets.misses
+        spread = np.sqrt(p.redistribution**2 + strayed)
+        sigmas = spread[:, None] * expected.boxes[:, 2:]
+        return particle_set.redistribute(expected.boxes, sigmas, count, rng)
+
+    def _gates(self, expected: Targets) -> Float[ndarray, "T 5"]:
+        """Ellipses within which the targets' modes are looked for."""
+        variances = (GATE * self._parameters.position_sigma * expected.boxes[:, 2:]) ** 2
+        across, down = variances.T
+        return np.column_stack([expected.boxes[:, :2], across, np.zeros_like(across), down])
+
+    def _steps(self, seconds: float) -> int:
+        return round(seconds / self._step_time)
+
+    def _result(
+        self,
+        targets: Targets,
+        *,
+        modes: Float[ndarray, "M 4"],
+        scores: Float[ndarray, " M"],
+        labels: Int[ndarray, " M"],
+        samples: Float[ndarray, "S 4"],
+        sample_weights: Float32[ndarray, " S"],
+        gates: Float[ndarray, "G 5"],
+        events: tuple[ViewEvent, ...],
+        information: dict[str, float],
+    ) -> ViewResult:
+        confirmed = targets.take(targets.confirmed)
+        boxes, weights, box_labels = modes, scores, labels
+        if self._parameters.output == "targets":
+            seen = confirmed.take(confirmed.misses == 0)
+            boxes, weights, box_labels = seen.boxes, seen.existences, seen.labels
+        return ViewResult(
+            boxes=boxes,
+            weights=weights,
+            labels=box_labels,
+            sigmas=self._model.sigmas(boxes),
+            estimates=confirmed.boxes,
+            estimate_weights=confirmed.existences,
+            estimate_labels=confirmed.labels,
+            measurements=modes,
+            measurement_scores=scores,
+            samples=samples.astype(np.float32),
+            sample_weights=sample_weights,
+            information=information,
+            events=events,
+            gates=gates,
+        )
+
+    def _unseen(self, state: PseudoParticleState) -> ViewResult:
+        """Without a picture: the targets of the step before, and nothing for the fusion."""
+        none = np.zeros(0)
+        confirmed = state.register.targets.take(state.register.targets.confirmed)
+        return replace(
+            ViewResult.of_boxes(np.zeros((0, 4)), none, np.zeros((0, 4))),
+            estimates=confirmed.boxes,
+            estimate_weights=confirmed.existences,
+            estimate_labels=confirmed.labels,
+        )
+
+
+def _relative(weights: Float[ndarray, " S"]) -> Float32[ndarray, " S"]:
+    """Weights as shares of the largest."""
+    largest = weights.max() if len(weights) else 1.0
+    return np.asarray(weights / largest, dtype=np.float32)

@@ -1,0 +1,108 @@
+"""Boxes as particles on colour: how they move, where newcomers are looked for, what they weigh."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+from numpy import ndarray
+
+from tracker import particles as particle_set
+from tracker.parameters import ForegroundParams, PseudoParticleParams
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.colour.appearance import Appearance, Scene
+
+
+class ColourParticles:
+    """The models that the pseudo particle filter and the classical one share.
+
+    Motion: a random walk in half sizes. Weight: exp(-λ d), d the Bhattacharyya distance
+    between the particle's histogram and the nearest of all targets' colours, times what
+    the foreground says of the box.
+    """
+
+    def __init__(
+        self,
+        sequence: Sequence,
+        camera_index: int,
+        parameters: PseudoParticleParams,
+        foreground: ForegroundParams,
+        reader: FrameReader,
+    ) -> None:
+        """Read the templates and learn the background, where something asks for it.
+
+        Raises:
+            ValueError: If there are no pictures or templates, or a template cannot be read.
+        """
+        p = self._parameters = parameters
+        weights = (p.foreground_weight, p.surroundings_weight, p.acceptance_foreground)
+        asked = p.birth == "foreground" or max(weights) > 0.0
+        self._appearance = Appearance(
+            sequence,
+            camera_index,
+            reader,
+            colour_space=p.colour_space,
+            histogram_kernel=p.histogram_kernel,
+            foreground=foreground if asked else None,
+        )
+        self._root_time = float(np.sqrt(sequence.step_time))
+        self.persons = len(self._appearance.model.names)
+
+    def start(self) -> Any:
+        """The state of the foreground model before the first picture."""
+        return self._appearance.start()
+
+    def look(self, state: Any, picture: UInt8[ndarray, "h w 3"]) -> tuple[Any, Scene]:
+        """Prepare a picture."""
+        return self._appearance.look(state, picture)
+
+    def move(
+        self, particles: Float[ndarray, "S 4"], rng: np.random.Generator
+    ) -> Float[ndarray, "S 4"]:
+        """Random walk in half sizes; a box grows or shrinks as a whole."""
+        p, root = self._parameters, self._root_time
+        noise = rng.standard_normal((len(particles), 3))
+        moved = particles.copy()
+        moved[:, :2] += p.motion_sigma * root * particles[:, 2:] * noise[:, :2]
+        moved[:, 2:] *= np.exp(p.growth_sigma * root * noise[:, 2:])
+        return self._appearance.within(moved)
+
+    def newcomers(
+        self, count: int, scene: Scene, rng: np.random.Generator
+    ) -> Float[ndarray, "N 4"]:
+        """Particles where somebody may have appeared."""
+        if self._parameters.birth == "foreground":
+            drawn = self._appearance.draw_on_foreground(count, scene, rng)
+        else:
+            drawn = self._appearance.draw_anywhere(count, rng)
+        return self._appearance.within(drawn)
+
+    def evidence(
+        self, scene: Scene, boxes: Float[ndarray, "N 4"]
+    ) -> tuple[Float[ndarray, " N"], Float[ndarray, " N"]]:
+        """What the foreground says of each box, and its share inside."""
+        p = self._parameters
+        return self._appearance.shape_scores(
+            scene, boxes, inside_weight=p.foreground_weight, around_weight=p.surroundings_weight
+        )
+
+    def scores(
+        self, scene: Scene, boxes: Float[ndarray, "N 4"]
+    ) -> tuple[Float[ndarray, " N"], Int[ndarray, " N"]]:
+        """The logarithm of each box's weight, and the person whose colours it fits best."""
+        distances = self._appearance.distances(scene, boxes)
+        colours = particle_set.log_likelihoods(distances, self._parameters.sharpness)
+        evidence, _ = self.evidence(scene, boxes)
+        return np.asarray(colours + evidence), np.asarray(distances.argmin(axis=1))
+
+    def distances(self, scene: Scene, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N G"]:
+        """d of each box to each person's colours."""
+        return self._appearance.distances(scene, boxes)
+
+    def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
+        """Standard deviations of modes: proportional to the box."""
+        p = self._parameters
+        half_sizes = np.maximum(boxes[:, 2:], 0.5)
+        return np.concatenate([p.centre_sigma * half_sizes, p.size_sigma * half_sizes], axis=1)
