@@ -49,7 +49,7 @@ def digests(data: Path, only: str = "") -> Iterator[tuple[str, Digests]]:
             yield piece.name, _of_recording(sequence, piece.steps)
         chosen = [one for one in chosen if only in f"{piece.name} / {one.name}"]
         for combination, run in runs(sequence, piece.steps, chosen):
-            yield f"{piece.name} / {combination.name}", _of_run(run)
+            yield f"{piece.name} / {combination.name}", of_run(run)
 
 
 def _rendered(room: str) -> Digests:
@@ -80,7 +80,7 @@ def _of_recording(sequence: Sequence, steps: int) -> Digests:
     return found
 
 
-def _of_run(run: Run) -> Digests:
+def of_run(run: Run) -> Digests:
     found: Digests = {}
     for index, camera in enumerate(run.sequence.cameras):
         steps = [views[index] for views in run.views]
