@@ -231,6 +231,7 @@ def test_a_failure_leaves_an_older_file_as_it_was(
     assert list(tmp_path.iterdir()) == [out]
 
 
+@pytest.mark.full
 def test_ctrl_c_in_the_middle_leaves_nothing(tmp_path: Path) -> None:
     folder = write_crossing(tmp_path / "long", 6000)
     out = tmp_path / "out"
@@ -328,6 +329,7 @@ def test_render_refuses_what_it_cannot_do(run: Runs, tmp_path: Path) -> None:
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.full
 def test_render_writes_what_track_reads(
     run: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
