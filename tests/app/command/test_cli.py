@@ -101,12 +101,15 @@ def test_benchmarks_run_from_a_checkout(
 
     monkeypatch.setattr(cli.subprocess, "run", note)
     wanted = tmp_path / "figures.json"
-    assert run("benchmark", "kernels", "targets", "--short", "--json", wanted)[0] == 1
-    ((line, where),) = lines
+    assert run("benchmark", "kernels", "targets", "--short", "--json", wanted, "--record")[0] == 1
+    chart = tmp_path / "chart.html"
+    run("benchmark", "--chart", chart)
+    (line, where), (drawn, _) = lines
     assert line == [
         *("-m", "tests.benchmarks", "kernels", "targets", "--short"),
-        *("--json", str(wanted)),
+        *("--json", str(wanted), "--record"),
     ]
+    assert drawn == ["-m", "tests.benchmarks", "--chart", str(chart)]
     assert (where / "tests" / "benchmarks" / "__main__.py").is_file()
 
 
