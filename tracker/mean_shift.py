@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.kernels import images
+from tracker.kernels.pictures import images
 
 ITERATIONS = 30
 """Steps after which a climb ends; most end after five to ten."""
