@@ -12,16 +12,16 @@ from numpy import ndarray
 from tests.engine.standing import RECOMMENDED, fuse, ids_of, line, watch
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.multi_bernoulli import MultiBernoulli
-from tracker.fusion.names import Names, recognise
 from tracker.fusion.protocol import Associations
+from tracker.fusion.reidentification import Identities, reidentify
 from tracker.single_view.protocol import ViewResult
 
 NOBODY = np.zeros(0, dtype=np.int64)
 
 
 def step(
-    names: Names, labels: list[int], looks: list[list[float]], seconds: float = 0.2
-) -> tuple[dict[int, int], Names]:
+    names: Identities, labels: list[int], looks: list[list[float]], seconds: float = 0.2
+) -> tuple[dict[int, int], Identities]:
     """One camera sees one box of each sure track, with these likenesses."""
     count = len(labels)
     boxes = np.ones((count, 4))
@@ -34,10 +34,12 @@ def step(
     )  # fmt: skip
     own = np.arange(count, dtype=np.int32)
     pairs = Associations(np.zeros(count, dtype=np.int32), own, own, np.ones(count, np.float32))
-    return recognise(names, posterior, pairs, [view], NOBODY, seconds)
+    return reidentify(names, posterior, pairs, [view], NOBODY, seconds)
 
 
-def watched(names: Names, labels: list[int], looks: list[list[float]], steps: int) -> Names:
+def watched(
+    names: Identities, labels: list[int], looks: list[list[float]], steps: int
+) -> Identities:
     """Many steps in which no label changes."""
     for _ in range(steps):
         renamed, names = step(names, labels, looks)
@@ -49,7 +51,7 @@ FIRST, SECOND, EITHER = [0.95, 0.05], [0.05, 0.95], [0.5, 0.5]
 
 
 def test_who_returns_after_long_absence_gets_his_label_back_once_it_is_sure() -> None:
-    names = watched(Names.none(), [1, 2], [FIRST, SECOND], 30)
+    names = watched(Identities.none(), [1, 2], [FIRST, SECOND], 30)
     assert names.owners.tolist() == [1, 2]
     names = watched(names, [2], [SECOND], 300)
     renamed, names = step(names, [2, 7], [SECOND, FIRST])
@@ -62,13 +64,13 @@ def test_who_returns_after_long_absence_gets_his_label_back_once_it_is_sure() ->
 
 
 def test_a_stranger_is_not_named_by_exclusion() -> None:
-    names = watched(Names.none(), [1, 2], [FIRST, SECOND], 30)
+    names = watched(Identities.none(), [1, 2], [FIRST, SECOND], 30)
     names = watched(names, [2], [SECOND], 20)
     watched(names, [2, 7], [SECOND, EITHER], 100)
 
 
 def test_two_tracks_that_were_exchanged_are_exchanged_back() -> None:
-    names = watched(Names.none(), [1, 2], [FIRST, SECOND], 20)
+    names = watched(Identities.none(), [1, 2], [FIRST, SECOND], 20)
     renamed: dict[int, int] = {}
     for _ in range(60):
         renamed, names = step(names, [1, 2], [SECOND, FIRST])
@@ -79,13 +81,13 @@ def test_two_tracks_that_were_exchanged_are_exchanged_back() -> None:
 
 
 def test_people_who_look_alike_keep_their_labels() -> None:
-    names = watched(Names.none(), [1, 2], [EITHER, EITHER], 200)
+    names = watched(Identities.none(), [1, 2], [EITHER, EITHER], 200)
     assert names.owners.tolist() == [-1, -1]
 
 
 def test_without_two_people_to_tell_apart_nothing_is_done() -> None:
     for looks in ([[1.0], [1.0]], [[], []]):
-        renamed, names = step(Names.none(), [1, 2], looks)
+        renamed, names = step(Identities.none(), [1, 2], looks)
         assert renamed == {}
         assert len(names.labels) == 0
 
@@ -93,7 +95,7 @@ def test_without_two_people_to_tell_apart_nothing_is_done() -> None:
 @given(st.integers(0, 10_000))
 def test_labels_stay_unique_and_what_is_kept_is_bounded(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    names, labels, free = Names.none(), [1, 2, 3], 4
+    names, labels, free = Identities.none(), [1, 2, 3], 4
     for _ in range(40):
         looks = rng.dirichlet([0.3, 0.3, 0.3], len(labels)).tolist()
         renamed, names = step(names, labels, looks, seconds=0.5)
