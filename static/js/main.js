@@ -1,23 +1,30 @@
 /** Wires the page: one store, one socket, one playback, and the panes that look at them. */
-import { createActions, valuesOf } from "./actions.js";
-import { fetcher, getJson, openStream } from "./api.js";
-import { all, one } from "./dom.js";
-import { commandFor, commandOf, keyLabel, keyOf, perform, register } from "./commands.js";
+import { createActions, valuesOf } from "./state/actions.js";
+import { fetcher, getJson, openStream } from "./state/api.js";
+import { all, one } from "./elements/dom.js";
+import { commandFor, commandOf, keyLabel, keyOf, perform, register } from "./state/commands.js";
 import { mountCameras } from "./panes/cameras.js";
 import { mountLayout } from "./panes/layout.js";
 import { mountNotes } from "./panes/notes.js";
 import { mountSheets } from "./panes/sheets.js";
-import { mountSide } from "./panes/side.js";
-import { mountTeach } from "./panes/teach.js";
+import { mountSide } from "./inspector/side.js";
+import { mountTeach } from "./inspector/teach.js";
 import { mountTimeline } from "./panes/timeline.js";
 import { mountTop } from "./panes/top.js";
 import { mountView3d } from "./panes/view3d.js";
-import { createPlayback } from "./playback.js";
-import { createStore } from "./store.js";
-import { readPlace, writePlace } from "./url.js";
+import { createPlayback } from "./play/playback.js";
+import { createStore } from "./state/store.js";
+import { readPlace, writePlace } from "./state/url.js";
 
 /** What is remembered in this browser: how the page looks, never what it shows. */
-const KEPT = /** @type {const} */ (["tab", "layers2d", "laneOrder", "measure", "singleKeys", "layout"]);
+const KEPT = /** @type {const} */ ([
+	"tab",
+	"layers2d",
+	"laneOrder",
+	"measure",
+	"singleKeys",
+	"layout",
+]);
 
 /** @returns {Partial<PageState>} */
 function remembered() {
@@ -69,15 +76,32 @@ const store = createStore(
 		singleKeys: true,
 		notes: [],
 		...remembered(),
-		layers2d: { measurements: true, estimates: false, boxes: true, samples: false, likelihood: false, foreground: false, trails: false, truth: true, ...remembered().layers2d },
+		layers2d: {
+			measurements: true,
+			estimates: false,
+			boxes: true,
+			samples: false,
+			likelihood: false,
+			foreground: false,
+			trails: false,
+			truth: true,
+			...remembered().layers2d,
+		},
 		theme: document.documentElement.dataset.theme === "light" ? "light" : "dark",
 	}),
 );
 
 const origin = Math.random().toString(36).slice(2);
 let seeks = 0;
-const playback = createPlayback(store, (step) => stream.send({ type: "seek", step, origin: `${origin}.${(seeks += 1)}` }));
-const actions = createActions({ store, seek: playback.seek, send: (message) => stream.send(message), receive: (state) => receiveState(state) });
+const playback = createPlayback(store, (step) =>
+	stream.send({ type: "seek", step, origin: `${origin}.${(seeks += 1)}` }),
+);
+const actions = createActions({
+	store,
+	seek: playback.seek,
+	send: (message) => stream.send(message),
+	receive: (state) => receiveState(state),
+});
 
 /** @type {Context} */
 const context = { store, playback, actions, retry: () => stream.retry(), press };
@@ -103,27 +127,38 @@ for (const control of all("[data-command], [data-command-key]")) {
 for (const chip of all("[data-layer2d], [data-layer3d]")) {
 	const { layer2d, layer3d } = chip.dataset;
 	const name = layer2d ?? layer3d ?? "";
-	chip.addEventListener("click", () => (layer2d ? actions.toggleLayer2d(name) : actions.toggleLayer3d(name)));
-	store.watch(["server", "sequence", "layers2d", "layers3d", "link"], ({ server, sequence, layers2d, layers3d, link }) => {
-		chip.ariaPressed = String(Boolean((layer2d ? layers2d : layers3d)[name]));
-		chip.disabled = layer2d ? !sequence : link !== "open";
-		chip.disabled ||= name === "truth" && !sequence?.has_truth;
-		chip.hidden = name === "pinned" && !server?.pinned;
-	});
+	chip.addEventListener("click", () =>
+		layer2d ? actions.toggleLayer2d(name) : actions.toggleLayer3d(name),
+	);
+	store.watch(
+		["server", "sequence", "layers2d", "layers3d", "link"],
+		({ server, sequence, layers2d, layers3d, link }) => {
+			chip.ariaPressed = String(Boolean((layer2d ? layers2d : layers3d)[name]));
+			chip.disabled = layer2d ? !sequence : link !== "open";
+			chip.disabled ||= name === "truth" && !sequence?.has_truth;
+			chip.hidden = name === "pinned" && !server?.pinned;
+		},
+	);
 }
 
 /** The place of the address is gone to once, when its sequence is open. */
 let place = start.place;
-if (start.unknown.length) actions.note("warn", `The address has unknown parts: ${start.unknown.join(", ")}`, "The rest of it is followed.");
+if (start.unknown.length)
+	actions.note(
+		"warn",
+		`The address has unknown parts: ${start.unknown.join(", ")}`,
+		"The rest of it is followed.",
+	);
 
-/** Go to a place as far as the open sequence is the place's.  @param {ServerState} server */
+/** Go to a place as far as the open sequence is the place's.  @param {Server.State} server */
 function arrive(server) {
 	const { sequence } = server;
 	if (!sequence) return;
 	const cameras = sequence.cameras.length;
 	const usual = cameras > 2 ? 0 : null;
 	// It may be that the place's sequence cannot be opened.
-	if (place.sequence && place.sequence !== sequence.name) return store.set({ step: server.playhead, large: usual });
+	if (place.sequence && place.sequence !== sequence.name)
+		return store.set({ step: server.playhead, large: usual });
 	const { step, camera, selection, values } = place;
 	place = { sequence: null, step: null, selection: null, camera: null, values: null };
 	store.set({
@@ -134,18 +169,27 @@ function arrive(server) {
 	if (values) void restore(server, values);
 }
 
-/** Have these values, and the defaults for all others.  @param {ServerState} server @param {Record<string, any>} values */
+/**
+ * Have these values, and the defaults for all others.
+ * @param {Server.State} server
+ * @param {Record<string, any>} values
+ */
 async function restore(server, values) {
 	const others = server.changed.filter((key) => !(key in values));
 	if (others.length) await actions.ask("POST", "parameters/reset", { keys: others });
-	const differing = Object.entries(values).filter(([key, value]) => String(server.parameters[key]) !== String(value));
+	const differing = Object.entries(values).filter(
+		([key, value]) => String(server.parameters[key]) !== String(value),
+	);
 	if (differing.length) await actions.change(Object.fromEntries(differing));
 }
 
-/** @param {ServerState} told @param {boolean} [streamed]  it came over the socket, in order */
+/** @param {Server.State} told @param {boolean} [streamed]  it came over the socket, in order */
 function receiveState(told, streamed = false) {
 	// A method is a choice like any other: it is listed, undone and taken up again with the values.
-	const server = { ...told, parameters: { ...told.parameters, ...told.methods, taught: told.teaching.key } };
+	const server = {
+		...told,
+		parameters: { ...told.parameters, ...told.methods, taught: told.teaching.key },
+	};
 	const before = store.get().server;
 	const changed = before?.sequence?.key !== server.sequence?.key;
 	// An answer to a request may be older than what the socket has brought since, and another
@@ -154,29 +198,64 @@ function receiveState(told, streamed = false) {
 	if (before?.sequence && !server.sequence) {
 		// The server was started anew: when the same sequence is open again, go where we were.
 		const { shown, selection, large } = store.get();
-		place = { sequence: before.sequence.name, step: Math.max(0, shown), selection, camera: large, values: valuesOf(before) };
+		place = {
+			sequence: before.sequence.name,
+			step: Math.max(0, shown),
+			selection,
+			camera: large,
+			values: valuesOf(before),
+		};
 	}
-	if (before === null && place.sequence && server.sequence?.name !== place.sequence && server.opening?.name !== place.sequence) {
+	if (
+		before === null &&
+		place.sequence &&
+		server.sequence?.name !== place.sequence &&
+		server.opening?.name !== place.sequence
+	) {
 		void actions.open(place.sequence);
 	}
 	if (changed) {
 		playback.clear(server.playhead);
 		actions.forget();
 		// What went wrong before it was opened is over.
-		store.set({ notes: store.get().notes.filter(({ level }) => level !== "error" || !before || !server.sequence), basis: "", timeline: null, span: null, scores: null, result: null, shown: -1, step: 0, playing: 0, range: [null, null], loop: false, hover: null, selection: server.selection });
+		store.set({
+			notes: store
+				.get()
+				.notes.filter(({ level }) => level !== "error" || !before || !server.sequence),
+			basis: "",
+			timeline: null,
+			span: null,
+			scores: null,
+			result: null,
+			shown: -1,
+			step: 0,
+			playing: 0,
+			range: [null, null],
+			loop: false,
+			hover: null,
+			selection: server.selection,
+		});
 	} else if (before) {
 		actions.remember(before.parameters, server.parameters);
 		if (before.selection !== server.selection) store.set({ selection: server.selection });
 		// Whoever looks through a camera in 3D wants to see its picture.
-		if (before.view !== server.view && typeof server.view === "number") store.set({ large: server.view });
+		if (before.view !== server.view && typeof server.view === "number")
+			store.set({ large: server.view });
 	}
 	const { sequence } = server;
 	const same = sequence && JSON.stringify(sequence) === JSON.stringify(before?.sequence);
-	if (!same) store.set({ sequence, frames: sequence?.frames ?? 0, fps: sequence?.fps ?? 25, cameras: sequence?.cameras ?? [] });
+	if (!same)
+		store.set({
+			sequence,
+			frames: sequence?.frames ?? 0,
+			fps: sequence?.fps ?? 25,
+			cameras: sequence?.cameras ?? [],
+		});
 	store.set({ server, run: server.run, layers3d: server.layers });
 	// The first word on the theme is this browser's, later ones are everybody's.
 	if (before) store.set({ theme: server.theme });
-	else if (server.theme !== store.get().theme) void actions.ask("POST", "theme", { theme: store.get().theme });
+	else if (server.theme !== store.get().theme)
+		void actions.ask("POST", "theme", { theme: store.get().theme });
 	if (changed || (place.sequence && place.sequence === sequence?.name)) arrive(server);
 	if (changed || before?.pinned?.key !== server.pinned?.key) void fetchScores();
 	if (before === null || before.opening?.name !== server.opening?.name) void fetchSequences();
@@ -211,12 +290,19 @@ const fetchScores = fetcher(async () => {
 	// A run without a step has no figures; they come with its first news.
 	if (!sequence?.has_truth || (!run?.done && run?.state !== "failed")) return;
 	const told = (/** @type {string} */ what) => getJson(`/api/evaluation${what}`);
-	const [evaluation, series, comparison] = await Promise.all([told(""), told(`/series?${part()}`), told("/comparison")]);
+	const [evaluation, series, comparison] = await Promise.all([
+		told(""),
+		told(`/series?${part()}`),
+		told("/comparison"),
+	]);
 	const reference = comparison && (await told(`/series?of=${comparison.against}&${part()}`));
-	if (store.get().sequence?.key === sequence.key) store.set({ scores: { evaluation, series, reference } });
+	if (store.get().sequence?.key === sequence.key)
+		store.set({ scores: { evaluation, series, reference } });
 });
 
-const fetchSequences = fetcher(async () => store.set({ sequences: (await getJson("/api/sequences")).sequences }));
+const fetchSequences = fetcher(async () =>
+	store.set({ sequences: (await getJson("/api/sequences")).sequences }),
+);
 const fetchSchema = fetcher(async () => store.set({ schema: await getJson("/api/schema") }));
 
 /** @param {any} message */
@@ -230,7 +316,11 @@ function receive(message) {
 			break;
 		case "playhead":
 			// Of our own seeks the newest counts too: the server may have come to it after another's.
-			if (store.get().sequence && (!message.origin.startsWith(origin) || message.origin === `${origin}.${seeks}`)) playback.follow(message.step);
+			if (
+				store.get().sequence &&
+				(!message.origin.startsWith(origin) || message.origin === `${origin}.${seeks}`)
+			)
+				playback.follow(message.step);
 			break;
 		case "step":
 			showRun(message.run);
@@ -271,19 +361,34 @@ const stream = openStream("/api/stream", {
 	lost(retryAt) {
 		const { link, lostAt, server, shown, selection, large } = store.get();
 		// A server that was started anew stands at its own first step: go back to where we are.
-		if (link === "open" && server?.sequence) place = { sequence: server.sequence.name, step: Math.max(0, shown), selection, camera: large, values: valuesOf(server) };
+		if (link === "open" && server?.sequence)
+			place = {
+				sequence: server.sequence.name,
+				step: Math.max(0, shown),
+				selection,
+				camera: large,
+				values: valuesOf(server),
+			};
 		store.set({ link: "lost", retryAt, playing: 0, lostAt: link === "lost" ? lostAt : Date.now() });
 	},
 	message: receive,
 });
 
-/** Run the command of a key, unless somebody types. @param {KeyboardEvent} event @returns {boolean} whether there was one */
+/**
+ * Run the command of a key, unless somebody types.
+ * @param {KeyboardEvent} event
+ * @returns {boolean} whether there was one
+ */
 function press(event) {
 	const key = keyOf(event);
 	const target = /** @type {Element} */ (event.target);
 	const open = document.querySelector("dialog[open]");
 	if (open && !(open.matches(".help") ? key === "?" : key === "Ctrl+k")) return false;
-	if (key !== "Ctrl+k" && target.matches?.("input:not([type=range], [type=checkbox]), textarea, [contenteditable=true]")) return false;
+	if (
+		key !== "Ctrl+k" &&
+		target.matches?.("input:not([type=range], [type=checkbox]), textarea, [contenteditable=true]")
+	)
+		return false;
 	// In a list letters and arrows choose.
 	if (!key.startsWith("Ctrl+") && target.matches?.("select")) return false;
 	// Space on a focused control presses that control.
@@ -300,7 +405,8 @@ document.addEventListener("keydown", press);
 // which keeps all keys to itself while it has the focus, gives it back.
 document.addEventListener("mousedown", (event) => {
 	if (document.activeElement instanceof HTMLIFrameElement) document.activeElement.blur();
-	if (event.target instanceof Element && event.target.closest("button, tr, .cam")) event.preventDefault();
+	if (event.target instanceof Element && event.target.closest("button, tr, .cam"))
+		event.preventDefault();
 });
 
 store.on(["span"], () => {
@@ -313,7 +419,10 @@ store.on(["theme"], ({ theme }) => {
 });
 store.on([...KEPT], (state) => {
 	try {
-		localStorage.setItem("page", JSON.stringify(Object.fromEntries(KEPT.map((key) => [key, state[key]]))));
+		localStorage.setItem(
+			"page",
+			JSON.stringify(Object.fromEntries(KEPT.map((key) => [key, state[key]]))),
+		);
 	} catch {
 		// Without storage the page forgets; nothing else changes.
 	}
@@ -329,10 +438,21 @@ store.on(["shown", "selection", "large", "server"], () => {
 		writing = undefined;
 		const { server, shown, selection, large } = store.get();
 		if (!server?.sequence || shown < 0 || server.opening) return;
-		const here = { sequence: server.sequence.name, step: shown, selection, camera: large, values: valuesOf(server) };
+		const here = {
+			sequence: server.sequence.name,
+			step: shown,
+			selection,
+			camera: large,
+			values: valuesOf(server),
+		};
 		const search = writePlace(here);
 		const next = writePlace({ ...here, step: null });
-		if (search !== location.search) history[standing && next !== standing ? "pushState" : "replaceState"](here, "", search || location.pathname);
+		if (search !== location.search)
+			history[standing && next !== standing ? "pushState" : "replaceState"](
+				here,
+				"",
+				search || location.pathname,
+			);
 		standing = next;
 		document.title = `${server.sequence.name} · multiview-phd`;
 	}, 400);

@@ -2,7 +2,10 @@
 
 const KNOWN = ["seq", "step", "sel", "cam"];
 
-/** @param {string} search  with or without the question mark @returns {{place: Place, unknown: string[]}} keys that mean nothing here are named, not fatal */
+/**
+ * @param {string} search  with or without the question mark
+ * @returns {{place: Place, unknown: string[]}} keys that mean nothing here are named, not fatal
+ */
 export function readPlace(search) {
 	const query = new URLSearchParams(search);
 	const whole = (/** @type {string} */ key) => {
@@ -17,13 +20,18 @@ export function readPlace(search) {
 			step: whole("step"),
 			selection: whole("sel"),
 			camera: camera === null || camera < 1 ? null : camera - 1,
-			values: values.length ? Object.fromEntries(values.map(([key, text]) => [key.slice(2), text])) : null,
+			values: values.length
+				? Object.fromEntries(values.map(([key, text]) => [key.slice(2), text]))
+				: null,
 		},
 		unknown: [...query.keys()].filter((key) => !KNOWN.includes(key) && !key.startsWith("p.")),
 	};
 }
 
-/** @param {Place} place  the camera is an index; the address counts from 1, as the page does @returns {string} beginning with a question mark, or empty */
+/**
+ * @param {Place} place  the camera is an index; the address counts from 1, as the page does
+ * @returns {string} beginning with a question mark, or empty
+ */
 export function writePlace({ sequence, step, selection, camera, values }) {
 	const query = new URLSearchParams();
 	if (sequence) query.set("seq", sequence);

@@ -19,7 +19,8 @@ export function createStore(initial, schedule = queueMicrotask) {
 	function flush() {
 		const changed = pending;
 		pending = new Set();
-		for (const { keys, listener } of [...listeners]) if (keys.some((key) => changed.has(key))) listener(state);
+		for (const { keys, listener } of [...listeners])
+			if (keys.some((key) => changed.has(key))) listener(state);
 	}
 
 	return {

@@ -9,7 +9,12 @@ export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
 /** A whole step of the sequence, 0 for an empty one. @param {number} step @param {number} frames */
 export const clampStep = (step, frames) => Math.max(0, Math.min(frames - 1, Math.round(step)));
 
-/** First and last step that are played. @param {[number | null, number | null]} range  in and out points @param {number} frames @returns {[number, number]} */
+/**
+ * First and last step that are played.
+ * @param {[number | null, number | null]} range  in and out points
+ * @param {number} frames
+ * @returns {[number, number]}
+ */
 export function playedRange([from, to], frames) {
 	const first = clampStep(from ?? 0, frames);
 	return [first, Math.max(first, clampStep(to ?? frames - 1, frames))];
@@ -36,7 +41,11 @@ export function advance({ step, rest }, seconds, { fps, speed, direction, first,
 	if (next >= first && next <= last) return { step: next, rest: left, ended: false };
 	const [start, end] = direction > 0 ? [first, last] : [last, first];
 	if (!loop) return { step: end, rest: 0, ended: true };
-	return { step: step === end || step < first || step > last ? start : end, rest: left, ended: false };
+	return {
+		step: step === end || step < first || step > last ? start : end,
+		rest: left,
+		ended: false,
+	};
 }
 
 /**
@@ -57,7 +66,10 @@ export function prefetchWindow(step, { frames, fps, speed, direction, most, seco
 	return steps.filter((k) => k >= 0 && k < frames).slice(0, Math.max(1, most));
 }
 
-/** Neighbouring steps joined into ranges, ascending and inclusive. @param {Iterable<number>} steps */
+/**
+ * Neighbouring steps joined into ranges, ascending and inclusive.
+ * @param {Iterable<number>} steps
+ */
 export function rangesOf(steps) {
 	/** @type {[number, number][]} */
 	const ranges = [];
@@ -69,19 +81,38 @@ export function rangesOf(steps) {
 	return ranges;
 }
 
-/** CSS pixels from the left end of the axis. @param {number} step  may lie between two steps @param {View} view */
-export const xOf = (step, { first, last, width }) => (last > first ? ((step - first) / (last - first)) * width : 0);
+/**
+ * CSS pixels from the left end of the axis.
+ * @param {number} step  may lie between two steps
+ * @param {View} view
+ */
+export const xOf = (step, { first, last, width }) =>
+	last > first ? ((step - first) / (last - first)) * width : 0;
 
-/** Where a step is among values of which each stands for some steps. @param {number} step @param {Buckets} buckets */
+/**
+ * Where a step is among values of which each stands for some steps.
+ * @param {number} step
+ * @param {Buckets} buckets
+ */
 export const bucketOf = (step, { first, stride }) => Math.floor((step - first) / stride);
 
-/** The whole step at CSS pixels from the left end, inside the view. @param {number} x @param {View} view */
+/**
+ * The whole step at CSS pixels from the left end, inside the view.
+ * @param {number} x
+ * @param {View} view
+ */
 export function stepAt(x, { first, last, width }) {
 	const step = width > 0 ? first + (x / width) * (last - first) : first;
 	return Math.round(Math.max(first, Math.min(last, step)));
 }
 
-/** The view after zooming at CSS pixels x, which keep their step. @param {View} view @param {number} factor  below 1 shows fewer steps @param {number} x @param {number} frames */
+/**
+ * The view after zooming at CSS pixels x, which keep their step.
+ * @param {View} view
+ * @param {number} factor  below 1 shows fewer steps
+ * @param {number} x
+ * @param {number} frames
+ */
 export function zoomed(view, factor, x, frames) {
 	const whole = Math.max(1, frames - 1);
 	const span = Math.max(Math.min(20, whole), Math.min(whole, (view.last - view.first) * factor));
@@ -90,14 +121,23 @@ export function zoomed(view, factor, x, frames) {
 	return panned({ ...view, first, last: first + span }, 0, frames);
 }
 
-/** The view moved by some steps, inside the sequence. @param {View} view @param {number} steps @param {number} frames */
+/**
+ * The view moved by some steps, inside the sequence.
+ * @param {View} view
+ * @param {number} steps
+ * @param {number} frames
+ */
 export function panned(view, steps, frames) {
 	const span = view.last - view.first;
 	const first = Math.max(0, Math.min(frames - 1 - span, view.first + steps));
 	return { ...view, first, last: first + span };
 }
 
-/** Distance of labelled and of small ticks: 1, 2 or 5 times a power of ten. @param {View} view @param {number} [pixels]  of two labels, at least */
+/**
+ * Distance of labelled and of small ticks: 1, 2 or 5 times a power of ten.
+ * @param {View} view
+ * @param {number} [pixels]  of two labels, at least
+ */
 export function tickSteps({ first, last, width }, pixels = 80) {
 	const raw = Math.max(1, ((last - first) / Math.max(1, width)) * pixels);
 	const power = 10 ** Math.floor(Math.log10(raw));
@@ -108,7 +148,12 @@ export function tickSteps({ first, last, width }, pixels = 80) {
 /** Seconds with two decimals. @param {number} step @param {number} fps */
 export const secondsOf = (step, fps) => (step / fps).toFixed(2);
 
-/** What a person typed: `264` is a step, `10.56 s` or `10,56s` a time, null neither. @param {string} text @param {number} fps @param {number} frames */
+/**
+ * What a person typed: `264` is a step, `10.56 s` or `10,56s` a time, null neither.
+ * @param {string} text
+ * @param {number} fps
+ * @param {number} frames
+ */
 export function parseStep(text, fps, frames) {
 	const match = /^\s*(\d+(?:[.,]\d+)?)\s*(s?)\s*$/.exec(text);
 	if (!match) return null;
