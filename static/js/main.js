@@ -337,7 +337,8 @@ function receive(message) {
 			actions.note(message.level, message.message, message.hint ?? "");
 			break;
 		case "command":
-			// Keys inside our own frame come here by themselves; this is for a 3D view in a window of its own.
+			// Keys inside our own frame come here by themselves; this is for a 3D view in a window of its
+			// own.
 			if (document.hasFocus() && document.activeElement === one("iframe")) break;
 			perform(commandOf(message.name), actions);
 			break;

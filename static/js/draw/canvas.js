@@ -25,7 +25,11 @@ export function trace(g, points) {
 
 /**
  * Stroke the current path, with a dark halo under it where it lies on a picture.
- * @param {Brush} g @param {string} colour @param {number} width @param {number[]} [dash] @param {number} [halo]  its opacity
+ * @param {Brush} g
+ * @param {string} colour
+ * @param {number} width
+ * @param {number[]} [dash]
+ * @param {number} [halo] its opacity
  */
 export function stroke(g, colour, width, dash = [], halo = 0) {
 	g.setLineDash(dash);

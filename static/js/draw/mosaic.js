@@ -7,7 +7,8 @@
  * @param {number[]} aspects  width by height of each camera
  * @param {number | null} large  index of the large one; null for all alike
  * @param {{width: number, most: number, gap: number}} room  `most` is the height that may be used
- * @returns {{cells: Cell[], height: number}} cells relative to the mosaic, its height with the gaps around
+ * @returns {{cells: Cell[], height: number}} cells relative to the mosaic, its height with the gaps
+ * around
  */
 export function mosaic(aspects, large, { width, most, gap }) {
 	if (aspects.length === 0) return { cells: [], height: 0 };

@@ -6,7 +6,10 @@ import { stroke, trace } from "./canvas.js";
 /**
  * A staircase: numbers of people hold for a whole step. Of many steps on one pixel the
  * lowest and the highest are drawn, so that a short change never disappears.
- * @param {Pen} pen @param {Buckets} buckets @param {{low: number[], high: number[]}} values @param {number} top  value at the upper edge
+ * @param {Pen} pen
+ * @param {Buckets} buckets
+ * @param {{low: number[], high: number[]}} values
+ * @param {number} top value at the upper edge
  * @param {string} colour @param {number} width @param {number[]} [dash]
  */
 function drawStairs({ g, row, view }, buckets, { low, high }, top, colour, width, dash) {
@@ -75,7 +78,10 @@ export function drawCardinality(pen, timeline) {
 /**
  * A distance between the sets of people and estimates, stacked: how much of it is place, how
  * much is number. Of the steps on one pixel the worst is drawn; what leaves the axis is capped.
- * @param {Pen} pen @param {Server.EvaluationSeries} series @param {Server.EvaluationSeries | null} reference @param {"ospa" | "gospa"} name
+ * @param {Pen} pen
+ * @param {Server.EvaluationSeries} series
+ * @param {Server.EvaluationSeries | null} reference
+ * @param {"ospa" | "gospa"} name
  */
 export function drawParts(pen, series, reference, name) {
 	drawGround(pen);

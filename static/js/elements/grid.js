@@ -7,7 +7,8 @@ import { fill, h, write } from "./dom.js";
  * @param {Column<R>[]} columns
  * @param {object} how
  * @param {(row: R) => string | number} how.key
- * @param {string} [how.by]  word of the column that sorts at first; without one rows stay in their order
+ * @param {string} [how.by] word of the column that sorts at first; without one rows stay in their
+ * order
  * @param {boolean} [how.down]  from the largest
  * @param {(row: R) => void} [how.choose]  by click or Enter
  * @param {(row: R) => void} [how.open]  by double click

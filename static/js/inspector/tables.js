@@ -45,7 +45,8 @@ export function mountTables(root, { store, actions }) {
 			const text = await (await request(`/api/tables/${path(store.get())}`)).text();
 			if (text === told) return;
 			told = text;
-			// Where the focus was, it is again, on the one in its place; what is being typed stays, but for what the server has taken.
+			// Where the focus was, it is again, on the one in its place; what is being typed stays, but
+			// for what the server has taken.
 			const held = document.activeElement;
 			const at = all("button, input", body).findIndex((control) => control === held);
 			const typed = all("input", body).filter(({ value, defaultValue }) => value !== defaultValue);

@@ -29,7 +29,8 @@ export function mountView3d(root, { store, actions, retry, press }) {
 		}
 		cover();
 	}
-	// After a click into 3D its document has the keys; ours come first, but for those that move its camera.
+	// After a click into 3D its document has the keys; ours come first, but for those that move its
+	// camera.
 	frame.addEventListener("load", () =>
 		frame.contentWindow?.addEventListener(
 			"keydown",

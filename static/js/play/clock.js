@@ -27,7 +27,8 @@ export function playedRange([from, to], frames) {
  * clock, play slows down and nothing is skipped. Above, steps may be skipped.
  * @param {{step: number, rest: number}} now  `rest` is the part of a step already waited for
  * @param {number} seconds  since the last call
- * @param {{fps: number, speed: number, direction: 1 | -1, first: number, last: number, loop: boolean}} how
+ * @param {{fps: number, speed: number, direction: 1 | -1, first: number, last: number, loop:
+ * boolean}} how
  * @returns {{step: number, rest: number, ended: boolean}}
  */
 export function advance({ step, rest }, seconds, { fps, speed, direction, first, last, loop }) {
@@ -35,7 +36,8 @@ export function advance({ step, rest }, seconds, { fps, speed, direction, first,
 	const whole = Math.floor(due + 1e-9);
 	if (whole === 0) return { step, rest: due, ended: false };
 	const stride = Math.min(whole, speed <= 1 ? 1 : Math.max(1, Math.ceil(speed * 2)));
-	// Up to a step of lateness is caught up; more is forgotten: play is late, it does not race afterwards.
+	// Up to a step of lateness is caught up; more is forgotten: play is late, it does not race
+	// afterwards.
 	const left = Math.min(1, due - stride);
 	const next = step + direction * stride;
 	if (next >= first && next <= last) return { step: next, rest: left, ended: false };
@@ -52,7 +54,8 @@ export function advance({ step, rest }, seconds, { fps, speed, direction, first,
  * The steps to have ready, nearest first: the step itself, then ahead in the direction of
  * play, then a few behind.
  * @param {number} step
- * @param {{frames: number, fps: number, speed: number, direction: 0 | 1 | -1, most: number, seconds?: number}} how  `most` is what the memory holds
+ * @param {{frames: number, fps: number, speed: number, direction: 0 | 1 | -1, most: number,
+ * seconds?: number}} how `most` is what the memory holds
  */
 export function prefetchWindow(step, { frames, fps, speed, direction, most, seconds = 1.5 }) {
 	const stride = direction && speed > 1 ? Math.max(1, Math.floor((speed * fps) / 60)) : 1;

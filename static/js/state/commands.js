@@ -25,7 +25,8 @@ export const perform = ({ action, value }, actions) => /** @type {any} */ (actio
 
 /**
  * The name of the key that an event brings.
- * @param {{key: string, ctrlKey: boolean, metaKey: boolean, altKey: boolean, shiftKey: boolean}} event
+ * @param {{key: string, ctrlKey: boolean, metaKey: boolean, altKey: boolean, shiftKey: boolean}}
+ * event
  * @returns {string} empty for a key that no command may have
  */
 export function keyOf({ key, ctrlKey, metaKey, altKey, shiftKey }) {

@@ -70,7 +70,8 @@ export function ordered(tracks, order) {
 /**
  * What a track is doing at a step.
  * @param {Server.TrackLife} track @param {number} step
- * @returns {"not yet" | "ended" | "seen" | "coasting" | "lost"} lost: not reported at this step, but later again
+ * @returns {"not yet" | "ended" | "seen" | "coasting" | "lost"} lost: not reported at this step,
+ * but later again
  */
 export function stateAt({ first, last, spans }, step) {
 	if (step < first) return "not yet";

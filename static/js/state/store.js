@@ -6,7 +6,8 @@
 /**
  * @template {object} T
  * @param {T} initial
- * @param {(turn: () => void) => void} [schedule]  when listeners are told; a microtask later by default
+ * @param {(turn: () => void) => void} [schedule] when listeners are told; a microtask later by
+ * default
  * @returns {Store<T>}
  */
 export function createStore(initial, schedule = queueMicrotask) {
