@@ -277,7 +277,12 @@ class Workbench:
                 self._put("opening", opening=opening)
 
     def open(
-        self, sequence: Sequence, key: str, reader: FrameReader, parameters: RunParameters
+        self,
+        sequence: Sequence,
+        key: str,
+        reader: FrameReader,
+        parameters: RunParameters,
+        opened_as: str = "",
     ) -> FrameReader | None:
         """Show another sequence, from its first step; the reader of the one before, to be closed.
 
@@ -286,6 +291,7 @@ class Workbench:
             key: Another for every content.
             reader: Its pictures.
             parameters: Its default parameters.
+            opened_as: The name or folder that opens it again; its own name where none is given.
         """
         with self._edit() as now:
             before = now.reader
@@ -295,6 +301,7 @@ class Workbench:
                 sequence=sequence,
                 saved=sequence,
                 editing_room=False,
+                opened_as=opened_as or sequence.name,
                 sequence_key=key,
                 reader=reader,
                 opening=None,

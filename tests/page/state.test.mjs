@@ -12,6 +12,7 @@ import {
   viewWords,
 } from "../../static/js/state/events.js";
 import { mosaic } from "../../static/js/draw/mosaic.js";
+import { viewFrom, viewOf } from "../../static/js/state/views.js";
 import { createStore } from "../../static/js/state/store.js";
 import { readPlace, writePlace } from "../../static/js/state/url.js";
 
@@ -51,14 +52,45 @@ test("the address round-trips and names what it does not know", () => {
     step: 264,
     selection: 7,
     camera: 1,
+    look: "top",
+    view: { tab: "changes", zoom: "20-90", layers: "boxes.truth" },
     values: { "fusion.detection_probability": "0.6", fusion_method: "sequential_phd" },
   };
   assert.deepEqual(readPlace(writePlace(place)), { place, unknown: [] });
-  const none = { sequence: null, step: null, selection: null, camera: null, values: null };
+  const nowhere = { sequence: null, step: null, selection: null, camera: null, look: null };
+  const none = { ...nowhere, values: null, view: {} };
   assert.equal(writePlace(none), "");
   assert.equal(writePlace({ ...none, values: {} }), "");
   assert.deepEqual(readPlace(""), { place: none, unknown: [] });
-  assert.deepEqual(readPlace("?step=-4&sel=x&cam=0&zoom=3"), { place: none, unknown: ["zoom"] });
+  assert.deepEqual(readPlace("?step=-4&sel=x&cam=0&look=0&zooom=3"), {
+    place: none,
+    unknown: ["zooom"],
+  });
+});
+
+test("how it is looked at: only what is not as at first is written, and it is read back", () => {
+  const first = viewFrom({});
+  const state = { ...first, frames: 100 };
+  assert.deepEqual(viewOf(state), {});
+  const other = {
+    ...state,
+    tab: "compare",
+    span: [20.4, 80],
+    loop: true,
+    range: [null, 60],
+    speed: 0.5,
+    layers2d: { ...first.layers2d, truth: false, samples: true },
+    measure: "gospa",
+    laneOrder: "born",
+  };
+  const words = viewOf(other);
+  assert.equal(words.layers, "measurements.boxes.samples");
+  assert.equal(words.loop, "0-60");
+  const back = { ...viewFrom(words), frames: 100 };
+  assert.deepEqual(viewOf(back), words);
+  assert.deepEqual(back.span, [20, 80]);
+  const senseless = { tab: "x", zoom: "9-3", speed: "7", loop: "a-b", layers: "none" };
+  assert.deepEqual(Object.keys(viewOf({ ...viewFrom(senseless), frames: 9 })), ["layers"]);
 });
 
 /** A cache whose requests are answered by hand. */

@@ -69,13 +69,14 @@ export function mountNotes(root, { store, actions, retry }) {
 				),
 			);
 		}
-		for (const { id, level, title, text } of notes) {
+		for (const { id, level, title, text, remedy } of notes) {
 			const kind = { error: "bad", warn: "warn", info: "busy" }[level];
-			all.push(
-				note(kind, title, text, [
-					close(() => store.set({ notes: store.get().notes.filter((other) => other.id !== id) })),
-				]),
-			);
+			const gone = () => store.set({ notes: store.get().notes.filter((other) => other.id !== id) });
+			const mend = () => {
+				gone();
+				remedy?.act();
+			};
+			all.push(note(kind, title, text, [remedy ? button(remedy.word, mend) : null, close(gone)]));
 		}
 		fill(root, all);
 		clearInterval(ticking);

@@ -62,10 +62,8 @@ export function mountTimeline(root, context) {
 	/** Another part is shown: of a long recording its values are fetched. @param {View} next */
 	function look(next) {
 		view = next;
-		const { timeline, span, frames } = store.get();
-		const whole = view.last - view.first >= frames - 1;
-		if (timeline && (timeline.stride > 1 || span))
-			store.set({ span: whole ? null : [view.first, view.last] });
+		const whole = view.last - view.first >= store.get().frames - 1;
+		store.set({ span: whole ? null : [view.first, view.last] });
 		draw();
 		placeHead();
 	}
@@ -296,9 +294,14 @@ export function mountTimeline(root, context) {
 	seekBar.addEventListener("input", () => playback.seek(seekBar.valueAsNumber));
 	lanes.addEventListener("scroll", draw);
 
-	store.on(["sequence"], ({ sequence, frames }) => {
+	store.on(["span"], ({ span }) => {
+		if (!span || (span[0] === view.first && span[1] === view.last)) return;
+		look({ ...view, first: span[0], last: Math.min(span[1], store.get().frames - 1) });
+	});
+	store.on(["sequence"], ({ sequence, frames, span }) => {
 		truthSign.hidden = scored.hidden = errors.hidden = !sequence?.has_truth;
-		view = { ...view, first: 0, last: Math.max(1, frames - 1) };
+		const [first, last] = span ?? [0, Math.max(1, frames - 1)];
+		view = { ...view, first, last };
 		seekBar.max = String(Math.max(0, frames - 1));
 		resize();
 	});

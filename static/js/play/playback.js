@@ -232,7 +232,7 @@ export function createPlayback(store, sendSeek) {
 		/** @param {number} step */
 		seek(step) {
 			const { frames } = store.get();
-			if (frames > 0) store.set({ step: clampStep(step, frames) });
+			if (frames > 0) store.set({ step: clampStep(step, frames), moved: true });
 		},
 		/** Another tab or the 3D view moved the playhead. @param {number} step */
 		follow(step) {

@@ -41,6 +41,8 @@ export function createActions({ store, seek, send, receive }) {
 	let [undoing, turn] = [0, Promise.resolve()];
 	const frames = () => store.get().frames;
 
+	const count = () => store.set({ undoable: [past.length, future.length] });
+
 	/** @param {unknown} error */
 	function tell(error) {
 		if (!(error instanceof ApiError)) throw error;
@@ -62,11 +64,11 @@ export function createActions({ store, seek, send, receive }) {
 
 	/** @type {Actions} */
 	const actions = {
-		note(level, title, text) {
+		note(level, title, text, remedy) {
 			const id = (noteId += 1);
 			// The same thing said twice is one note.
 			const others = store.get().notes.filter((other) => other.title !== title);
-			store.set({ notes: [...others.slice(-3), { id, level, title, text }] });
+			store.set({ notes: [...others.slice(-3), { id, level, title, text, remedy }] });
 			if (level === "info")
 				setTimeout(
 					() => store.set({ notes: store.get().notes.filter((other) => other.id !== id) }),
@@ -184,7 +186,10 @@ export function createActions({ store, seek, send, receive }) {
 		},
 
 		// runs and parameters
-		open: (name) => actions.ask("POST", "sequence", { name }),
+		open(name) {
+			store.set({ asked: name });
+			return actions.ask("POST", "sequence", { name });
+		},
 		async change({ taught, ...changes }) {
 			if (taught) await actions.ask("POST", "teach/restore", { key: taught, changes });
 			else await actions.ask("PATCH", "parameters", { changes });
@@ -215,8 +220,12 @@ export function createActions({ store, seek, send, receive }) {
 			else if (undoing > 0 || !same) past.push(old);
 			if (!undoing) future.length = 0;
 			if (past.length > 100) past.shift();
+			count();
 		},
-		forget: () => void (past.length = future.length = 0),
+		forget() {
+			past.length = future.length = 0;
+			count();
+		},
 		undo(direction) {
 			// Pressed again before the last answer came, it waits for its turn.
 			turn = turn.then(async () => {
@@ -225,6 +234,7 @@ export function createActions({ store, seek, send, receive }) {
 				undoing = direction;
 				await actions.change(old);
 				undoing = 0;
+				count();
 			});
 			return turn;
 		},

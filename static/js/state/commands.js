@@ -21,7 +21,8 @@ export function register(groups) {
 }
 
 /** @param {Command} command @param {Actions} actions */
-export const perform = ({ action, value }, actions) => /** @type {any} */ (actions)[action](value);
+export const perform = ({ action, value }, actions) =>
+	/** @type {any} */ (actions)[action](...(value === undefined ? [] : [value]));
 
 /**
  * The name of the key that an event brings.

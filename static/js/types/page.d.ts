@@ -32,7 +32,16 @@ type Buckets = { first: number; stride: number };
 /** Of each bucket. */
 type Summary = { low: number[]; high: number[]; mean: number[] };
 
-type Note = { id: number; level: "info" | "warn" | "error"; title: string; text: string };
+/** What a note offers to do about it. */
+type Remedy = { word: string; act: () => void };
+
+type Note = {
+	id: number;
+	level: "info" | "warn" | "error";
+	title: string;
+	text: string;
+	remedy?: Remedy;
+};
 
 interface PageState {
 	link: "connecting" | "open" | "lost";
@@ -92,6 +101,16 @@ interface PageState {
 	theme: "dark" | "light";
 	singleKeys: boolean;
 	notes: Note[];
+	/** What this page asked the server to open. */
+	asked: string;
+	/** Whether somebody has chosen a step of this sequence. */
+	moved: boolean;
+	/** Every step is shown, however late; else steps are left out to keep real time. */
+	everyStep: boolean;
+	/** How many changes can be undone, and redone. */
+	undoable: [number, number];
+	/** Notices that were closed for good, by name. */
+	dismissed: string[];
 }
 
 /** Metres over the steps; null where there is no pair. */
@@ -118,7 +137,7 @@ interface Command {
 
 /** What a person can do. */
 interface Actions {
-	note: (level: "info" | "warn" | "error", title: string, text: string) => void;
+	note: (level: "info" | "warn" | "error", title: string, text: string, remedy?: Remedy) => void;
 	/** Null after a failure, which is told. */
 	ask: (method: "POST" | "PATCH" | "DELETE", path: string, body?: object) => Promise<any>;
 	togglePlay: () => void;
@@ -237,7 +256,11 @@ type Place = {
 	step: number | null;
 	selection: number | null;
 	camera: number | null;
+	/** Through which camera, or from where, the 3D view looks. */
+	look: number | "top" | null;
 	values: Record<string, any> | null;
+	/** Words of the address. */
+	view: Record<string, string>;
 };
 
 type Picture = { bitmap: ImageBitmap | null; missing: string | null };

@@ -426,6 +426,8 @@ declare namespace Server {
 		/** Part of the pictures' addresses; another for every content. */
 		key: string;
 		name: string;
+		/** The name or folder that opens it again. */
+		opened_as: string;
 		description: string;
 		fps: number;
 		frames: number;
