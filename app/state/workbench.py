@@ -348,13 +348,16 @@ class Workbench:
     def run_ends(
         self, key: str, phase: Literal["done", "cancelled", "failed"], error: str | None = None
     ) -> None:
-        """The run with this key is over; after a failure the last good one is shown again."""
+        """The run with this key is over; after a failure the last good one is shown again.
+
+        Where none was finished yet, what was shown stays: an unfinished run says more than none.
+        """
         with self._edit() as now:
             if key != now.run_state.key:  # superseded
                 return
             run = now.run
             if phase == "failed":
-                run = self._last_good
+                run = self._last_good or run
             elif phase == "done":
                 self._last_good = run
             state = replace(now.run_state, state=phase, seconds_left=None, message="", error=error)

@@ -6,6 +6,7 @@ import {
   eventsNow,
   isAlone,
   nextEvent,
+  nextLayers,
   ordered,
   resultOf,
   stateAt,
@@ -91,6 +92,29 @@ test("how it is looked at: only what is not as at first is written, and it is re
   assert.deepEqual(back.span, [20, 80]);
   const senseless = { tab: "x", zoom: "9-3", speed: "7", loop: "a-b", layers: "none" };
   assert.deepEqual(Object.keys(viewOf({ ...viewFrom(senseless), frames: 9 })), ["layers"]);
+});
+
+test("a layer's key comes back to where it began, also where pictures and 3D differed", () => {
+  const press = (now, mixed, times) => {
+    const seen = [now];
+    for (let k = 0; k < times; k += 1) {
+      if (now[0] !== now[1] && !now.includes(undefined)) mixed = now;
+      seen.push((now = nextLayers(now, mixed)));
+    }
+    return seen;
+  };
+  const [on, off, apart] = [
+    [true, true],
+    [false, false],
+    [false, true],
+  ];
+  assert.deepEqual(press(apart, undefined, 3), [apart, on, off, apart]);
+  assert.deepEqual(press(on, undefined, 2), [on, off, on]);
+  assert.deepEqual(press([false, undefined], undefined, 2), [
+    [false, undefined],
+    [true, undefined],
+    [false, undefined],
+  ]);
 });
 
 /** A cache whose requests are answered by hand. */

@@ -5,20 +5,23 @@
  */
 import { all, h, one } from "../elements/dom.js";
 
+const DRAW = "Drag a box around a person. Esc leaves; the Teach tab takes numbers too.";
+const NAME = "Whose colours are these? Type a name: Enter keeps it, Esc leaves it as it is.";
+
 /** @param {HTMLElement} mosaic  the pictures @param {Context} context */
 export function mountTeach(mosaic, { store, actions }) {
 	const panel = one("#panel-teach");
 	const drawn = h("div", { class: "drawn" });
-	const hint = h(
-		"p",
-		{ class: "hint", role: "status", hidden: true },
-		"Drag a box around a person. Esc leaves; the Teach tab takes numbers too.",
-	);
+	const hint = h("p", { class: "hint", role: "status", hidden: true }, DRAW);
 	mosaic.before(hint);
 	/** Where a drag began.  @type {{cam: HTMLElement, x: number, y: number} | null} */
 	let begun = null;
 	/** How many templates there are when the new one is listed. */
 	let added = Infinity;
+	/** The name that the page asks for: only Enter keeps what was typed, since nobody chose the field. */
+	let asked = "";
+	/** What is being sent; saving comes after it. */
+	let sending = Promise.resolve();
 
 	actions.drawTemplate = () => {
 		begun = null;
@@ -108,14 +111,31 @@ export function mountTeach(mosaic, { store, actions }) {
 	/** @param {any} from @param {string} kind @param {() => object} body */
 	function send(from, kind, body) {
 		const [method, path] = from?.matches(kind) ? from.dataset.send.split(" ") : [];
-		if (path) void actions.ask(method, path, body());
+		if (path) sending = actions.ask(method, path, body());
 	}
+	const { saveTaught } = actions;
+	actions.saveTaught = () => void sending.then(saveTaught);
+	panel.addEventListener("keydown", (event) => {
+		const field = /** @type {HTMLInputElement} */ (event.target);
+		if (!field.matches("input")) return;
+		const keeps = event.key === "Enter" || ((event.ctrlKey || event.metaKey) && event.key === "s");
+		if (keeps && field.id === asked) asked = "";
+		if (event.key === "Escape") field.value = field.defaultValue;
+		if (event.key === "Escape" || (event.key === "Enter" && !field.form)) field.blur();
+	});
+	panel.addEventListener("focusout", () => {
+		asked = "";
+		hint.textContent = DRAW;
+	});
 	panel.onclick = ({ target }) => {
 		const button = /** @type {HTMLElement} */ (target).closest("button");
 		send(button, "[data-send]", () => JSON.parse(button?.dataset.body ?? "{}"));
 	};
-	panel.onchange = ({ target }) =>
-		send(target, "[data-send]", () => ({ value: /** @type {HTMLInputElement} */ (target).value }));
+	panel.onchange = ({ target }) => {
+		const field = /** @type {HTMLInputElement} */ (target);
+		if (field.id === asked) field.value = field.defaultValue;
+		else send(field, "[data-send]", () => ({ value: field.value }));
+	};
 	panel.onsubmit = (event) => {
 		event.preventDefault();
 		send(event.target, "form", () =>
@@ -131,7 +151,11 @@ export function mountTeach(mosaic, { store, actions }) {
 		const names = all("[id^=template-]", panel);
 		if (names.length < added) return;
 		added = Infinity;
-		names[names.length - 1].select();
+		const field = names[names.length - 1];
+		field.select();
+		field.scrollIntoView({ block: "center" });
+		asked = field.id;
+		hint.textContent = NAME;
 	}).observe(panel, { childList: true, subtree: true });
 
 	store.on(["server"], ({ server }) => {

@@ -151,10 +151,12 @@ export function mountTimeline(root, context) {
 		});
 		drawRange(over, playback.loadedSteps(), done, frames);
 		drawRuler(ruler, range);
-		if (timeline) drawCardinality(row(token("h-strip")), timeline);
+		// Each plot has its row, whether there is something to plot or not.
+		const [counts, costs, distances] = [0, 1, 2].map(() => row(token("h-strip")));
+		if (timeline) drawCardinality(counts, timeline);
 		if (series && !scored.hidden) {
-			drawParts(row(token("h-strip")), series, reference ?? null, name);
-			drawErrors(row(token("h-strip")), series, selection);
+			drawParts(costs, series, reference ?? null, name);
+			drawErrors(distances, series, selection);
 		}
 		if (done < frames) {
 			const x = Math.max(0, xOf(done, view));

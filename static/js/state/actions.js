@@ -1,7 +1,7 @@
 /** What a person can do: the page's own state at once, the server's by request. */
 import { ApiError, request, sendJson } from "./api.js";
 import { SPEEDS, clampStep } from "../play/clock.js";
-import { eventsNow, nextEvent, ordered } from "./events.js";
+import { eventsNow, nextEvent, nextLayers, ordered } from "./events.js";
 
 /** What differs from the defaults. @param {Server.State} server */
 export const valuesOf = ({ changed, parameters }) =>
@@ -39,6 +39,9 @@ export function createActions({ store, seek, send, receive }) {
 	const [past, future] = [[], []];
 	let rememberedAt = -Infinity;
 	let [undoing, turn] = [0, Promise.resolve()];
+	/** Layers that were on in pictures and off in 3D, or the other way round, before their key. */
+	/** @type {Record<string, (boolean | undefined)[]>} */
+	const mixed = {};
 	const frames = () => store.get().frames;
 
 	const count = () => store.set({ undoable: [past.length, future.length] });
@@ -169,11 +172,11 @@ export function createActions({ store, seek, send, receive }) {
 		},
 		toggleLayer(layer) {
 			const { layers2d, layers3d } = store.get();
-			// One key, one meaning: where both were different, both are on afterwards.
-			const on = ![layers2d, layers3d].every((layers) => layers[layer] ?? true);
-			if (layer in layers2d && layers2d[layer] !== on) actions.toggleLayer2d(layer);
-			if (layer in layers3d && layers3d[layer] !== on && layer !== "boxes")
-				actions.toggleLayer3d(layer);
+			const now = [layers2d[layer], layer === "boxes" ? undefined : layers3d[layer]];
+			const [first, second] = nextLayers(now, mixed[layer]);
+			if (now[0] !== undefined && now[1] !== undefined && now[0] !== now[1]) mixed[layer] = now;
+			if (first !== now[0]) actions.toggleLayer2d(layer);
+			if (second !== now[1]) actions.toggleLayer3d(layer);
 		},
 		toggleLayer2d(layer) {
 			const { layers2d } = store.get();

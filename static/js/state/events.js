@@ -16,6 +16,20 @@ export const resultOf = ({ result, basis }) =>
  */
 export const trueCount = ({ truth }) => truth.filter(({ valid }) => valid).length;
 
+/**
+ * What a layer's key makes of it: on in pictures and in 3D, then off in both, then as it was where
+ * the two differed.
+ * @param {(boolean | undefined)[]} now  in the pictures and in 3D; undefined where there is none
+ * @param {(boolean | undefined)[] | undefined} mixed  how the two differed, if ever
+ * @returns {(boolean | undefined)[]}
+ */
+export function nextLayers(now, mixed) {
+	const known = now.filter((on) => on !== undefined);
+	if (!known.some(Boolean)) return mixed ?? now.map((on) => (on === undefined ? on : true));
+	const all = known.every(Boolean);
+	return now.map((on) => (on === undefined ? on : !all));
+}
+
 /** Whether only the selected track is shown. @param {Readonly<PageState>} state */
 export const isAlone = ({ selection, layers3d }) => selection !== null && layers3d.others === false;
 
