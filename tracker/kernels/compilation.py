@@ -52,7 +52,8 @@ _HAS_KERNELS = re.compile(rb"^@(?:pixel_)?kernel$", re.MULTILINE)
 def kernel(function: _F) -> _F:
     """Compile on the first call, keep the machine code on disk, release the interpreter."""
     compiled: Any = pixel_kernel(function)
-    compiled._compile_for_args = _Chooser(compiled)
+    if not _config.DISABLE_JIT:  # numba's own variable: then it is the function itself
+        compiled._compile_for_args = _Chooser(compiled)
     return cast(_F, compiled)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
@@ -83,6 +84,39 @@ def test_two_tracks_that_were_exchanged_are_exchanged_back() -> None:
 def test_people_who_look_alike_keep_their_labels() -> None:
     names = watched(Identities.none(), [1, 2], [EITHER, EITHER], 200)
     assert names.owners.tolist() == [-1, -1]
+
+
+def test_looks_that_nobody_renews_are_forgotten_at_the_rate_of_the_leak() -> None:
+    names = watched(Names.none(), [1, 2], [FIRST, SECOND], 30)
+
+    def share() -> float:
+        """π of the first person in the first track's looks."""
+        chances = np.exp(names.looks[names.labels.tolist().index(1)])
+        return float(chances[0] / chances.sum())
+
+    begin, seconds, steps = share(), 0.2, 40
+    assert begin > 0.9
+    names = watched(names, [1, 2], [EITHER, EITHER], steps)
+    # π − 1/G shrinks by 1 − Δt/T a step, T = 30 s
+    assert share() - 0.5 == pytest.approx((begin - 0.5) * (1.0 - seconds / 30.0) ** steps)
+
+
+def test_no_evidence_lasts_for_ever() -> None:
+    soon = watched(Names.none(), [1, 2], [FIRST, SECOND], 200)
+    late = watched(soon, [1, 2], [FIRST, SECOND], 2000)
+    odds = [float(np.ptp(names.looks[0])) for names in (soon, late)]
+    assert odds[1] == pytest.approx(odds[0], abs=0.01)
+    assert odds[1] < 10.0
+
+
+def test_pictures_of_one_moment_count_as_one_look() -> None:
+    odds = []
+    for seconds in (0.02, 0.1):
+        names = Names.none()
+        for _ in range(round(1.0 / seconds)):
+            _, names = step(names, [1, 2], [FIRST, SECOND], seconds)
+        odds.append(float(np.ptp(names.looks[0])))
+    assert odds[0] == pytest.approx(odds[1], rel=0.03), "the frame rate makes nobody surer"
 
 
 def test_without_two_people_to_tell_apart_nothing_is_done() -> None:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tests.benchmarks import scenario as scene
+from tests.benchmarks.plane import scenario as scene
 from tests.engine import plain_phd
 from tests.engine.mixtures import random_covariances, random_mixture
 from tracker.filters import gaussian_mixture, phd

@@ -1,4 +1,4 @@
-"""The filters that are set beside each other on :mod:`tests.benchmarks.scenario`.
+"""The filters that are set beside each other on :mod:`tests.benchmarks.plane.scenario`.
 
 Each takes one scan after another and says where the targets are, by a rule: ``components``
 reports every component above a half, ``W_z`` gathers by measurement.
@@ -12,7 +12,7 @@ import numpy as np
 from numpy import ndarray
 from scipy.stats import chi2
 
-from tests.benchmarks.scenario import (
+from tests.benchmarks.plane.scenario import (
     DETECTION,
     MERGING,
     MOTION_NOISE,
