@@ -111,11 +111,16 @@ def type_checker() -> str | None:
 
 def page_checks() -> list[Check]:
     """What needs nothing of the environment."""
-    node, tsc = shutil.which("node"), type_checker()
+    node, tsc, prettier = shutil.which("node"), type_checker(), shutil.which("prettier")
     scripts = sorted(str(path) for path in (ROOT / "tests" / "page").glob("*.test.mjs"))
     types = ("--project", str(ROOT / "static" / "jsconfig.json"))
     return [
         Check("page", ((node or "", "--test", *scripts),), "" if node else "Node.js"),
+        Check(
+            "page style",
+            ((prettier or "", "--check", "static", "tests/page"),),
+            "" if prettier else "prettier 3",
+        ),
         Check(
             "page types",
             ((tsc or "", *types),),

@@ -185,15 +185,25 @@ def main() -> int:
         if not any(statuses):
             compilation.mark_compiled()
         return max(statuses)
-    if sys.platform != "win32":
-        os.nice(5)
+    half = sys.argv[1]
+    _give_way(5 if half == HALVES[0] else 15)
 
     def say(words: str) -> None:
         sys.stdout.write(f"{words}\n")
         sys.stdout.flush()
 
-    compile_kernels(sys.argv[1], lambda done, total: say(f"{done} {total}"), lambda: say("ready"))
+    def ready() -> None:
+        say("ready")
+        _give_way(10)
+
+    compile_kernels(half, lambda done, total: say(f"{done} {total}"), ready)
     return 0
+
+
+def _give_way(steps: int) -> None:
+    """Whoever renders or tracks goes first; what a run waits for goes before the rest."""
+    if sys.platform != "win32":
+        os.nice(steps)
 
 
 if __name__ == "__main__":

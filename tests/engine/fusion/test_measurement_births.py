@@ -10,9 +10,10 @@ from scipy.special import logit, logsumexp
 from scipy.stats import multivariate_normal
 
 from tests.engine.standing import CAMERAS, HALF_EXTENTS, ROOM, watch
-from tracker.fusion.measurement_births import Evidence, MeasurementBirths, Newborns
+from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths, Newborns
 from tracker.fusion.model import all_boxes
 from tracker.fusion.target_model import MeasurementKind, TargetModel
+from tracker.kernels.gating import Measurements
 from tracker.single_view.protocol import ViewResult
 
 BIRTH_RATE, P_D = 0.005, 0.98
@@ -29,12 +30,14 @@ def births(kind: MeasurementKind = "box", margin: float = 0.0) -> MeasurementBir
         CAMERAS,
         ROOM,
         TargetModel(HALF_EXTENTS, kind),
-        birth_rate=BIRTH_RATE,
-        detection_probability=P_D,
-        clutter=np.full(len(CAMERAS), clutter_of(kind)),
-        gate=21.0,
-        margin=margin,
-        largest_gap=1.0,
+        BirthModel(
+            birth_rate=BIRTH_RATE,
+            detection_probability=P_D,
+            clutter=np.full(len(CAMERAS), clutter_of(kind)),
+            gate=21.0,
+            margin=margin,
+            largest_gap=1.0,
+        ),
     )
 
 
@@ -42,12 +45,13 @@ def evidence(
     views: tuple[ViewResult, ...], kind: MeasurementKind = "box", unexplained: float = 1.0
 ) -> Evidence:
     """All boxes equally unexplained."""
-    boxes, _, starts = all_boxes(views)
+    seen = all_boxes(views)
     model = TargetModel(HALF_EXTENTS, kind)
-    values, noises = (
-        np.concatenate(part) for part in zip(*(model.measured(v, 1.0) for v in views), strict=True)
+    each = [model.measured(view, 1.0) for view in views]
+    measured = Measurements(
+        np.concatenate([one.values for one in each]), np.concatenate([one.noises for one in each])
     )
-    return Evidence(boxes[:, :2], values, noises, np.full(len(boxes), unexplained), starts)
+    return Evidence(seen.boxes[:, :2], measured, np.full(len(seen.boxes), unexplained), seen.starts)
 
 
 def seen(places: ndarray, clutter_rate: float = 0.0, seed: int = 0) -> tuple[ViewResult, ...]:
