@@ -24,7 +24,8 @@ import numpy as np
 from tracker import pipeline
 from tracker.camera import Camera
 from tracker.kernels import compilation
-from tracker.parameters import METHODS, PRESETS, RunParameters, with_values
+from tracker.parameters import METHODS, PRESETS, MethodKey, RunParameters, with_values
+from tracker.parameters.registry import FOLLOWING, ORIGINS, REGISTERED
 from tracker.sequences.sequence import Detections, Entrance, Room, Sequence, Template, View
 
 STEPS = 36
@@ -40,9 +41,6 @@ _WAYS = (((-1.2, 0.2, 0.84), (1.2, 0.2, 0.84)), ((1.2, -0.3, 0.84), (-1.2, -0.3,
 
 _COLOURS = ((40, 40, 220), (220, 60, 40))
 """Of the two people, blue green red."""
-
-_FIRST = ("colour_phd", "none")
-"""What a sequence starts with: for pictures, for boxes."""
 
 _OTHER_WAYS = (
     {"fusion.update": "unscented"},
@@ -66,6 +64,10 @@ def compile_kernels(
         shown: Called when the cameras have theirs: a sequence can be seen.
         ready: Called when the methods that a sequence starts with have their kernels.
     """
+    for methods in REGISTERED.values():
+        for method in methods.values():
+            if method.name not in ORIGINS:
+                method.load()  # its kernels are counted from the beginning
     with (
         tempfile.TemporaryDirectory() as folder,
         compilation.followed(lambda: told(*compilation.counts())),
@@ -73,9 +75,8 @@ def compile_kernels(
         recording = _recording(Path(folder))
         recording.cameras[0].back_project(np.zeros((1, 2)))
         shown()
-        for single_view in _FIRST:
-            values = {"single_view": single_view, "fusion_method": "multi_bernoulli"}
-            pipeline.compute(recording, with_values(RunParameters(), values))
+        for single_view in FOLLOWING:
+            pipeline.compute(recording, RunParameters(single_view=single_view))
         ready()
         for parameters in _ways():
             pipeline.compute(recording, parameters)
@@ -84,12 +85,17 @@ def compile_kernels(
 
 def _ways() -> Iterator[RunParameters]:
     for preset in PRESETS.values():
-        for single_view in METHODS["single_view"]:
+        for single_view in _own("single_view"):
             yield with_values(RunParameters(), {**preset, "single_view": single_view})
     for values in (*PRESETS.values(), *_OTHER_WAYS):
-        for method in METHODS["fusion_method"]:
+        for method in _own("fusion_method"):
             chosen = {"single_view": "none", **values, "fusion_method": method}
             yield with_values(RunParameters(), chosen)
+
+
+def _own(key: MethodKey) -> list[str]:
+    """The methods of this project: another package compiles its kernels when they are called."""
+    return [name for name in METHODS[key] if name not in ORIGINS]
 
 
 def _recording(folder: Path) -> Sequence:

@@ -69,6 +69,8 @@ interface ServerState {
 	/** The command that computes the same in a terminal. */
 	command: string;
 	methods: {single_view: string, fusion_method: string};
+	/** Why a method cannot work on the sequence, by `single_view` or `fusion_method` and its name. */
+	unfit: Record<string, Record<string, string>>;
 	/** Those that somebody has saved. */
 	presets: string[];
 	/** The one whose values the parameters have. */

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,9 +25,11 @@ from tracker.fusion.names import Names
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import WORTH_TELLING, Record, summed
 from tracker.kernels.labelled import step as step_kernels
-from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
+
+if TYPE_CHECKING:
+    from tracker.parameters import RunParameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,8 +52,8 @@ class MultiBernoulli:
     and so do unexplained boxes of several cameras that agree on a place.
     """
 
-    def __init__(self, sequence: Sequence, parameters: FusionParams) -> None:
-        p, model = parameters, FusionModel(sequence, parameters)
+    def __init__(self, sequence: Sequence, parameters: RunParameters) -> None:
+        p, model = parameters.fusion, FusionModel(sequence, parameters.fusion)
         self._parameters, self._model = p, model
         motion, target = model.motion, model.target
         births = model.births

@@ -11,6 +11,10 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
+from tracker.parameters.methods import Method, Reads, Uses
+
+_APART = {"follow_mild": (True,)}
+_TARGETS = {"output": ("targets",)}
 
 
 class AssociationMatrixParams(Params):
@@ -44,11 +48,13 @@ class AssociationMatrixParams(Params):
     follow_mild: Annotated[bool, ui("MS")] = True
     """Whether two who merge under mild occlusion are followed apart by mean shift."""
 
-    mild_share: Annotated[float, Field(ge=0.1, le=1.5), ui("S_k/(S_a+S_b)", step=0.01)] = 0.8
+    mild_share: Annotated[
+        float, Field(ge=0.1, le=1.5), ui("S_k/(S_a+S_b)", step=0.01, when=_APART)
+    ] = 0.8
     """Two who merge into an object larger than this share of both are mildly occluded."""
 
     occlusion_distance: Annotated[
-        float, Field(ge=0.0, le=3.0), ui("ε", unit="half widths", step=0.05)
+        float, Field(ge=0.0, le=3.0), ui("ε", unit="half widths", step=0.05, when=_APART)
     ] = 0.5
     """Two who are followed apart are one object once their centres are this near."""
 
@@ -58,13 +64,19 @@ class AssociationMatrixParams(Params):
     output: Annotated[Literal["targets", "objects"], ui("Y", published="objects")] = "targets"
     """What goes to the fusion: target boxes fitted to the objects' outlines, or the objects."""
 
-    acceptance: Annotated[float, Field(ge=-10.0, le=0.0), ui("s_min", step=0.1)] = -2.0
+    acceptance: Annotated[
+        float, Field(ge=-10.0, le=0.0), ui("s_min", step=0.1, when=_TARGETS)
+    ] = -2.0
     """Targets: an object's best box is not taken if the outline fits it worse than this."""
 
-    further_acceptance: Annotated[float, Field(ge=-10.0, le=0.0), ui("s_2", step=0.1)] = -1.7
+    further_acceptance: Annotated[
+        float, Field(ge=-10.0, le=0.0), ui("s_2", step=0.1, when=_TARGETS)
+    ] = -1.7
     """Targets: nor are the other boxes of a merged object if they fit worse than this."""
 
-    spare_acceptance: Annotated[float, Field(ge=-10.0, le=0.0), ui("s_+", step=0.1)] = -0.7
+    spare_acceptance: Annotated[
+        float, Field(ge=-10.0, le=0.0), ui("s_+", step=0.1, when=_TARGETS)
+    ] = -0.7
     """Targets: a box that fits better than this is taken beyond the object's number of tracks."""
 
     centre_sigma: Annotated[
@@ -76,3 +88,12 @@ class AssociationMatrixParams(Params):
         float, Field(ge=0.02, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
     ] = 0.2
     """Standard deviation of a box's half sizes."""
+
+
+METHOD = Method(
+    name="association_matrix",
+    help="Tracks of foreground objects by decision matrices.",
+    made_by="tracker.single_view.association_matrix.method:AssociationMatrix",
+    uses=Uses(pictures=True, reads=(Reads("association_matrix"), Reads("foreground"))),
+    parameters=AssociationMatrixParams,
+)

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
+from tracker.parameters.methods import Method, Reads, Uses
 
 
 class DetectionBoxParams(Params):
@@ -81,3 +82,21 @@ class DetectionPhdParams(DetectionBoxParams):
 
     output: Annotated[Literal["boxes", "estimates"], ui("Y", published="estimates")] = "boxes"
     """What goes to the fusion: the boxes that the filter believes in, or its estimates."""
+
+
+AS_THEY_ARE = Method(
+    name="none",
+    help="An outside detector's boxes, without a filter in the picture.",
+    made_by="tracker.single_view.none:DetectionBoxes",
+    uses=Uses(detections=True, reads=(Reads("detection_boxes"),)),
+    parameters=DetectionBoxParams,
+    group="detection_boxes",
+)
+
+FILTERED = Method(
+    name="detection_phd",
+    help="GM-PHD filter on an outside detector's boxes.",
+    made_by="tracker.single_view.detection_phd:DetectionPhd",
+    uses=Uses(detections=True, reads=(Reads("detection_phd"),)),
+    parameters=DetectionPhdParams,
+)

@@ -6,11 +6,17 @@ density filtering", 2021.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
+from tracker.parameters.methods import Method, Reads, Uses
+
+if TYPE_CHECKING:
+    from tracker.parameters.run import RunParameters
+
+_WALK, _VELOCITY = {"motion": ("random_walk",)}, {"motion": ("constant_velocity",)}
 
 
 class FusionParams(Params):
@@ -41,7 +47,11 @@ class FusionParams(Params):
     ] = "box"
     """What is used of a box: its centre; its horizontal centre, top and bottom; and its width."""
 
-    low_share: Annotated[float, Field(ge=0.0, le=0.5), ui("ε", step=0.01, published=0.0)] = 0.1
+    low_share: Annotated[
+        float,
+        Field(ge=0.0, le=0.5),
+        ui("ε", step=0.01, published=0.0, when={"measurement": ("box", "box_and_width")}),
+    ] = 0.1
     """Share of the boxes that show a person lying, crouching or bent; 0: everybody stands."""
 
     update: Annotated[Literal["extended", "unscented"], ui("h(x)")] = "extended"
@@ -53,24 +63,30 @@ class FusionParams(Params):
     """How people move between two steps."""
 
     motion_sigma: Annotated[
-        float, Field(ge=0.01, le=3.0), ui("σ_w", unit="m/√s", step=0.01, log=True)
+        float, Field(ge=0.01, le=3.0), ui("σ_w", unit="m/√s", step=0.01, log=True, when=_WALK)
     ] = 0.4
     """Random walk: how far a person strays in one second, along each axis."""
 
     acceleration_sigma: Annotated[
-        float, Field(ge=0.05, le=10.0), ui("σ_a", unit="m/s per √s", step=0.05, log=True)
+        float,
+        Field(ge=0.05, le=10.0),
+        ui("σ_a", unit="m/s per √s", step=0.05, log=True, when=_VELOCITY),
     ] = 0.8
     """Constant velocity: how much a person's speed changes in one second, along each axis."""
 
-    vertical_share: Annotated[float, Field(ge=0.01, le=1.0), ui("σ_z/σ_x", step=0.01)] = 0.2
+    vertical_share: Annotated[
+        float, Field(ge=0.01, le=1.0), ui("σ_z/σ_x", step=0.01, when=_VELOCITY)
+    ] = 0.2
     """Constant velocity: how lively the height is, relative to the ground plane."""
 
     velocity_memory: Annotated[
-        float, Field(ge=0.1, le=100.0), ui("τ", unit="s", step=0.1, log=True)
+        float, Field(ge=0.1, le=100.0), ui("τ", unit="s", step=0.1, log=True, when=_VELOCITY)
     ] = 2.0
     """Constant velocity: time after which a person who is not seen has slowed to a third."""
 
-    start_velocity: Annotated[float, Field(ge=0.0, le=5.0), ui("σ_v0", unit="m/s", step=0.1)] = 0.7
+    start_velocity: Annotated[
+        float, Field(ge=0.0, le=5.0), ui("σ_v0", unit="m/s", step=0.1, when=_VELOCITY)
+    ] = 0.7
     """Constant velocity: spread of a newcomer's speed along each axis."""
 
     birth: Annotated[
@@ -136,3 +152,25 @@ class FusionParams(Params):
         float, Field(ge=0.01, le=0.99), ui("T_e", step=0.01, stage="tracks")
     ] = 0.5
     """A component whose weight is above this is reported as a person."""
+
+
+def _multi_bernoulli_uses(parameters: RunParameters) -> Uses:
+    without = {"misses", "extraction"}
+    if parameters.fusion.birth == "measurements":
+        without.add("merging_threshold")  # of the people not yet detected, of whom there are none
+    return Uses(reads=(Reads("fusion", without=frozenset(without)),))
+
+
+SEQUENTIAL_PHD = Method(
+    name="sequential_phd",
+    help="GM-PHD filter updated by one camera after another.",
+    made_by="tracker.fusion.sequential_phd:SequentialPhd",
+    uses=Uses(reads=(Reads("fusion", without=frozenset({"recognition"})),)),
+)
+
+MULTI_BERNOULLI = Method(
+    name="multi_bernoulli",
+    help="Poisson multi-Bernoulli filter with belief propagation.",
+    made_by="tracker.fusion.multi_bernoulli:MultiBernoulli",
+    uses=_multi_bernoulli_uses,
+)

@@ -87,7 +87,7 @@ class SingleViews:
         method = single_view.create(
             run.parameters.single_view, run.sequence, camera, run.parameters, self._reader
         )
-        run.costly = run.costly or method.needs_pictures
+        run.costly = run.costly or _looks_at_pictures(run)
         state = run.view_states[camera] if run.view_states is not None else method.start()
         return _CameraWorker(method, state, camera, run, self._reader, self._is_stopped)
 
@@ -111,8 +111,9 @@ class _CameraWorker:
         self._frames = run.sequence.frames
         self._seed = run.seed
         self._stopped = stopped
-        self._pictures = reader.iterate(camera, self._frame) if method.needs_pictures else None
-        self._likeness = Likeness.of(run.sequence, reader) if method.needs_pictures else None
+        looks = _looks_at_pictures(run)
+        self._pictures = reader.iterate(camera, self._frame) if looks else None
+        self._likeness = Likeness.of(run.sequence, reader) if looks else None
 
     def block(self, steps: int) -> list[tuple[ViewResult, Any]]:
         """The next few steps: result and state of each; none at the end."""
@@ -127,6 +128,10 @@ class _CameraWorker:
             done.append((result, self._state))
             self._frame += 1
         return done
+
+
+def _looks_at_pictures(run: Run) -> bool:
+    return run.parameters.method("single_view").used(run.parameters).pictures
 
 
 class _StoppingReader(FrameReader):

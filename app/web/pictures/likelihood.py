@@ -42,7 +42,7 @@ def key_of(sequence: Sequence, parameters: ColourPhdParams) -> str:
 def shown_colours(snapshot: Snapshot) -> ColourPhdParams:
     """The numbers of the run that is shown, else those that are chosen."""
     run = snapshot.run
-    return (run.parameters if run is not None else snapshot.parameters).colour_phd
+    return (run.parameters if run is not None else snapshot.parameters).of(ColourPhdParams)
 
 
 class Likelihoods:

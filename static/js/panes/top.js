@@ -33,7 +33,10 @@ export function mountTop(root, { store, actions }) {
 		for (const [key, select] of Object.entries({ single_view, fusion_method })) {
 			const now = server?.parameters[key] ?? "";
 			const names = schema?.methods[key] ?? [];
-			fill(select, (names.includes(now) ? names : [now, ...names]).map((name) => h("option", { value: name }, name)));
+			const unfit = server?.unfit[key] ?? {};
+			const choice = (/** @type {string} */ name) => h("option", { value: name, title: unfit[name] }, unfit[name] ? `${name} · not here` : name);
+			fill(select, (names.includes(now) ? names : [now, ...names]).map(choice));
+			select.title = unfit[now] ?? "";
 			select.value = now;
 			select.disabled = link !== "open" || !size;
 		}

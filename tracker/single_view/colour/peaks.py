@@ -67,19 +67,13 @@ class PeakFinder:
             ValueError: If there are no pictures or templates, or a template cannot be read.
         """
         self._parameters = p = parameters
-        asked = (
-            p.acceptance_foreground,
-            p.foreground_weight,
-            p.surroundings_weight,
-            p.foreground_samples,
-        )
         self._appearance = Appearance(
             sequence,
             camera_index,
             reader,
             colour_space=p.colour_space,
             histogram_kernel=p.histogram_kernel,
-            foreground=foreground if max(asked) > 0.0 else None,
+            foreground=foreground if p.asks_foreground else None,
         )
 
     @property

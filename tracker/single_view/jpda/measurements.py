@@ -6,7 +6,7 @@ Boxes are ``centre_x, centre_y, half_width, half_height`` in pixels.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -15,12 +15,20 @@ from numpy import ndarray
 from tracker.blobs import blobs
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.foreground import ForegroundModel, box_shares, integral, learn
-from tracker.parameters import ForegroundParams, JpdaParams, RunParameters
+from tracker.parameters import (
+    ColourPhdParams,
+    DetectionBoxParams,
+    ForegroundParams,
+    JpdaParams,
+)
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.peaks import PeakFinder
 from tracker.single_view.detector_boxes import DetectorBoxes, trust
 from tracker.single_view.jpda.crowns import TargetSizes, crowns
+
+if TYPE_CHECKING:
+    from tracker.parameters import RunParameters
 
 COVER = 2.0
 """Without a piece of foreground, whoever is hidden lies within so many half sizes of the box."""
@@ -54,8 +62,6 @@ class Measured:
 
 class Source(Protocol):
     """Where one camera's measurements come from."""
-
-    needs_pictures: bool
 
     def start(self) -> Any:
         """The state before the first step."""
@@ -96,7 +102,7 @@ def source_of(
     Raises:
         ValueError: If the camera lacks what the source needs.
     """
-    p = parameters.jpda
+    p = parameters.of(JpdaParams)
     if p.measurements == "detections":
         return _Detector(sequence, camera_index, parameters)
     if p.measurements == "colour" and sequence.templates:
@@ -112,8 +118,6 @@ def source_of(
 
 class _Foreground:
     """Boxes of the pieces of foreground, or of a target under each top of a piece."""
-
-    needs_pictures = True
 
     def __init__(
         self,
@@ -174,8 +178,6 @@ class _Foreground:
 class _Colours:
     """Peaks of the colour likelihood, with the numbers of ``colour_phd``."""
 
-    needs_pictures = True
-
     def __init__(
         self,
         sequence: Sequence,
@@ -184,7 +186,7 @@ class _Colours:
         reader: FrameReader,
     ) -> None:
         self._finder = PeakFinder(
-            sequence, camera_index, parameters.colour_phd, parameters.foreground, reader
+            sequence, camera_index, parameters.of(ColourPhdParams), parameters.foreground, reader
         )
 
     def start(self) -> Any:
@@ -219,10 +221,8 @@ class _Colours:
 class _Detector:
     """An outside detector's boxes, with the numbers of ``detection_boxes``."""
 
-    needs_pictures = False
-
     def __init__(self, sequence: Sequence, camera_index: int, parameters: RunParameters) -> None:
-        self._parameters = parameters.detection_boxes
+        self._parameters = parameters.of(DetectionBoxParams)
         self._boxes = DetectorBoxes(sequence, camera_index, self._parameters)
 
     def start(self) -> None:

@@ -7,7 +7,7 @@ data association", patent CN101783020A, 2010.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import UInt8
@@ -16,7 +16,7 @@ from scipy.stats import chi2
 
 from tracker.association import validation_matrix
 from tracker.foreground import pack
-from tracker.parameters import RunParameters
+from tracker.parameters import JpdaParams
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.jpda.association import associate
@@ -26,6 +26,9 @@ from tracker.single_view.jpda.measurements import Measured, source_of
 from tracker.single_view.jpda.moves import Moved, move
 from tracker.single_view.jpda.targets import Targets, innovations
 from tracker.single_view.protocol import ViewEvent, ViewResult
+
+if TYPE_CHECKING:
+    from tracker.parameters import RunParameters
 
 LONGEST_HIDDEN = 4.0
 """Seconds after which somebody who never came out from behind another is given up."""
@@ -77,9 +80,8 @@ class Jpda:
         Raises:
             ValueError: If the camera lacks what the measurements are made from.
         """
-        self._parameters = p = parameters.jpda
+        self._parameters = p = parameters.of(JpdaParams)
         self._source = source_of(sequence, camera_index, parameters, reader)
-        self.needs_pictures = self._source.needs_pictures
         self._step_time = sequence.step_time
         self._longest_hidden = max(1, round(LONGEST_HIDDEN * sequence.fps))
         self._gate = float(chi2.ppf(p.gate_probability, df=2))

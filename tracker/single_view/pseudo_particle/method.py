@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float, Float32, Int, UInt8
@@ -15,7 +15,7 @@ from scipy.special import expit
 
 from tracker import particles as particle_set
 from tracker.foreground import pack
-from tracker.parameters import ForegroundParams, PseudoParticleParams
+from tracker.parameters import PseudoParticleParams
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.appearance import Scene
@@ -24,6 +24,9 @@ from tracker.single_view.pseudo_particle import hypotheses
 from tracker.single_view.pseudo_particle.hypotheses import GATE
 from tracker.single_view.pseudo_particle.particles import ColourParticles
 from tracker.single_view.pseudo_particle.register import UNCONFIRMED, Register, Targets, follow
+
+if TYPE_CHECKING:
+    from tracker.parameters import RunParameters
 
 MERGE_DISTANCE = 1.0
 """Modes closer than this, in half sizes, are one."""
@@ -64,14 +67,11 @@ class PseudoParticle:
     the confirmed targets, go to the fusion.
     """
 
-    needs_pictures = True
-
     def __init__(
         self,
         sequence: Sequence,
         camera_index: int,
-        parameters: PseudoParticleParams,
-        foreground: ForegroundParams,
+        parameters: RunParameters,
         reader: FrameReader,
     ) -> None:
         """Read the templates and learn the background.
@@ -79,8 +79,8 @@ class PseudoParticle:
         Raises:
             ValueError: If there are no pictures or templates, or a template cannot be read.
         """
-        self._parameters = parameters
-        self._model = ColourParticles(sequence, camera_index, parameters, foreground, reader)
+        self._parameters = p = parameters.of(PseudoParticleParams)
+        self._model = ColourParticles(sequence, camera_index, p, parameters.foreground, reader)
         self._step_time = sequence.step_time
 
     def start(self) -> PseudoParticleState:

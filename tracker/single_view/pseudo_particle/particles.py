@@ -37,15 +37,13 @@ class ColourParticles:
             ValueError: If there are no pictures or templates, or a template cannot be read.
         """
         p = self._parameters = parameters
-        weights = (p.foreground_weight, p.surroundings_weight, p.acceptance_foreground)
-        asked = p.birth == "foreground" or max(weights) > 0.0
         self._appearance = Appearance(
             sequence,
             camera_index,
             reader,
             colour_space=p.colour_space,
             histogram_kernel=p.histogram_kernel,
-            foreground=foreground if asked else None,
+            foreground=foreground if p.asks_foreground else None,
         )
         self._root_time = float(np.sqrt(sequence.step_time))
         self.persons = len(self._appearance.model.names)
