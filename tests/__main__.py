@@ -19,7 +19,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 ENVIRONMENT = ROOT / ".venv"
-NEEDS = {"page": "Node.js", "page types": "TypeScript 5.5 or newer (tsc)"}
+NEEDS = {
+    "page": "Node.js",
+    "page style": "prettier 3",
+    "page types": "TypeScript 5.5 or newer (tsc)",
+}
 BIN = ENVIRONMENT / ("Scripts" if os.name == "nt" else "bin")
 PYTHON = BIN / ("python.exe" if os.name == "nt" else "python")
 
@@ -51,7 +55,7 @@ def type_checker() -> str | None:
 
 def commands(pytest_arguments: list[str]) -> dict[str, list[list[str]]]:
     """What is run, by name, in order."""
-    node, tsc = shutil.which("node"), type_checker()
+    node, tsc, prettier = shutil.which("node"), type_checker(), shutil.which("prettier")
     page_tests = sorted(str(path) for path in (ROOT / "tests" / "page").glob("*.test.mjs"))
     return {
         "style": [
@@ -61,6 +65,7 @@ def commands(pytest_arguments: list[str]) -> dict[str, list[list[str]]]:
         "types": [[str(BIN / "mypy")]],
         "imports": [[str(BIN / "lint-imports")]],
         "page": [[node, "--test", *page_tests]] if node else [],
+        "page style": [[prettier, "--check", "static", "tests/page"]] if prettier else [],
         "page types": [[tsc, "--project", str(ROOT / "static" / "jsconfig.json")]] if tsc else [],
         # at once for all processes that the tests start
         "kernels": [[str(PYTHON), "-m", "tracker.warm_up"]],

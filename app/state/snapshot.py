@@ -98,6 +98,8 @@ class Snapshot:
     """The same as its file has it."""
     editing_room: bool = False
     """Whether the 3D view has handles on the room."""
+    opened_as: str = ""
+    """The name or folder that opens the sequence again."""
     sequence_key: str = ""
     """Another for every content, so that pictures may be kept for ever."""
     reader: FrameReader | None = None

@@ -16,7 +16,8 @@ export class ApiError extends Error {
 async function failureOf(response) {
 	try {
 		const body = await response.json();
-		if (body && body.error && typeof body.error.message === "string") return new ApiError(response.status, body.error);
+		if (body && body.error && typeof body.error.message === "string")
+			return new ApiError(response.status, body.error);
 	} catch {
 		// Not our error body: a proxy or a crash. The status has to do.
 	}
@@ -36,7 +37,12 @@ export async function request(path, options) {
 		response = await fetch(path, options);
 	} catch (error) {
 		if (error instanceof DOMException && error.name === "AbortError") throw error;
-		throw new ApiError(0, { code: "unreachable", message: "The server cannot be reached.", field: null, hint: null });
+		throw new ApiError(0, {
+			code: "unreachable",
+			message: "The server cannot be reached.",
+			field: null,
+			hint: null,
+		});
 	}
 	if (!response.ok) throw await failureOf(response);
 	return response;
@@ -53,7 +59,10 @@ export async function sendJson(method, path, body = {}) {
 	return (await request(path, { method, headers, body: JSON.stringify(body) })).json();
 }
 
-/** Fetch the newest: never twice at once, and once more where there was news meanwhile. @param {() => Promise<void>} work */
+/**
+ * Fetch the newest: never twice at once, and once more where there was news meanwhile.
+ * @param {() => Promise<void>} work
+ */
 export function fetcher(work) {
 	let busy = false;
 	let again = false;
@@ -74,7 +83,11 @@ export function fetcher(work) {
 	};
 }
 
-/** How long to wait before the next try: quickly at first, then every few seconds. @param {number} tries  failed so far @returns {number} milliseconds */
+/**
+ * How long to wait before the next try: quickly at first, then every few seconds.
+ * @param {number} tries  failed so far
+ * @returns {number} milliseconds
+ */
 export function backoff(tries) {
 	return Math.min(5000, 300 * 2 ** Math.min(10, tries));
 }

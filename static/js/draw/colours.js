@@ -1,5 +1,5 @@
 /** Colours for the canvases, read from the tokens once a theme. */
-import { colourIndex } from "./dom.js";
+import { colourIndex } from "../elements/dom.js";
 
 /** @param {Element} element  whose theme counts @returns {Palette} */
 function read(element) {
@@ -11,7 +11,12 @@ function read(element) {
 		if (value === undefined) known.set(name, (value = style.getPropertyValue(`--${name}`).trim()));
 		return value;
 	};
-	return { get, id: (id) => get(`id-${colourIndex(id)}`), on: (id) => get(`on-${colourIndex(id)}`), font: get("font") };
+	return {
+		get,
+		id: (id) => get(`id-${colourIndex(id)}`),
+		on: (id) => get(`on-${colourIndex(id)}`),
+		font: get("font"),
+	};
 }
 
 /** @type {{theme: string, palette: Palette} | null} */
@@ -40,5 +45,10 @@ export function pictureInk() {
 
 /** @param {string} hex  #rrggbb @param {number} alpha  0 … 1 */
 export function faded(hex, alpha) {
-	return hex + Math.round(alpha * 255).toString(16).padStart(2, "0");
+	return (
+		hex +
+		Math.round(alpha * 255)
+			.toString(16)
+			.padStart(2, "0")
+	);
 }

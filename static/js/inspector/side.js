@@ -1,6 +1,6 @@
 /** The side panel: tabs with a panel each. */
-import { all, one, parts } from "../dom.js";
-import { isAlone } from "../events.js";
+import { all, one, parts } from "../elements/dom.js";
+import { isAlone } from "../state/events.js";
 import { mountTables } from "./tables.js";
 import { mountTracks } from "./tracks.js";
 
@@ -9,7 +9,8 @@ export function mountSide(root, context) {
 	const { store } = context;
 	const { count, only } = parts(root);
 	const tabs = all("[role=tab]", root);
-	const nameOf = (/** @type {Part} */ tab) => /** @type {PageState["tab"]} */ (tab.id.replace("tab-", ""));
+	const nameOf = (/** @type {Part} */ tab) =>
+		/** @type {PageState["tab"]} */ (tab.id.replace("tab-", ""));
 	tabs.forEach((tab, index) => {
 		tab.addEventListener("click", () => store.set({ tab: nameOf(tab) }));
 		tab.addEventListener("keydown", (event) => {

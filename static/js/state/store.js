@@ -6,7 +6,8 @@
 /**
  * @template {object} T
  * @param {T} initial
- * @param {(turn: () => void) => void} [schedule]  when listeners are told; a microtask later by default
+ * @param {(turn: () => void) => void} [schedule] when listeners are told; a microtask later by
+ * default
  * @returns {Store<T>}
  */
 export function createStore(initial, schedule = queueMicrotask) {
@@ -19,7 +20,8 @@ export function createStore(initial, schedule = queueMicrotask) {
 	function flush() {
 		const changed = pending;
 		pending = new Set();
-		for (const { keys, listener } of [...listeners]) if (keys.some((key) => changed.has(key))) listener(state);
+		for (const { keys, listener } of [...listeners])
+			if (keys.some((key) => changed.has(key))) listener(state);
 	}
 
 	return {

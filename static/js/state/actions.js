@@ -1,15 +1,20 @@
 /** What a person can do: the page's own state at once, the server's by request. */
 import { ApiError, request, sendJson } from "./api.js";
-import { SPEEDS, clampStep } from "./clock.js";
-import { eventsNow, nextEvent, ordered } from "./events.js";
+import { SPEEDS, clampStep } from "../play/clock.js";
+import { eventsNow, nextEvent, nextLayers, ordered } from "./events.js";
 
-/** What differs from the defaults. @param {ServerState} server */
-export const valuesOf = ({ changed, parameters }) => Object.fromEntries(changed.map((key) => [key, parameters[key]]));
+/** What differs from the defaults. @param {Server.State} server */
+export const valuesOf = ({ changed, parameters }) =>
+	Object.fromEntries(changed.map((key) => [key, parameters[key]]));
 
 /** Changes of one drag that follow each other within this time are undone together. */
 const SAME_DRAG = 1500;
 
-/** Save what an address gives, once it is known that it gives it. @param {string} path @param {string} fallback  name of the file where the answer has none */
+/**
+ * Save what an address gives, once it is known that it gives it.
+ * @param {string} path
+ * @param {string} fallback  name of the file where the answer has none
+ */
 async function download(path, fallback) {
 	const response = await request(path);
 	const named = /filename="?([^";]+)"?/.exec(response.headers.get("content-disposition") ?? "");
@@ -25,7 +30,7 @@ async function download(path, fallback) {
  * @param {Store<PageState>} how.store
  * @param {(step: number) => void} how.seek
  * @param {(message: object) => boolean} how.send
- * @param {(state: ServerState) => void} how.receive
+ * @param {(state: Server.State) => void} how.receive
  * @returns {Actions}
  */
 export function createActions({ store, seek, send, receive }) {
@@ -34,7 +39,12 @@ export function createActions({ store, seek, send, receive }) {
 	const [past, future] = [[], []];
 	let rememberedAt = -Infinity;
 	let [undoing, turn] = [0, Promise.resolve()];
+	/** Layers that were on in pictures and off in 3D, or the other way round, before their key. */
+	/** @type {Record<string, (boolean | undefined)[]>} */
+	const mixed = {};
 	const frames = () => store.get().frames;
+
+	const count = () => store.set({ undoable: [past.length, future.length] });
 
 	/** @param {unknown} error */
 	function tell(error) {
@@ -44,7 +54,12 @@ export function createActions({ store, seek, send, receive }) {
 		actions.note("error", error.message, error.hint ?? "");
 	}
 
-	/** A change that is undone by itself, however soon it follows another. @param {"POST"} method @param {string} path @param {object} [body] */
+	/**
+	 * A change that is undone by itself, however soon it follows another.
+	 * @param {"POST"} method
+	 * @param {string} path
+	 * @param {object} [body]
+	 */
 	function askApart(method, path, body) {
 		rememberedAt = -Infinity;
 		return actions.ask(method, path, body);
@@ -52,12 +67,16 @@ export function createActions({ store, seek, send, receive }) {
 
 	/** @type {Actions} */
 	const actions = {
-		note(level, title, text) {
+		note(level, title, text, remedy) {
 			const id = (noteId += 1);
 			// The same thing said twice is one note.
 			const others = store.get().notes.filter((other) => other.title !== title);
-			store.set({ notes: [...others.slice(-3), { id, level, title, text }] });
-			if (level === "info") setTimeout(() => store.set({ notes: store.get().notes.filter((other) => other.id !== id) }), 6000);
+			store.set({ notes: [...others.slice(-3), { id, level, title, text, remedy }] });
+			if (level === "info")
+				setTimeout(
+					() => store.set({ notes: store.get().notes.filter((other) => other.id !== id) }),
+					6000,
+				);
 		},
 		async ask(method, path, body) {
 			try {
@@ -118,7 +137,16 @@ export function createActions({ store, seek, send, receive }) {
 			const { timeline, laneOrder, selection } = store.get();
 			const ids = ordered(timeline?.tracks ?? [], laneOrder).map((track) => track.id);
 			const index = ids.indexOf(selection ?? -1);
-			if (ids.length) actions.select(ids[index < 0 ? (direction > 0 ? 0 : ids.length - 1) : (index + direction + ids.length) % ids.length]);
+			if (ids.length)
+				actions.select(
+					ids[
+						index < 0
+							? direction > 0
+								? 0
+								: ids.length - 1
+							: (index + direction + ids.length) % ids.length
+					],
+				);
 		},
 		go(place) {
 			const [step, id] = place.split(" ").map(Number);
@@ -144,10 +172,11 @@ export function createActions({ store, seek, send, receive }) {
 		},
 		toggleLayer(layer) {
 			const { layers2d, layers3d } = store.get();
-			// One key, one meaning: where both were different, both are on afterwards.
-			const on = ![layers2d, layers3d].every((layers) => layers[layer] ?? true);
-			if (layer in layers2d && layers2d[layer] !== on) actions.toggleLayer2d(layer);
-			if (layer in layers3d && layers3d[layer] !== on && layer !== "boxes") actions.toggleLayer3d(layer);
+			const now = [layers2d[layer], layer === "boxes" ? undefined : layers3d[layer]];
+			const [first, second] = nextLayers(now, mixed[layer]);
+			if (now[0] !== undefined && now[1] !== undefined && now[0] !== now[1]) mixed[layer] = now;
+			if (first !== now[0]) actions.toggleLayer2d(layer);
+			if (second !== now[1]) actions.toggleLayer3d(layer);
 		},
 		toggleLayer2d(layer) {
 			const { layers2d } = store.get();
@@ -160,7 +189,10 @@ export function createActions({ store, seek, send, receive }) {
 		},
 
 		// runs and parameters
-		open: (name) => actions.ask("POST", "sequence", { name }),
+		open(name) {
+			store.set({ asked: name });
+			return actions.ask("POST", "sequence", { name });
+		},
 		async change({ taught, ...changes }) {
 			if (taught) await actions.ask("POST", "teach/restore", { key: taught, changes });
 			else await actions.ask("PATCH", "parameters", { changes });
@@ -168,25 +200,35 @@ export function createActions({ store, seek, send, receive }) {
 		reset: (...keys) => void askApart("POST", "parameters/reset", keys.length ? { keys } : {}),
 		preset: (name) => void askApart("POST", "parameters/preset", { name }),
 		savePreset: (name) => actions.ask("POST", "presets", { name }),
-		renamePreset: (name, to) => actions.ask("PATCH", `presets/${encodeURIComponent(name)}`, { name: to }),
+		renamePreset: (name, to) =>
+			actions.ask("PATCH", `presets/${encodeURIComponent(name)}`, { name: to }),
 		removePreset: (name) => actions.ask("DELETE", `presets/${encodeURIComponent(name)}`),
 		cancel: () => void actions.ask("POST", "run/cancel"),
 		useAgain: (number) => void askApart("POST", `run/again/${number}`),
 		runAgain: () => void actions.ask("POST", "run"),
 		pin: (on) => void actions.ask(on ? "POST" : "DELETE", "run/pin"),
 		remember(before, after) {
-			const old = Object.fromEntries(Object.keys(after).filter((key) => before[key] !== after[key]).map((key) => [key, before[key]]));
+			const old = Object.fromEntries(
+				Object.keys(after)
+					.filter((key) => before[key] !== after[key])
+					.map((key) => [key, before[key]]),
+			);
 			if (Object.keys(old).length === 0) return;
 			const now = performance.now();
 			const last = past[past.length - 1];
-			const same = last && now - rememberedAt < SAME_DRAG && Object.keys(old).every((key) => key in last);
+			const same =
+				last && now - rememberedAt < SAME_DRAG && Object.keys(old).every((key) => key in last);
 			rememberedAt = undoing ? -Infinity : now;
 			if (undoing < 0) future.push(old);
 			else if (undoing > 0 || !same) past.push(old);
 			if (!undoing) future.length = 0;
 			if (past.length > 100) past.shift();
+			count();
 		},
-		forget: () => void (past.length = future.length = 0),
+		forget() {
+			past.length = future.length = 0;
+			count();
+		},
 		undo(direction) {
 			// Pressed again before the last answer came, it waits for its turn.
 			turn = turn.then(async () => {
@@ -195,6 +237,7 @@ export function createActions({ store, seek, send, receive }) {
 				undoing = direction;
 				await actions.change(old);
 				undoing = 0;
+				count();
 			});
 			return turn;
 		},
@@ -211,11 +254,16 @@ export function createActions({ store, seek, send, receive }) {
 		},
 
 		drawTemplate() {},
-		editRoom: () => void actions.ask("POST", "teach/editing", { on: !store.get().server?.teaching.editing_room }),
+		editRoom: () =>
+			void actions.ask("POST", "teach/editing", { on: !store.get().server?.teaching.editing_room }),
 		saveTaught: () => void actions.ask("POST", "teach/save"),
 
 		// page
-		showTab: (tab) => store.set({ tab, layout: { ...store.get().layout, ...(store.get().layout.max && { max: "side" }) } }),
+		showTab: (tab) =>
+			store.set({
+				tab,
+				layout: { ...store.get().layout, ...(store.get().layout.max && { max: "side" }) },
+			}),
 		toggleTheme() {
 			const theme = store.get().theme === "dark" ? "light" : "dark";
 			store.set({ theme });
@@ -228,7 +276,9 @@ export function createActions({ store, seek, send, receive }) {
 		},
 		maximise(pane) {
 			const { layout } = store.get();
-			store.set({ layout: pane === null ? {} : { ...layout, max: layout.max === pane ? undefined : pane } });
+			store.set({
+				layout: pane === null ? {} : { ...layout, max: layout.max === pane ? undefined : pane },
+			});
 		},
 		// what the dialogs and the timeline put in place of these when they are there
 		help() {},

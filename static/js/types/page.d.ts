@@ -1,5 +1,6 @@
 /**
- * What comes over the wire and what the page keeps, known in every module; no browser loads it.
+ * What the page keeps, known in every module; no browser loads it. What the server sends is in
+ * `server.d.ts`.
  * Steps are 0-based; boxes are `[left, top, width, height]` in pixels; positions are metres.
  */
 
@@ -11,7 +12,8 @@ type Box = [number, number, number, number];
 type Child = Node | string | number | null | undefined | false;
 
 /** An element of the markup by its `data-ref`: it has what its tag has. */
-type Part = HTMLElement & Omit<HTMLInputElement & HTMLSelectElement & HTMLIFrameElement, keyof HTMLElement>;
+type Part = HTMLElement &
+	Omit<HTMLInputElement & HTMLSelectElement & HTMLIFrameElement, keyof HTMLElement>;
 
 /** Of `h`: listeners by `on…`, style properties by `--…`, and plain attributes. */
 interface Attributes {
@@ -22,179 +24,24 @@ interface Attributes {
 	[name: string]: unknown;
 }
 
-type ApiFailure = {code: string, message: string, field: string | null, hint: string | null};
-
-interface CameraInfo {
-	name: string;
-	width: number;
-	height: number;
-	has_pictures: boolean;
-	has_detections: boolean;
-}
-
-interface SequenceInfo {
-	/** Changes with the content, so that pictures may be cached for ever. */
-	key: string;
-	name: string;
-	description: string;
-	fps: number;
-	frames: number;
-	has_pictures: boolean;
-	has_detections: boolean;
-	has_truth: boolean;
-	cameras: CameraInfo[];
-	templates: number;
-}
-
-interface RunState {
-	key: string;
-	state: "idle" | "computing" | "done" | "failed" | "cancelled";
-	/** Steps that are computed. */
-	done: number;
-	total: number;
-	steps_per_second: number | null;
-	seconds_left: number | null;
-	/** The stage that takes the time. */
-	message: string;
-	error: string | null;
-}
-
-interface ServerState {
-	version: number;
-	sequence: SequenceInfo | null;
-	opening: {name: string, message: string, done: number, total: number} | null;
-	/** In the page with the methods among them. */
-	parameters: Record<string, any>;
-	changed: string[];
-	/** The command that computes the same in a terminal. */
-	command: string;
-	methods: {single_view: string, fusion_method: string};
-	/** Why a method cannot work on the sequence, by `single_view` or `fusion_method` and its name. */
-	unfit: Record<string, Record<string, string>>;
-	/** Those that somebody has saved. */
-	presets: string[];
-	/** The one whose values the parameters have. */
-	preset: string | null;
-	playhead: number;
-	selection: number | null;
-	run: RunState;
-	pinned: {key: string, changed: string[]} | null;
-	teaching: {key: string, unsaved: number, editing_room: boolean};
-	viser: {path: string};
-	/** Of the 3D view. */
-	layers: Record<string, boolean>;
-	/** What the 3D view looks through. */
-	view: number | "top" | null;
-	theme: "dark" | "light";
-}
-
-interface TrackInView {
-	id: number;
-	box: Box | null;
-	seen: boolean;
-	detection_probability: number | null;
-	/** Index of the box that fed it, -1 where none did. */
-	source: number;
-	fed_by: {box: Box, weight: number, share: number} | null;
-	hidden_by: number | null;
-	visible: boolean;
-	reason: string | null;
-	centre: [number, number] | null;
-	/** Steps from now, x and y of the feet. */
-	trail: [number, number, number][];
-}
-
-/** Labels of the camera's own estimates. */
-type ViewEvent = {kind: string, labels: number[]};
-
-interface CameraStep {
-	name: string;
-	measurements: {box: Box, score: number}[];
-	estimates: {box: Box, weight: number, label: number}[];
-	samples?: [number, number, number][] | null;
-	events: ViewEvent[];
-	/** Of the method, by name. */
-	information: Record<string, number>;
-	/** The query of its address, null where there is none. */
-	foreground: string | null;
-	/** The same of the map of likelihoods. */
-	likelihood: string | null;
-	/** Centre x and y; xx, xy, yy of the ellipse's matrix. */
-	gates: [number, number, number, number, number][];
-	tracks: TrackInView[];
-	truth: {id: number, box: Box | null, valid: boolean}[];
-}
-
-interface StepResult {
-	run: string;
-	step: number;
-	computed: boolean;
-	cameras: CameraStep[];
-	tracks: {id: number, position: number[], sigma: number[], existence: number, seen: boolean[]}[];
-	truth: {id: number, position: number[], valid: boolean, track: number | null, error: number | null}[];
-	components: number;
-	cardinality: number;
-}
-
-/** From and to are inclusive. */
-type Span = [number, number, "seen" | "coasting" | "long miss"];
-
-/** Seen: share of its life. */
-type TrackLane = {id: number, first: number, last: number, seen: number, cameras: number[], spans: Span[]};
+type ApiFailure = { code: string; message: string; field: string | null; hint: string | null };
 
 /** Each value stands for `stride` steps, the first from step `first` on. */
-type Buckets = {first: number, stride: number};
+type Buckets = { first: number; stride: number };
 
 /** Of each bucket. */
-type Summary = {low: number[], high: number[], mean: number[]};
+type Summary = { low: number[]; high: number[]; mean: number[] };
 
-interface Timeline {
-	run: string;
-	done: number;
-	frames: number;
-	first: number;
-	stride: number;
-	cardinality: Summary;
-	count: Summary;
-	truth: Summary | null;
-	tracks: TrackLane[];
-	/** Like: the shown run's track. */
-	pinned: {run: string, count: Summary, tracks: (TrackLane & {like: number | null})[]} | null;
-	/** Step and track. */
-	events: [number, number, "birth" | "death" | "long miss"][];
-	left_out: number;
-}
+/** What a note offers to do about it. */
+type Remedy = { word: string; act: () => void };
 
-interface Parameter {
-	key: string;
-	group: string;
-	name: string;
-	label: string;
-	help: string;
-	symbol: string;
-	unit: string;
-	kind: string;
-	default: any;
-}
-
-interface Schema {
-	groups: {name: string, help: string}[];
-	parameters: Parameter[];
-	methods: Record<string, string[]>;
-	presets: Record<string, Record<string, any>>;
-}
-
-interface SequenceEntry {
-	name: string;
-	description: string;
-	kind: "rendered" | "folder";
-	cameras: number | null;
-	frames: number | null;
-	ready: boolean;
-	error?: string | null;
-}
-
-type Note = {id: number, level: "info" | "warn" | "error", title: string, text: string};
+type Note = {
+	id: number;
+	level: "info" | "warn" | "error";
+	title: string;
+	text: string;
+	remedy?: Remedy;
+};
 
 interface PageState {
 	link: "connecting" | "open" | "lost";
@@ -202,20 +49,22 @@ interface PageState {
 	lostAt: number;
 	/** Milliseconds since 1970. */
 	retryAt: number;
-	server: ServerState | null;
+	server: Server.State | null;
 	/** The newest progress, also between two states. */
-	run: RunState | null;
-	schema: Schema | null;
+	run: Server.RunInfo | null;
+	schema: Server.Schema | null;
 	/** That is open, and of it:. */
-	sequence: SequenceInfo | null;
+	sequence: Server.SequenceInfo | null;
 	frames: number;
 	fps: number;
-	cameras: CameraInfo[];
-	sequences: SequenceEntry[];
-	/** Key of the run that the server shows: that in `run`, or while that has no step yet, one before. */
+	cameras: Server.CameraInfo[];
+	sequences: Server.SequenceEntryInfo[];
+	/**
+	 * Key of the run that the server shows: that in `run`, or while that has no step yet, one before.
+	 */
 	basis: string;
 	/** Always of the run `basis`. */
-	timeline: Timeline | null;
+	timeline: Server.Timeline | null;
 	/** Steps that the timeline shows of a long recording; null: all of them. */
 	span: [number, number] | null;
 	/** What is asked for. */
@@ -223,7 +72,7 @@ interface PageState {
 	/** What is painted. */
 	shown: number;
 	/** Of the painted step. */
-	result: StepResult | null;
+	result: Server.Step | null;
 	/** Counts up whenever a picture arrives or leaves. */
 	loaded: number;
 	playing: 0 | 1 | -1;
@@ -232,7 +81,7 @@ interface PageState {
 	/** In and out points. */
 	range: [number | null, number | null];
 	selection: number | null;
-	hover: {id: number, camera: number} | null;
+	hover: { id: number; camera: number } | null;
 	layers2d: Record<string, boolean>;
 	layers3d: Record<string, boolean>;
 	/** The camera that is shown large; null: all alike. */
@@ -248,48 +97,30 @@ interface PageState {
 	measure: "ospa" | "gospa";
 	laneOrder: "longest" | "born";
 	/** Shares of the window, and the pane that is alone. */
-	layout: {right?: number, cams?: number, lanes?: number, max?: PaneName};
+	layout: { right?: number; cams?: number; lanes?: number; max?: PaneName };
 	theme: "dark" | "light";
 	singleKeys: boolean;
 	notes: Note[];
+	/** What this page asked the server to open. */
+	asked: string;
+	/** Whether somebody has chosen a step of this sequence. */
+	moved: boolean;
+	/** Every step is shown, however late; else steps are left out to keep real time. */
+	everyStep: boolean;
+	/** How many changes can be undone, and redone. */
+	undoable: [number, number];
+	/** Notices that were closed for good, by name. */
+	dismissed: string[];
 }
-
-type ScoredTrack = {id: number, kind: string, person: number | null, mean_error: number | null, switches: number};
-
-type Evaluation = {run: string, steps: number, partial: boolean, per_track: ScoredTrack[]};
 
 /** Metres over the steps; null where there is no pair. */
-type Course = {first: number, values: (number | null)[]};
+type Course = { first: number; values: (number | null)[] };
 
-/** Of a person's identity, from one track to another. */
-type Switch = {step: number, before: number, track: number};
-
-interface ScoreSeries {
-	run: string;
-	first: number;
-	stride: number;
-	unit: string;
-	/** Cut-off and order, in words. */
-	cost: string;
-	gate: string;
-	ospa: number[];
-	ospa_localisation: number[];
-	ospa_cardinality: number[];
-	gospa: number[];
-	gospa_localisation: number[];
-	gospa_missed: number[];
-	gospa_false: number[];
-	/** How much of it is location, 0 … 1. */
-	ospa_share: number[];
-	gospa_share: number[];
-	track_errors: (Course & {track: number})[];
-	mean_error: (number | null)[];
-	/** Upper ends for plots. */
-	axes: {ospa: number, gospa: number, error: number};
-	switches: Switch[];
-}
-
-type Scores = {evaluation: Evaluation, series: ScoreSeries, reference: ScoreSeries | null};
+type Scores = {
+	evaluation: Server.EvaluationInfo;
+	series: Server.EvaluationSeries;
+	reference: Server.EvaluationSeries | null;
+};
 
 type PaneName = "view" | "cams" | "side" | "time";
 
@@ -306,7 +137,7 @@ interface Command {
 
 /** What a person can do. */
 interface Actions {
-	note: (level: "info" | "warn" | "error", title: string, text: string) => void;
+	note: (level: "info" | "warn" | "error", title: string, text: string, remedy?: Remedy) => void;
 	/** Null after a failure, which is told. */
 	ask: (method: "POST" | "PATCH" | "DELETE", path: string, body?: object) => Promise<any>;
 	togglePlay: () => void;
@@ -373,7 +204,7 @@ interface Frame {
 	pictures: (Picture | undefined)[];
 	/** By camera: what is laid over its picture. */
 	maps: Picture[][];
-	result: StepResult | null;
+	result: Server.Step | null;
 	/** The result is of the run before, shown faintly until the new one is there. */
 	stale: boolean;
 }
@@ -381,7 +212,7 @@ interface Frame {
 /** What every pane is given. */
 interface Context {
 	store: Store<PageState>;
-	playback: ReturnType<typeof import("./playback.js").createPlayback>;
+	playback: ReturnType<typeof import("../play/playback.js").createPlayback>;
 	actions: Actions;
 	/** Connect now. */
 	retry: () => void;
@@ -393,36 +224,46 @@ interface Context {
 type Pane = (root: HTMLElement, context: Context) => void;
 
 /** Of the timeline, CSS pixels. */
-type Row = {y: number, height: number};
+type Row = { y: number; height: number };
 
 /** What a row is drawn with. */
-type Pen = {g: Brush, row: Row, view: View, ink: Palette};
+type Pen = { g: Brush; row: Row; view: View; ink: Palette };
 
 interface Lanes {
 	/** In the order of the lanes. */
-	tracks: TrackLane[];
-	pinned: (TrackLane & {like: number | null})[];
+	tracks: Server.TrackLife[];
+	pinned: (Server.TrackLife & { like: number | null })[];
 	/** Pixels. */
 	scroll: number;
 	laneHeight: number;
 	done: number;
 	selection: number | null;
 	hover: number | null;
-	switches: Switch[];
+	switches: Server.Switch[];
 }
 
 /** The steps an axis of `width` CSS pixels shows. */
-type View = {first: number, last: number, width: number};
+type View = { first: number; last: number; width: number };
 
-type LaneEvent = {step: number, id: number, kind: "birth" | "death" | "long miss" | "switch"};
+type LaneEvent = { step: number; id: number; kind: "birth" | "death" | "long miss" | "switch" };
 
 /** Of the mosaic of pictures. */
-type Cell = {x: number, y: number, width: number, height: number};
+type Cell = { x: number; y: number; width: number; height: number };
 
 /** Values: what differs from the defaults. */
-type Place = {sequence: string | null, step: number | null, selection: number | null, camera: number | null, values: Record<string, any> | null};
+type Place = {
+	sequence: string | null;
+	step: number | null;
+	selection: number | null;
+	camera: number | null;
+	/** Through which camera, or from where, the 3D view looks. */
+	look: number | "top" | null;
+	values: Record<string, any> | null;
+	/** Words of the address. */
+	view: Record<string, string>;
+};
 
-type Picture = {bitmap: ImageBitmap | null, missing: string | null};
+type Picture = { bitmap: ImageBitmap | null; missing: string | null };
 
 interface Palette {
 	/** A token without its dashes. */
@@ -445,7 +286,7 @@ interface Scene {
 	hover: number | null;
 	/** Only the selected track. */
 	alone: boolean;
-	people: StepResult["truth"];
+	people: Server.Step["truth"];
 	opacity: number;
 	ink: Palette;
 }

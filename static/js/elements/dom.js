@@ -12,7 +12,8 @@ export function h(tag, attributes = {}, ...children) {
 	const element = document.createElement(tag);
 	for (const [name, value] of Object.entries(attributes)) {
 		if (value === null || value === undefined || value === false) continue;
-		if (name.startsWith("on")) element.addEventListener(name.slice(2), /** @type {EventListener} */ (value));
+		if (name.startsWith("on"))
+			element.addEventListener(name.slice(2), /** @type {EventListener} */ (value));
 		else if (name.startsWith("--")) element.style.setProperty(name, String(value));
 		else element.setAttribute(name, value === true ? "" : String(value));
 	}
@@ -20,29 +21,59 @@ export function h(tag, attributes = {}, ...children) {
 	return element;
 }
 
-/** Replace what an element holds. @param {Element} element @param {...(Child | Child[])} children */
+/**
+ * Replace what an element holds.
+ * @param {Element} element
+ * @param {...(Child | Child[])} children
+ */
 export function fill(element, ...children) {
-	const nodes = children.flat().filter((child) => child !== null && child !== undefined && child !== false);
-	element.replaceChildren(.../** @type {(Node | string)[]} */ (nodes.map((n) => (typeof n === "number" ? String(n) : n))));
+	const nodes = children
+		.flat()
+		.filter((child) => child !== null && child !== undefined && child !== false);
+	element.replaceChildren(
+		.../** @type {(Node | string)[]} */ (nodes.map((n) => (typeof n === "number" ? String(n) : n))),
+	);
 }
 
-/** Write a text only where it changed: cheap enough for every frame. @param {Node} node @param {string} text */
+/**
+ * Write a text only where it changed: cheap enough for every frame.
+ * @param {Node} node
+ * @param {string} text
+ */
 export function write(node, text) {
 	if (node.textContent !== text) node.textContent = text;
 }
 
-/** The elements of the markup that a selector finds. @param {string} selector @param {ParentNode} [root] @returns {Part[]} */
-export const all = (selector, root = document) => [...root.querySelectorAll(selector)].map((element) => /** @type {any} */ (element));
+/**
+ * The elements of the markup that a selector finds.
+ * @param {string} selector
+ * @param {ParentNode} [root]
+ * @returns {Part[]}
+ */
+export const all = (selector, root = document) =>
+	[...root.querySelectorAll(selector)].map((element) => /** @type {any} */ (element));
 
 /** The one that there is. @param {string} selector @param {ParentNode} [root] */
 export const one = (selector, root) => all(selector, root)[0];
 
-/** Those that the markup names with `data-ref`, by that name. @param {ParentNode} root @returns {Record<string, Part>} */
-export const parts = (root) => Object.fromEntries(all("[data-ref]", root).map((element) => [element.dataset.ref, element]));
+/**
+ * Those that the markup names with `data-ref`, by that name.
+ * @param {ParentNode} root
+ * @returns {Record<string, Part>}
+ */
+export const parts = (root) =>
+	Object.fromEntries(all("[data-ref]", root).map((element) => [element.dataset.ref, element]));
 
-/** @param {Part} select @param {[string | number, string][]} choices  values and words @param {string | number} chosen */
+/**
+ * @param {Part} select
+ * @param {[string | number, string][]} choices  values and words
+ * @param {string | number} chosen
+ */
 export function choices(select, choices, chosen) {
-	fill(select, choices.map(([value, word]) => h("option", { value }, word)));
+	fill(
+		select,
+		choices.map(([value, word]) => h("option", { value }, word)),
+	);
 	select.value = String(chosen);
 }
 
@@ -68,5 +99,7 @@ export function idTag(id) {
 /** @param {number} value  @returns {string} as short as it stays readable */
 export function show(value) {
 	if (Number.isInteger(value)) return String(value);
-	return Math.abs(value) < 1e-3 ? value.toExponential().replace("e-", "e−") : String(Number(value.toPrecision(5)));
+	return Math.abs(value) < 1e-3
+		? value.toExponential().replace("e-", "e−")
+		: String(Number(value.toPrecision(5)));
 }

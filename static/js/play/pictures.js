@@ -1,8 +1,10 @@
 /** Pictures of all cameras around the playhead, decoded, within a budget of bytes. */
-import { request } from "./api.js";
+import { request } from "../state/api.js";
 import { createCache } from "./cache.js";
 
-/** Decoded pictures kept, in bytes: a minute of two small cameras, some seconds of four large ones. */
+/**
+ * Decoded pictures kept, in bytes: a minute of two small cameras, some seconds of four large ones.
+ */
 export const PICTURE_BUDGET = 256 * 2 ** 20;
 
 /**
@@ -12,14 +14,26 @@ export const PICTURE_BUDGET = 256 * 2 ** 20;
  * @param {number} step
  * @param {string} [kind]  of the picture itself, or of what is laid over it
  */
-export const pictureName = (sequence, camera, step, kind = "picture") => `/api/${kind}/${sequence}/${camera}/${step}.${kind === "picture" ? "jpg" : "png"}`;
+export const pictureName = (sequence, camera, step, kind = "picture") =>
+	`/api/${kind}/${sequence}/${camera}/${step}.${kind === "picture" ? "jpg" : "png"}`;
 
 /** What can be laid over a picture. */
 const MAPS = /** @type {const} */ (["foreground", "likelihood"]);
 
-/** The addresses of what is laid over the pictures of a step, by camera. @param {string} sequence  its key @param {StepResult} result @param {Record<string, boolean>} layers */
+/**
+ * The addresses of what is laid over the pictures of a step, by camera.
+ * @param {string} sequence  its key
+ * @param {Server.Step} result
+ * @param {Record<string, boolean>} layers
+ */
 export const mapNames = (sequence, result, layers) =>
-	result.cameras.map((view, camera) => MAPS.flatMap((kind) => (layers[kind] && view[kind] ? [`${pictureName(sequence, camera, result.step, kind)}?run=${view[kind]}`] : [])));
+	result.cameras.map((view, camera) =>
+		MAPS.flatMap((kind) =>
+			layers[kind] && view[kind]
+				? [`${pictureName(sequence, camera, result.step, kind)}?run=${view[kind]}`]
+				: [],
+		),
+	);
 
 /** @param {(name: string) => void} arrived */
 export function createPictures(arrived) {

@@ -2,13 +2,19 @@
  * The panels whose tables the server writes: they are fetched while they are looked at, when
  * something that they tell of is new. Their buttons name an action and its value.
  */
-import { fetcher, request } from "../api.js";
-import { all, choices, one, parts, write } from "../dom.js";
+import { fetcher, request } from "../state/api.js";
+import { all, choices, one, parts, write } from "../elements/dom.js";
 
-/** What a panel tells of, and where it comes from. @type {Record<string, {keys: (keyof PageState)[], path: (state: Readonly<PageState>) => string}>} */
+/**
+ * What a panel tells of, and where it comes from.
+ * @type {Record<string, {keys: (keyof PageState)[], path: (state: Readonly<PageState>) => string}>}
+ */
 const TABLES = {
 	step: { keys: ["result", "scores"], path: ({ shown }) => `step/${Math.max(0, shown)}` },
-	events: { keys: ["timeline", "scores", "eventKind"], path: ({ eventKind }) => `events${eventKind && `?kind=${eventKind}`}` },
+	events: {
+		keys: ["timeline", "scores", "eventKind"],
+		path: ({ eventKind }) => `events${eventKind && `?kind=${eventKind}`}`,
+	},
 	teach: { keys: ["server"], path: () => "teach" },
 	changes: { keys: ["server"], path: () => "changes" },
 	compare: { keys: ["scores", "basis", "every"], path: ({ every }) => `compare?every=${every}` },
@@ -17,7 +23,19 @@ const TABLES = {
 
 /** @type {Pane} */
 export function mountTables(root, { store, actions }) {
-	const { kind, presets, presetName, savePreset, renamePreset, removePreset, code, pin, unpin, more, resetAll } = parts(root);
+	const {
+		kind,
+		presets,
+		presetName,
+		savePreset,
+		renamePreset,
+		removePreset,
+		code,
+		pin,
+		unpin,
+		more,
+		resetAll,
+	} = parts(root);
 	for (const [name, { keys, path }] of Object.entries(TABLES)) {
 		const body = one(`#panel-${name} [data-fill]`, root);
 		let told = "";
@@ -27,22 +45,34 @@ export function mountTables(root, { store, actions }) {
 			const text = await (await request(`/api/tables/${path(store.get())}`)).text();
 			if (text === told) return;
 			told = text;
-			// Where the focus was, it is again, on the one in its place; what is being typed stays, but for what the server has taken.
+			// Where the focus was, it is again, on the one in its place; what is being typed stays, but
+			// for what the server has taken.
 			const held = document.activeElement;
 			const at = all("button, input", body).findIndex((control) => control === held);
 			const typed = all("input", body).filter(({ value, defaultValue }) => value !== defaultValue);
 			body.innerHTML = text;
-			for (const { id, value, defaultValue } of typed) for (const field of all(`#${id}`, body)) if (field.defaultValue === defaultValue) field.value = value;
-			if (at >= 0) ((held?.id && all(`#${held.id}`, body)[0]) || all("button, input", body)[at] || body).focus();
+			for (const { id, value, defaultValue } of typed)
+				for (const field of all(`#${id}`, body))
+					if (field.defaultValue === defaultValue) field.value = value;
+			if (at >= 0)
+				(
+					(held?.id && all(`#${held.id}`, body)[0]) ||
+					all("button, input", body)[at] ||
+					body
+				).focus();
 		});
 		store.on([...keys, "tab", "sequence"], refresh);
 	}
 	root.addEventListener("click", ({ target }) => {
-		const { do: act, value = "" } = /** @type {Part} */ (/** @type {Part} */ (target).closest("[data-do]") ?? root).dataset;
+		const { do: act, value = "" } = /** @type {Part} */ (
+			/** @type {Part} */ (target).closest("[data-do]") ?? root
+		).dataset;
 		if (act) /** @type {any} */ (actions)[act](value);
 	});
 
-	kind.addEventListener("change", () => store.set({ eventKind: /** @type {LaneEvent["kind"]} */ (kind.value) }));
+	kind.addEventListener("change", () =>
+		store.set({ eventKind: /** @type {LaneEvent["kind"]} */ (kind.value) }),
+	);
 	more.addEventListener("click", () => store.set({ every: !store.get().every }));
 	presets.addEventListener("change", () => actions.preset(presets.value));
 	for (const button of [savePreset, renamePreset]) {
@@ -52,7 +82,13 @@ export function mountTables(root, { store, actions }) {
 			presetName.select();
 			presetName.onkeydown = async (event) => {
 				event.stopPropagation();
-				if (event.key === "Enter" && !(await (old ? actions.renamePreset(old, presetName.value) : actions.savePreset(presetName.value)))) return;
+				if (
+					event.key === "Enter" &&
+					!(await (old
+						? actions.renamePreset(old, presetName.value)
+						: actions.savePreset(presetName.value)))
+				)
+					return;
 				if (event.key === "Enter" || event.key === "Escape") presets.focus();
 			};
 		});
@@ -65,7 +101,14 @@ export function mountTables(root, { store, actions }) {
 		const changed = server?.changed ?? [];
 		const locked = link !== "open" || !sequence;
 		const [own, now] = [server?.presets ?? [], server?.preset ?? ""];
-		choices(presets, [...(now ? [] : [""]), ...Object.keys(schema?.presets ?? {}), ...own].map((name) => [name, name || "own values"]), now);
+		choices(
+			presets,
+			[...(now ? [] : [""]), ...Object.keys(schema?.presets ?? {}), ...own].map((name) => [
+				name,
+				name || "own values",
+			]),
+			now,
+		);
 		presets.disabled = savePreset.disabled = locked;
 		renamePreset.hidden = removePreset.hidden = !own.includes(now);
 		resetAll.disabled = locked || changed.length === 0;

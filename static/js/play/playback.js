@@ -5,7 +5,7 @@
  * pictures and its result are there: all cameras, overlays, readout and playhead in one
  * animation frame. Until then the last whole step stays.
  */
-import { getJson } from "./api.js";
+import { getJson } from "../state/api.js";
 import { createCache } from "./cache.js";
 import { advance, clampStep, playedRange, prefetchWindow } from "./clock.js";
 import { createPictures, mapNames, pictureName, PICTURE_BUDGET } from "./pictures.js";
@@ -36,9 +36,10 @@ export function createPlayback(store, sendSeek) {
 	const results = createCache({
 		load: async (name, signal) => {
 			const [, step, query] = name.split("/");
-			/** @type {StepResult} */
+			/** @type {Server.Step} */
 			const result = await getJson(`/api/step/${step}${query}`, { signal });
-			if (name !== resultName(result.run, result.step, query)) throw new Error(`asked for ${name}, the server shows run ${result.run} by now`);
+			if (name !== resultName(result.run, result.step, query))
+				throw new Error(`asked for ${name}, the server shows run ${result.run} by now`);
 			return result;
 		},
 		sizeOf: () => 1,
@@ -56,7 +57,11 @@ export function createPlayback(store, sendSeek) {
 		},
 	});
 
-	/** @param {string} run @param {number} step @param {string} query  for what is not in every answer */
+	/**
+	 * @param {string} run
+	 * @param {number} step
+	 * @param {string} query  for what is not in every answer
+	 */
 	const resultName = (run, step, query) => `${run || "none"}/${step}/${query}`;
 
 	/** What the layers need of a result besides what is always in it. */
@@ -88,7 +93,10 @@ export function createPlayback(store, sendSeek) {
 			results.want([]);
 			return;
 		}
-		const bytes = sequence.cameras.reduce((sum, c) => sum + (c.has_pictures ? c.width * c.height * 4 : 0), 0);
+		const bytes = sequence.cameras.reduce(
+			(sum, c) => sum + (c.has_pictures ? c.width * c.height * 4 : 0),
+			0,
+		);
 		const how = { frames: sequence.frames, fps: sequence.fps, speed, direction: playing };
 		const most = Math.min(400, Math.floor((PICTURE_BUDGET * 0.9) / Math.max(1, bytes)));
 		const steps = prefetchWindow(step, { ...how, most });
@@ -96,7 +104,12 @@ export function createPlayback(store, sendSeek) {
 			steps.flatMap((k) => {
 				const result = results.get(resultName(basis, k, queryNow()));
 				const maps = result ? mapNames(sequence.key, result, layers2d).flat() : [];
-				return [...sequence.cameras.flatMap((camera, index) => (camera.has_pictures ? [pictureName(sequence.key, index, k)] : [])), ...maps];
+				return [
+					...sequence.cameras.flatMap((camera, index) =>
+						camera.has_pictures ? [pictureName(sequence.key, index, k)] : [],
+					),
+					...maps,
+				];
 			}),
 		);
 		const done = shownDone(state);
@@ -104,7 +117,11 @@ export function createPlayback(store, sendSeek) {
 		results.want(useful.slice(0, RESULTS_KEPT / 2).map((k) => resultName(basis, k, queryNow())));
 	}
 
-	/** @param {PageState} state @param {number} step @returns {Frame | null} null while something that will come is missing */
+	/**
+	 * @param {PageState} state
+	 * @param {number} step
+	 * @returns {Frame | null} null while something that will come is missing
+	 */
 	function assemble(state, step) {
 		const { sequence } = state;
 		if (!sequence) return null;
@@ -115,13 +132,16 @@ export function createPlayback(store, sendSeek) {
 				: { bitmap: null, missing: null },
 		);
 		if (!lost && found.some((picture) => picture === undefined)) return null;
-		const result = results.get(resultName(state.basis, step, queryNow())) ?? (lost ? results.get(resultName(state.basis, step, "")) : undefined);
+		const result =
+			results.get(resultName(state.basis, step, queryNow())) ??
+			(lost ? results.get(resultName(state.basis, step, "")) : undefined);
 		const names = result ? mapNames(sequence.key, result, state.layers2d) : [];
 		const maps = names.map((list) => list.flatMap((name) => pictures.get(name) ?? []));
 		if (!lost && maps.flat().length < names.flat().length) return null;
 		const frame = { step, pictures: found, maps };
 		const computing = state.run?.state === "computing";
-		if (result?.computed) return { ...frame, result, stale: computing && result.run !== state.run?.key };
+		if (result?.computed)
+			return { ...frame, result, stale: computing && result.run !== state.run?.key };
 		// Until the new run comes to this step, the one before is faintly better than nothing.
 		const before = state.result;
 		if (computing && before?.computed && before.step === step && state.shown === step) {
@@ -138,7 +158,14 @@ export function createPlayback(store, sendSeek) {
 		if (!sequence) return;
 		if (state.playing && state.step === state.shown) {
 			const [first, last] = playedRange(state.range, sequence.frames);
-			const how = { fps: sequence.fps, speed: state.speed, direction: state.playing, first, last, loop: state.loop };
+			const how = {
+				fps: sequence.fps,
+				speed: state.speed,
+				direction: state.playing,
+				first,
+				last,
+				loop: state.loop,
+			};
 			const next = advance({ step: state.step, rest }, lastTick ? (now - lastTick) / 1000 : 0, how);
 			rest = next.rest;
 			lastTick = now;
@@ -166,7 +193,8 @@ export function createPlayback(store, sendSeek) {
 		const done = shownDone(state);
 		for (const name of [...results.names()]) {
 			const result = results.get(name);
-			if (result && !result.computed && (result.run !== state.basis || result.step < done)) results.forget(name);
+			if (result && !result.computed && (result.run !== state.basis || result.step < done))
+				results.forget(name);
 		}
 		dirty = true;
 		windowDirty = true;
@@ -195,7 +223,7 @@ export function createPlayback(store, sendSeek) {
 			dirty = true;
 			ask();
 		},
-		/** A result that came by itself. @param {StepResult} result */
+		/** A result that came by itself. @param {Server.Step} result */
 		receive(result) {
 			results.put(resultName(result.run, result.step, ""), result);
 			if (result.step === store.get().step) dirty = true;
@@ -204,7 +232,7 @@ export function createPlayback(store, sendSeek) {
 		/** @param {number} step */
 		seek(step) {
 			const { frames } = store.get();
-			if (frames > 0) store.set({ step: clampStep(step, frames) });
+			if (frames > 0) store.set({ step: clampStep(step, frames), moved: true });
 		},
 		/** Another tab or the 3D view moved the playhead. @param {number} step */
 		follow(step) {
@@ -212,7 +240,10 @@ export function createPlayback(store, sendSeek) {
 			lastSent = step;
 			store.set({ step, playing: 0 });
 		},
-		/** Forget everything of the sequence before. @param {number} step  where the server stands in the new one */
+		/**
+		 * Forget everything of the sequence before.
+		 * @param {number} step  where the server stands in the new one
+		 */
 		clear(step) {
 			pictures.clear();
 			results.clear();

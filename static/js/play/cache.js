@@ -8,7 +8,15 @@
  * @param {CacheHow<V>} how
  * @returns {Kept<V>}
  */
-export function createCache({ load, sizeOf, budget, parallel = 4, arrived, dispose = () => {}, failed }) {
+export function createCache({
+	load,
+	sizeOf,
+	budget,
+	parallel = 4,
+	arrived,
+	dispose = () => {},
+	failed,
+}) {
 	/** In the order of their last use, oldest first.  @type {Map<string, V>} */
 	const kept = new Map();
 	/** @type {Map<string, AbortController>} */

@@ -9,20 +9,25 @@
 /** @type {Command[]} */
 export const COMMANDS = [];
 
-/** @param {Record<Command["group"], Omit<Command, "group">[]>} groups  what `commands.json` holds */
+/**
+ * @param {Record<Command["group"], Omit<Command, "group">[]>} groups  what `commands.json` holds
+ */
 export function register(groups) {
 	COMMANDS.length = 0;
 	for (const [group, rows] of Object.entries(groups)) {
-		for (const row of rows) COMMANDS.push({ ...row, group: /** @type {Command["group"]} */ (group) });
+		for (const row of rows)
+			COMMANDS.push({ ...row, group: /** @type {Command["group"]} */ (group) });
 	}
 }
 
 /** @param {Command} command @param {Actions} actions */
-export const perform = ({ action, value }, actions) => /** @type {any} */ (actions)[action](value);
+export const perform = ({ action, value }, actions) =>
+	/** @type {any} */ (actions)[action](...(value === undefined ? [] : [value]));
 
 /**
  * The name of the key that an event brings.
- * @param {{key: string, ctrlKey: boolean, metaKey: boolean, altKey: boolean, shiftKey: boolean}} event
+ * @param {{key: string, ctrlKey: boolean, metaKey: boolean, altKey: boolean, shiftKey: boolean}}
+ * event
  * @returns {string} empty for a key that no command may have
  */
 export function keyOf({ key, ctrlKey, metaKey, altKey, shiftKey }) {
@@ -35,12 +40,24 @@ export function keyOf({ key, ctrlKey, metaKey, altKey, shiftKey }) {
 }
 
 /** @type {Record<string, string>} */
-const SIGNS = { ArrowLeft: "←", ArrowRight: "→", Escape: "Esc", PageUp: "Page ↑", PageDown: "Page ↓", "-": "−" };
+const SIGNS = {
+	ArrowLeft: "←",
+	ArrowRight: "→",
+	Escape: "Esc",
+	PageUp: "Page ↑",
+	PageDown: "Page ↓",
+	"-": "−",
+};
 
-/** @param {string} key  as `keyOf` names it @returns {string} as a person reads it, for instance `Shift ←` */
+/**
+ * @param {string} key  as `keyOf` names it
+ * @returns {string} as a person reads it, for instance `Shift ←`
+ */
 export function keyLabel(key) {
 	const parts = key === "+" ? [key] : key.split("+");
-	return parts.map((part) => SIGNS[part] ?? (part.length === 1 ? part.toUpperCase() : part)).join(" ");
+	return parts
+		.map((part) => SIGNS[part] ?? (part.length === 1 ? part.toUpperCase() : part))
+		.join(" ");
 }
 
 /** @param {string} name */
@@ -50,17 +67,27 @@ export function commandOf(name) {
 	return found;
 }
 
-/** The command of a key. @param {string} key  as `keyOf` names it @param {boolean} singleKeys  whether letters, digits and signs alone are on */
+/**
+ * The command of a key.
+ * @param {string} key  as `keyOf` names it
+ * @param {boolean} singleKeys  whether letters, digits and signs alone are on
+ */
 export function commandFor(key, singleKeys = true) {
 	if (!key) return undefined;
 	if (!singleKeys && key !== "?" && key.replace("Shift+", "").length === 1) return undefined;
 	return COMMANDS.find((command) => command.keys.includes(key));
 }
 
-/** Commands whose title has all words of a text, those that begin with it first. @param {string} text */
+/**
+ * Commands whose title has all words of a text, those that begin with it first.
+ * @param {string} text
+ */
 export function search(text) {
 	const words = text.toLowerCase().split(/\s+/).filter(Boolean);
-	const found = COMMANDS.filter(({ title, group }) => words.every((word) => `${title} ${group}`.toLowerCase().includes(word)));
-	const late = (/** @type {Command} */ { title }) => Number(!title.toLowerCase().startsWith(words[0] ?? ""));
+	const found = COMMANDS.filter(({ title, group }) =>
+		words.every((word) => `${title} ${group}`.toLowerCase().includes(word)),
+	);
+	const late = (/** @type {Command} */ { title }) =>
+		Number(!title.toLowerCase().startsWith(words[0] ?? ""));
 	return found.sort((a, b) => late(a) - late(b));
 }
