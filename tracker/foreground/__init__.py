@@ -16,7 +16,7 @@ from tracker.foreground.exposure import BackgroundModel, LearntForeground, tone_
 from tracker.foreground.segmentation import ForegroundModel, Segmentation, pack, unpack
 from tracker.foreground.shares import box_shares, integral, shape_scores, shape_shares
 from tracker.parameters.foreground import ForegroundParams
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 
 __all__ = [
@@ -41,7 +41,7 @@ BACKGROUND_PICTURES = 32
 
 
 def learn(
-    sequence: Sequence, camera_index: int, reader: FrameReader, parameters: ForegroundParams
+    sequence: Sequence, camera_index: int, reader: Pictures, parameters: ForegroundParams
 ) -> ForegroundModel | None:
     """The chosen foreground model of one camera; None where it has not a single picture.
 

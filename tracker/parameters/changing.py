@@ -15,11 +15,18 @@ _READ = {key: attrgetter(key) for key in (*METHODS, *PARAMETERS)}
 
 
 class ParameterError(ValueError):
-    """A parameter does not exist or its value is out of range; the message says what to do."""
+    """A parameter does not exist or its value is out of range; the message says what to do.
 
-    def __init__(self, key: str, message: str) -> None:
+    Args:
+        key: Of the parameter, or the name of what else was asked for.
+        message: What was expected and what was found.
+        hint: Where to find what there is, if that is not the table of parameters.
+    """
+
+    def __init__(self, key: str, message: str, hint: str | None = None) -> None:
         super().__init__(f"{key}: {message}")
         self.key = key
+        self.hint = hint
 
 
 def value(parameters: RunParameters, key: str) -> Any:

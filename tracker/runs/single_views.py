@@ -12,7 +12,7 @@ import numpy as np
 
 from tracker import single_view
 from tracker.runs.run import Cancelled, Run
-from tracker.sequences.frames import FrameReader, Picture
+from tracker.sequences.frames import Picture, Pictures
 from tracker.single_view.colour.likeness import Likeness
 from tracker.single_view.protocol import SingleViewMethod, ViewResult
 
@@ -30,7 +30,7 @@ class SingleViews:
     def __init__(
         self,
         run: Run,
-        reader: FrameReader,
+        reader: Pictures,
         cancelled: Cancel,
         thread_begins: Callable[[], None] = lambda: None,
     ) -> None:
@@ -101,7 +101,7 @@ class _CameraWorker:
         state: Any,
         camera: int,
         run: Run,
-        reader: FrameReader,
+        reader: Pictures,
         stopped: Cancel,
     ) -> None:
         self._method = method
@@ -134,14 +134,14 @@ def _looks_at_pictures(run: Run) -> bool:
     return run.parameters.method("single_view").used(run.parameters).pictures
 
 
-class _StoppingReader(FrameReader):
+class _StoppingReader:
     """The pictures of another reader, until the run is to stop: then :class:`Cancelled` is raised.
 
     A background or the templates take many pictures before the first step: nobody waits for
     the rest of them.
     """
 
-    def __init__(self, reader: FrameReader, stopped: Cancel) -> None:
+    def __init__(self, reader: Pictures, stopped: Cancel) -> None:
         self._reader = reader
         self._stopped = stopped
 
@@ -159,6 +159,3 @@ class _StoppingReader(FrameReader):
     def check(self) -> None:
         if self._stopped():
             raise Cancelled
-
-    def close(self) -> None:
-        """Whoever opened the other one closes it."""

@@ -11,7 +11,7 @@ from tracker.single_view.protocol import SingleViewMethod, ViewResult
 
 if TYPE_CHECKING:
     from tracker.parameters import RunParameters
-    from tracker.sequences.frames import FrameReader
+    from tracker.sequences.frames import Pictures
     from tracker.sequences.sequence import Sequence
 
 __all__ = ["SingleViewMethod", "ViewResult", "create"]
@@ -22,7 +22,7 @@ def create(
     sequence: Sequence,
     camera_index: int,
     parameters: RunParameters,
-    reader: FrameReader,
+    reader: Pictures,
 ) -> SingleViewMethod:
     """The single-view method of that name, prepared for one camera of a sequence.
 

@@ -20,7 +20,7 @@ from tracker.filters import gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.foreground import pack
 from tracker.parameters import ColourPhdParams
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import entrance_boxes
 from tracker.single_view.colour.peaks import PeakFinder, Peaks
@@ -66,7 +66,7 @@ class ColourPhd:
         sequence: Sequence,
         camera_index: int,
         parameters: RunParameters,
-        reader: FrameReader,
+        reader: Pictures,
     ) -> None:
         """Read the templates and learn the background.
 

@@ -26,7 +26,7 @@ from tracker.single_view.protocol import ViewResult
 
 if TYPE_CHECKING:
     from tracker.parameters import RunParameters
-    from tracker.sequences.frames import FrameReader
+    from tracker.sequences.frames import Pictures
 
 GATE = float(chi2.ppf(0.9999, df=4))
 """Squared Mahalanobis distance: a person's own box lies inside with this probability."""
@@ -63,7 +63,7 @@ class DetectionPhd:
         sequence: Sequence,
         camera_index: int,
         parameters: RunParameters,
-        reader: FrameReader | None = None,
+        reader: Pictures | None = None,
     ) -> None:
         """Prepare for one camera.
 

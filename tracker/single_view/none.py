@@ -15,7 +15,7 @@ from tracker.single_view.protocol import ViewResult
 
 if TYPE_CHECKING:
     from tracker.parameters import RunParameters
-    from tracker.sequences.frames import FrameReader
+    from tracker.sequences.frames import Pictures
 
 
 class DetectionBoxes:
@@ -29,7 +29,7 @@ class DetectionBoxes:
         sequence: Sequence,
         camera_index: int,
         parameters: RunParameters,
-        reader: FrameReader | None = None,
+        reader: Pictures | None = None,
     ) -> None:
         """Prepare for one camera.
 

@@ -10,7 +10,7 @@ from fastapi.responses import HTMLResponse
 
 from app.state.snapshot import Snapshot
 from app.state.teaching import Part, Side, Teaching
-from app.web.api import ERRORS, Bench, nothing_open
+from app.web.dependencies import ERRORS, Bench, nothing_open
 from app.web.tables.markup import Cell, Markup, escaped, line, quiet, table
 from tracker.parameters import METHODS, method_of
 from tracker.sequences.sequence import Sequence, Template

@@ -18,7 +18,7 @@ from tracker.blobs import Blobs, blobs
 from tracker.colour import BINS
 from tracker.foreground import ForegroundModel, learn, pack
 from tracker.parameters import AssociationMatrixParams
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.association_matrix.following import follow, object_histograms
 from tracker.single_view.association_matrix.handing_over import advance
@@ -63,7 +63,7 @@ class AssociationMatrix:
         sequence: Sequence,
         camera_index: int,
         parameters: RunParameters,
-        reader: FrameReader,
+        reader: Pictures,
     ) -> None:
         """Learn the background.
 

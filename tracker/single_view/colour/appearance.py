@@ -16,7 +16,7 @@ from tracker import colour
 from tracker.colour import ColourSpaceName, KernelName
 from tracker.foreground import ForegroundModel, integral, learn, shape_scores
 from tracker.parameters import ForegroundParams
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.templates import read_templates
@@ -55,7 +55,7 @@ class Appearance:
         self,
         sequence: Sequence,
         camera_index: int,
-        reader: FrameReader,
+        reader: Pictures,
         *,
         colour_space: ColourSpaceName,
         histogram_kernel: KernelName,

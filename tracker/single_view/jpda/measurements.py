@@ -21,7 +21,7 @@ from tracker.parameters import (
     ForegroundParams,
     JpdaParams,
 )
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.peaks import PeakFinder
 from tracker.single_view.detector_boxes import DetectorBoxes, trust
@@ -92,7 +92,7 @@ class Source(Protocol):
 
 
 def source_of(
-    sequence: Sequence, camera_index: int, parameters: RunParameters, reader: FrameReader
+    sequence: Sequence, camera_index: int, parameters: RunParameters, reader: Pictures
 ) -> Source:
     """The chosen source, prepared for one camera.
 
@@ -125,7 +125,7 @@ class _Foreground:
         camera_index: int,
         parameters: JpdaParams,
         foreground: ForegroundParams,
-        reader: FrameReader,
+        reader: Pictures,
     ) -> None:
         self._parameters = parameters
         self._minimum_area = foreground.minimum_area
@@ -183,7 +183,7 @@ class _Colours:
         sequence: Sequence,
         camera_index: int,
         parameters: RunParameters,
-        reader: FrameReader,
+        reader: Pictures,
     ) -> None:
         self._finder = PeakFinder(
             sequence, camera_index, parameters.of(ColourPhdParams), parameters.foreground, reader

@@ -17,7 +17,7 @@ from scipy.stats import chi2
 from tracker.association import validation_matrix
 from tracker.foreground import pack
 from tracker.parameters import JpdaParams
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.jpda.association import associate
 from tracker.single_view.jpda.cases import Cases, look_into_pieces, part_strangers, tell_apart
@@ -73,7 +73,7 @@ class Jpda:
         sequence: Sequence,
         camera_index: int,
         parameters: RunParameters,
-        reader: FrameReader,
+        reader: Pictures,
     ) -> None:
         """Prepare for one camera.
 

@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tracker import particles as particle_set
 from tracker.parameters import ForegroundParams, PseudoParticleParams
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.appearance import Appearance, Scene
 
@@ -29,7 +29,7 @@ class ColourParticles:
         camera_index: int,
         parameters: PseudoParticleParams,
         foreground: ForegroundParams,
-        reader: FrameReader,
+        reader: Pictures,
     ) -> None:
         """Read the templates and learn the background, where something asks for it.
 
