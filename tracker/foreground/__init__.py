@@ -69,4 +69,4 @@ def learn(
     background = reader.once(
         ("background", camera_index), lambda: BackgroundModel.learn(pictures(), reader.check)
     )
-    return None if background is None else LearntForeground(background, parameters.threshold)
+    return None if background is None else LearntForeground(background, parameters)

@@ -16,8 +16,6 @@ from numpy import ndarray
 
 from tracker.foreground import kernels
 from tracker.foreground.exposure import (
-    DARKEST_SHADOW,
-    SHADOW_TINT,
     BackgroundModel,
     median,
     tone_curve,
@@ -31,12 +29,6 @@ ITERATIONS = 20
 CLOSING = np.ones((3, 3), dtype=np.uint8)
 AROUND_FOREGROUND = np.ones((5, 5), dtype=np.uint8)
 """What is this near to the foreground does not change the background."""
-
-BLINDING = 0.6
-"""A picture of which more than this share differs shows another scene or another light."""
-
-BLANK = 4.0
-"""A picture whose grey levels deviate by less than this shows nothing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -163,12 +155,12 @@ class AdaptiveForeground:
         difference = cv2.absdiff(picture, shown)
         if p.drop_shadows:
             kernels.clear_shadows(
-                difference, picture, shown, DARKEST_SHADOW, SHADOW_TINT, p.least_threshold
+                difference, picture, shown, p.darkest_shadow, p.shadow_tint, p.least_threshold
             )
         thresholds = self.thresholds(difference)
         different = kernels.above(difference, thresholds)
         share = cv2.countNonZero(different) / different.size
-        if share > BLINDING or cv2.meanStdDev(picture)[1].max() < BLANK:
+        if share > p.blinding_share or cv2.meanStdDev(picture)[1].max() < p.blank_deviation:
             return state, Segmentation(np.zeros_like(different), thresholds)
         mask = clean(different, p.minimum_area)
         background, still = kernels.update_background(

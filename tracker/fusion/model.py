@@ -33,7 +33,7 @@ class FusionModel:
         self.cameras = sequence.cameras
         self.step_time = sequence.step_time
         self.target = TargetModel(
-            sequence.target_half_extents, p.measurement, p.update, p.low_share
+            sequence.target_half_extents, p.measurement, p.update, p.low_share, p
         )
         self.motion = models.Motion.of(p, sequence.step_time)
         self.births = self.motion.at_rest(
@@ -49,6 +49,8 @@ class FusionModel:
         """κ of each camera, per unit of the measurement space."""
         self.gate = float(chi2.ppf(p.gate_probability, df=self.target.size))
         """Squared Mahalanobis distance of the innovation."""
+        self.memory_reach = float(chi2.ppf(p.memory_gate_probability, df=3))
+        """Squared Mahalanobis distance within which a newcomer may be somebody lately lost."""
         self.near = p.duplicate_distance * 2.0 * float(np.mean(sequence.target_half_extents[:2]))
         """Metres within which two components may be one person."""
         margin = p.followed_margin

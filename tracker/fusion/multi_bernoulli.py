@@ -113,7 +113,13 @@ class MultiBernoulli:
         recognised = state.names
         if p.recognition:
             renamed, recognised = names.recognise(
-                recognised, posterior, associations, views, lost.lost.labels, self._model.step_time
+                recognised,
+                posterior,
+                associations,
+                views,
+                lost.lost.labels,
+                self._model.step_time,
+                p,
             )
             if renamed:
                 posterior, lost = posterior.renamed(renamed), lost.renamed(renamed)

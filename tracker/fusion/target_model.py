@@ -12,6 +12,7 @@ from numpy import ndarray
 from tracker.camera import NEAREST_DEPTH, Camera
 from tracker.kernels import measurement
 from tracker.kernels.kalman import Alternative
+from tracker.parameters import FusionParams
 from tracker.single_view.protocol import ViewResult
 
 MeasurementKind = Literal["centre", "box", "box_and_width"]
@@ -29,12 +30,7 @@ _FROM_BOX: dict[MeasurementKind, Float[ndarray, "m 4"]] = {
     ),
 }
 
-# a person who lies or bends, seen in perspective and from any side, against one who stands: in
-# half heights of the standing one, what his box should be and how far it may be off
-_LOW_HALF_HEIGHT, _LOW_HALF_WIDTH = 0.5, 0.6
-_LOW_SIGMAS = np.array([0.15, 0.15, 0.5, 0.25])  # centre across and down, half width, half height
-_DROP = 0.3  # how far his middle moves from one camera's box to the next
-
+_DEFAULTS = FusionParams()
 _NO_COVARIANCES = np.zeros((0, 3, 3))
 
 
@@ -92,6 +88,7 @@ class TargetModel:
         kind: MeasurementKind,
         update: UpdateKind = "extended",
         low_share: float = 0.0,
+        parameters: FusionParams = _DEFAULTS,
     ) -> None:
         """Prepare for targets of one size.
 
@@ -100,6 +97,7 @@ class TargetModel:
             kind: What is used of a box.
             update: How the bend of the projection is met.
             low_share: Share of the boxes that show a person low: lying, crouching, bent.
+            parameters: What the box of such a person should be, and how far it may be off.
         """
         self.kind: MeasurementKind = kind
         self.size = SIZES[kind]
@@ -113,12 +111,17 @@ class TargetModel:
         products = np.einsum("pa,qa->apq", transform, transform).reshape(4, self.size**2).copy()
         self.transforms = transform, products
         """T (m, 4) and (4, m²), as :func:`tracker.kernels.measurement.measured_boxes` has them."""
-        low_noise = (_LOW_SIGMAS**2 @ products).reshape(self.size, self.size)
+        p = parameters
+        low_sigmas = np.array(
+            [p.low_centre_sigma, p.low_centre_sigma, p.low_width_sigma, p.low_height_sigma]
+        )
+        low_noise = (low_sigmas**2 @ products).reshape(self.size, self.size)
+        self._drop = p.low_drop
         self.numbers = (
             self.half_height,
             self.half_width,
-            _LOW_HALF_HEIGHT * self.half_height,
-            _LOW_HALF_WIDTH * self.half_height,
+            p.low_height * self.half_height,
+            p.low_width * self.half_height,
             low_noise if self.low_share else np.zeros((0, 0)),
             self.size,
         )
@@ -160,7 +163,7 @@ class TargetModel:
     def drift(self, dimension: int) -> Float[ndarray, "d d"]:
         """How far a state may have moved with a change of posture from one box to the next: P."""
         drift = np.zeros((dimension, dimension))
-        drift[2, 2] = (_DROP * self.half_height) ** 2
+        drift[2, 2] = (self._drop * self.half_height) ** 2
         return drift
 
     def measured(

@@ -89,6 +89,40 @@ class AssociationMatrixParams(Params):
     ] = 0.2
     """Standard deviation of a box's half sizes."""
 
+    straying: Annotated[
+        float, Field(ge=0.0, le=2.0), ui("v_s", unit="1/step", step=0.01, advanced=True)
+    ] = 0.1
+    """How much further a lost object may be found with every step, as a share of its reach."""
+
+    inside_weight: Annotated[
+        float, Field(ge=0.0, le=20.0), ui("a", step=0.5, advanced=True, when=_TARGETS)
+    ] = 3.0
+    """Targets: how much the foreground inside a box counts for it."""
+
+    around_weight: Annotated[
+        float, Field(ge=0.0, le=20.0), ui("b", step=0.5, advanced=True, when=_TARGETS)
+    ] = 3.0
+    """Targets: how much the foreground above and beside it counts against it."""
+
+    least_inside: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("f_min", step=0.05, advanced=True, when=_TARGETS)
+    ] = 0.4
+    """Targets: a box with a smaller share of foreground is nobody."""
+
+    averaging_width: Annotated[
+        float,
+        Field(ge=0.05, le=5.0),
+        ui("h", unit="half sizes", step=0.05, advanced=True, when=_TARGETS),
+    ] = 0.5
+    """Targets: width over which boxes that fit nearly as well are averaged."""
+
+    apart: Annotated[
+        float,
+        Field(ge=0.0, le=5.0),
+        ui("d", unit="half sizes", step=0.1, advanced=True, when=_TARGETS),
+    ] = 1.0
+    """Targets: the distance that two boxes keep."""
+
 
 METHOD = Method(
     name="association_matrix",

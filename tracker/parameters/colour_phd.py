@@ -85,6 +85,19 @@ class ColourPeakParams(Params):
     ] = 0.5
     """Standard deviation of a peak's half sizes: colour alone hardly tells them."""
 
+    size_jitter: Annotated[float, Field(ge=0.0, le=1.0), ui("σ_s", step=0.01, advanced=True)] = 0.1
+    """Spread of the samples' sizes around what a target has at a place: people differ."""
+
+    merge_distance: Annotated[
+        float, Field(ge=0.1, le=5.0), ui("d_m", unit="half sizes", step=0.1, advanced=True)
+    ] = 0.8
+    """Climbs that end nearer to each other than this are one peak."""
+
+    same_person_distance: Annotated[
+        float, Field(ge=0.1, le=5.0), ui("d_g", unit="half sizes", step=0.1, advanced=True)
+    ] = 1.5
+    """Peaks of one person's colours keep this far apart."""
+
     @property
     def asks_foreground(self) -> bool:
         """Whether anything is made of the foreground."""
@@ -147,6 +160,11 @@ class ColourPhdParams(ColourPeakParams):
 
     output: Annotated[Literal["peaks", "estimates"], ui("Y", published="estimates")] = "peaks"
     """What goes to the fusion: this step's peaks, which lag less, or the filter's estimates."""
+
+    gate_probability: Annotated[float, Field(ge=0.5, le=0.999999), ui("P_G", advanced=True)] = (
+        0.9999
+    )
+    """Probability that a person's own peak lies in the gate."""
 
 
 def _uses(parameters: RunParameters) -> Uses:

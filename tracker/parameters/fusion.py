@@ -16,6 +16,8 @@ from tracker.parameters.methods import Method, Reads, Uses
 if TYPE_CHECKING:
     from tracker.parameters.run import RunParameters
 
+_BOXES = {"measurement": ("box", "box_and_width")}
+_RECOGNITION = {"recognition": (True,)}
 _WALK, _VELOCITY = {"motion": ("random_walk",)}, {"motion": ("constant_velocity",)}
 
 
@@ -50,7 +52,7 @@ class FusionParams(Params):
     low_share: Annotated[
         float,
         Field(ge=0.0, le=0.5),
-        ui("ε", step=0.01, published=0.0, when={"measurement": ("box", "box_and_width")}),
+        ui("ε", step=0.01, published=0.0, when=_BOXES),
     ] = 0.1
     """Share of the boxes that show a person lying, crouching or bent; 0: everybody stands."""
 
@@ -153,6 +155,82 @@ class FusionParams(Params):
     ] = 0.5
     """A component whose weight is above this is reported as a person."""
 
+    low_height: Annotated[
+        float,
+        Field(ge=0.1, le=1.0),
+        ui("h_l", unit="half heights", step=0.05, advanced=True, when=_BOXES),
+    ] = 0.5
+    """Low posture: half height of the box, seen in perspective and from any side."""
+
+    low_width: Annotated[
+        float,
+        Field(ge=0.1, le=2.0),
+        ui("w_l", unit="half heights", step=0.05, advanced=True, when=_BOXES),
+    ] = 0.6
+    """Low posture: half width of the box."""
+
+    low_centre_sigma: Annotated[
+        float,
+        Field(ge=0.01, le=2.0),
+        ui("σ_lc", unit="half heights", step=0.01, advanced=True, when=_BOXES),
+    ] = 0.15
+    """Low posture: deviation of the box's centre, across and down."""
+
+    low_width_sigma: Annotated[
+        float,
+        Field(ge=0.01, le=2.0),
+        ui("σ_lw", unit="half heights", step=0.01, advanced=True, when=_BOXES),
+    ] = 0.5
+    """Low posture: deviation of its half width."""
+
+    low_height_sigma: Annotated[
+        float,
+        Field(ge=0.01, le=2.0),
+        ui("σ_lh", unit="half heights", step=0.01, advanced=True, when=_BOXES),
+    ] = 0.25
+    """Low posture: deviation of its half height."""
+
+    low_drop: Annotated[
+        float,
+        Field(ge=0.0, le=1.0),
+        ui("σ_ld", unit="half heights", step=0.05, advanced=True, when=_BOXES),
+    ] = 0.3
+    """Low posture: how far the middle moves from one box to the next."""
+
+    memory_gate_probability: Annotated[
+        float, Field(ge=0.1, le=0.9999), ui("P_m", step=0.01, advanced=True)
+    ] = 0.9
+    """Probability that somebody who comes back lies within reach of where he should be."""
+
+    recognition_doubt: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("ε_r", step=0.01, advanced=True, when=_RECOGNITION)
+    ] = 0.1
+    """Recognition: probability that a box's colours tell nothing of who it is."""
+
+    recognition_interval: Annotated[
+        float,
+        Field(ge=0.01, le=60.0),
+        ui("τ_r", unit="s", log=True, advanced=True, when=_RECOGNITION),
+    ] = 1.0
+    """Recognition: after so long a look is a new one; pictures of one moment agree."""
+
+    recognition_swap: Annotated[
+        float,
+        Field(ge=0.1, le=1000.0),
+        ui("T_r", unit="s", log=True, advanced=True, when=_RECOGNITION),
+    ] = 30.0
+    """Recognition: time in which a track may come to be of somebody else."""
+
+    recognition_odds: Annotated[
+        float, Field(ge=1.0, le=10000.0), ui("o_s", log=True, advanced=True, when=_RECOGNITION)
+    ] = 20.0
+    """Recognition: odds of the best naming against any without it, from which a pair holds."""
+
+    recognition_own_odds: Annotated[
+        float, Field(ge=1.0, le=1000.0), ui("o_o", log=True, advanced=True, when=_RECOGNITION)
+    ] = 3.0
+    """Recognition: odds of a track's own looks, from which it may be named."""
+
 
 def _multi_bernoulli_uses(parameters: RunParameters) -> Uses:
     without = {"misses", "extraction"}
@@ -161,11 +239,15 @@ def _multi_bernoulli_uses(parameters: RunParameters) -> Uses:
     return Uses(reads=(Reads("fusion", without=frozenset(without)),))
 
 
+_RECOGNITION_ONLY = frozenset(
+    name for name in FusionParams.model_fields if name.startswith("recognition")
+)
+
 SEQUENTIAL_PHD = Method(
     name="sequential_phd",
     help="GM-PHD filter updated by one camera after another.",
     made_by="tracker.fusion.sequential_phd:SequentialPhd",
-    uses=Uses(reads=(Reads("fusion", without=frozenset({"recognition"})),)),
+    uses=Uses(reads=(Reads("fusion", without=_RECOGNITION_ONLY),)),
 )
 
 MULTI_BERNOULLI = Method(

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tracker.parameters.run import RunParameters
 
 _FOREGROUND = {"measurements": ("foreground",)}
+_CROWNS = {**_FOREGROUND, "foreground_box": ("target",)}
 _FIVE = {"five_cases": (True,)}
 
 
@@ -130,6 +131,89 @@ class JpdaParams(Params):
         "estimates"
     )
     """What goes to the fusion: the targets' boxes, or the measurements that are somebody's."""
+
+    longest_hidden: Annotated[
+        float, Field(ge=0.0, le=60.0), ui("t_h", unit="s", step=0.5, advanced=True, when=_FIVE)
+    ] = 4.0
+    """Somebody who does not come out from behind another for so long is given up."""
+
+    same_size: Annotated[
+        float, Field(ge=1.0, le=5.0), ui("k_s", step=0.1, advanced=True, when=_FIVE)
+    ] = 1.5
+    """A measurement larger or smaller than its target by this factor shows others too."""
+
+    leap: Annotated[
+        float,
+        Field(ge=0.0, le=10.0),
+        ui("k_l", unit="half sizes", step=0.1, advanced=True, when=_FIVE),
+    ] = 2.0
+    """A measurement this near may be that of a target whose gate it missed."""
+
+    one_side: Annotated[
+        float, Field(ge=1.0, le=10.0), ui("k_e", step=0.1, advanced=True, when=_FIVE)
+    ] = 2.0
+    """An edge of a piece is left over if more is by this factor than of the opposite one."""
+
+    cover: Annotated[
+        float,
+        Field(ge=1.0, le=10.0),
+        ui(
+            "k_c",
+            unit="half sizes",
+            step=0.1,
+            advanced=True,
+            when={"measurements": ("colour", "detections")},
+        ),
+    ] = 2.0
+    """Without a piece of foreground, who is hidden lies within so many half sizes of the box."""
+
+    height_sigmas: Annotated[
+        float, Field(ge=0.0, le=10.0), ui("k_z", step=0.5, advanced=True, when=_CROWNS)
+    ] = 2.0
+    """Targets keep within so many deviations of the heights that they come in at."""
+
+    crack: Annotated[
+        float,
+        Field(ge=0.0, le=2.0),
+        ui("h_c", unit="half heights", step=0.05, advanced=True, when=_CROWNS),
+    ] = 0.5
+    """Cracks across a piece up to this height, between head and shirt say, are closed."""
+
+    top_reach: Annotated[
+        float,
+        Field(ge=0.1, le=5.0),
+        ui("w_t", unit="half widths", step=0.1, advanced=True, when=_CROWNS),
+    ] = 1.2
+    """The pixels under a top within so many half widths are its target."""
+
+    least_inside: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("f_i", step=0.05, advanced=True, when=_CROWNS)
+    ] = 0.4
+    """A box with a smaller share of foreground is no target's."""
+
+    most_above: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("f_a", step=0.05, advanced=True, when=_CROWNS)
+    ] = 0.5
+    """Nor is one with a larger share of foreground above it."""
+
+    most_beside: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("f_b", step=0.05, advanced=True, when=_CROWNS)
+    ] = 0.8
+    """Nor is one with a larger share beside its upper part."""
+
+    shoulder_across: Annotated[
+        float,
+        Field(ge=0.0, le=5.0),
+        ui("w_s", unit="half widths", step=0.1, advanced=True, when=_CROWNS),
+    ] = 1.0
+    """A top no further beside another may be that target's shoulder."""
+
+    shoulder_down: Annotated[
+        float,
+        Field(ge=0.0, le=5.0),
+        ui("h_s", unit="half heights", step=0.1, advanced=True, when=_CROWNS),
+    ] = 1.5
+    """And no further below it."""
 
 
 def _uses(parameters: RunParameters) -> Uses:

@@ -165,6 +165,31 @@ class PseudoParticleParams(Params):
     )
     """What goes to the fusion: every mode that is not background, or the confirmed targets."""
 
+    size_jitter: Annotated[float, Field(ge=0.0, le=1.0), ui("σ_s", step=0.01, advanced=True)] = 0.1
+    """Spread of the newcomers' sizes around what a target has at a place: people differ."""
+
+    merge_distance: Annotated[
+        float,
+        Field(ge=0.1, le=5.0),
+        ui("d_m", unit="half sizes", step=0.1, advanced=True, when=_PSEUDO),
+    ] = 1.0
+    """Modes nearer to each other than this are one."""
+
+    newcomer_misses: Annotated[
+        int, Field(ge=1, le=50), ui("n_m", unit="steps", step=1, advanced=True, when=_PSEUDO)
+    ] = 2
+    """An unconfirmed target that is not found at so many steps in a row is given up."""
+
+    velocity_memory: Annotated[
+        float, Field(ge=0.0, le=0.99), ui("μ", step=0.05, advanced=True, when=_PSEUDO)
+    ] = 0.8
+    """Share of the mean displacement that a new one leaves as it is."""
+
+    position_gate: Annotated[
+        float, Field(ge=0.5, le=10.0), ui("k_a", step=0.5, advanced=True, when=_PSEUDO)
+    ] = 3.0
+    """A target at an unknown place is as likely as one so many deviations σ_a off."""
+
     @property
     def asks_foreground(self) -> bool:
         """Whether anything is made of the foreground."""

@@ -29,9 +29,6 @@ from tracker.single_view.protocol import ViewResult
 if TYPE_CHECKING:
     from tracker.parameters import RunParameters
 
-GATE = float(chi2.ppf(0.9999, df=4))
-"""Squared Mahalanobis distance: a person's own peak lies inside with this probability."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColourPhdState:
@@ -75,6 +72,7 @@ class ColourPhd:
         """
         self._parameters = p = parameters.of(ColourPhdParams)
         self._finder = PeakFinder(sequence, camera_index, p, parameters.foreground, reader)
+        self._gate = float(chi2.ppf(p.gate_probability, df=4))
         self._step_time = sequence.step_time
         camera = sequence.cameras[camera_index]
         births = GaussianMixture.empty(4)
@@ -123,7 +121,7 @@ class ColourPhd:
             noise=noise,
             detection_probability=p.detection_probability,
             clutter_intensity=self._clutter,
-            gate=GATE,
+            gate=self._gate,
         )
         mixture = self._reduce(updated.posterior)
         unexplained = peaks.boxes[updated.measurement_weights < 0.5]

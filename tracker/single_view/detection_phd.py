@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     from tracker.parameters import RunParameters
     from tracker.sequences.frames import Pictures
 
-GATE = float(chi2.ppf(0.9999, df=4))
-"""Squared Mahalanobis distance: a person's own box lies inside with this probability."""
-
 BELIEVED = 0.5
 """A box that people explain with more than this weight goes to the fusion."""
 
@@ -72,6 +69,7 @@ class DetectionPhd:
         """
         self._parameters = p = parameters.of(DetectionPhdParams)
         self._boxes = DetectorBoxes(sequence, camera_index, p)
+        self._gate = float(chi2.ppf(p.gate_probability, df=4))
         self._step_time = sequence.step_time
         width, height = sequence.cameras[camera_index].image_size
         # half sizes up to half of the picture's, as the fusion's clutter has them
@@ -102,7 +100,7 @@ class DetectionPhd:
             detection_probability=p.detection_probability,
             clutter_intensity=self._clutter
             * np.exp(2.0 * p.score_clutter * (0.5 - found.scores[good])),
-            gate=GATE,
+            gate=self._gate,
         )
         mixture, _ = gaussian_mixture.reduce(
             updated.posterior,

@@ -136,7 +136,7 @@ def test_what_is_not_shown_changes_no_result(choice: dict[str, Any], recording: 
     other = with_values(parameters, hidden)
     assert set(shown_keys(other)) == shown
     first, second = pipeline.compute(some, parameters), pipeline.compute(some, other)
-    assert len(first.tracks) > 0 or "published" in named(choice)
+    assert any(len(view.boxes) for views in first.views for view in views)
     for a, b in zip(numbers(first), numbers(second), strict=True):
         np.testing.assert_array_equal(a, b)
 

@@ -145,14 +145,7 @@ class AssociationMatrix:
         objects, p = situation.objects, self._parameters
         wanted = np.array([len(one.labels) for one in objects], dtype=np.int64)
         if p.output == "targets":
-            fits = self._silhouettes.fit(
-                mask,
-                seen,
-                wanted,
-                acceptance=p.acceptance,
-                further_acceptance=p.further_acceptance,
-                spare_acceptance=p.spare_acceptance,
-            )
+            fits = self._silhouettes.fit(mask, seen, wanted, p)
             boxes, weights = fits.boxes, np.exp(np.minimum(fits.scores, 0.0))
             labels = _labels_of_fits(fits, situation)
         else:

@@ -18,6 +18,7 @@ from tracker.blobs import Blobs
 from tracker.camera import Camera
 from tracker.foreground import integral, shape_scores
 from tracker.kernels.compilation import pixel_kernel
+from tracker.parameters import AssociationMatrixParams
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BoxSizes
 
@@ -26,18 +27,6 @@ SIZES = 6
 
 STRIDE = 2
 """Pixels between the columns of a piece of foreground in which crowns are looked for."""
-
-INSIDE_WEIGHT, AROUND_WEIGHT = 3.0, 3.0
-"""Of the foreground inside the box, and above and beside it, in a box's score."""
-
-LEAST_INSIDE = 0.4
-"""A box with a smaller share of foreground is nobody's."""
-
-WIDTH = 0.5
-"""Half sizes over which boxes that fit nearly as well are averaged."""
-
-APART = 1.0
-"""Half sizes that two boxes keep."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,10 +71,7 @@ class Silhouettes:
         mask: UInt8[ndarray, "h w"],
         pieces: Blobs,
         wanted: Int[ndarray, " J"],
-        *,
-        acceptance: float,
-        further_acceptance: float,
-        spare_acceptance: float,
+        parameters: AssociationMatrixParams,
     ) -> Fits:
         """The targets in each piece of foreground.
 
@@ -93,10 +79,10 @@ class Silhouettes:
             mask: Foreground.
             pieces: Its pieces.
             wanted: How many targets each piece is believed to hold.
-            acceptance: Least score of a piece's best box.
-            further_acceptance: Least score of its others.
-            spare_acceptance: Least score of boxes beyond the number that is believed.
+            parameters: How scores are made, and the least of a piece's best box, of its others
+                and of boxes beyond the number that is believed.
         """
+        p = parameters
         boxes, owners = _candidates(
             pieces.owners,
             pieces.boxes,
@@ -109,20 +95,20 @@ class Silhouettes:
             STRIDE,
         )
         scores, inside = shape_scores(
-            integral(mask), boxes, inside_weight=INSIDE_WEIGHT, around_weight=AROUND_WEIGHT
+            integral(mask), boxes, inside_weight=p.inside_weight, around_weight=p.around_weight
         )
-        good = inside >= LEAST_INSIDE
+        good = inside >= p.least_inside
         return Fits(
             *_choose(
                 boxes[good],
                 scores[good],
                 owners[good],
                 np.asarray(wanted, dtype=np.int64),
-                acceptance,
-                further_acceptance,
-                spare_acceptance,
-                WIDTH,
-                APART,
+                p.acceptance,
+                p.further_acceptance,
+                p.spare_acceptance,
+                p.averaging_width,
+                p.apart,
             )
         )
 

@@ -30,9 +30,6 @@ from tracker.single_view.jpda.crowns import TargetSizes, crowns
 if TYPE_CHECKING:
     from tracker.parameters import RunParameters
 
-COVER = 2.0
-"""Without a piece of foreground, whoever is hidden lies within so many half sizes of the box."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measured:
@@ -132,7 +129,9 @@ class _Foreground:
         self._model: ForegroundModel | None = learn(sequence, camera_index, reader, foreground)
         camera = sequence.views[camera_index].camera
         self._sizes = (
-            TargetSizes(camera, sequence.room, sequence.target_half_extents)
+            TargetSizes(
+                camera, sequence.room, sequence.target_half_extents, parameters.height_sigmas
+            )
             if parameters.foreground_box == "target"
             else None
         )
@@ -157,7 +156,7 @@ class _Foreground:
             edges = np.concatenate([boxes[:, :2] - boxes[:, 2:], boxes[:, :2] + boxes[:, 2:]], 1)
             scores = box_shares(integral(found.mask), edges)
         else:
-            targets = crowns(found.mask, self._sizes, self._minimum_area)
+            targets = crowns(found.mask, self._sizes, self._minimum_area, self._parameters)
             boxes, pieces, scores = targets.boxes, targets.pieces, targets.inside
         return state, Measured(
             boxes,
@@ -185,6 +184,7 @@ class _Colours:
         parameters: RunParameters,
         reader: Pictures,
     ) -> None:
+        self._cover = parameters.of(JpdaParams).cover
         self._finder = PeakFinder(
             sequence, camera_index, parameters.of(ColourPhdParams), parameters.foreground, reader
         )
@@ -207,7 +207,7 @@ class _Colours:
             peaks.boxes,
             peaks.scores,
             self.sigmas(peaks.boxes),
-            peaks.boxes * [1.0, 1.0, COVER, COVER],
+            peaks.boxes * [1.0, 1.0, self._cover, self._cover],
             samples=peaks.samples,
             sample_weights=peaks.sample_weights,
             mask=peaks.mask,
@@ -222,6 +222,7 @@ class _Detector:
     """An outside detector's boxes, with the numbers of ``detection_boxes``."""
 
     def __init__(self, sequence: Sequence, camera_index: int, parameters: RunParameters) -> None:
+        self._cover = parameters.of(JpdaParams).cover
         self._parameters = parameters.of(DetectionBoxParams)
         self._boxes = DetectorBoxes(sequence, camera_index, self._parameters)
 
@@ -243,7 +244,7 @@ class _Detector:
             boxes,
             found.scores[good],
             found.sigmas[good],
-            boxes * [1.0, 1.0, COVER, COVER],
+            boxes * [1.0, 1.0, self._cover, self._cover],
             shown=found.boxes,
             shown_scores=found.scores,
             information={"boxes outside the room": float((~good).sum())},

@@ -43,6 +43,7 @@ class ColourParticles:
             reader,
             colour_space=p.colour_space,
             histogram_kernel=p.histogram_kernel,
+            size_jitter=p.size_jitter,
             foreground=foreground if p.asks_foreground else None,
         )
         self._root_time = float(np.sqrt(sequence.step_time))
