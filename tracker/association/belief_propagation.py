@@ -16,7 +16,8 @@ from numpy import ndarray
 from tracker.kernels.labelled import marginals as marginal_kernels
 
 TOLERANCE = 1e-6
-"""Largest change of a message, relative to the intensity it meets, at which all are settled."""
+"""Largest change of a message, relative to the intensity it meets, at which all are settled:
+far below what a probability is told with."""
 
 ITERATIONS = 200
 """At most so many, should they not settle."""

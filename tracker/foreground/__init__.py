@@ -37,7 +37,8 @@ __all__ = [
 ]
 
 BACKGROUND_PICTURES = 32
-"""Pictures spread over the clip that a background is learnt from."""
+"""Pictures spread over the clip that a background is learnt from: a median needs the scene empty in
+half of them, and each takes time before the first step."""
 
 
 def learn(

@@ -27,6 +27,8 @@ ITERATIONS = 20
 """Of the c-means at most; most come to rest after five to eight."""
 
 CLOSING = np.ones((3, 3), dtype=np.uint8)
+"""Gaps that are closed, as published."""
+
 AROUND_FOREGROUND = np.ones((5, 5), dtype=np.uint8)
 """What is this near to the foreground does not change the background."""
 

@@ -24,10 +24,10 @@ from tracker.kernels import images
 from tracker.parameters.foreground import ForegroundParams
 
 LEVELS = 16
-"""Levels of the source at which a tone curve is measured."""
+"""Levels of the source at which a tone curve is measured; between them it is interpolated."""
 
 SAMPLED_PIXELS = 6000
-"""About so many pixels a tone curve is measured on."""
+"""About so many pixels a tone curve is measured on: some hundred for each level's median."""
 
 MEDIAN_VALUES = 50_000
 """Values of a picture of which medians are taken at a time: some ten milliseconds."""

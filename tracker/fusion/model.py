@@ -21,7 +21,8 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 
 CONFIRMED = 0.5
-"""A component surer than this stands for a person: it may hide others."""
+"""A component surer than this stands for a person, who may hide others: he is there more likely
+than not."""
 
 
 class FusionModel:

@@ -14,7 +14,8 @@ from tracker.fusion.target_model import ExpectedBoxes
 from tracker.kernels import boxes as box_kernels
 
 WORTH_TELLING = 0.2
-"""Share of a target's box that must be covered for its occluder to be named."""
+"""Share of a target's box that must be covered for its occluder to be named. It changes what is
+told, not what is tracked."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -29,6 +29,10 @@ from tracker.single_view.protocol import ViewResult
 if TYPE_CHECKING:
     from tracker.parameters import RunParameters
 
+EXPLAINED = 0.5
+"""A peak that people explain with less than this weight may be somebody new: it is more likely
+nobody's than somebody's."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColourPhdState:
@@ -124,7 +128,7 @@ class ColourPhd:
             gate=self._gate,
         )
         mixture = self._reduce(updated.posterior)
-        unexplained = peaks.boxes[updated.measurement_weights < 0.5]
+        unexplained = peaks.boxes[updated.measurement_weights < EXPLAINED]
         after = ColourPhdState(mixture, unexplained, next_label, background)
         return after, self._result(mixture, peaks)
 

@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from tracker.sequences.frames import Pictures
 
 BELIEVED = 0.5
-"""A box that people explain with more than this weight goes to the fusion."""
+"""A box that people explain with more than this weight goes to the fusion: it is more likely
+somebody's than nobody's."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,6 +14,8 @@ from numpy import ndarray
 from tracker.kernels.compilation import pixel_kernel
 
 ITERATIONS = 20
+"""At most; a climb that goes on for longer goes nowhere."""
+
 TOLERANCE = 0.1
 """Pixels: a shift shorter than this is the last one."""
 

@@ -23,10 +23,11 @@ from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BoxSizes
 
 SIZES = 6
-"""So many sizes of targets are tried at each place."""
+"""So many sizes of targets are tried at each place: the best are averaged, so more only cost."""
 
 STRIDE = 2
-"""Pixels between the columns of a piece of foreground in which crowns are looked for."""
+"""Pixels between the columns of a piece of foreground in which crowns are looked for: the
+best are averaged, so all of them only cost."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

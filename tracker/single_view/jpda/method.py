@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from tracker.parameters import RunParameters
 
 BELIEVED = 0.5
-"""A measurement that targets explain with more than this probability is somebody's."""
+"""A measurement that targets explain with more than this probability is somebody's: more likely
+than not."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
