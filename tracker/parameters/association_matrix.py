@@ -58,7 +58,9 @@ class AssociationMatrixParams(Params):
     output: Annotated[Literal["targets", "objects"], ui("Y", published="objects")] = "targets"
     """What goes to the fusion: target boxes fitted to the objects' outlines, or the objects."""
 
-    acceptance: Annotated[float, Field(ge=-10.0, le=0.0), ui("s_min", step=0.1)] = -2.0
+    acceptance: Annotated[
+        float, Field(ge=-10.0, le=0.0), ui("s_min", step=0.1, essential=True)
+    ] = -2.0
     """Targets: an object's best box is not taken if the outline fits it worse than this."""
 
     further_acceptance: Annotated[float, Field(ge=-10.0, le=0.0), ui("s_2", step=0.1)] = -1.7

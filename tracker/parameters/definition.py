@@ -18,6 +18,7 @@ def ui(
     stage: Stage | None = None,
     published: Any = None,
     advanced: bool = False,
+    essential: bool = False,
 ) -> Any:
     """What a parameter's face needs beyond its range and help.
 
@@ -29,6 +30,7 @@ def ui(
         stage: The first stage that a change re-runs, where it is not the group's.
         published: The value of the ``published`` preset, where it differs from the default.
         advanced: Whether the page folds it away at first.
+        essential: Whether it is among the few that the page shows first.
     """
     extra = {
         "symbol": symbol,
@@ -38,6 +40,7 @@ def ui(
         "stage": stage,
         "published": published,
         "advanced": advanced,
+        "essential": essential,
     }
     return Field(json_schema_extra={"x-ui": extra})
 

@@ -35,6 +35,7 @@ class Parameter:
     choices: tuple[str, ...]
     published: Any
     advanced: bool
+    essential: bool
 
 
 def _group_stage(group: str) -> Stage:
@@ -73,6 +74,7 @@ def _describe(group: str, name: str, field: FieldInfo) -> Parameter:
         choices=tuple(get_args(annotation)) if kind == "choice" else (),
         published=extra["published"],
         advanced=extra["advanced"],
+        essential=extra["essential"],
     )
 
 
