@@ -175,6 +175,8 @@ class ParameterInfo(Model):
     log: bool
     choices: list[str]
     advanced: bool
+    essential: bool
+    """Among the few that are shown first."""
 
 
 class GroupInfo(Model):

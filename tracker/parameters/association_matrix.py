@@ -65,7 +65,9 @@ class AssociationMatrixParams(Params):
     """What goes to the fusion: target boxes fitted to the objects' outlines, or the objects."""
 
     acceptance: Annotated[
-        float, Field(ge=-10.0, le=0.0), ui("s_min", step=0.1, when=_TARGETS)
+        float,
+        Field(ge=-10.0, le=0.0),
+        ui("s_min", step=0.1, when=_TARGETS, essential=True),
     ] = -2.0
     """Targets: an object's best box is not taken if the outline fits it worse than this."""
 

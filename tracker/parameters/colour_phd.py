@@ -34,7 +34,7 @@ class ColourPeakParams(Params):
     """Spread of the distance D to the nearest template in the colour likelihood N(D; 0, σ²)."""
 
     acceptance_distance: Annotated[
-        float, Field(ge=0.05, le=1.0), ui("D_max", step=0.01, published=1.0)
+        float, Field(ge=0.05, le=1.0), ui("D_max", step=0.01, published=1.0, essential=True)
     ] = 0.52
     """A peak less likely, with its foreground, than a box at this distance is not taken."""
 

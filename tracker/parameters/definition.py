@@ -23,6 +23,7 @@ def ui(
     published: Any = None,
     advanced: bool = False,
     when: Mapping[str, tuple[Any, ...]] = NO_CONDITION,
+    essential: bool = False,
 ) -> Any:
     """What a parameter's face needs beyond its range and help.
 
@@ -36,6 +37,7 @@ def ui(
         advanced: Whether the page folds it away at first.
         when: Other parameters of the same group and the values of each with which this one has
             an effect; with any other value it is not shown.
+        essential: Whether it is among the few that the page shows first.
     """
     extra = {
         "symbol": symbol,
@@ -46,6 +48,7 @@ def ui(
         "published": published,
         "advanced": advanced,
         "when": {name: list(values) for name, values in when.items()},
+        "essential": essential,
     }
     return Field(json_schema_extra={"x-ui": extra})
 

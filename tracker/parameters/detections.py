@@ -13,7 +13,9 @@ from tracker.parameters.methods import Method, Reads, Uses
 class DetectionBoxParams(Params):
     """An outside detector's boxes, as they are."""
 
-    score_threshold: Annotated[float, Field(ge=0.0, le=1.0), ui("s_min", step=0.01)] = 0.0
+    score_threshold: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("s_min", step=0.01, essential=True)
+    ] = 0.0
     """Boxes with a lower score are left out."""
 
     room_tolerance: Annotated[float, Field(ge=0.0, le=100.0), ui("d_r", unit="m", step=0.1)] = 1.0

@@ -24,23 +24,27 @@ _WALK, _VELOCITY = {"motion": ("random_walk",)}, {"motion": ("constant_velocity"
 class FusionParams(Params):
     """Fusion of the cameras in 3D ([ZW21] §2.4)."""
 
-    survival_probability: Annotated[float, Field(ge=0.5, le=1.0), ui("p_S", step=0.001)] = 0.99
+    survival_probability: Annotated[
+        float, Field(ge=0.5, le=1.0), ui("p_S", step=0.001, essential=True)
+    ] = 0.99
     """Probability that a person in the room is still there a step later."""
 
     detection_probability: Annotated[
-        float, Field(ge=0.05, le=1.0), ui("p_D", step=0.01, published=0.98)
+        float, Field(ge=0.05, le=1.0), ui("p_D", step=0.01, published=0.98, essential=True)
     ] = 0.95
     """Probability that a camera's boxes include a person that its picture holds."""
 
     clutter_rate: Annotated[
         float,
         Field(ge=0.001, le=50.0),
-        ui("λ_c", unit="1/(camera·step)", step=0.1, log=True, published=0.5),
+        ui("λ_c", unit="1/(camera·step)", step=0.1, log=True, published=0.5, essential=True),
     ] = 3.0
     """Expected number of false boxes that a camera gives at each step."""
 
     birth_rate: Annotated[
-        float, Field(ge=1e-4, le=10.0), ui("γ", unit="1/(entrance·s)", log=True, published=0.5)
+        float,
+        Field(ge=1e-4, le=10.0),
+        ui("γ", unit="1/(entrance·s)", log=True, published=0.5, essential=True),
     ] = 0.05
     """Expected number of people who come in at each entrance in one second."""
 
@@ -72,7 +76,7 @@ class FusionParams(Params):
     acceleration_sigma: Annotated[
         float,
         Field(ge=0.05, le=10.0),
-        ui("σ_a", unit="m/s per √s", step=0.05, log=True, when=_VELOCITY),
+        ui("σ_a", unit="m/s per √s", step=0.05, log=True, when=_VELOCITY, essential=True),
     ] = 0.8
     """Constant velocity: how much a person's speed changes in one second, along each axis."""
 
@@ -123,7 +127,7 @@ class FusionParams(Params):
     """How far outside the room people are followed, unreported, so that their boxes are theirs."""
 
     memory: Annotated[
-        float, Field(ge=0.0, le=30.0), ui("t_m", unit="s", step=0.1, published=0.0)
+        float, Field(ge=0.0, le=30.0), ui("t_m", unit="s", step=0.1, published=0.0, essential=True)
     ] = 3.0
     """How long a person whom no camera sees may be gone and still come back under the same id."""
 
@@ -151,7 +155,7 @@ class FusionParams(Params):
     """Sequential PHD: whether the components that one box made are reported singly or as one."""
 
     extraction_threshold: Annotated[
-        float, Field(ge=0.01, le=0.99), ui("T_e", step=0.01, stage="tracks")
+        float, Field(ge=0.01, le=0.99), ui("T_e", step=0.01, stage="tracks", essential=True)
     ] = 0.5
     """A component whose weight is above this is reported as a person."""
 

@@ -47,7 +47,9 @@ class JpdaParams(Params):
     five_cases: Annotated[bool, ui("Ω")] = True
     """Whether occlusions, splits and returns are treated apart; off is the classical filter."""
 
-    gate_probability: Annotated[float, Field(ge=0.5, le=0.99999), ui("P_G", step=0.001)] = 0.99
+    gate_probability: Annotated[
+        float, Field(ge=0.5, le=0.99999), ui("P_G", step=0.001, essential=True)
+    ] = 0.99
     """Probability that a target's own measurement lies in its gate."""
 
     detection_probability: Annotated[float, Field(ge=0.05, le=0.999), ui("P_D", step=0.01)] = 0.9

@@ -107,7 +107,7 @@ class PseudoParticleParams(Params):
     """Spread of the particles that are drawn anew around each target; 0 keeps the resampled."""
 
     acceptance_distance: Annotated[
-        float, Field(ge=0.05, le=1.0), ui("d_0", step=0.01, published=0.6)
+        float, Field(ge=0.05, le=1.0), ui("d_0", step=0.01, published=0.6, essential=True)
     ] = 0.5
     """Column of the background: a mode less likely than one at this distance is nobody."""
 

@@ -39,6 +39,7 @@ class Parameter:
     advanced: bool
     when: Mapping[str, tuple[Any, ...]]
     """Keys of others, and the values of each with which this one has an effect."""
+    essential: bool
 
 
 def _group_stage(group: str) -> Stage:
@@ -79,6 +80,7 @@ def _describe(group: str, name: str, field: FieldInfo) -> Parameter:
         published=extra["published"],
         advanced=extra["advanced"],
         when={f"{group}.{other}": tuple(values) for other, values in extra["when"].items()},
+        essential=extra["essential"],
     )
 
 

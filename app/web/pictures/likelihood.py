@@ -112,7 +112,7 @@ def heat(values: Float[ndarray, "rows columns"], least: float) -> bytes:
     share = np.clip(1.0 - values / least, 0.0, 1.0)[:, :, None]
     picture = np.empty((*values.shape, 4), dtype=np.uint8)
     picture[:, :, :3] = np.rint(np.array(LOW) * (1.0 - share) + np.array(HIGH) * share)
-    picture[:, :, 3] = np.rint(OPAQUE * share[:, :, 0])
+    picture[:, :, 3] = np.rint(OPAQUE * np.sqrt(share[:, :, 0]))
     done, data = cv2.imencode(".png", picture)
     assert done, "a picture of four channels can be written as PNG"
     return bytes(data)

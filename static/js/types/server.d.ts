@@ -292,6 +292,8 @@ declare namespace Server {
 		log: boolean;
 		choices: string[];
 		advanced: boolean;
+		/** Among the few that are shown first. */
+		essential: boolean;
 	}
 
 	/** A person's position error over time. */
