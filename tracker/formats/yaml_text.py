@@ -25,7 +25,7 @@ def parse_yaml(text: str, most_depth: int = 100) -> Any:
     """The first document of a YAML text.
 
     Raises:
-        ValueError: If it is not YAML, or uses references or tags of other programs, or is nested deeper.
+        ValueError: If it is not YAML, refers, has tags of other programs or is too deep.
     """
     # OpenCV begins with "%YAML:1.0", which no other reader takes for a directive
     text = re.sub(r"\A%YAML[: ]\d\.\d\s*\n", "", text)
