@@ -101,9 +101,9 @@ def solve(
     offsets: list[Offset | None] = []
     for camera in range(cameras):
         if any(camera in key for key in curves):
-            curve = _of_camera(camera, found, curves, weights, grid, grid[inner])
+            own = _of_camera(camera, found, curves, weights, grid, grid[inner])
             gain = _gain(camera, found, pairings, list(curves))
-            offsets.append(Offset(float(found[camera]), curve, _sharpness(curve), gain))
+            offsets.append(Offset(float(found[camera]), own, _sharpness(own), gain))
         else:
             offsets.append(None)
     return tuple(offsets)
@@ -143,7 +143,7 @@ def _at(
         return np.zeros(len(offsets))
     usual = float(np.median(curve[known]))
     filled = np.where(known, curve, usual)
-    return np.interp(offsets, grid, filled, left=usual, right=usual)
+    return np.asarray(np.interp(offsets, grid, filled, left=usual, right=usual))
 
 
 def _joined(
@@ -158,7 +158,7 @@ def _joined(
 
     def height(key: tuple[int, int]) -> float:
         curve = curves[key]
-        return float(np.nanmax(curve) - np.nanmedian(curve)) * np.sqrt(weights[key])
+        return float((np.nanmax(curve) - np.nanmedian(curve)) * np.sqrt(weights[key]))
 
     for a, b in sorted(curves, key=height, reverse=True):
         if group[a] == group[b]:
