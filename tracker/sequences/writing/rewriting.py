@@ -149,7 +149,7 @@ def _check_unchanged(values: dict[str, Any], before: Values, where: str) -> None
             )
 
 
-def taught_in(values: dict[str, Any], otherwise: Values) -> Values:
+def taught_in(values: dict[str, Any], otherwise: Values | None = None) -> Values:
     """Room and templates of a file in the form of :func:`taught_values`.
 
     Args:
@@ -160,7 +160,7 @@ def taught_in(values: dict[str, Any], otherwise: Values) -> Values:
     def numbers(vector: list[Any]) -> list[float]:
         return [float(value) for value in vector]
 
-    room = values.get("room", otherwise["room"])
+    room: dict[str, Any] = values["room"] if "room" in values else (otherwise or {})["room"]
     return {
         "room": {
             "min": numbers(room["min"]),
