@@ -29,6 +29,11 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 def pytest_addoption(parser: pytest.Parser) -> None:
     """``--long``: also what takes long; each such test has a short form that always runs."""
     parser.addoption("--long", action="store_true", help="also run the tests marked long")
+    parser.addoption(
+        "--update-golden",
+        action="store_true",
+        help="accept the numbers of tests/golden as they are",
+    )
     parser.addoption("--screenshots", type=Path, help="folder that keeps pictures of the page")
 
 

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -193,9 +194,8 @@ def _track(command: Track) -> None:
     if not output.parent.is_dir():
         raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
 
-    from app.state.compiling import WORDS
+    from app.state.compiling import Compiling
     from tracker import export, pipeline
-    from tracker.kernels import compilation
     from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
 
@@ -204,20 +204,14 @@ def _track(command: Track) -> None:
     parameters = table.with_values(pipeline.default_parameters(sequence), changes)
     begin = time.perf_counter()
     stages: set[table.Stage] = set()
-    is_told = False
-
-    def compiles() -> None:
-        nonlocal is_told
-        if not is_told:
-            is_told = True
-            say(WORDS)
 
     def told(_: pipeline.Run, progress: pipeline.Progress) -> None:
         stages.add(progress.stage)
         tracking.at(progress.done, progress.total)
 
-    with Bar("tracking", "step") as tracking, compilation.followed(compiles):
+    with Bar("tracking", "step") as tracking, closing(Compiling(say)) as compiling:
         tracking.at(0, sequence.frames)
+        compiling.wait(lambda done, total: None, lambda: False)
         run = pipeline.compute(
             sequence,
             parameters,

@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numpy import ndarray
 
-from tracker.kernels.compilation import kernel
+from tracker.kernels.compilation import pixel_kernel
 
 
-@kernel
+@pixel_kernel
 def two_classes(
     difference: ndarray,
     background_centre: float,
@@ -85,7 +85,7 @@ def two_classes(
     return thresholds, counts
 
 
-@kernel
+@pixel_kernel
 def above(difference: ndarray, thresholds: ndarray) -> ndarray:
     """1 where any channel differs by more than its threshold.
 
@@ -107,7 +107,7 @@ def above(difference: ndarray, thresholds: ndarray) -> ndarray:
     return mask
 
 
-@kernel
+@pixel_kernel
 def clear_shadows(
     difference: ndarray,
     picture: ndarray,
@@ -140,7 +140,7 @@ def clear_shadows(
                     difference[y, x, c] = 0
 
 
-@kernel
+@pixel_kernel
 def update_background(
     background: ndarray,
     still: ndarray,
@@ -195,7 +195,7 @@ def update_background(
     return after, counts
 
 
-@kernel
+@pixel_kernel
 def level_medians(
     source: ndarray, target: ndarray, groups: int
 ) -> tuple[ndarray, ndarray, ndarray]:
@@ -233,7 +233,7 @@ def level_medians(
     return totals, sums, medians
 
 
-@kernel
+@pixel_kernel
 def upper_medians(values: ndarray) -> ndarray:
     """The median of each column of (N, P) uint8, of an even number the upper one.
 

@@ -11,10 +11,10 @@ import math
 import numpy as np
 from numpy import ndarray
 
-from tracker.kernels.compilation import kernel
+from tracker.kernels.compilation import pixel_kernel
 
 
-@kernel
+@pixel_kernel
 def box_histograms(
     bin_map: ndarray, boxes: ndarray, bins: int, epanechnikov: bool, longest_side: int
 ) -> ndarray:
@@ -61,7 +61,7 @@ def box_histograms(
     return histograms
 
 
-@kernel
+@pixel_kernel
 def template_distances(
     bin_map: ndarray,
     boxes: ndarray,
@@ -132,7 +132,7 @@ def template_distances(
     return np.sqrt(np.maximum(1.0 - largest, 0.0))
 
 
-@kernel
+@pixel_kernel
 def hue_saturation_bins(hsv: ndarray, least_saturation: int, least_value: int) -> ndarray:
     """The bin of each pixel: 16 hues × 16 saturations where it is coloured, else 16 values.
 
@@ -156,7 +156,7 @@ def hue_saturation_bins(hsv: ndarray, least_saturation: int, least_value: int) -
     return bins
 
 
-@kernel
+@pixel_kernel
 def box_means(integral: ndarray, edges: ndarray) -> ndarray:
     """The mean of a picture over rectangles, from its integral image.
 
@@ -186,7 +186,7 @@ def box_means(integral: ndarray, edges: ndarray) -> ndarray:
     return means
 
 
-@kernel
+@pixel_kernel
 def spread_starts(samples: ndarray, weights: ndarray, order: ndarray, most: int) -> ndarray:
     """Heaviest samples that keep a box's distance from each other.
 
@@ -221,7 +221,7 @@ def spread_starts(samples: ndarray, weights: ndarray, order: ndarray, most: int)
     return taken[:count].copy()
 
 
-@kernel
+@pixel_kernel
 def mean_shift(
     samples: ndarray,
     weights: ndarray,
@@ -286,7 +286,7 @@ def mean_shift(
     return modes, densities
 
 
-@kernel
+@pixel_kernel
 def foreground_mask(
     picture: ndarray,
     background: ndarray,
@@ -340,7 +340,7 @@ def foreground_mask(
     return mask
 
 
-@kernel
+@pixel_kernel
 def keep_apart(boxes: ndarray, densities: ndarray, order: ndarray, distance: float) -> ndarray:
     """Which boxes stay, in the given order: none whose centre is near one that stays already.
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numpy import ndarray
 
-from tracker.kernels.compilation import kernel
+from tracker.kernels.compilation import pixel_kernel
 
 
-@kernel
+@pixel_kernel
 def epanechnikov_climb(
     boxes: ndarray,
     counts: ndarray,
@@ -74,7 +74,7 @@ def epanechnikov_climb(
     return points, densities
 
 
-@kernel
+@pixel_kernel
 def join_modes(
     points: ndarray, counts: ndarray, order: ndarray, distance: float
 ) -> tuple[ndarray, ndarray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -141,10 +142,10 @@ def test_the_warm_up_calls_every_kernel_that_a_run_may_call() -> None:
     code = """
         from tracker import warm_up
         from tracker.kernels import compilation
-        compilation.mark_compiled = lambda: None
         told = []
-        warm_up.compile_kernels(lambda *counts: told.append(counts), lambda: told.append("ready"))
-        assert told.count("ready") == 1
+        for half in warm_up.HALVES:
+            warm_up.compile_kernels(half, ready=lambda: told.append("ready"))
+        assert told == ["ready"]
         kernels = {id(each.py_func): each.py_func for each in compilation._KERNELS}
         reached = {id(each.py_func) for each in compilation._KERNELS if each.signatures}
         open_ones = list(reached)
@@ -167,3 +168,45 @@ def test_the_warm_up_calls_every_kernel_that_a_run_may_call() -> None:
         *("disjoint_matchings", "_nearest", "_augment", "_push", "_pop"),
     }
     assert set(done.stdout.strip().split(",")) <= library_only
+
+
+BY_HAND = """
+    import sys
+    sys.path.insert(0, {folder!r})
+    from tracker.kernels import compilation
+    import some_kernels
+    compilation.while_compiling()
+    assert some_kernels.quadruple(3.0) == 12.0
+    print(compilation.counts())
+    {then}
+    assert some_kernels.quadruple(3.0) == 12.0
+    print(compilation.counts())
+"""
+
+
+def test_while_another_process_compiles_a_kernel_runs_as_plain_python(
+    package: Path, tmp_path: Path
+) -> None:
+    def counts(then: str) -> list[str]:
+        return python(
+            BY_HAND.format(folder=str(package), then=then), tmp_path / "cache"
+        ).splitlines()
+
+    assert counts("pass") == ["(0, 2)", "(0, 2)"]
+    # what the other process has put on disk is used when it has told of it, and not before
+    assert python(USE.format(folder=str(package), result=12.0), tmp_path / "cache")
+    assert counts("pass") == ["(1, 2)", "(1, 2)"]
+    assert counts("compilation.news_of_compiling()") == ["(1, 2)", "(1, 2)"]
+    shutil.rmtree(tmp_path / "cache")
+    assert counts("pass") == ["(0, 2)", "(0, 2)"]
+    elsewhere = (
+        "import subprocess; subprocess.run([sys.executable, '-c', "
+        f'"import sys; sys.path.insert(0, {str(package)!r}); '
+        'import some_kernels; some_kernels.quadruple(3.0)"], check=True)'
+    )
+    assert counts(elsewhere) == ["(0, 2)", "(0, 2)"]
+    shutil.rmtree(tmp_path / "cache")
+    assert counts(f"{elsewhere}; compilation.news_of_compiling()") == ["(0, 2)", "(1, 2)"]
+    shutil.rmtree(tmp_path / "cache")
+    # where the other process has failed, it is compiled here
+    assert counts("compilation.no_longer_compiling()") == ["(0, 2)", "(2, 2)"]

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt16
 from numpy import ndarray
 
-from tracker.kernels.compilation import kernel
+from tracker.kernels.compilation import pixel_kernel
 
 ITERATIONS = 20
 TOLERANCE = 0.1
@@ -72,7 +72,7 @@ def follow(
     return centre
 
 
-@kernel
+@pixel_kernel
 def _follow(
     bins: ndarray,
     moving: ndarray,

@@ -17,7 +17,7 @@ from numpy import ndarray
 from tracker.blobs import Blobs
 from tracker.camera import Camera
 from tracker.foreground import integral, shape_scores
-from tracker.kernels.compilation import kernel
+from tracker.kernels.compilation import pixel_kernel
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BoxSizes
 
@@ -127,7 +127,7 @@ class Silhouettes:
         )
 
 
-@kernel
+@pixel_kernel
 def _candidates(
     owners: ndarray,
     pieces: ndarray,
@@ -194,7 +194,7 @@ def _candidates(
     return boxes[:count].copy(), whose[:count].copy()
 
 
-@kernel
+@pixel_kernel
 def _choose(
     boxes: ndarray,
     scores: ndarray,
