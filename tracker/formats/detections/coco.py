@@ -98,7 +98,7 @@ def _piece(
     # AlphaPose's score is a sum over box and joints, and above 1
     scores = to_unit(np.minimum(scores, 1.0) if keypoints is not None else scores)
     image = rows[0][1] if rows else {}
-    size = (image.get("width"), image.get("height"))
+    size: tuple[Any, Any] = (image.get("width"), image.get("height"))
     known = all(isinstance(side, int) and 0 < side < 65536 for side in size)
     return DetectionPiece(
         source=file.path,
