@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -239,7 +238,8 @@ def _truth(
 
 def number_in(text: str) -> int | None:
     """The last run of digits of a name: the frame of ``cam1/frame_0012.jpg``."""
-    stem = Path(text.replace("\\", "/")).stem
+    name = text.replace("\\", "/").rsplit("/", 1)[-1]
+    stem = re.sub(r"\.[A-Za-z]\w{0,4}$", "", name)  # of "cam1.0012.json" the number stays
     runs = re.findall(r"\d+", stem)
     return int(runs[-1]) if runs and len(runs[-1]) <= 15 else None
 

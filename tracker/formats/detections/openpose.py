@@ -8,6 +8,7 @@ Source: Cao et al., "OpenPose", IEEE TPAMI 43(1), 2021, and its "Output" page.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
     last = 0
     for place, path in enumerate(file.series):
         member = file.member(path)
-        frame = number_in(path.stem.removesuffix("_keypoints"))
+        frame = _frame(path)
         frame = place if frame is None else frame
         last = max(last, frame)
         values = member.json
@@ -70,11 +71,12 @@ def read(file: SourceFile) -> Iterator[Piece]:
         boxes=boxes[keep],
         scores=np.clip(confidence, 0.0, 1.0)[keep],
         layout="ltwh",
-        first_index=0 if len(file.series) > 1 and _first(file) == 0 else None,
+        first_index=0 if len(file.series) > 1 and _frame(file.series[0]) == 0 else None,
         last_frame=last,
         keypoints=joints[keep],
     )
 
 
-def _first(file: SourceFile) -> int | None:
-    return number_in(file.series[0].stem.removesuffix("_keypoints"))
+def _frame(path: Path) -> int | None:
+    """``cam1_000000000012_keypoints.json`` is frame 12."""
+    return number_in(path.name.replace("_keypoints", ""))
