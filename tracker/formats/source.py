@@ -59,6 +59,11 @@ class SourceFile:
         """Another file of the series or of the folder, by itself."""
         return SourceFile(path, self._root)
 
+    @property
+    def label(self) -> str:
+        """Folder and name without the suffix: what may name the camera."""
+        return self.where.removesuffix(self.path.suffix)
+
     def error(self, message: str, field: str = "") -> FormatError:
         """An error about the file or one field of it."""
         return FormatError(f"{self.where}{', ' if field else ''}{field}: {message}")
@@ -163,7 +168,7 @@ class SourceFile:
                 "declares XML entities, which no calibration or annotation needs; "
                 "remove its <!DOCTYPE …>"
             )
-        parser = ElementTree.XMLPullParser(events=("start", "end"))
+        parser: Any = ElementTree.XMLPullParser(events=("start", "end"))
         depth = 0
         root: ElementTree.Element | None = None
         try:
@@ -172,7 +177,6 @@ class SourceFile:
             for begin in range(0, len(text), HEAD_BYTES):
                 parser.feed(text[begin : begin + HEAD_BYTES])
                 for event, element in parser.read_events():
-                    assert isinstance(element, ElementTree.Element)
                     root = element if root is None else root
                     depth += 1 if event == "start" else -1
                     if depth > MOST_DEPTH:

@@ -40,7 +40,7 @@ def parse_yaml(text: str, most_depth: int = 100) -> Any:
             depth -= isinstance(event, yaml.CollectionEndEvent)
             if depth > most_depth:
                 raise ValueError(f"has more than {most_depth} levels of nesting")
-        loader = _Loader(text)
+        loader: Any = _Loader(text)
         try:
             return loader.get_data() if loader.check_data() else None
         finally:

@@ -65,14 +65,15 @@ def _load(file: SourceFile) -> dict[str, Any]:
         raise file.error('is of version 7.3 (HDF5), expected 7 or older; save it with "-v7"')
     try:
         _check_size(file, data)
-        values = scipy.io.loadmat(io.BytesIO(data), simplify_cells=True)
+        stream: Any = io.BytesIO(data)
+        values = scipy.io.loadmat(stream, simplify_cells=True)
     except (ValueError, TypeError, KeyError, IndexError, EOFError, OverflowError,
             MemoryError, NotImplementedError, zlib.error, struct.error) as error:  # fmt: skip
         raise file.error(f"cannot be read as a MATLAB file ({error}); save it again") from None
     values = {k: v for k, v in values.items() if not k.startswith("__")}
     if any(type(v).__name__ == "MatlabOpaque" for v in values.values()) or not values:
         raise file.error(
-            "holds MATLAB objects, which only MATLAB reads; save toStruct(stereoParams) in its place"
+            "holds MATLAB objects, which only MATLAB reads; save toStruct(stereoParams) instead"
         )
     return values
 
