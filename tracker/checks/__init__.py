@@ -33,7 +33,7 @@ def check(
     found = [*check_boxes(sequence, told)]
     lenses = check_lenses(sequence.cameras)
     if told is not None and told.mistaken:
-        return [*found, lenses, check_counting(sequence)]
+        return [*found, lenses, check_counting(sequence, places=False)]
     found += [lenses, *check_places(sequence.cameras, sequence.room)]
     if sequence.has_detections or pictures:
         found += check_time(sequence, reader)

@@ -12,18 +12,21 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jaxtyping import Int
+from numpy import ndarray
 
 from tracker import association
 from tracker.camera import stacked
 from tracker.filters import gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion import memory, names, visibility
+from tracker.fusion import memory, names, sight, visibility
 from tracker.fusion.measurement_births import Evidence, Newborns
 from tracker.fusion.memory import Memory
 from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
 from tracker.fusion.names import Names
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import WORTH_TELLING, Record, summed
+from tracker.fusion.sight import Recent
 from tracker.kernels.labelled import step as step_kernels
 from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
@@ -39,6 +42,8 @@ class MultiBernoulliState:
     next_label: int
     memory: Memory
     names: Names
+    recent: Recent = ()
+    """What each camera left unexplained in its last frame."""
 
 
 class MultiBernoulli:
@@ -51,23 +56,40 @@ class MultiBernoulli:
     """
 
     def __init__(self, sequence: Sequence, parameters: FusionParams) -> None:
-        p, model = parameters, FusionModel(sequence, parameters)
-        self._parameters, self._model = p, model
+        model = FusionModel(sequence, parameters)
+        self._parameters, self._model = parameters, model
+        self._of_cameras: dict[bytes, tuple[Any, ...]] = {}
+        """The same where some cameras have no frame, by those that have."""
+        self._fixed = self._told_of(np.arange(len(model.cameras)))
+        """What :func:`tracker.kernels.labelled.step.predict_and_update` is told at every step."""
+
+    def _told_of(self, cameras: Int[ndarray, " S"]) -> tuple[Any, ...]:
+        """What the step's kernel is told at every step at which these cameras have a frame."""
+        p, model = self._parameters, self._model
         motion, target = model.motion, model.target
         births = model.births
         if p.birth == "measurements":
             births = GaussianMixture.empty(motion.dimension)
-        self._fixed: tuple[Any, ...] = (
+        own = tuple(model.cameras[c] for c in cameras.tolist())
+        return (
             *(motion.transition, motion.noise[None], p.survival_probability),
             *(births.weights, births.means, births.covariances),
             *(p.measurement_sigma, *target.transforms, target.unscented, *target.numbers),
             *(target.drift(motion.dimension), target.low_share),
-            *(*stacked(model.cameras), model.clutter, model.gate, p.edge == "soft"),
+            *(*stacked(own), model.clutter[cameras], model.gate, p.edge == "soft"),
             *(p.detection_probability, CONFIRMED, p.occlusion, model.near),
             *(visibility.WORTH_TELLING, association.TOLERANCE, association.ITERATIONS),
             *(WORTH_TELLING, p.pruning_threshold),
         )
-        """What :func:`tracker.kernels.labelled.step.predict_and_update` is told at every step."""
+
+    def _seeing(self, cameras: Int[ndarray, " S"]) -> tuple[Any, ...]:
+        """As :meth:`_told_of`, made once for the same cameras; of none the kernel asks nothing."""
+        if not len(cameras):
+            return self._fixed
+        key = cameras.tobytes()
+        if key not in self._of_cameras:
+            self._of_cameras[key] = self._told_of(cameras)
+        return self._of_cameras[key]
 
     def start(self) -> MultiBernoulliState:
         """Nobody is in the room."""
@@ -81,6 +103,11 @@ class MultiBernoulli:
         """Predict one step ahead and update with every camera's boxes, in the cameras' order."""
         p, before, unseen = self._parameters, state.tracks, state.undetected
         boxes, sigmas, starts = all_boxes(views)
+        cameras = sight.seeing(views)
+        fixed, own_starts = self._fixed, starts
+        if cameras is not None:
+            fixed = self._seeing(cameras)
+            own_starts = np.append(starts[:-1][cameras], starts[-1])  # others have no boxes
         (
             existences, means, covariances, labels, next_label,
             left, unseen_means, unseen_covariances,
@@ -89,16 +116,20 @@ class MultiBernoulli:
         ) = step_kernels.predict_and_update(
             *(before.weights, before.means, before.covariances, before.labels, state.next_label),
             *(unseen.weights, unseen.means, unseen.covariances),
-            *(boxes, sigmas, starts, *self._fixed),
+            *(boxes, sigmas, own_starts, *fixed),
         )  # fmt: skip
         tracks = GaussianMixture(existences, means, covariances, labels)
         record = Record(chances, sources, shares, hidden_by)
+        if cameras is not None:
+            told[0] = cameras[told[0]]
+            record = sight.spread(record, cameras, len(views))
+        recent = state.recent
         if p.birth != "entrances":
             evidence = Evidence(boxes[:, :2], values, noises, unexplained, starts)
-            found = self._model.newborns(evidence)
+            found, recent = self._model.newborns_and_recent(evidence, boxes, views, recent)
             if found is not None:
                 tracks, record, next_label = self._with_newborns(
-                    tracks, record, *found, state.next_label, next_label
+                    tracks, record, *found, state.next_label, next_label, cameras
                 )
         kept = step_kernels.kept_tracks(
             *(tracks.weights, tracks.means, tracks.labels, record.sources, p.pruning_threshold),
@@ -124,7 +155,7 @@ class MultiBernoulli:
             max_components=p.max_components,
         )
         return (
-            MultiBernoulliState(posterior, undetected, next_label, lost, recognised),
+            MultiBernoulliState(posterior, undetected, next_label, lost, recognised, recent),
             record.result(posterior, associations),
         )
 
@@ -136,8 +167,10 @@ class MultiBernoulli:
         newborns: Newborns,
         first_new_label: int,
         next_label: int,
+        cameras: Int[ndarray, " S"] | None,
     ) -> tuple[GaussianMixture, Record, int]:
         """The tracks with those that begin where unexplained boxes of several cameras agree."""
+        seeing = slice(None) if cameras is None else cameras
         # a track begun at an entrance by one of the same boxes is the same person
         own, theirs = record.sources[:, :, None], newborns.sources[:, None, :]
         shared = ((own == theirs) & (theirs >= 0)).any(axis=(0, 2))
@@ -148,5 +181,5 @@ class MultiBernoulli:
         record = record.take(others).extended(born.size)
         record.sources[:, first:] = newborns.sources
         record.source_weights[:, first:] = newborns.sources >= 0
-        record.detection_probabilities[:, first:] = self._parameters.detection_probability
+        record.detection_probabilities[seeing, first:] = self._parameters.detection_probability
         return tracks, record, next_label + born.size
