@@ -196,11 +196,18 @@ def _track(command: Track) -> None:
 
     from app.state.compiling import Compiling
     from tracker import export, pipeline
+    from tracker.checks import check
+    from tracker.runs.outcome import why_no_tracks
     from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
 
     with Bar("rendering", "frame") as rendering:
         sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    for sentence in sequence.warnings:
+        say(sentence)
+    for found in check(sequence, quick=True):
+        if found.status == "warning" and str(found) not in sequence.warnings:
+            say(str(found))
     parameters = table.with_values(pipeline.default_parameters(sequence), changes)
     begin = time.perf_counter()
     stages: set[table.Stage] = set()
@@ -227,6 +234,8 @@ def _track(command: Track) -> None:
         f"{sequence.frames} steps, {targets} tracks, {sequence.frames / seconds:.0f} steps/s "
         f"({sequence.frames / seconds / sequence.fps:.1f} × real time{kept}), written to {output}"
     )
+    if (reason := why_no_tracks(run)) is not None:
+        say(reason)
 
 
 # the rest
