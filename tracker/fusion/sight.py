@@ -16,6 +16,8 @@ from numpy import ndarray
 
 from tracker.fusion.measurement_births import Evidence, Newborns
 from tracker.fusion.record import Record
+from tracker.kernels.gating import Measurements
+from tracker.kernels.labelled.step import CameraBoxes
 from tracker.single_view.protocol import ViewResult
 
 LONGEST = 0.2
@@ -32,6 +34,11 @@ def seeing(views: Many[ViewResult]) -> Int[ndarray, " S"] | None:
     if not any(view.blind for view in views):
         return None
     return np.array([c for c, view in enumerate(views) if not view.blind], dtype=np.int64)
+
+
+def boxes_of(seen: CameraBoxes, cameras: Int[ndarray, " S"]) -> CameraBoxes:
+    """The boxes of all cameras as those of the ones that have a frame: the others have none."""
+    return seen._replace(starts=np.append(seen.starts[:-1][cameras], seen.starts[-1]))
 
 
 def spread(record: Record, cameras: Int[ndarray, " S"], count: int) -> Record:
@@ -83,8 +90,10 @@ def with_recent(now: Glimpse, recent: Recent, step_time: float, half_height: flo
     starts = np.cumsum([0, *(len(part.centres) for part in parts)])
     return Evidence(
         np.concatenate([part.centres for part in parts]),
-        np.concatenate([part.values for part in parts]),
-        np.concatenate([part.noises for part in parts]),
+        Measurements(
+            np.concatenate([part.measurements.values for part in parts]),
+            np.concatenate([part.measurements.noises for part in parts]),
+        ),
         np.concatenate([part.unexplained for part in parts]),
         starts,
         ~now.blind,
@@ -104,11 +113,11 @@ def _last(
     if age:
         rows = rows[evidence.unexplained[rows] > _UNEXPLAINED]
     walked = WALKING * age * step_time / half_height * seen.boxes[rows, 3]
-    looser = walked[:, None, None] ** 2 * np.eye(evidence.values.shape[1])
+    values, noises = evidence.measurements
+    looser = walked[:, None, None] ** 2 * np.eye(values.shape[1])
     return Evidence(
         evidence.centres[rows],
-        evidence.values[rows],
-        evidence.noises[rows] + looser,
+        Measurements(values[rows], noises[rows] + looser),
         evidence.unexplained[rows],
         evidence.starts,
     )
