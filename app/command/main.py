@@ -1,4 +1,4 @@
-"""The command line: serve, track, evaluate, experiment, benchmark, sequences, …
+"""The command line: serve, track, evaluate, experiment, benchmark, import, check, …
 
 Status 0 for success, 1 for a failure told in one line on standard error, 2 for
 wrong usage, 130 after Ctrl-C. The engine is imported by the command that needs it.
@@ -19,8 +19,12 @@ from typing import Any
 from app.command.flags import (
     Arguments,
     Benchmark,
+    Check,
     Evaluate,
     Experiment,
+    ExportCalibration,
+    Formats,
+    Import,
     Parameters,
     Render,
     Sequences,
@@ -76,6 +80,10 @@ def _run(command: Arguments) -> int:
             experiment(command)
         case Benchmark():
             return _benchmark(command)
+        case Import() | Check() | Formats() | ExportCalibration():
+            from app.command.importing import run
+
+            return run(command)
         case Sequences():
             _sequences(command)
         case Render():

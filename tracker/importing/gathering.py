@@ -117,10 +117,10 @@ def _series(files: Sequence[Path]) -> Iterator[tuple[Path, ...]]:
         # of numbers that differ as much, the last
         at = max(range(len(kinds)), key=lambda place: (kinds[place], place))
         by_rest: dict[tuple[str, ...], list[tuple[int, Path]]] = {}
-        for words, path in members:
-            by_rest.setdefault((*words[:at], *words[at + 1 :]), []).append((int(words[at]), path))
-        for own in by_rest.values():
-            yield tuple(path for _, path in sorted(own))
+        for own, path in members:
+            by_rest.setdefault((*own[:at], *own[at + 1 :]), []).append((int(own[at]), path))
+        for row in by_rest.values():
+            yield tuple(path for _, path in sorted(row))
 
 
 def _read(series: tuple[Path, ...], root: Path) -> Iterator[Taken]:

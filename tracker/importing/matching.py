@@ -52,6 +52,8 @@ class Matched:
     """All cameras with what belongs to them, and what belongs to none."""
 
     cameras: list[MatchedCamera]
+    format: str
+    """Of their calibration."""
     truths: list[tuple[str, TruthPiece]]
     told: list[str]
     """Sentences about what is not used."""
@@ -82,7 +84,7 @@ def match_all(taken: Sequence[Taken], sets: Sequence[CameraSet], options: Import
             f"{len(left)} cameras of {chosen.label} have neither video nor boxes and are left out: "
             f"{', '.join(left[:8])}{' …' if len(left) > 8 else ''}"
         )
-    return Matched(used or cameras, truths, told)
+    return Matched(used or cameras, chosen.format, truths, told)
 
 
 _Pictures = list[tuple[str, VideoPiece | ImagesPiece]]
@@ -225,11 +227,12 @@ def _by_pictures(
     cameras: list[MatchedCamera], labels: Sequence[str]
 ) -> tuple[dict[int, int], How] | None:
     """By the names of the videos, where these are not called as the calibration's cameras."""
-    named = [
-        (place, camera.video.path.stem if camera.video is not None else camera.images.folder.name)
-        for place, camera in enumerate(cameras)
-        if camera.video is not None or camera.images is not None
-    ]
+    named: list[tuple[int, str]] = []
+    for place, camera in enumerate(cameras):
+        if camera.video is not None:
+            named.append((place, camera.video.path.stem))
+        elif camera.images is not None:
+            named.append((place, camera.images.folder.name))
     found = match([name for _, name in named], labels) if named else None
     if found is None:
         return None
