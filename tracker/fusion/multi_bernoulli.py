@@ -12,18 +12,21 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from jaxtyping import Int
+from numpy import ndarray
 
 from tracker import association
 from tracker.camera import stacked
 from tracker.filters import gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion import memory, reidentification, visibility
+from tracker.fusion import memory, reidentification, sight, visibility
 from tracker.fusion.measurement_births import Evidence, Newborns
 from tracker.fusion.memory import Memory
 from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import WORTH_TELLING, Record, summed
 from tracker.fusion.reidentification import Identities
+from tracker.fusion.sight import Recent
 from tracker.kernels.boxes import Occlusion
 from tracker.kernels.labelled import step as step_kernels
 from tracker.kernels.labelled.camera_update import CameraModel, Tracks
@@ -44,6 +47,8 @@ class MultiBernoulliState:
     next_label: int
     memory: Memory
     identities: Identities
+    recent: Recent = ()
+    """What each camera left unexplained in the last frames."""
 
 
 class MultiBernoulli:
@@ -81,10 +86,23 @@ class MultiBernoulli:
             ),
             least_existence=p.pruning_threshold,
         )
+        self._models: dict[bytes, StepModel] = {}
+        """The same where some cameras have no frame, by those that have."""
         low, high = model.followed
         self._keeping_rule = KeepingRule(
             p.pruning_threshold, low, high, p.max_components, model.near, CONFIRMED
         )
+
+    def _seen_by(self, cameras: Int[ndarray, " S"]) -> StepModel:
+        """The step's model where only these cameras have a frame; of none the kernel asks
+        nothing."""
+        key = cameras.tobytes()
+        if key not in self._models:
+            own = [self._model.cameras[c] for c in cameras.tolist()] or self._model.cameras
+            self._models[key] = self._step_model._replace(
+                cameras=stacked(own), clutter=self._model.clutter[cameras]
+            )
+        return self._models[key]
 
     def start(self) -> MultiBernoulliState:
         """Nobody is in the room."""
@@ -98,12 +116,13 @@ class MultiBernoulli:
         """Predict one step ahead and update with every camera's boxes, in the cameras' order."""
         p, before = self._parameters, state.tracks
         seen = all_boxes(views)
+        cameras = sight.seeing(views)
         found = step_kernels.predict_and_update(
             Tracks(before.weights, before.means, before.covariances, before.labels),
             state.next_label,
             state.undetected.gaussians,
-            seen,
-            self._step_model,
+            seen if cameras is None else sight.boxes_of(seen, cameras),
+            self._step_model if cameras is None else self._seen_by(cameras),
         )
         tracks, next_label = _mixture(found.tracks), found.next_label
         record = Record(
@@ -112,17 +131,21 @@ class MultiBernoulli:
             found.record.shares,
             found.record.hidden_by,
         )
+        pairs, recent = found.pairs, state.recent
+        if cameras is not None:
+            record = sight.spread(record, cameras, len(views))
+            pairs = pairs._replace(cameras=cameras[pairs.cameras])
         if p.birth != "entrances":
             evidence = Evidence(
                 seen.boxes[:, :2], found.measurements, found.unexplained, seen.starts
             )
-            proposed = self._model.newborns(evidence)
+            proposed, recent = self._model.newborns_and_recent(evidence, seen.boxes, views, recent)
             if proposed is not None:
                 born, newborns = proposed
                 born = models.label_births(born, next_label)
                 next_label += born.size
                 tracks, record = self._with_newborns(
-                    tracks, record, born, newborns, state.next_label
+                    tracks, record, born, newborns, state.next_label, cameras
                 )
         kept = step_kernels.kept_tracks(
             Tracks(tracks.weights, tracks.means, tracks.covariances, tracks.labels),
@@ -132,7 +155,7 @@ class MultiBernoulli:
         tracks, record = tracks.take(kept), record.take(kept)
         labels, lost = memory.recall(state.memory, tracks, self._model, state.next_label)
         posterior = GaussianMixture(tracks.weights, tracks.means, tracks.covariances, labels)
-        associations = summed(tracks.labels, found.pairs)
+        associations = summed(tracks.labels, pairs)
         recognised = state.identities
         if p.recognition:
             changed, recognised = reidentification.reidentify(
@@ -155,7 +178,7 @@ class MultiBernoulli:
             max_components=p.max_components,
         )
         return (
-            MultiBernoulliState(posterior, undetected, next_label, lost, recognised),
+            MultiBernoulliState(posterior, undetected, next_label, lost, recognised, recent),
             record.result(posterior, associations),
         )
 
@@ -166,8 +189,10 @@ class MultiBernoulli:
         born: GaussianMixture,
         newborns: Newborns,
         first_new_label: int,
+        cameras: Int[ndarray, " S"] | None,
     ) -> tuple[GaussianMixture, Record]:
         """The tracks with those that begin where unexplained boxes of several cameras agree."""
+        seeing = slice(None) if cameras is None else cameras
         # a track begun at an entrance by one of the same boxes is the same person
         own, theirs = record.sources[:, :, None], newborns.sources[:, None, :]
         shared = ((own == theirs) & (theirs >= 0)).any(axis=(0, 2))
@@ -177,7 +202,7 @@ class MultiBernoulli:
         record = record.take(others).extended(born.size)
         record.sources[:, first:] = newborns.sources
         record.source_weights[:, first:] = newborns.sources >= 0
-        record.detection_probabilities[:, first:] = self._parameters.detection_probability
+        record.detection_probabilities[seeing, first:] = self._parameters.detection_probability
         return tracks, record
 
 
