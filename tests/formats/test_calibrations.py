@@ -160,7 +160,9 @@ def test_nerfstudio(tmp_path: Path) -> None:
         plain = np.array([*camera.distortion[:4], 0.0])
         assert_same(
             raw,
-            Camera(camera.name, SIZE, camera.intrinsics, camera.rotation, camera.translation, plain),
+            Camera(
+                camera.name, SIZE, camera.intrinsics, camera.rotation, camera.translation, plain
+            ),
         )
 
 
