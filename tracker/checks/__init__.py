@@ -9,6 +9,7 @@ from __future__ import annotations
 from tracker.checks.boxes import check_boxes, listen
 from tracker.checks.cameras import check_lenses, check_places
 from tracker.checks.check import Check, Remedy, Status
+from tracker.checks.readings import EVERY_ORDER
 from tracker.checks.timing import check_counting, check_time
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
@@ -17,7 +18,11 @@ __all__ = ["Check", "Remedy", "Status", "check"]
 
 
 def check(
-    sequence: Sequence, *, pictures: bool = True, reader: FrameReader | None = None
+    sequence: Sequence,
+    *,
+    pictures: bool = True,
+    quick: bool = False,
+    reader: FrameReader | None = None,
 ) -> list[Check]:
     """Every check of a recording, the ones that matter most first.
 
@@ -27,15 +32,17 @@ def check(
     Args:
         sequence: As it was read.
         pictures: Whether pictures may be looked at, for the motion where there are no boxes.
+        quick: Whether to leave out what takes more than a second or so: the cameras' clocks, and
+            calibrations exchanged among many cameras.
         reader: Of the pictures; one is opened where it is needed and none is given.
     """
-    told = listen(sequence)
+    told = listen(sequence, exchanges=not quick or len(sequence.views) <= EVERY_ORDER)
     found = [*check_boxes(sequence, told)]
     lenses = check_lenses(sequence.cameras)
     if told is not None and told.mistaken:
-        return [*found, lenses, check_counting(sequence)]
+        return [*found, lenses, check_counting(sequence, places=False)]
     found += [lenses, *check_places(sequence.cameras, sequence.room)]
-    if sequence.has_detections or pictures:
+    if not quick and (sequence.has_detections or pictures):
         found += check_time(sequence, reader)
     if told is not None:
         found.append(check_counting(sequence))

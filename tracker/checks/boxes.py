@@ -15,6 +15,7 @@ from tracker.checks.readings import (
     Judge,
     Judged,
     Meaning,
+    Open,
     Seen,
     clearly_better,
     find_meaning,
@@ -68,8 +69,13 @@ def raw_cameras(sequence: Sequence) -> tuple[RawCamera, ...]:
     )
 
 
-def listen(sequence: Sequence) -> BoxesTell | None:
-    """Judge all usual readings of a sequence; None where fewer than two cameras have boxes."""
+def listen(sequence: Sequence, *, exchanges: bool = True) -> BoxesTell | None:
+    """Judge all usual readings of a sequence; None where fewer than two cameras have boxes.
+
+    Args:
+        sequence: Whose cameras and boxes.
+        exchanges: Whether to look for calibrations that are exchanged.
+    """
     seen: list[Seen | None] = []
     for view in sequence.views:
         own = view.detections
@@ -83,7 +89,7 @@ def listen(sequence: Sequence) -> BoxesTell | None:
     if not judge.possible:
         return None
     given = judge(AS_GIVEN)
-    meaning = find_meaning(cameras, seen)
+    meaning = find_meaning(cameras, seen, tried=Open(orders=exchanges))
     assert meaning is not None
     best = meaning.best
     enough = best.consensus.agreeing >= LEAST_AGREEING and best.consensus.share >= LEAST_SHARE

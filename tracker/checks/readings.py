@@ -46,7 +46,8 @@ CLEARLY = 1.3
 SIGMAS = 4.0
 """so many standard deviations of a count above it."""
 
-_EVERY_ORDER = 4  # up to so many cameras every exchange is tried, above that one pair at a time
+EVERY_ORDER = 4
+"""Up to so many cameras every exchange is tried, above that one pair at a time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -245,7 +246,7 @@ def _with_orders(judge: Judge, judged: list[Judged]) -> list[Judged]:
     # an exchange and a wrong pose together: the poses' readings are all near nothing then
     for start in judged[:1] if judged[0].consensus.share >= LEAST_SHARE else judged[:8]:
         best = start
-        for _ in range(1 if count <= _EVERY_ORDER else count):
+        for _ in range(1 if count <= EVERY_ORDER else count):
             own = [judge(replace(best.reading, order=order)) for order in _orders(best, count)]
             found += own
             better = max(own, key=lambda one: one.score, default=best)
@@ -257,7 +258,7 @@ def _with_orders(judge: Judge, judged: list[Judged]) -> list[Judged]:
 
 def _orders(best: Judged, count: int) -> Iterable[tuple[int, ...]]:
     own = best.reading.order or tuple(range(count))
-    if count <= _EVERY_ORDER:
+    if count <= EVERY_ORDER:
         yield from (order for order in itertools.permutations(range(count)) if order != own)
         return
     for a, b in itertools.combinations(range(count), 2):

@@ -27,7 +27,7 @@ LEAST_STEPS = 1.5
 LEAST_GAIN = 4.0
 """Standard deviations by which an offset must be better than none to be told."""
 
-LEAST_SHARPNESS = 4.0
+LEAST_SHARPNESS = 3.5
 """Deviations by which the peak must stand above the curve."""
 
 
