@@ -18,7 +18,8 @@ def _matrix(loader: yaml.CSafeLoader, node: yaml.Node) -> Any:
     return loader.construct_mapping(node, deep=True)
 
 
-_Loader.add_constructor("tag:yaml.org,2002:opencv-matrix", _matrix)
+for _kind in ("opencv-matrix", "opencv-nd-matrix"):
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _matrix)
 
 
 def parse_yaml(text: str, most_depth: int = 100) -> Any:

@@ -22,7 +22,7 @@ COMMON_SIZES = (
 """Pixels, of cameras; where no file says the size."""
 
 _OFF_CENTRE = 0.25
-"""Part of the size by which a principal point may lie beside the picture's middle."""
+"""By how much, as a logarithm, twice a principal point may differ from the size."""
 
 
 def picture_sizes(
@@ -86,25 +86,23 @@ def scaled(raw: RawCamera, size: tuple[int, int]) -> RawCamera:
 
 
 def _likely(cameras: Sequence[MatchedCamera]) -> tuple[int, int]:
-    """The smallest common size that holds the boxes, with principal points near its middle."""
+    """The common size that has the principal points nearest to its middle and holds the boxes."""
     middle = np.median([lens_of(c.raw, (1, 1)).intrinsics[:2, 2] for c in cameras], axis=0)
-    ends = [_ends(c.detections) for c in cameras if c.detections is not None]
-    least = np.max(ends, axis=0) if ends else np.ones(2)
-    for common in sorted(COMMON_SIZES):
-        for size in (common, common[::-1]):
-            half = np.array(size) / 2.0
-            if (np.array(size) >= least).all() and (
-                np.abs(middle - half) <= _OFF_CENTRE * half
-            ).all():
-                return int(size[0]), int(size[1])
-    guess = np.maximum(2.0 * middle, least)
-    return int(np.ceil(guess[0])), int(np.ceil(guess[1]))
+    begins = [_begins(c.detections) for c in cameras if c.detections is not None]
+    least = np.max(begins, axis=0) if begins else np.ones(2)
+    sizes = np.array([[size, size[::-1]] for size in COMMON_SIZES], dtype=float).reshape(-1, 2)
+    off = np.abs(np.log(sizes / np.maximum(2.0 * middle, 1.0))).max(axis=1)
+    off[(sizes < least).any(axis=1)] = np.inf
+    best = int(np.argmin(off))
+    if off[best] <= _OFF_CENTRE:
+        return int(sizes[best, 0]), int(sizes[best, 1])
+    guess = np.ceil(np.maximum(2.0 * middle, least))
+    return int(guess[0]), int(guess[1])
 
 
-def _ends(piece: DetectionPiece) -> Float[ndarray, " 2"]:
-    """How far right and down the boxes reach, but for a few outliers."""
+def _begins(piece: DetectionPiece) -> Float[ndarray, " 2"]:
+    """How far right and down boxes begin, but for a few; their ends may lie beyond the picture."""
     if not len(piece.boxes) or piece.normalised:
         return np.ones(2)
-    layout = piece.layout or "xyxy"
-    boxes = read_boxes(piece.boxes, layout)
-    return np.asarray(np.quantile(boxes[:, :2] + boxes[:, 2:], 0.99, axis=0))
+    boxes = read_boxes(piece.boxes, piece.layout or "ltwh")
+    return np.asarray(np.quantile(boxes[:, :2], 0.99, axis=0))

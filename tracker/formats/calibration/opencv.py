@@ -14,11 +14,13 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
+
 from tracker.formats.calibration.camera_fields import cameras, has_cameras
 from tracker.formats.pieces import CalibrationPiece, Convention, Piece
 from tracker.formats.protocol import Certainty, Kind
 from tracker.formats.source import SourceFile
-from tracker.formats.values import number, numbers, shown
+from tracker.formats.values import numbers, shown
 
 NAME = "OpenCV FileStorage"
 KIND: Kind = "calibration"
@@ -51,7 +53,9 @@ def _plain(file: SourceFile, value: Any, field: str) -> Any:
     """Matrices as nested lists in place of tables with rows, cols and data."""
     if isinstance(value, Mapping):
         if "rows" in value and "cols" in value and "data" in value:
-            return _matrix(file, field, value["rows"], value["cols"], value["data"])
+            return _matrix(file, field, [value["rows"], value["cols"]], value["data"])
+        if "sizes" in value and "data" in value:
+            return _matrix(file, field, value["sizes"], value["data"])
         return {str(key): _plain(file, item, str(key)) for key, item in value.items()}
     if isinstance(value, list):
         return [_plain(file, item, field) for item in value]
@@ -60,11 +64,13 @@ def _plain(file: SourceFile, value: Any, field: str) -> Any:
 
 def _of_xml(file: SourceFile, element: ElementTree.Element) -> Any:
     children = list(element)
-    if element.get("type_id") == "opencv-matrix":
+    if element.get("type_id") in ("opencv-matrix", "opencv-nd-matrix"):
         parts = {child.tag: child.text or "" for child in children}
+        if "sizes" in parts and "data" in parts:
+            return _matrix(file, element.tag, parts["sizes"], parts["data"])
         if not {"rows", "cols", "data"} <= parts.keys():
             raise file.error("expected a matrix with rows, cols and data", element.tag)
-        return _matrix(file, element.tag, parts["rows"], parts["cols"], parts["data"])
+        return _matrix(file, element.tag, [parts["rows"], parts["cols"]], parts["data"])
     if not children:
         text = (element.text or "").strip()
         try:
@@ -76,11 +82,9 @@ def _of_xml(file: SourceFile, element: ElementTree.Element) -> Any:
     return {child.tag: _of_xml(file, child) for child in children}
 
 
-def _matrix(file: SourceFile, field: str, rows: Any, columns: Any, data: Any) -> list[float] | Any:
-    height, width = int(number(file, field, rows)), int(number(file, field, columns))
+def _matrix(file: SourceFile, field: str, sizes: Any, data: Any) -> list[float]:
+    count = np.prod(numbers(file, field, sizes))
     found = numbers(file, field, data)
-    if height < 1 or width < 1 or len(found) % (height * width):
-        raise file.error(
-            f"expected {height}×{width} numbers, found {len(found)} ({shown(data)})", field
-        )
+    if count < 1 or len(found) % count:  # several numbers an element, where it has channels
+        raise file.error(f"expected {count:g} numbers, found {len(found)} ({shown(data)})", field)
     return found.tolist()
