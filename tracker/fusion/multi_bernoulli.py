@@ -23,10 +23,10 @@ from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import WORTH_TELLING, Record, summed
 from tracker.fusion.reidentification import Identities
-from tracker.kernels.boxes import Occlusion
+from tracker.kernels.gating import Measurements
 from tracker.kernels.labelled import step as step_kernels
-from tracker.kernels.labelled.camera_update import CameraModel, Tracks
-from tracker.kernels.labelled.step import KeepingRule, Motion, StepModel
+from tracker.kernels.labelled.camera_update import CameraRule, Tracks
+from tracker.kernels.labelled.step import KeepingRule, StepModel
 from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
@@ -59,24 +59,33 @@ class MultiBernoulli:
         births = model.births
         if p.birth == "measurements":
             births = GaussianMixture.empty(motion.dimension)
+        transform, products = target.transforms
         self._step_model = StepModel(
-            motion=Motion(motion.transition, motion.noise[None], p.survival_probability),
-            births=births.gaussians,
-            transform=target.transform,
+            transition=motion.transition,
+            motion_noise=motion.noise[None],
+            survival_probability=p.survival_probability,
+            birth_weights=births.weights,
+            birth_means=births.means,
+            birth_covariances=births.covariances,
+            transform=transform,
+            products=products,
             sigma_factor=p.measurement_sigma,
-            target=target.target(motion.dimension),
-            cameras=stacked(model.cameras),
             clutter=model.clutter,
-            update=CameraModel(
-                gate=model.gate,
-                soft=p.edge == "soft",
-                detection_probability=p.detection_probability,
-                confirmed=CONFIRMED,
-                occlusion=Occlusion(model.near, p.occlusion, visibility.WORTH_TELLING),
-                settling=association.SETTLING,
-                least_told=WORTH_TELLING,
-            ),
             least_existence=p.pruning_threshold,
+        )
+        self._target = target.target(motion.dimension)
+        self._cameras = stacked(model.cameras)
+        self._camera_rule = CameraRule(
+            gate=model.gate,
+            soft=p.edge == "soft",
+            detection_probability=p.detection_probability,
+            confirmed=CONFIRMED,
+            near=model.near,
+            strength=p.occlusion,
+            worth_telling=visibility.WORTH_TELLING,
+            tolerance=association.TOLERANCE,
+            iterations=association.ITERATIONS,
+            least_told=WORTH_TELLING,
         )
         low, high = model.followed
         self._keeping_rule = KeepingRule(
@@ -101,17 +110,19 @@ class MultiBernoulli:
             state.undetected.gaussians,
             seen,
             self._step_model,
+            self._target,
+            self._cameras,
+            self._camera_rule,
         )
-        tracks, next_label = _mixture(found.tracks), found.next_label
-        record = Record(
-            found.record.detection_probabilities,
-            found.record.sources,
-            found.record.shares,
-            found.record.hidden_by,
-        )
+        tracks = GaussianMixture(found.existences, found.means, found.covariances, found.labels)
+        next_label = found.next_label
+        record = Record(found.detection_probabilities, found.sources, found.shares, found.hidden_by)
         if p.birth != "entrances":
             evidence = Evidence(
-                seen.boxes[:, :2], found.measurements, found.unexplained, seen.starts
+                seen.boxes[:, :2],
+                Measurements(found.values, found.noises),
+                found.unexplained,
+                seen.starts,
             )
             proposed = self._model.newborns(evidence)
             if proposed is not None:
@@ -122,14 +133,18 @@ class MultiBernoulli:
                     tracks, record, born, newborns, state.next_label
                 )
         kept = step_kernels.kept_tracks(
-            Tracks(tracks.weights, tracks.means, tracks.covariances, tracks.labels),
-            record.sources,
-            self._keeping_rule,
+            tracks.weights, tracks.means, tracks.labels, record.sources, self._keeping_rule
         )
         tracks, record = tracks.take(kept), record.take(kept)
         labels, lost = memory.recall(state.memory, tracks, self._model, state.next_label)
         posterior = GaussianMixture(tracks.weights, tracks.means, tracks.covariances, labels)
-        associations = summed(tracks.labels, found.pairs)
+        associations = summed(
+            tracks.labels,
+            found.pair_cameras,
+            found.pair_labels,
+            found.pair_boxes,
+            found.pair_probabilities,
+        )
         recognised = state.identities
         if p.recognition:
             changed, recognised = reidentification.reidentify(
@@ -138,8 +153,11 @@ class MultiBernoulli:
             if changed:
                 posterior, lost = posterior.relabelled(changed), lost.relabelled(changed)
         undetected, _ = gaussian_mixture.reduce(
-            GaussianMixture.of(
-                found.undetected, np.zeros(len(found.undetected.weights), dtype=np.int64)
+            GaussianMixture(
+                found.undetected_weights,
+                found.undetected_means,
+                found.undetected_covariances,
+                np.zeros(len(found.undetected_weights), dtype=np.int64),
             ),
             pruning_threshold=p.pruning_threshold,
             merging_threshold=p.merging_threshold,
@@ -170,8 +188,3 @@ class MultiBernoulli:
         record.source_weights[:, first:] = newborns.sources >= 0
         record.detection_probabilities[:, first:] = self._parameters.detection_probability
         return tracks, record
-
-
-def _mixture(tracks: Tracks) -> GaussianMixture:
-    """Tracks as a mixture whose weights are existences."""
-    return GaussianMixture(tracks.existences, tracks.means, tracks.covariances, tracks.labels)

@@ -87,7 +87,7 @@ def test_people_who_look_alike_keep_their_labels() -> None:
 
 
 def test_looks_that_nobody_renews_are_forgotten_at_the_rate_of_the_leak() -> None:
-    names = watched(Names.none(), [1, 2], [FIRST, SECOND], 30)
+    names = watched(Identities.none(), [1, 2], [FIRST, SECOND], 30)
 
     def share() -> float:
         """π of the first person in the first track's looks."""
@@ -102,7 +102,7 @@ def test_looks_that_nobody_renews_are_forgotten_at_the_rate_of_the_leak() -> Non
 
 
 def test_no_evidence_lasts_for_ever() -> None:
-    soon = watched(Names.none(), [1, 2], [FIRST, SECOND], 200)
+    soon = watched(Identities.none(), [1, 2], [FIRST, SECOND], 200)
     late = watched(soon, [1, 2], [FIRST, SECOND], 2000)
     odds = [float(np.ptp(names.looks[0])) for names in (soon, late)]
     assert odds[1] == pytest.approx(odds[0], abs=0.01)
@@ -112,7 +112,7 @@ def test_no_evidence_lasts_for_ever() -> None:
 def test_pictures_of_one_moment_count_as_one_look() -> None:
     odds = []
     for seconds in (0.02, 0.1):
-        names = Names.none()
+        names = Identities.none()
         for _ in range(round(1.0 / seconds)):
             _, names = step(names, [1, 2], [FIRST, SECOND], seconds)
         odds.append(float(np.ptp(names.looks[0])))
