@@ -28,7 +28,7 @@ RunPhase = Literal["idle", "computing", "done", "failed", "cancelled"]
 
 Level = Literal["info", "warn", "error"]
 
-LAYERS = ("boxes", "ellipsoids", "trails", "truth", "volume", "pinned", "others")
+LAYERS = ("boxes", "bodies", "ellipsoids", "trails", "truth", "volume", "pinned", "others")
 """The layers of the 3D view that can be switched; ``others`` are the tracks that are not
 selected, while one is."""
 
@@ -119,7 +119,8 @@ class Snapshot:
     scores: Scores = field(default_factory=Scores)
     """Runs against the truth, where there is one."""
     layers: Mapping[str, bool] = field(
-        default_factory=lambda: MappingProxyType(dict.fromkeys(LAYERS, True))
+        # the truth is in the pictures at first: in 3D twice as many boxes hide the people
+        default_factory=lambda: MappingProxyType({name: name != "truth" for name in LAYERS})
     )
     view: View = None
     flies: bool = True

@@ -1,4 +1,4 @@
-"""Who looks like whom: people with templates keep their labels, however long they were away."""
+"""Re-identification: people with templates keep their labels, however long they were away."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _DEFAULTS = FusionParams()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Names:
+class Identities:
     """What the colours said of the tracks so far. G people have templates.
 
     A track's looks are a categorical distribution over these people, which follows
@@ -43,25 +43,25 @@ class Names:
     """The label of each person, -1 as long as nobody is surely that person."""
 
     @staticmethod
-    def none() -> Names:
+    def none() -> Identities:
         """Nobody was looked at."""
         nothing = np.zeros(0, dtype=np.int64)
-        return Names(nothing, np.zeros((0, 0)), nothing)
+        return Identities(nothing, np.zeros((0, 0)), nothing)
 
 
-def recognise(
-    names: Names,
+def reidentify(
+    identities: Identities,
     posterior: GaussianMixture,
     associations: Associations,
     views: Many[ViewResult],
     waiting: Int[ndarray, " L"],
     step_time: float,
     parameters: FusionParams = _DEFAULTS,
-) -> tuple[dict[int, int], Names]:
+) -> tuple[dict[int, int], Identities]:
     """Look at this step's boxes, and say which labels change.
 
     Args:
-        names: Of the step before.
+        identities: Of the step before.
         posterior: Tracks, one component a label.
         associations: Which box is whose.
         views: The boxes with their likenesses; of less than two people nothing is told.
@@ -70,19 +70,19 @@ def recognise(
         parameters: How far colours are believed, and from which odds.
 
     Returns:
-        New label by old one, each at most once on either side; and the names after it.
+        New label by old one, each at most once on either side; and the identities after it.
     """
     people = max((view.likenesses.shape[1] for view in views), default=0)
     if people < 2:
-        return {}, names
-    p, seen = parameters, (names, posterior, associations, views, people, waiting, step_time)
+        return {}, identities
+    p, seen = parameters, (identities, posterior, associations, views, people, waiting, step_time)
     labels, looks = _looked(*seen, p)
-    owners = names.owners if len(names.owners) else np.full(people, -1, dtype=np.int64)
+    owners = identities.owners if len(identities.owners) else np.full(people, -1, dtype=np.int64)
     sure = posterior.labels.compress(posterior.weights > CONFIRMED)
     told = looks.take(np.searchsorted(labels, sure), 0)
     own_odds = float(np.log(p.recognition_own_odds))
     if _is_settled(told, sure, owners, own_odds):
-        return {}, Names(labels, looks, owners)
+        return {}, Identities(labels, looks, owners)
     wanted: dict[int, int] = {}
     owners = owners.copy()
     for track, person in _named(told, own_odds, float(np.log(p.recognition_odds))):
@@ -91,18 +91,18 @@ def recognise(
             owners[person] = label
         elif owners[person] >= 0:
             wanted[label] = int(owners[person])
-    renamed = _permuted(wanted, posterior.labels.tolist())
+    relabelled = _permuted(wanted, posterior.labels.tolist())
     own: dict[int, ndarray] = dict(zip(labels.tolist(), looks, strict=True))
-    kept = {renamed.get(label, label): look for label, look in own.items()}
+    kept = {relabelled.get(label, label): look for label, look in own.items()}
     # who takes over the label of somebody lost brings his own looks along
-    kept |= {renamed[label]: own[label] for label in renamed}
+    kept |= {relabelled[label]: own[label] for label in relabelled}
     order = sorted(kept)
     rows = np.array([kept[label] for label in order]).reshape(-1, people)
-    return renamed, Names(np.array(order, dtype=np.int64), rows, owners)
+    return relabelled, Identities(np.array(order, dtype=np.int64), rows, owners)
 
 
 def _looked(
-    names: Names,
+    identities: Identities,
     posterior: GaussianMixture,
     associations: Associations,
     views: Many[ViewResult],
@@ -114,13 +114,13 @@ def _looked(
     """The labels that are there or waited for, ascending, and log π of each after this step."""
     labels = np.unique(np.concatenate([posterior.labels, waiting]))
     before = np.zeros((len(labels), people))
-    if len(names.labels):
-        place = names.labels.searchsorted(labels).clip(max=len(names.labels) - 1)
-        known = names.labels.take(place) == labels
-        before[known] = names.looks.take(place.compress(known), 0)
+    if len(identities.labels):
+        place = identities.labels.searchsorted(labels).clip(max=len(identities.labels) - 1)
+        known = identities.labels.take(place) == labels
+        before[known] = identities.looks.take(place.compress(known), 0)
     leak = min(step_time / p.recognition_swap, 1.0)
-    chances = np.exp(before)
-    looks = np.log((1.0 - leak) * chances / chances.sum(axis=1, keepdims=True) + leak / people)
+    beliefs = np.exp(before)
+    looks = np.log((1.0 - leak) * beliefs / beliefs.sum(axis=1, keepdims=True) + leak / people)
     # a camera without a picture tells nothing
     tellers = np.array([view.likenesses.shape[1] == people for view in views])
     rows = tellers.take(associations.cameras).nonzero()[0]
@@ -174,12 +174,12 @@ def _named(looks: Float[ndarray, "n G"], own: float, odds: float) -> list[tuple[
 
 def _permuted(wanted: dict[int, int], present: list[int]) -> dict[int, int]:
     """Renamings in which no label is there twice: who loses his label takes one that is free."""
-    renamed = {old: new for old, new in wanted.items() if old != new}
-    left = sorted(old for old in renamed if old not in renamed.values())
-    for new in list(renamed.values()):
+    relabelled = {old: new for old, new in wanted.items() if old != new}
+    left = sorted(old for old in relabelled if old not in relabelled.values())
+    for new in list(relabelled.values()):
         # somebody else wears it and asks for no other
-        if new in present and new not in renamed:
-            renamed[new] = new if new in wanted else left.pop()
-    if len(set(renamed.values())) < len(renamed):
+        if new in present and new not in relabelled:
+            relabelled[new] = new if new in wanted else left.pop()
+    if len(set(relabelled.values())) < len(relabelled):
         return {}
-    return {old: new for old, new in renamed.items() if old != new}
+    return {old: new for old, new in relabelled.items() if old != new}

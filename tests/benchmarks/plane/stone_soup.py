@@ -21,8 +21,8 @@ from stonesoup.types.state import TaggedWeightedGaussianState
 from stonesoup.updater.kalman import KalmanUpdater
 from stonesoup.updater.pointprocess import PHDUpdater
 
-from tests.benchmarks.filters import GATE, HALF
-from tests.benchmarks.scenario import (
+from tests.benchmarks.plane.filters import GATE, HALF
+from tests.benchmarks.plane.scenario import (
     DETECTION,
     MERGING,
     MOTION_NOISE,

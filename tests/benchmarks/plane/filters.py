@@ -1,4 +1,4 @@
-"""The filters that are set beside each other on :mod:`tests.benchmarks.scenario`.
+"""The filters that are set beside each other on :mod:`tests.benchmarks.plane.scenario`.
 
 Each takes one scan after another and says where the targets are, by a rule: ``components``
 reports every component above a half, ``W_z`` gathers by measurement.
@@ -12,7 +12,7 @@ import numpy as np
 from numpy import ndarray
 from scipy.stats import chi2
 
-from tests.benchmarks.scenario import (
+from tests.benchmarks.plane.scenario import (
     DETECTION,
     MERGING,
     MOTION_NOISE,
@@ -28,6 +28,7 @@ from tests.engine import plain_phd
 from tracker.filters import gaussian_mixture, phd, pmb
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.kernels import linear_algebra
+from tracker.kernels.kalman import Expected
 
 GATE = float(chi2.ppf(0.9999, df=2))
 """Squared Mahalanobis distance: a target's own measurement lies inside with this probability."""
@@ -85,8 +86,7 @@ class Phd:
         updated = phd.update(
             predicted,
             scan,
-            expected=predicted.means @ POSITION.T,
-            jacobians=POSITION[None],
+            expected=Expected.of(predicted.means @ POSITION.T, POSITION[None]),
             noise=NOISE[None],
             detection_probability=DETECTION,
             clutter_intensity=self._case.clutter_intensity,
@@ -156,8 +156,7 @@ class Labelled:
         new = phd.update(
             undetected,
             scan,
-            expected=undetected.means @ POSITION.T,
-            jacobians=POSITION[None],
+            expected=Expected.of(undetected.means @ POSITION.T, POSITION[None]),
             noise=NOISE[None],
             detection_probability=DETECTION,
             clutter_intensity=clutter,
@@ -167,8 +166,7 @@ class Labelled:
         updated = pmb.update(
             tracks,
             scan,
-            expected=tracks.means @ POSITION.T,
-            jacobians=_h(tracks),
+            expected=Expected.of(tracks.means @ POSITION.T, _h(tracks)),
             noise=NOISE[None],
             detection_probability=np.full(tracks.size, DETECTION),
             unexplained_intensity=clutter / (1.0 - newcomer),  # κ + e
@@ -180,7 +178,7 @@ class Labelled:
         place = np.full(count, -1)
         place[born] = np.arange(len(born))
         pairs = size + np.flatnonzero(place[new.measurements[size:]] >= 0)
-        _, means, covariances = linear_algebra.merge_moments(
+        merged = linear_algebra.merge_moments(
             new.posterior.weights[pairs],
             new.posterior.means[pairs],
             new.posterior.covariances[pairs],
@@ -189,7 +187,7 @@ class Labelled:
         )
         labels = self._next_label + np.arange(len(born))
         self._next_label += len(born)
-        newborns = GaussianMixture(existences[born], means, covariances, labels)
+        newborns = GaussianMixture(existences[born], merged.means, merged.covariances, labels)
         tracks = gaussian_mixture.concatenate([updated.tracks, newborns])
         self._tracks = tracks.take(gaussian_mixture.prune(tracks, 100.0 * PRUNING))
         self._undetected, _ = gaussian_mixture.reduce(

@@ -15,7 +15,7 @@ from playwright.sync_api import Page, expect
 from app.scene import geometry
 from app.scene.scene import _margin_around
 from tests.browser.conftest import Server
-from tests.browser.test_main_job import readout, until, viser
+from tests.browser.looking import readout, until, viser
 from tracker import pipeline
 from tracker.export import read_tracks_csv
 from tracker.sequences.reader import FILE, read_sequence

@@ -1,6 +1,6 @@
 """The main states at all sizes, dark and light: everything is inside the window, and pictures.
 
-``pytest tests/browser/test_screens.py --screenshots FOLDER`` keeps the pictures to be looked at.
+``pytest tests/browser/access --screenshots FOLDER`` keeps the pictures, to be looked at.
 """
 
 from __future__ import annotations

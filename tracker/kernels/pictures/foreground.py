@@ -5,10 +5,41 @@ Each has a NumPy counterpart in the tests that it must agree with.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy import ndarray
 
 from tracker.kernels.compilation import pixel_kernel
+
+
+class ClassThresholds(NamedTuple):
+    """The K iterations of a c-means on differences."""
+
+    thresholds: ndarray
+    """(K, 3), a channel each."""
+    counts: ndarray
+    """(K,) the foreground pixels n(k)."""
+
+
+class Background(NamedTuple):
+    """A background that follows the light."""
+
+    levels: ndarray
+    """(h, w, 3) uint16, 256 times the level."""
+    still: ndarray
+    """(h, w) uint8, for how many pictures each pixel has been away from the foreground."""
+
+
+class LevelMedians(NamedTuple):
+    """What a target shows at groups of a source's levels: (3, groups) each, channel by channel."""
+
+    totals: ndarray
+    """Pixels of the group."""
+    sums: ndarray
+    """Of their levels in the source."""
+    medians: ndarray
+    """The lower median of their levels in the target, 0 where there is none."""
 
 
 @pixel_kernel
@@ -20,7 +51,7 @@ def two_classes(
     least: float,
     enough: int,
     iterations: int,
-) -> tuple[ndarray, ndarray]:
+) -> ClassThresholds:
     """Split differences into background and foreground by the modified c-means.
 
     Each class has one centre a channel. A difference d belongs to the background
@@ -39,9 +70,6 @@ def two_classes(
         least: No threshold is lower.
         enough: A class of fewer pixels keeps its centres.
         iterations: At most so many; fewer where the thresholds come to rest.
-
-    Returns:
-        (K, 3) the thresholds of each iteration and (K,) its foreground pixels n(k).
     """
     height, width, _ = difference.shape
     total = np.zeros(3)
@@ -73,7 +101,7 @@ def two_classes(
                     s2 += d2
         counts[k] = count
         if before[0] == t0 and before[1] == t1 and before[2] == t2:
-            return thresholds[: k + 1].copy(), counts[: k + 1].copy()
+            return ClassThresholds(thresholds[: k + 1].copy(), counts[: k + 1].copy())
         before[0], before[1], before[2] = t0, t1, t2
         rest = height * width - count
         sums = (s0, s1, s2)
@@ -82,7 +110,7 @@ def two_classes(
                 m_f[c] = sums[c] / count
             if rest >= enough:
                 m_b[c] = (total[c] - sums[c]) / rest
-    return thresholds, counts
+    return ClassThresholds(thresholds, counts)
 
 
 @pixel_kernel
@@ -150,7 +178,7 @@ def update_background(
     limit: int,
     frames: int,
     rate: float,
-) -> tuple[ndarray, ndarray]:
+) -> Background:
     """Let the background follow where a pixel has been background for long enough.
 
         M ← M + α (I - M)
@@ -192,23 +220,17 @@ def update_background(
             after[y, x, 0] = min(max(np.int64(after[y, x, 0]) + steps[d0 + limit], 0), 65280)
             after[y, x, 1] = min(max(np.int64(after[y, x, 1]) + steps[d1 + limit], 0), 65280)
             after[y, x, 2] = min(max(np.int64(after[y, x, 2]) + steps[d2 + limit], 0), 65280)
-    return after, counts
+    return Background(after, counts)
 
 
 @pixel_kernel
-def level_medians(
-    source: ndarray, target: ndarray, groups: int
-) -> tuple[ndarray, ndarray, ndarray]:
+def level_medians(source: ndarray, target: ndarray, groups: int) -> LevelMedians:
     """What a target shows at each of some levels of a source, channel by channel.
 
     Args:
         source: (N, 3) uint8.
         target: (N, 3) uint8.
         groups: The source's 256 levels are taken together into so many.
-
-    Returns:
-        For each channel and group (3, groups): its pixels, the sum of their levels in the source
-        and the lower median of those in the target, 0 where there is none.
     """
     totals = np.zeros((3, groups), dtype=np.int64)
     sums = np.zeros((3, groups))
@@ -230,7 +252,7 @@ def level_medians(
                 if below >= 0.5 * totals[c, group]:
                     medians[c, group] = level
                     break
-    return totals, sums, medians
+    return LevelMedians(totals, sums, medians)
 
 
 @pixel_kernel

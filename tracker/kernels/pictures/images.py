@@ -7,11 +7,21 @@ kernel has a NumPy counterpart in the tests that it must agree with.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy import ndarray
 
 from tracker.kernels.compilation import pixel_kernel
+
+
+class Modes(NamedTuple):
+    """Where K climbs ended."""
+
+    boxes: ndarray
+    """(K, 4)."""
+    densities: ndarray
+    """(K,), Σ_i w_i k_i there."""
 
 
 @pixel_kernel
@@ -229,7 +239,7 @@ def mean_shift(
     bandwidth: float,
     iterations: int,
     tolerance: float,
-) -> tuple[ndarray, ndarray]:
+) -> Modes:
     """Climb from each start to a mode of a weighted sample of boxes.
 
     m ← Σ_i w_i k_i x_i / Σ_i w_i k_i with the Gaussian kernel
@@ -242,9 +252,6 @@ def mean_shift(
         bandwidth: In half sizes, for the centre and for the sizes alike.
         iterations: At most so many.
         tolerance: Stop when a step is shorter than this many half sizes.
-
-    Returns:
-        (K, 4) modes and (K,) densities Σ_i w_i k_i.
     """
     count = len(starts)
     modes = starts.copy()
@@ -283,7 +290,7 @@ def mean_shift(
             modes[k] = shifted
             if u * u + v * v + s * s + t * t < tolerance * tolerance:
                 break
-    return modes, densities
+    return Modes(modes, densities)
 
 
 @pixel_kernel

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.benchmarks.filters import Filter, Labelled, Phd, PlainPhd
 from tests.benchmarks.measure import Measurement
-from tests.benchmarks.scenario import Scenario, ospa, scenario
+from tests.benchmarks.plane.filters import Filter, Labelled, Phd, PlainPhd
+from tests.benchmarks.plane.scenario import Scenario, ospa, scenario
 
 STEPS = {10: 40, 100: 40, 500: 20, 1000: 10}
 THEIR_STEPS = {10: 40, 100: 40, 500: 4, 1000: 2}
@@ -99,7 +99,7 @@ def _at(targets: int, short: bool) -> Iterator[Measurement]:
 
 
 def _beside_stone_soup(case: Scenario, ours: Course, plain: Course) -> Iterator[Measurement]:
-    from tests.benchmarks.stone_soup import StoneSoupPhd
+    from tests.benchmarks.plane.stone_soup import StoneSoupPhd
 
     targets, steps = case.targets, THEIR_STEPS[case.targets]
     theirs = course(StoneSoupPhd, case, steps, ("components",))

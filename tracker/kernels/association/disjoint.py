@@ -13,6 +13,8 @@ Computers & Operations Research 23(10), 1996.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy import ndarray
 
@@ -20,6 +22,35 @@ from tracker.kernels.compilation import kernel
 
 CORE = 6
 """Of each row so many of the nearest columns are kept."""
+
+
+class _Matching(NamedTuple):
+    """A matching on its way, with the duals that prove it the heaviest."""
+
+    row_duals: ndarray
+    """(N,), feasible with the columns'."""
+    column_duals: ndarray
+    """(N,)."""
+    column_of: ndarray
+    """(N,) the column of each row, -1 for none."""
+    row_of: ndarray
+    """(N,) the row of each column, -1 for none."""
+
+
+class _Room(NamedTuple):
+    """What a search writes in."""
+
+    shortest: ndarray
+    """(N,) all infinite, before a search and after it."""
+    before: ndarray
+    """(N,) for the row that each column is reached from."""
+    settled: ndarray
+    """(N,) all false, before a search and after it."""
+    touched: ndarray
+    """(N,) for the columns that were reached."""
+    keys: ndarray
+    """(N (N + 2),) for the heap, as the next."""
+    nodes: ndarray
 
 
 @kernel
@@ -44,12 +75,15 @@ def disjoint_matchings(weights: ndarray, count: int) -> ndarray:
     core = np.empty((size, kept), dtype=np.int64)
     reduced = np.empty((size, kept))
     row_duals = np.empty(size)
-    shortest = np.full(size, np.inf)
-    before = np.empty(size, dtype=np.int64)
-    settled = np.zeros(size, dtype=np.bool_)
-    touched = np.empty(size, dtype=np.int64)
-    keys = np.empty(size * (size + 2))
-    nodes = np.empty(size * (size + 2), dtype=np.int64)
+    matching = _Matching(row_duals, column_duals, column_of, row_of)
+    room = _Room(
+        np.full(size, np.inf),
+        np.empty(size, dtype=np.int64),
+        np.zeros(size, dtype=np.bool_),
+        np.empty(size, dtype=np.int64),
+        np.empty(size * (size + 2)),
+        np.empty(size * (size + 2), dtype=np.int64),
+    )
     for k in range(count):
         column_of[:] = -1
         row_of[:] = -1
@@ -66,22 +100,7 @@ def disjoint_matchings(weights: ndarray, count: int) -> ndarray:
                     break
         for i in range(size):
             if column_of[i] < 0:
-                _augment(
-                    cost,
-                    i,
-                    row_duals,
-                    column_duals,
-                    column_of,
-                    row_of,
-                    core,
-                    reduced[:, kept - 1],
-                    shortest,
-                    before,
-                    settled,
-                    touched,
-                    keys,
-                    nodes,
-                )
+                _augment(cost, i, matching, core, reduced[:, kept - 1], room)
         pairs = 0
         for i in range(size):
             found[k, i] = -1
@@ -117,18 +136,10 @@ def _nearest(cost: ndarray, duals: ndarray, columns: ndarray, reduced: ndarray) 
 def _augment(
     cost: ndarray,
     start: int,
-    row_duals: ndarray,
-    column_duals: ndarray,
-    column_of: ndarray,
-    row_of: ndarray,
+    matching: _Matching,
     core: ndarray,
     bounds: ndarray,
-    shortest: ndarray,
-    before: ndarray,
-    settled: ndarray,
-    touched: ndarray,
-    keys: ndarray,
-    nodes: ndarray,
+    room: _Room,
 ) -> None:
     """Give one more row its column by the shortest augmenting path, in place.
 
@@ -138,19 +149,15 @@ def _augment(
     Args:
         cost: (N, N), finite.
         start: The row without a column.
-        row_duals: (N,) feasible, with the columns'.
-        column_duals: (N,).
-        column_of: (N,) the column of each row, -1 for none.
-        row_of: (N,) the row of each column, -1 for none.
+        matching: Of the other rows.
         core: (N, C) the nearest columns of each row.
         bounds: (N,) the least reduced cost of each row's other columns.
-        shortest: (N,) all infinite, here and afterwards.
-        before: (N,) room for the row that each column is reached from.
-        settled: (N,) all false, here and afterwards.
-        touched: (N,) room for the columns that were reached.
-        keys: (N (N + 2),) room for the heap.
-        nodes: (N (N + 2),) room for the heap.
+        room: To write in.
     """
+    row_duals, column_duals = matching.row_duals, matching.column_duals
+    column_of, row_of = matching.column_of, matching.row_of
+    shortest, before, settled = room.shortest, room.before, room.settled
+    touched, keys, nodes = room.touched, room.keys, room.nodes
     size = len(cost)
     partial = core.shape[1] < size
     heap, reached = 0, 0

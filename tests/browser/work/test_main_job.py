@@ -43,6 +43,7 @@ def test_pictures_overlays_readout_and_3d_show_the_same_step(page: Page, server:
     until(page, lambda: numbers_in_pictures(page) == [FRAMES - 1] * 2, "its pictures")
 
 
+@pytest.mark.main_job
 def test_dragging_the_timeline_scrubs_everything(page: Page) -> None:
     scene = viser(page)
     clear_overlays(page)
@@ -60,6 +61,7 @@ def test_dragging_the_timeline_scrubs_everything(page: Page) -> None:
     until(page, lambda: shown_in_3d(scene) == str(step), f"3D shows {step}")
 
 
+@pytest.mark.main_job
 def test_a_slider_in_the_3d_panel_changes_the_run_and_the_csv_is_the_engines(
     page: Page, server: Server, tmp_path: Path
 ) -> None:
