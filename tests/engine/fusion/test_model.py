@@ -55,7 +55,7 @@ def test_two_within_a_share_of_a_persons_width_are_one() -> None:
     old, new = np.array([0.0, 0.0, 0.85]), np.array([0.0, 0.0, 0.85])
     for apart, double in ((0.49 * width, True), (0.51 * width, False)):
         new[0] = apart
-        found = made.doubles(
+        found = made.duplicates(
             np.stack([old, new]), np.array([0.9, 0.9]), np.array([1, 2]),
             np.full((4, 2), -1, dtype=np.int64),
         )  # fmt: skip
