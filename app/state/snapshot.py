@@ -112,6 +112,8 @@ class Snapshot:
     presets: Presets = field(default_factory=lambda: MappingProxyType({}))
     playhead: int = 0
     playhead_origin: str = ""
+    sought: bool = False
+    """Whether the playhead was moved since the sequence was opened."""
     selection: int | None = None
     run: Run | None = None
     """What is shown; steps below its ``done`` are there."""

@@ -143,8 +143,8 @@ class Workbench:
             sequence = now.sequence
             last = sequence.frames - 1 if sequence is not None else 0
             step = max(0, min(int(step), last))
-            if step != now.playhead:
-                self._put("playhead", playhead=step, playhead_origin=origin)
+            if step != now.playhead or not now.sought:
+                self._put("playhead", playhead=step, playhead_origin=origin, sought=True)
             return step
 
     def select(self, target: int | None) -> None:
@@ -320,6 +320,7 @@ class Workbench:
                 parameters_origin="",
                 playhead=0,
                 playhead_origin="",
+                sought=False,
                 selection=None,
                 view=None,
                 run=None,
