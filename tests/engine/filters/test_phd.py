@@ -332,7 +332,7 @@ def test_a_noise_that_is_no_covariance_is_refused() -> None:
         update_kernels.kalman_pairs(
             np.zeros((1, 2)),
             np.zeros((1, 2, 2)),
-            Expected(np.zeros((1, 2)), np.eye(2)[None], np.zeros((0, 2, 2))),
+            Expected.of(np.zeros((1, 2)), np.eye(2)[None]),
             Measurements(np.zeros((1, 2)), np.zeros((1, 2, 2))),
             np.inf,
         )
