@@ -11,8 +11,9 @@ from scipy.stats import chi2
 
 from tracker.filters import models
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion import visibility
+from tracker.fusion import sight, visibility
 from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths, Newborns
+from tracker.fusion.sight import Glimpse, Recent
 from tracker.fusion.target_model import ExpectedBoxes, TargetModel
 from tracker.fusion.visibility import Visibility
 from tracker.kernels import linear_algebra
@@ -22,7 +23,8 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 
 CONFIRMED = 0.5
-"""A component surer than this stands for a person: it may hide others."""
+"""A component surer than this stands for a person, who may hide others: he is there more likely
+than not."""
 
 
 class FusionModel:
@@ -34,7 +36,7 @@ class FusionModel:
         self.cameras = sequence.cameras
         self.step_time = sequence.step_time
         self.target = TargetModel(
-            sequence.target_half_extents, p.measurement, p.update, p.posture_share
+            sequence.target_half_extents, p.measurement, p.update, p.posture_share, p
         )
         self.motion = models.Motion.of(p, sequence.step_time)
         self.births = self.motion.at_rest(
@@ -50,6 +52,8 @@ class FusionModel:
         """κ of each camera, per unit of the measurement space."""
         self.gate = float(chi2.ppf(p.gate_probability, df=self.target.size))
         """Squared Mahalanobis distance of the innovation."""
+        self.memory_reach = float(chi2.ppf(p.memory_gate_probability, df=3))
+        """Squared Mahalanobis distance within which a newcomer may be somebody lately lost."""
         self.near = p.duplicate_distance * 2.0 * float(np.mean(sequence.target_half_extents[:2]))
         """Metres within which two components may be one person."""
         margin = p.followed_margin
@@ -114,8 +118,36 @@ class FusionModel:
         """Newcomers where unexplained boxes of several cameras agree: components without labels,
         and what says so; None for nobody."""
         found = self._newborns.propose(evidence)
-        if found is None:
-            return None
+        return None if found is None else self._at_rest(found)
+
+    def newborns_and_recent(
+        self,
+        evidence: Evidence,
+        boxes: Float[ndarray, "B 4"],
+        views: Many[ViewResult],
+        recent: Recent,
+    ) -> tuple[tuple[GaussianMixture, Newborns] | None, Recent]:
+        """As :meth:`newborns`, and what is to be remembered of this step's frames.
+
+        Args:
+            evidence: What the cameras leave unexplained.
+            boxes: Camera after camera, centre and half sizes, pixels.
+            views: Which cameras have a frame.
+            recent: What was remembered at the end of the step before; empty at the start.
+        """
+        blind = np.array([view.blind for view in views])
+        now = Glimpse(evidence, boxes, blind)
+        later = sight.remember(recent, now, self.step_time)
+        if not blind.any():
+            return self.newborns(evidence), later
+        joined = sight.with_recent(now, recent, self.step_time, self.target.half_height)
+        proposed = self._newborns.propose(joined)
+        if proposed is None:
+            return None, later
+        found = sight.of_this_step(proposed, blind)
+        return (self._at_rest(found) if len(found.existences) else None), later
+
+    def _at_rest(self, found: Newborns) -> tuple[GaussianMixture, Newborns]:
         nameless = np.zeros(len(found.existences), dtype=np.int64)
         born = GaussianMixture(found.existences, found.positions, found.covariances, nameless)
         return self.motion.at_rest(born), found

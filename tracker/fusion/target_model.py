@@ -12,8 +12,9 @@ from numpy import ndarray
 from tracker.camera import Camera
 from tracker.kernels import measurement
 from tracker.kernels.gating import Measurements
-from tracker.kernels.kalman import Alternative, Expected
-from tracker.kernels.measurement import Target, Transform
+from tracker.kernels.kalman import Expected
+from tracker.kernels.measurement import Target
+from tracker.parameters import FusionParams
 from tracker.single_view.protocol import ViewResult
 
 MeasurementKind = Literal["centre", "box", "box_and_width"]
@@ -31,14 +32,7 @@ _FROM_BOX: dict[MeasurementKind, Float[ndarray, "m 4"]] = {
     ),
 }
 
-# a person who lies or bends, seen in perspective and from any side, against one who stands: in
-# half heights of the standing one, what his box should be and how far it may be off
-_POSTURE_HALF_HEIGHT, _POSTURE_HALF_WIDTH = 0.5, 0.6
-_POSTURE_SIGMAS = np.array(
-    [0.15, 0.15, 0.5, 0.25]
-)  # centre across and down, half width, half height
-_DROP = 0.3  # how far his middle moves from one camera's box to the next
-
+_DEFAULTS = FusionParams()
 _NO_COVARIANCES = np.zeros((0, 3, 3))
 
 
@@ -46,33 +40,32 @@ _NO_COVARIANCES = np.zeros((0, 3, 3))
 class ExpectedBoxes:
     """What one camera should measure of J states."""
 
-    upright: Expected
+    expected: Expected
     """Values: centre (x, y), or horizontal centre, top, bottom (and width), in pixels. Their
     derivatives by the state, pixels a metre; zero for velocities. What the bend of the
-    projection adds to the noise, squared pixels: one each, or nothing."""
+    projection adds to the noise, squared pixels: one each, or nothing. The same of a person
+    who lies or is bent, where that is asked for."""
     boxes: Float[ndarray, "J 4"]
     """left, top, right, bottom in pixels, not clipped."""
     depths: Float[ndarray, " J"]
     """Distance from the lens, metres."""
     valid: Bool[ndarray, " J"]
     """Whether middle, head and foot lie in front of the lens."""
-    posture: Alternative | None = None
-    """The box of the same person lying or bent, where that is asked for."""
 
     @property
     def values(self) -> Float[ndarray, "J m"]:
         """Of the upright."""
-        return self.upright.values
+        return self.expected.values
 
     @property
     def jacobians(self) -> Float[ndarray, "J m d"]:
         """Of the upright."""
-        return self.upright.jacobians
+        return self.expected.jacobians
 
     @property
     def spreads(self) -> Float[ndarray, "K m m"]:
         """Of the upright."""
-        return self.upright.spreads
+        return self.expected.spreads
 
 
 class TargetModel:
@@ -99,7 +92,7 @@ class TargetModel:
 
     A person may also lie, crouch or bend, or half of him is behind a table. Then the
     box is of another shape: with ``posture_share`` a box is one of two kinds, and
-    ``posture`` holds the second, low and broad and known loosely.
+    ``expected`` holds the second, too, low and broad and known loosely.
     """
 
     def __init__(
@@ -108,6 +101,7 @@ class TargetModel:
         kind: MeasurementKind,
         update: UpdateKind = "extended",
         posture_share: float = 0.0,
+        parameters: FusionParams = _DEFAULTS,
     ) -> None:
         """Prepare for targets of one size.
 
@@ -117,6 +111,7 @@ class TargetModel:
             update: How the bend of the projection is met.
             posture_share: Share of the boxes that show a person in another posture than upright:
                 lying, crouching, bent.
+            parameters: What the box of such a person should be, and how far it may be off.
         """
         self.kind: MeasurementKind = kind
         self.size = SIZES[kind]
@@ -128,24 +123,35 @@ class TargetModel:
         transform = _FROM_BOX[kind]
         # R = T diag(σ²) Tᵀ is linear in σ²
         products = np.einsum("pa,qa->apq", transform, transform).reshape(4, self.size**2).copy()
-        self.transform = Transform(transform, products)
-        """What is measured of a box."""
-        noise = (_POSTURE_SIGMAS**2 @ products).reshape(self.size, self.size)
+        self.transforms = transform, products
+        """T (m, 4) and (4, m²), as :func:`tracker.kernels.measurement.measured_boxes` has them."""
+        p = parameters
+        sigmas = np.array(
+            [
+                p.posture_centre_sigma,
+                p.posture_centre_sigma,
+                p.posture_width_sigma,
+                p.posture_height_sigma,
+            ]
+        )
+        noise = (sigmas**2 @ products).reshape(self.size, self.size)
         self._posture_noise = noise if self.posture_share else np.zeros((0, 0))
+        self._parameters = p
         self._targets: dict[int, Target] = {}
 
     def target(self, dimension: int) -> Target:
         """The target as kernels know it, for states of ``dimension``."""
         if dimension not in self._targets:
+            p = self._parameters
             drift = np.zeros((dimension, dimension))
-            drift[2, 2] = (_DROP * self.half_height) ** 2
+            drift[2, 2] = (p.posture_drop * self.half_height) ** 2
             self._targets[dimension] = Target(
                 self.half_height,
                 self.half_width,
                 self.size,
                 self.unscented,
-                _POSTURE_HALF_HEIGHT * self.half_height,
-                _POSTURE_HALF_WIDTH * self.half_height,
+                p.posture_height * self.half_height,
+                p.posture_width * self.half_height,
                 self._posture_noise,
                 drift,
                 self.posture_share,
@@ -174,8 +180,7 @@ class TargetModel:
             target,
             camera.calibration,
         )
-        posture = found.posture if self.posture_share else None
-        return ExpectedBoxes(found.upright, found.boxes, found.depths, found.valid, posture)
+        return ExpectedBoxes(found.expected, found.boxes, found.depths, found.valid)
 
     def measured(self, view: ViewResult, factor: float) -> Measurements:
         """The boxes of a camera as measurements z, and their noise R in squared pixels.
@@ -187,5 +192,5 @@ class TargetModel:
         return measurement.measured_boxes(
             np.ascontiguousarray(view.boxes, dtype=float),
             np.ascontiguousarray((factor * view.sigmas) ** 2, dtype=float),
-            self.transform,
+            *self.transforms,
         )

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import html
 import threading
-from collections.abc import Set
+from collections.abc import Mapping, Set
 from functools import partial
 from typing import Any
 
@@ -24,7 +24,7 @@ from app.scene.worker import LatestWorker
 from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
 from tracker import parameters as table
-from tracker.parameters import Parameter, ParameterError, RunParameters, Stage
+from tracker.parameters import MethodKey, Parameter, ParameterError, RunParameters, Stage
 
 ORIGIN = "viser"
 PANEL_WIDTH = 276
@@ -34,7 +34,10 @@ OWN_VALUES = "own values"
 """What the values are while they are no preset's, as on the page."""
 
 STAGES: dict[Stage, str] = {"single_view": "Single view", "fusion": "Fusion", "tracks": "Tracks"}
-METHOD_STAGE: dict[str, Stage] = {"single_view": "single_view", "fusion_method": "fusion"}
+METHOD_STAGE: dict[MethodKey, Stage] = {"single_view": "single_view", "fusion_method": "fusion"}
+
+UNFIT = " · not here"
+"""Behind the name of a method that cannot work on the open sequence, as on the page."""
 
 Input = (
     viser.GuiInputHandle[float]
@@ -157,7 +160,7 @@ class Controls:
             reset.on_click(lambda _: self._reset(stage))
             self._resets[stage] = reset
 
-    def _make_method(self, method: str) -> None:
+    def _make_method(self, method: MethodKey) -> None:
         field = RunParameters.model_fields[method]
         chooser = self._server.gui.add_dropdown(
             "Method",
@@ -258,6 +261,8 @@ class Controls:
 
     def _value_of(self, key: str, handle: Any) -> Any:
         place = handle.value
+        if key in METHOD_STAGE:
+            return place.removesuffix(UNFIT)
         return self._scales[key].value(place) if key in self._scales else place
 
     def _refresh(self, snapshot: Snapshot) -> None:
@@ -266,8 +271,11 @@ class Controls:
         shown = self._inputs.keys() & self._shown_keys(parameters)
         with self._server.atomic():
             for key, handle in self._inputs.items():
-                for input_ in (handle, *self._copies.get(key, ())):
-                    self._write(key, input_, table.value(parameters, key))
+                if key not in METHOD_STAGE:
+                    for input_ in (handle, *self._copies.get(key, ())):
+                        self._write(key, input_, table.value(parameters, key))
+            for method, unfit in snapshot.unfit.items():
+                self._write_method(method, getattr(parameters, method), unfit)
             # only what differs is written: the interpreter is wanted by the run
             for key in changed ^ self._changed:
                 if key in table.PARAMETERS:
@@ -336,13 +344,30 @@ class Controls:
             elif not scale.stands_at(handle.value, value):
                 handle.value = scale.place(value)
 
+    def _write_method(self, key: MethodKey, name: str, unfit: Mapping[str, str]) -> None:
+        """The methods, marked where one cannot work here; of the chosen one the hint says why."""
+        handle = self._inputs[key]
+        marked = {name: f"{name}{UNFIT}" if name in unfit else name for name in table.METHODS[key]}
+        with self._lock:
+            if key in self._moved:
+                return
+            if handle.options != tuple(marked.values()):
+                handle.options = tuple(marked.values())
+            if handle.value != marked[name]:
+                handle.value = marked[name]
+            hint = unfit.get(name, RunParameters.model_fields[key].description)
+            if handle.hint != hint:
+                handle.hint = hint
+
     def _shown_keys(self, parameters: RunParameters) -> set[str]:
-        """The keys that the chosen methods read, the choices themselves included."""
-        stages = (table.stage_values(parameters, stage) for stage in STAGES)
-        return {*table.METHODS, *(key for values in stages for key in values)}
+        """The choices of the methods, and what has an effect with what is chosen."""
+        return set(table.shown_keys(parameters))
 
     def _stage_of(self, key: str) -> Stage:
-        return METHOD_STAGE[key] if key in METHOD_STAGE else table.PARAMETERS[key].stage
+        for method, stage in METHOD_STAGE.items():
+            if key == method:
+                return stage
+        return table.PARAMETERS[key].stage
 
     def _value_style(self, parameters: RunParameters, changed: set[str]) -> str:
         """The readable numbers of logarithmic sliders, and stronger ink for changed labels."""
