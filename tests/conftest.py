@@ -66,6 +66,15 @@ def data_folder() -> Path:
     return DATA
 
 
+@pytest.fixture(scope="session")
+def foreign() -> Path:
+    """The folder of recordings as their makers give them, beside the checkout."""
+    folder = DATA.parent / "foreign"
+    if not folder.is_dir():
+        pytest.skip(f"the recordings of others are not there: no folder {folder}")
+    return folder
+
+
 CHROMIUM_FLAGS = [
     "--no-sandbox",
     "--use-angle=swiftshader",

@@ -2,7 +2,8 @@
 
 World: metres, z up, right-handed. Camera: OpenCV axes (x right, y down, z ahead),
 ``x_camera = R @ x_world + t``. Image: pixels, origin at the centre of the top-left
-pixel, x right, y down. Lens: OpenCV's radial-tangential model (k1 k2 p1 p2 k3).
+pixel, x right, y down. Lens: OpenCV's radial-tangential model (k1 k2 p1 p2 k3), its rational
+model (k4 k5 k6 as well), or its fisheye.
 """
 
 from __future__ import annotations
@@ -40,8 +41,11 @@ class Camera:
     """R, from world to camera axes."""
     translation: Float[ndarray, " 3"]
     """t, in metres, in camera axes."""
-    distortion: Float[ndarray, " 5"]
-    """k1, k2, p1, p2, k3; zeros for a pinhole."""
+    distortion: Float[ndarray, " n"]
+    """k1, k2, p1, p2, k3, zeros for a pinhole; with k4, k5, k6 of the rational model; or
+    k1, k2, k3, k4 of a fisheye."""
+    fisheye: bool = False
+    """Whether the lens draws by the angle (OpenCV's fisheye model) and not by its tangent."""
 
     @staticmethod
     def from_projection(
@@ -81,7 +85,7 @@ class Camera:
     @cached_property
     def is_pinhole(self) -> bool:
         """Whether the lens draws straight lines straight."""
-        return not np.any(self.distortion)
+        return not self.fisheye and not np.any(self.distortion)
 
     @cached_property
     def largest_radius(self) -> float:
@@ -90,10 +94,27 @@ class Camera:
         Beyond the first extremum of r (1 + k1 r² + k2 r⁴ + k3 r⁶) the polynomial
         folds back and would draw far-outside points inside the picture.
         """
+        if len(self._lens) == lens.GENERAL:
+            angles = np.linspace(0.0, np.pi / 2.0, 2000)[1:-1]
+            radii = np.tan(angles)
+            drawn = np.array([r * lens.bend(r * r, self._lens)[0] for r in radii])
+            folds = np.flatnonzero(np.diff(drawn) <= 0.0)
+            return float(radii[folds[0]]) if len(folds) else np.inf
         k1, k2, _, _, k3 = self.distortion
         roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])  # in r²
         real = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0.0)].real
         return float(np.sqrt(real.min())) if len(real) else np.inf
+
+    @cached_property
+    def _lens(self) -> Float[ndarray, " n"]:
+        """The distortion as the kernels know it: 5 numbers where that is enough."""
+        given = np.asarray(self.distortion, dtype=float)
+        if self.fisheye:
+            k1, k2, k3, k4 = given[:4]
+            return np.array([k1, k2, 0.0, 0.0, k3, k4, 0.0, 0.0, 1.0])
+        if not given[5:].any():
+            return np.ascontiguousarray(given[:5])
+        return np.array([*given, *np.zeros(lens.GENERAL - len(given))])
 
     @cached_property
     def calibration(self) -> Calibration:
@@ -103,7 +124,7 @@ class Camera:
             np.ascontiguousarray(self.rotation, dtype=float),
             np.ascontiguousarray(self.translation, dtype=float),
             np.ascontiguousarray(self.intrinsics, dtype=float),
-            np.ascontiguousarray(self.distortion, dtype=float),
+            self._lens,
             NEAREST_DEPTH,
             self.largest_radius,
         )
@@ -188,12 +209,13 @@ class Camera:
 def stacked(cameras: Many[Camera]) -> Calibrations:
     """C cameras in the form that compiled kernels know."""
     each = [camera.calibration for camera in cameras]
+    longest = max((len(one.distortion) for one in each), default=5)
     return Calibrations(
         np.array([one.image_size for one in each]),
         np.array([one.rotation for one in each]),
         np.array([one.translation for one in each]),
         np.array([one.intrinsics for one in each]),
-        np.array([one.distortion for one in each]),
+        np.array([[*one.distortion, *np.zeros(longest - len(one.distortion))] for one in each]),
         NEAREST_DEPTH,
         np.array([one.largest_radius for one in each]),
     )

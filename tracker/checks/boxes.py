@@ -62,6 +62,7 @@ def raw_cameras(sequence: Sequence) -> tuple[RawCamera, ...]:
             camera.image_size,
             camera.intrinsics,
             camera.distortion,
+            "fisheye" if camera.fisheye else "pinhole",
             rotation=camera.rotation,
             translation=camera.translation,
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -81,9 +81,7 @@ def to_camera(camera: RawCamera, reading: Reading, image_size: tuple[int, int]) 
     stands = pose(camera, reading)
     rotation = stands.rotation @ upright(reading.up).T
     centre = METRES[reading.unit] * upright(reading.up) @ stands.centre
-    return Camera(
-        camera.name, image_size, lens.intrinsics, rotation, -rotation @ centre, lens.distortion
-    )
+    return replace(lens, name=camera.name, rotation=rotation, translation=-rotation @ centre)
 
 
 def lens_of(camera: RawCamera, image_size: tuple[int, int]) -> Camera:
@@ -98,9 +96,11 @@ def lens_of(camera: RawCamera, image_size: tuple[int, int]) -> Camera:
         raise ValueError(f'camera "{camera.name}" has no lens: expected K, or a projection')
     else:
         intrinsics = np.asarray(camera.intrinsics, dtype=float)
-        given = np.zeros(0) if camera.distortion is None else np.asarray(camera.distortion, float)
-        distortion = np.concatenate([given[:5], np.zeros(max(0, 5 - len(given)))])
-    return Camera(camera.name, image_size, intrinsics, np.eye(3), np.zeros(3), distortion)
+        distortion = np.zeros(0) if camera.distortion is None else np.asarray(camera.distortion)
+        if camera.lens != "fisheye":
+            distortion = np.concatenate([distortion, np.zeros(max(0, 5 - len(distortion)))])
+    fisheye = camera.lens == "fisheye"
+    return Camera(camera.name, image_size, intrinsics, np.eye(3), np.zeros(3), distortion, fisheye)
 
 
 def _split(camera: RawCamera) -> Camera:

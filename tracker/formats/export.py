@@ -54,6 +54,7 @@ def _save_opencv(path: Path, cameras: Sequence[Camera], keys: Sequence[str]) -> 
             storage.write(f"size_{key}", np.array([camera.image_size], dtype=np.int32))
             storage.write(f"K_{key}", np.asarray(camera.intrinsics, dtype=float))
             storage.write(f"D_{key}", np.asarray(camera.distortion, dtype=float)[:, None])
+            storage.write(f"fisheye_{key}", int(camera.fisheye))
             storage.write(f"R_{key}", np.asarray(camera.rotation, dtype=float))
             storage.write(f"T_{key}", np.asarray(camera.translation, dtype=float)[:, None])
     finally:
@@ -72,7 +73,7 @@ def _table(key: str, camera: Camera) -> str:
             f"distortions = {camera.distortion.tolist()}",
             f"rotation = {vector.tolist()}",
             f"translation = {camera.translation.tolist()}",
-            "fisheye = false",
+            f"fisheye = {str(camera.fisheye).lower()}",
             "",
         ]
     )

@@ -27,6 +27,9 @@ from tracker.sequences.sequence import Detections, GroundTruth
 USUAL_RATE = 25.0
 """Steps a second where no file says."""
 
+ROOM_MARGIN = 1.0
+"""Metres on each side: a room that is too large costs little, who is outside is lost."""
+
 PERSON = 1.70
 """Metres: the usual stature, by which a reconstruction without a unit is scaled."""
 
@@ -303,6 +306,8 @@ def _room(
         )
         found.append(("room", "around the cameras: neither boxes nor views meet; correct it"))
         return room
+    margin = np.array([ROOM_MARGIN, ROOM_MARGIN, 0.0])
+    room = replace(room, minimum=room.minimum - margin, maximum=room.maximum + margin)
     how = f"from {room.people} pairs of boxes that meet" if room.people else "where views overlap"
     sides = " × ".join(f"{side:.1f}" for side in _sides(room))
     found.append(("room", f"{sides} m, {how}"))

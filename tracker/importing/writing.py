@@ -87,6 +87,7 @@ def _camera(view: SettledView, name: str, folder: Path, copy: bool, told: list[s
     lines += [
         f"K = {_rows(camera.intrinsics)}",
         f"distortion = {_list(camera.distortion)}",
+        *(['lens = "fisheye"'] if camera.fisheye else []),
         f"R = {_rows(camera.rotation)}",
         f"t = {_list(camera.translation)}",
         "",

@@ -23,7 +23,7 @@ class Calibration(NamedTuple):
     intrinsics: ndarray
     """(3, 3), pixels."""
     distortion: ndarray
-    """(5,), k1 k2 p1 p2 k3."""
+    """(5,), k1 k2 p1 p2 k3, or the :data:`GENERAL` numbers of another model."""
     nearest_depth: float
     """Metres; what is nearer than this does not count."""
     largest_radius: float
@@ -74,6 +74,64 @@ def one_camera(cameras: Calibrations, index: int) -> Calibration:
     )
 
 
+GENERAL = 9
+"""Numbers of a lens that is not plain: k1 k2 p1 p2 k3 k4 k5 k6 and 1 for a fisheye, else 0."""
+
+
+@kernel
+def bend(r2: float, distortion: ndarray) -> tuple[float, float]:
+    """How much farther from the middle a lens draws, and twice its derivative by r².
+
+    Plain: 1 + k1 r² + k2 r⁴ + k3 r⁶; rational: that, divided by 1 + k4 r² + k5 r⁴ + k6 r⁶;
+    fisheye: θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸) / r with r = tan θ (OpenCV, calib3d; the
+    latter Kannala, Brandt, IEEE TPAMI 28(8), 2006, equation 6).
+
+    Args:
+        r2: Squared radius, in units of the depth.
+        distortion: As :class:`Calibration` has it.
+    """
+    k1, k2, k3 = distortion[0], distortion[1], distortion[4]
+    if len(distortion) == GENERAL and distortion[8] > 0.0:
+        if r2 < 1e-8:  # the first terms of the series
+            return 1.0 + (k1 - 1.0 / 3.0) * r2, 2.0 * (k1 - 1.0 / 3.0)
+        r = math.sqrt(r2)
+        angle = math.atan(r)
+        a2 = angle * angle
+        k4 = distortion[5]
+        drawn = angle * (1.0 + a2 * (k1 + a2 * (k2 + a2 * (k3 + a2 * k4))))
+        rise = 1.0 + a2 * (3.0 * k1 + a2 * (5.0 * k2 + a2 * (7.0 * k3 + a2 * 9.0 * k4)))
+        return drawn / r, (rise / (1.0 + r2) - drawn / r) / r2
+    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2))
+    if len(distortion) == GENERAL:
+        k4, k5, k6 = distortion[5], distortion[6], distortion[7]
+        below = 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6))
+        fall = 2.0 * (k4 + r2 * (2.0 * k5 + 3.0 * k6 * r2))
+        return radial / below, (slope - fall * radial / below) / below
+    return radial, slope
+
+
+@kernel
+def unbend_fisheye(drawn: float, distortion: ndarray, iterations: int) -> float:
+    """tan θ / θ_d of a point that a fisheye draws at the radius θ_d: Newton's method on θ."""
+    if drawn < 1e-8:
+        return 1.0
+    k1, k2, k3, k4 = distortion[0], distortion[1], distortion[4], distortion[5]
+    angle = min(drawn, 1.5)
+    for _ in range(iterations):
+        a2 = angle * angle
+        error = angle * (1.0 + a2 * (k1 + a2 * (k2 + a2 * (k3 + a2 * k4)))) - drawn
+        rise = 1.0 + a2 * (3.0 * k1 + a2 * (5.0 * k2 + a2 * (7.0 * k3 + a2 * 9.0 * k4)))
+        if rise < 1e-6:
+            break
+        step = error / rise
+        # the plane of the picture holds what is less than a right angle aside
+        angle = min(max(angle - step, 1e-9), 1.57)
+        if step * step < 1e-24:
+            break
+    return math.tan(angle) / drawn
+
+
 @kernel
 def project_points(points: ndarray, camera: Calibration, with_jacobian: bool) -> Projection:
     """Draw world points through a radial-tangential lens.
@@ -89,7 +147,8 @@ def project_points(points: ndarray, camera: Calibration, with_jacobian: bool) ->
     pixels = np.full((count, 2), np.nan)
     jacobians = np.zeros((count if with_jacobian else 0, 2, 3))
     valid = np.zeros(count, dtype=np.bool_)
-    k1, k2, p1, p2, k3 = camera.distortion
+    distortion = camera.distortion
+    p1, p2 = distortion[2], distortion[3]
     r = camera.rotation
     for n in range(count):
         x, y, z = points[n, 0], points[n, 1], points[n, 2]
@@ -102,7 +161,7 @@ def project_points(points: ndarray, camera: Calibration, with_jacobian: bool) ->
         if not r2 < largest_radius * largest_radius:
             continue
         valid[n] = True
-        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        radial, slope = bend(r2, distortion)
         drawn_u = u * radial + 2.0 * p1 * u * v + p2 * (r2 + 2.0 * u * u)
         drawn_v = v * radial + p1 * (r2 + 2.0 * v * v) + 2.0 * p2 * u * v
         for i in range(2):
@@ -111,7 +170,6 @@ def project_points(points: ndarray, camera: Calibration, with_jacobian: bool) ->
             )
         if not with_jacobian:
             continue
-        slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2))  # d radial / d(r²) · 2
         uu = radial + u * u * slope + 2.0 * p1 * v + 6.0 * p2 * u
         uv = u * v * slope + 2.0 * p1 * u + 2.0 * p2 * v
         vv = radial + v * v * slope + 6.0 * p1 * v + 2.0 * p2 * u
@@ -127,24 +185,28 @@ def project_points(points: ndarray, camera: Calibration, with_jacobian: bool) ->
 
 @kernel
 def undistort(distorted: ndarray, distortion: ndarray, iterations: int) -> ndarray:
-    """Undo the radial-tangential lens model by Newton's method.
+    """Undo the lens model by Newton's method.
 
     Args:
         distorted: (N, 2), normalised image coordinates as the lens draws them.
-        distortion: (5,), k1 k2 p1 p2 k3.
+        distortion: As :class:`Calibration` has it.
         iterations: At most so many; four or five are enough inside a picture.
 
     Returns:
         (N, 2), the coordinates that a pinhole would have drawn.
     """
-    k1, k2, p1, p2, k3 = distortion
+    p1, p2 = distortion[2], distortion[3]
     straight = distorted.copy()
     for n in range(len(distorted)):
         u, v = distorted[n, 0], distorted[n, 1]
+        if len(distortion) == GENERAL and distortion[8] > 0.0:
+            stretch = unbend_fisheye(math.sqrt(u * u + v * v), distortion, iterations)
+            straight[n, 0] = u * stretch
+            straight[n, 1] = v * stretch
+            continue
         for _ in range(iterations):
             r2 = u * u + v * v
-            radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-            slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2))  # d radial / d(r²) · 2
+            radial, slope = bend(r2, distortion)
             error_u = u * radial + 2.0 * p1 * u * v + p2 * (r2 + 2.0 * u * u) - distorted[n, 0]
             error_v = v * radial + p1 * (r2 + 2.0 * v * v) + 2.0 * p2 * u * v - distorted[n, 1]
             a = radial + u * u * slope + 2.0 * p1 * v + 6.0 * p2 * u

@@ -12,7 +12,7 @@ from tracker.camera import Camera
 from tracker.sequences.fields import Fields, listed, shown
 from tracker.sequences.sequence import Room, SequenceError
 
-POSE = ("K", "distortion", "R", "t")
+POSE = ("K", "distortion", "lens", "R", "t")
 """The fields that, without ``projection``, say how a camera sees."""
 
 ROTATION_TOLERANCE = 2e-3
@@ -42,13 +42,17 @@ def read_camera(name: str, image_size: tuple[int, int], fields: Fields) -> Camer
             f"{fields.where}: the calibration is incomplete: expected K, R and t, or projection; "
             f"{listed(missing)} {'is' if len(missing) == 1 else 'are'} missing"
         )
+    lens = fields.text("lens", "plain")
+    if lens not in ("plain", "fisheye"):
+        raise fields.error("lens", f'expected "plain" or "fisheye", found {shown(lens)}')
     return Camera(
         name,
         image_size,
         _intrinsics(fields),
         _rotation(fields),
         fields.vector("t", 3, "metres, in camera axes"),
-        _distortion(fields),
+        _distortion(fields, fisheye=lens == "fisheye"),
+        fisheye=lens == "fisheye",
     )
 
 
@@ -84,18 +88,28 @@ def _rotation(fields: Fields) -> Float[ndarray, "3 3"]:
     return matrix
 
 
-def _distortion(fields: Fields) -> Float[ndarray, " 5"]:
+def _distortion(fields: Fields, *, fisheye: bool) -> Float[ndarray, " n"]:
     given = fields.numbers("distortion")
+    if fisheye:
+        if len(given) not in (0, 4):
+            raise fields.error(
+                "distortion",
+                f"expected the 4 numbers of a fisheye (k1 k2 k3 k4), found {len(given)}",
+            )
+        return given if len(given) else np.zeros(4)
     if len(given) not in (0, 4, 5, 8, 12, 14):
         raise fields.error(
-            "distortion", f"expected 4 or 5 numbers (k1 k2 p1 p2 [k3]), found {len(given)}"
+            "distortion",
+            f"expected 4, 5 or 8 numbers (k1 k2 p1 p2 [k3 [k4 k5 k6]]), found {len(given)}",
         )
-    if given[5:].any():
+    if given[8:].any():
         raise fields.error(
             "distortion",
-            f"expected at most 5 numbers other than 0 (k1 k2 p1 p2 k3), found {len(given)}; "
-            "calibrate with the plain lens model",
+            "expected at most 8 numbers other than 0 (k1 k2 p1 p2 k3 k4 k5 k6), found "
+            f"{len(given)}; calibrate with the rational or the plain lens model",
         )
+    if given[5:].any():
+        return given[:8]
     return np.concatenate([given[:5], np.zeros(max(0, 5 - len(given)))])
 
 

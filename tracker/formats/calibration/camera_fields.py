@@ -108,7 +108,7 @@ def camera(
         size = image_size(file, at("size"), both)
     k = intrinsics(file, at("K"), fields["K"]) if _length(fields.get("K")) == 9 else None
     distortion, model = lens(
-        file, at("distortion"), fields.get("D"), fisheye=bool(fields.get("fisheye"))
+        file, at("distortion"), fields.get("D"), fisheye=_is_set(fields.get("fisheye"))
     )
     turned = translation = projection = None
     if "R" in fields and "T" in fields:
@@ -176,6 +176,11 @@ def _stereo(cameras: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
         "2": {key: cameras[""][key] for key in ("R", "T") if key in cameras[""]},
     }
     return {side: {**shared, **lenses[side], **poses[side]} for side in ("1", "2")}
+
+
+def _is_set(value: Any) -> bool:
+    """A flag: true, or a number other than 0."""
+    return bool(np.any(np.asarray(value, dtype=float))) if _length(value) else value is True
 
 
 def _length(value: Any) -> int:

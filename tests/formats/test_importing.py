@@ -1,0 +1,271 @@
+"""From files as people have them to a sequence folder: matched, found out, written."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from app.command.main import main
+from tests.formats.rig import FLIP, HALF_EXTENTS, SIZE, boxes, cameras, walks
+from tracker.formats.pieces import FormatError
+from tracker.importing.gathering import gather
+from tracker.importing.names import match, short_names
+from tracker.importing.options import ImportOptions
+from tracker.importing.settling import Settled, settle
+from tracker.importing.writing import write
+from tracker.sequences.reader import read_sequence
+
+PLACES = walks()
+
+
+def _toml(folder: Path, *, scale: float = 1.0, size: tuple[int, int] = SIZE) -> None:
+    """Anipose's calibration, whose unit nobody knows."""
+    lines = []
+    for camera in cameras():
+        k = np.diag([size[0] / SIZE[0], size[1] / SIZE[1], 1.0]) @ camera.intrinsics
+        lines += [
+            f'[{camera.name}]\nname = "{camera.name}"\nsize = {list(size)}',
+            f"matrix = {k.tolist()}\ndistortions = {camera.distortion.tolist()}",
+            f"rotation = {Rotation.from_matrix(camera.rotation).as_rotvec().tolist()}",
+            f"translation = {(scale * camera.translation).tolist()}",
+        ]
+    (folder / "calibration.toml").write_text("\n".join(lines))
+
+
+def _detections(folder: Path, first: int = 0) -> None:
+    for camera in cameras():
+        frames, found = boxes(camera, PLACES)
+        rows = [
+            f"{f + first},{','.join(map(str, b))}"
+            for f, b in zip(frames, found.tolist(), strict=True)
+        ]
+        path = folder / f"{camera.name}.csv"
+        path.write_text("\n".join(["frame,left,top,width,height", *rows]))
+
+
+def _videos(folder: Path, size: tuple[int, int] = SIZE, frames: int = 60) -> None:
+    for camera in cameras():
+        path = str(folder / f"{camera.name}.avi")
+        writer = cv2.VideoWriter(path, cv2.VideoWriter.fourcc(*"MJPG"), 20.0, size)
+        for _ in range(frames):
+            writer.write(np.zeros((size[1], size[0], 3), np.uint8))
+        writer.release()
+
+
+def _settled(folder: Path, options: ImportOptions | None = None) -> Settled:
+    return settle(gather([folder]), options)
+
+
+def _assert_cameras(settled: Settled, tolerance: float = 1e-6) -> None:
+    for view, camera in zip(settled.views, cameras(), strict=True):
+        np.testing.assert_allclose(view.camera.centre, camera.centre, atol=tolerance)
+        np.testing.assert_allclose(view.camera.rotation, camera.rotation, atol=tolerance)
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("m", 1.0), ("cm", 100.0), ("mm", 1000.0)])
+def test_the_unit_follows_from_the_height_of_people(
+    tmp_path: Path, unit: str, scale: float
+) -> None:
+    _toml(tmp_path, scale=scale)
+    _detections(tmp_path)
+    settled = _settled(tmp_path)
+    assert settled.reading.unit == unit
+    _assert_cameras(settled)
+    assert settled.room.minimum[2] == pytest.approx(0.0, abs=0.25)
+    assert 2.0 * settled.room.half_extents[2] == pytest.approx(1.7, abs=0.1)
+    assert settled.frames == len(PLACES)
+
+
+def test_poses_of_ones_own_the_other_way_round(tmp_path: Path) -> None:
+    tables = {
+        c.name: {"K": c.intrinsics.tolist(), "dist": c.distortion.tolist(),
+                 "R": (c.rotation.T @ FLIP).tolist(), "t": c.centre.tolist(),
+                 "size": list(SIZE)}
+        for c in cameras()
+    }  # fmt: skip
+    (tmp_path / "cameras.json").write_text(json.dumps(tables))
+    _detections(tmp_path)
+    settled = _settled(tmp_path)
+    assert (settled.reading.direction, settled.reading.axes) == ("camera-to-world", "opengl")
+    _assert_cameras(settled)
+    with pytest.raises(AssertionError):  # a flag is believed
+        _assert_cameras(_settled(tmp_path, ImportOptions(pose="world-to-camera", axes="opencv")))
+
+
+def test_a_calibration_of_another_resolution_is_scaled(tmp_path: Path) -> None:
+    _toml(tmp_path, size=(2560, 1440))
+    _videos(tmp_path)
+    settled = _settled(tmp_path, ImportOptions(unit="m"))
+    found = settled.views[0].camera
+    assert found.image_size == SIZE
+    np.testing.assert_allclose(found.intrinsics[0, 0], cameras()[0].intrinsics[0, 0])
+    assert (settled.fps, settled.frames) == (20.0, 60)
+    _assert_cameras(settled)
+
+
+def test_a_calibration_of_another_shape_is_refused(tmp_path: Path) -> None:
+    _toml(tmp_path, size=(720, 1280))
+    _videos(tmp_path, frames=3)
+    with pytest.raises(FormatError, match="they are turned"):
+        _settled(tmp_path)
+
+
+def test_what_is_written_opens_and_is_whole(tmp_path: Path) -> None:
+    source, target = tmp_path / "source", tmp_path / "target"
+    source.mkdir()
+    _toml(source)
+    _videos(source)
+    (source / "boxes").mkdir()
+    _detections(source / "boxes", first=1)
+    rows = [
+        f"{step},{who},{x},{y},{z}"
+        for step, people in enumerate(PLACES)
+        for who, (x, y, z) in enumerate(people)
+    ]
+    (source / "truth.csv").write_text("\n".join(["frame,id,x,y,z", *rows]))
+    settled = _settled(source)
+    told = write(settled, target, "a room")
+    sequence = read_sequence(target)
+    assert told == []
+    assert not sequence.warnings
+    assert sequence.views[0].has_pictures
+    assert sequence.ground_truth is not None
+    np.testing.assert_allclose(
+        sequence.ground_truth.positions.reshape(PLACES.shape), PLACES, atol=1e-4
+    )
+    for view, camera in zip(sequence.views, cameras(), strict=True):
+        frames, found = boxes(camera, PLACES)
+        assert view.detections is not None
+        np.testing.assert_array_equal(view.detections.frames, frames)
+        np.testing.assert_allclose(view.detections.boxes, found, atol=1e-3)
+        assert (target / f"{camera.name}.avi").stat().st_nlink == 2  # linked, not copied
+    with pytest.raises(FormatError, match="already"):
+        write(settled, target, "again")
+
+
+def test_truth_with_y_up_finds_its_way_into_the_boxes(tmp_path: Path) -> None:
+    _toml(tmp_path)
+    _detections(tmp_path)
+    head = (
+        "PathFileType\t4\t(X/Y/Z)\ta.trc\nDataRate\tUnits\n25\tm\nFrame#\tTime\tHip\t\t\n"
+        "\t\tX1\tY1\tZ1\n"
+    )
+    for person in range(2):
+        # as Pose2Sim turns its z up to y up: (x, y, z) → (y, z, x)
+        rows = [
+            f"{n + 1}\t{n / 25}\t{y}\t{z}\t{x}"
+            for n, (x, y, z) in enumerate(PLACES[:, person].tolist())
+        ]
+        (tmp_path / f"P{person}.trc").write_text(head + "\n".join(rows))
+    truth = _settled(tmp_path).truth
+    assert truth is not None
+    assert set(truth.ids.tolist()) == {1, 2}
+    np.testing.assert_allclose(truth.positions[truth.ids == 2], PLACES[:, 1], atol=1e-9)
+
+
+def test_poses_alone_tell_direction_and_unit(tmp_path: Path) -> None:
+    tables = [
+        {"name": c.name, "K": c.intrinsics.tolist(), "R": c.rotation.T.tolist(),
+         "t": (1000.0 * c.centre).tolist(), "size": list(SIZE)}
+        for c in cameras()
+    ]  # fmt: skip
+    (tmp_path / "cameras.json").write_text(json.dumps({"cameras": tables}))
+    _videos(tmp_path, frames=3)
+    settled = _settled(tmp_path)
+    assert settled.reading.direction == "camera-to-world"
+    assert settled.reading.unit == "mm"
+    for view, camera in zip(settled.views, cameras(), strict=True):
+        np.testing.assert_allclose(view.camera.centre, camera.centre, atol=1e-6)
+
+
+def test_nothing_to_import_says_what_is_missing(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("nothing")
+    with pytest.raises(FormatError, match="no calibration"):
+        _settled(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("names", "labels", "how", "expected"),
+    [
+        (["cam1", "cam2"], ["b/cam2_json/cam2", "b/cam1_json/cam1"], "name", {0: 1, 1: 0}),
+        (["cam_01", "cam_02"], ["videos/Cam 2", "videos/Cam 1"], "name", {0: 1, 1: 0}),
+        (["0", "1", "2"], ["cam1", "cam2", "cam3"], "number", {0: 0, 1: 1, 2: 2}),
+        (["north", "east"], ["a1", "a2"], "order", {0: 1, 1: 0}),
+        (["A", "B", "C"], ["rec_A_x", "rec_C_x"], "name", {0: 0, 1: 2}),
+        (["a", "b"], ["x", "y", "z"], None, None),
+    ],
+)
+def test_files_belong_to_cameras(
+    names: list[str], labels: list[str], how: str | None, expected: dict[int, int] | None
+) -> None:
+    found = match(names, labels)
+    assert found == (None if expected is None else (expected, how))
+
+
+def test_short_names_keep_what_tells_files_apart() -> None:
+    assert short_names(["c/extr_A1", "c/extr_B2"]) == ["A1", "B2"]
+    assert short_names(["v/cam01/x", "v/cam02/x"]) == ["cam01", "cam02"]
+
+
+def test_the_command_prints_what_it_takes_files_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / "source"
+    source.mkdir()
+    _toml(source, scale=1000.0)
+    _detections(source)
+    (source / "notes.txt").write_text("nothing")
+    assert main(["import", str(source), "--dry-run"]) == 0
+    said = capsys.readouterr()
+    assert "Anipose, Pose2Sim or Caliscope TOML" in said.out
+    assert "notes.txt" in said.out
+    assert "mm, by the height of people; --unit" in said.out
+    assert "nothing was written" in said.err
+    wrong = f"cam9={source / 'cam1.csv'}"
+    assert main(["import", str(source), "-o", str(tmp_path / "out"), "--camera", wrong]) == 1
+    assert "cam9" in capsys.readouterr().err
+    assert main(["import", str(source)]) == 2
+    assert main(["import", str(source), "-o", str(tmp_path / "out"), "--unit", "mm"]) == 0
+    assert main(["check", str(tmp_path / "out")]) == 0
+    assert main(["formats"]) == 0
+    assert "WILDTRACK annotations" in capsys.readouterr().out
+    exported = tmp_path / "again.toml"
+    line = ["export-calibration", str(tmp_path / "out"), "-o", str(exported), "--form", "pose2sim"]
+    assert main(line) == 0
+    assert exported.read_text().count("rotation") == 4
+
+
+def test_names_with_slashes_stay_in_the_folder(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.mkdir()
+    _toml(source)
+    _detections(source)
+    settled = _settled(source)
+    evil = [
+        replace(view, camera=replace(view.camera, name=f'../../{view.camera.name}, "#\n'))
+        for view in settled.views
+    ]
+    write(replace(settled, views=tuple(evil)), tmp_path / "in" / "target", 'a "name"\n')
+    sequence = read_sequence(tmp_path / "in" / "target")
+    assert len(sequence.views) == 4
+    assert sorted(path.name for path in (tmp_path / "in").iterdir()) == ["target"]
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("name", ["pose2sim-multi", "wildtrack-60"])
+def test_foreign_recordings_open_without_a_flag(foreign: Path, tmp_path: Path, name: str) -> None:
+    settled = _settled(foreign / name)
+    write(settled, tmp_path / name, name)
+    sequence = read_sequence(tmp_path / name)
+    assert sequence.has_detections
+    truth = sequence.ground_truth
+    assert truth is not None
+    inside = sequence.room.contains(truth.positions)
+    assert inside.mean() > 0.95
+    assert HALF_EXTENTS[2] == pytest.approx(float(sequence.target_half_extents[2]), abs=0.06)
