@@ -14,7 +14,7 @@ from tracker.runs.single_views import Cancel, SingleViews
 from tracker.runs.stage_cache import FusionColumn, StageCache, ViewColumn
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
-from tracker.trajectories import Trajectories
+from tracker.trajectories import Bounds, Trajectories
 
 __all__ = [
     "Cancelled", "Progress", "Run", "compute", "default_parameters", "stage_keys",
@@ -156,9 +156,11 @@ class _Telling:
             cameras=len(run.sequence.views),
             extraction_threshold=p.extraction_threshold,
             rule=p.extraction if sequential else "components",
-            room=run.sequence.room,
-            margin=p.room_margin,
-            below=float(run.sequence.target_half_extents[2]) / 2.0,
+            bounds=Bounds(
+                run.sequence.room,
+                p.room_margin,
+                float(run.sequence.target_half_extents[2]) / 2.0,
+            ),
             first_frame=run.done,
             ids=self._ids,
         )

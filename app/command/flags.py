@@ -183,6 +183,10 @@ class Benchmark:
     """The form of a minute or two that the checks run."""
     json: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
     """Write the figures to this file as well, with the machine and the versions."""
+    record: FlagCreatePairsOff[bool] = False
+    """Append the figures to the record of speed and accuracy over the commits."""
+    chart: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
+    """Measure nothing, but draw that record as one HTML page."""
 
 
 @dataclass

@@ -243,6 +243,8 @@ def _benchmark(command: Benchmark) -> int:
     line = [sys.executable, "-m", "tests.benchmarks", *command.names]
     line += ["--short"] if command.short else []
     line += ["--json", str(command.json.absolute())] if command.json is not None else []
+    line += ["--record"] if command.record else []
+    line += ["--chart", str(command.chart.absolute())] if command.chart is not None else []
     return subprocess.run(line, cwd=root).returncode
 
 

@@ -45,6 +45,8 @@ class SequenceInfo(Model):
     key: str
     """Part of the pictures' addresses; another for every content."""
     name: str
+    opened_as: str
+    """The name or folder that opens it again."""
     description: str
     fps: float
     frames: int

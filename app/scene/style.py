@@ -12,6 +12,8 @@ PANEL = """<style>
 [data-mantine-color-scheme="light"] { --mvp-ink-1: #1b1b1b; --mvp-ink-2: #444444;
   --mvp-ink-3: #656565; --mvp-busy: #1a66b0; --mvp-field: #ffffff; --mvp-line: #dededb;
   --mvp-thumb: #ffffff; --mvp-rim: #1a66b0; }
+/* the page says by itself, and once, that there is no graphics card */
+.mantine-Notification-root:has([class*="Notification-title"]) { display: none; }
 /* the step */
 .mvp-status { padding: 0 16px 6px 10px; color: var(--mvp-ink-2); line-height: 16px; }
 .mvp-status p { margin: 0 0 2px; font-size: 13px; font-variant-numeric: tabular-nums; }

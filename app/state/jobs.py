@@ -153,7 +153,8 @@ class Jobs:
                     reader.close()
                     raise Cancelled
                 self._opening = None
-            before = self._workbench.open(sequence, sequence.digest[:16], reader, parameters)
+            key = sequence.digest[:16]
+            before = self._workbench.open(sequence, key, reader, parameters, name)
         except Exception as error:
             if cancelled.is_set():
                 future.set_exception(Cancelled("another sequence was asked for"))

@@ -27,7 +27,7 @@ RunPhase = Literal["idle", "computing", "done", "failed", "cancelled"]
 
 Level = Literal["info", "warn", "error"]
 
-LAYERS = ("boxes", "ellipsoids", "trails", "truth", "volume", "pinned", "others")
+LAYERS = ("boxes", "bodies", "ellipsoids", "trails", "truth", "volume", "pinned", "others")
 """The layers of the 3D view that can be switched; ``others`` are the tracks that are not
 selected, while one is."""
 
@@ -97,6 +97,8 @@ class Snapshot:
     """The same as its file has it."""
     editing_room: bool = False
     """Whether the 3D view has handles on the room."""
+    opened_as: str = ""
+    """The name or folder that opens the sequence again."""
     sequence_key: str = ""
     """Another for every content, so that pictures may be kept for ever."""
     reader: FrameReader | None = None
@@ -116,7 +118,8 @@ class Snapshot:
     scores: Scores = field(default_factory=Scores)
     """Runs against the truth, where there is one."""
     layers: Mapping[str, bool] = field(
-        default_factory=lambda: MappingProxyType(dict.fromkeys(LAYERS, True))
+        # the truth is in the pictures at first: in 3D twice as many boxes hide the people
+        default_factory=lambda: MappingProxyType({name: name != "truth" for name in LAYERS})
     )
     view: View = None
     flies: bool = True

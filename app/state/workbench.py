@@ -277,7 +277,12 @@ class Workbench:
                 self._put("opening", opening=opening)
 
     def open(
-        self, sequence: Sequence, key: str, reader: FrameReader, parameters: RunParameters
+        self,
+        sequence: Sequence,
+        key: str,
+        reader: FrameReader,
+        parameters: RunParameters,
+        opened_as: str = "",
     ) -> FrameReader | None:
         """Show another sequence, from its first step; the reader of the one before, to be closed.
 
@@ -286,6 +291,7 @@ class Workbench:
             key: Another for every content.
             reader: Its pictures.
             parameters: Its default parameters.
+            opened_as: The name or folder that opens it again; its own name where none is given.
         """
         with self._edit() as now:
             before = now.reader
@@ -295,6 +301,7 @@ class Workbench:
                 sequence=sequence,
                 saved=sequence,
                 editing_room=False,
+                opened_as=opened_as or sequence.name,
                 sequence_key=key,
                 reader=reader,
                 opening=None,
@@ -341,13 +348,16 @@ class Workbench:
     def run_ends(
         self, key: str, phase: Literal["done", "cancelled", "failed"], error: str | None = None
     ) -> None:
-        """The run with this key is over; after a failure the last good one is shown again."""
+        """The run with this key is over; after a failure the last good one is shown again.
+
+        Where none was finished yet, what was shown stays: an unfinished run says more than none.
+        """
         with self._edit() as now:
             if key != now.run_state.key:  # superseded
                 return
             run = now.run
             if phase == "failed":
-                run = self._last_good
+                run = self._last_good or run
             elif phase == "done":
                 self._last_good = run
             state = replace(now.run_state, state=phase, seconds_left=None, message="", error=error)

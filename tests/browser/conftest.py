@@ -15,6 +15,7 @@ from tests.browser.walkers import write_walkers
 expect.set_options(timeout=30_000)  # the software renderer takes its time where others work too
 
 
+@pytest.hookimpl(tryfirst=True)  # the settings that all tests share ask for this mark
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Everything in this folder drives the browser."""
     for item in items:

@@ -136,9 +136,7 @@ def fuse(
         results,
         cameras=len(cameras),
         extraction_threshold=parameters.extraction_threshold,
-        room=ROOM,
-        margin=parameters.room_margin,
-        below=HALF_EXTENTS[2] / 2.0,
+        bounds=trajectories.Bounds(ROOM, parameters.room_margin, HALF_EXTENTS[2] / 2.0),
     )
     return results, tracks
 

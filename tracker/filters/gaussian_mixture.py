@@ -12,6 +12,7 @@ from numpy import ndarray
 from tracker.kernels import linear_algebra
 from tracker.kernels.intensity import merging
 from tracker.kernels.intensity import mixture as mixture_kernels
+from tracker.kernels.linear_algebra import Gaussians
 
 _NOBODY = np.zeros(0, dtype=np.int64)
 """Instead of owners, where no component has one."""
@@ -54,6 +55,11 @@ class GaussianMixture:
             labels=np.zeros(0, dtype=np.int64),
         )
 
+    @staticmethod
+    def of(gaussians: Gaussians, labels: Int[ndarray, " J"]) -> GaussianMixture:
+        """The components that a compiled kernel gave, with their labels."""
+        return GaussianMixture(gaussians.weights, gaussians.means, gaussians.covariances, labels)
+
     @property
     def size(self) -> int:
         """The number of components J."""
@@ -68,6 +74,11 @@ class GaussianMixture:
     def cardinality(self) -> float:
         """The expected number of targets: the sum of the weights."""
         return float(self.weights.sum())
+
+    @property
+    def gaussians(self) -> Gaussians:
+        """The components in the form that the compiled kernels know."""
+        return Gaussians(self.weights, self.means, self.covariances)
 
     def take(self, indices: ndarray | slice) -> GaussianMixture:
         """The components at ``indices`` (integers, a mask or a slice), in that order."""
@@ -88,9 +99,11 @@ class GaussianMixture:
             self.labels.take(indices),
         )
 
-    def renamed(self, names: dict[int, int]) -> GaussianMixture:
+    def relabelled(self, changed: dict[int, int]) -> GaussianMixture:
         """The same components; each label that is a key becomes what it stands for."""
-        labels = np.array([names.get(n, n) for n in self.labels.tolist()], dtype=np.int64)
+        labels = np.array(
+            [changed.get(label, label) for label in self.labels.tolist()], dtype=np.int64
+        )
         return GaussianMixture(self.weights, self.means, self.covariances, labels)
 
 
@@ -120,14 +133,14 @@ def predict(
         noise: Q, in squared state units per step, one for all or one a component.
         survival_probability: p_S, one for all or one a component.
     """
-    means, covariances = mixture_kernels.predict(
+    moved = mixture_kernels.predict(
         mixture.means,
         mixture.covariances,
         np.ascontiguousarray(transition, dtype=float),
         np.ascontiguousarray(noise, dtype=float).reshape(-1, *transition.shape),
     )
     return GaussianMixture(
-        mixture.weights * survival_probability, means, covariances, mixture.labels
+        mixture.weights * survival_probability, moved.means, moved.covariances, mixture.labels
     )
 
 
@@ -168,17 +181,18 @@ def merge(
     if mixture.size == 0:
         return mixture, np.zeros(0, dtype=np.int64)
     order = mixture_kernels.heaviest_first(mixture.weights)
-    group, leaders = merging.merge_groups(
+    groups = merging.merge_groups(
         mixture.means,
         mixture.covariances,
         order,
         _NOBODY if owners is None else owners,
         threshold,
     )
-    weights, means, covariances = linear_algebra.merge_moments(
-        mixture.weights, mixture.means, mixture.covariances, group, len(leaders)
+    leaders = groups.leaders
+    merged = linear_algebra.merge_moments(
+        mixture.weights, mixture.means, mixture.covariances, groups.places, len(leaders)
     )
-    return GaussianMixture(weights, means, covariances, mixture.labels.take(leaders)), leaders
+    return GaussianMixture.of(merged, mixture.labels.take(leaders)), leaders
 
 
 def reduce(
@@ -207,16 +221,15 @@ def reduce(
         the component that led each.
     """
     _check(merging_threshold)
-    weights, means, covariances, leaders = merging.reduce_mixture(
-        mixture.weights,
-        mixture.means,
-        mixture.covariances,
+    reduced = merging.reduce_mixture(
+        mixture.gaussians,
         _NOBODY if owners is None else owners,
         pruning_threshold,
         merging_threshold,
         max_components,
     )
-    return GaussianMixture(weights, means, covariances, mixture.labels.take(leaders)), leaders
+    labels = mixture.labels.take(reduced.leaders)
+    return GaussianMixture.of(reduced.components, labels), reduced.leaders
 
 
 def _check(threshold: float) -> None:

@@ -14,7 +14,6 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
 from numpy import ndarray
 
-from tracker.foreground import kernels
 from tracker.foreground.exposure import (
     DARKEST_SHADOW,
     SHADOW_TINT,
@@ -23,6 +22,12 @@ from tracker.foreground.exposure import (
     tone_curve,
 )
 from tracker.foreground.segmentation import Segmentation
+from tracker.kernels.pictures.foreground import (
+    above,
+    clear_shadows,
+    two_classes,
+    update_background,
+)
 from tracker.parameters.foreground import ForegroundParams
 
 ITERATIONS = 20
@@ -83,7 +88,7 @@ def cluster(difference: UInt8[ndarray, "h w 3"], parameters: ForegroundParams) -
         difference: |I - M|.
         parameters: Start centres, ratio r, least threshold, least number of pixels.
     """
-    thresholds, counts = kernels.two_classes(
+    found = two_classes(
         difference,
         parameters.background_centre,
         parameters.foreground_centre,
@@ -92,7 +97,7 @@ def cluster(difference: UInt8[ndarray, "h w 3"], parameters: ForegroundParams) -
         parameters.minimum_area,
         ITERATIONS,
     )
-    return Iterations(thresholds, counts, choose_iteration(counts))
+    return Iterations(found.thresholds, found.counts, choose_iteration(found.counts))
 
 
 def first_background(
@@ -162,16 +167,16 @@ class AdaptiveForeground:
             shown = cv2.LUT(shown, tone_curve(shown, picture))
         difference = cv2.absdiff(picture, shown)
         if p.drop_shadows:
-            kernels.clear_shadows(
+            clear_shadows(
                 difference, picture, shown, DARKEST_SHADOW, SHADOW_TINT, p.least_threshold
             )
         thresholds = self.thresholds(difference)
-        different = kernels.above(difference, thresholds)
+        different = above(difference, thresholds)
         share = cv2.countNonZero(different) / different.size
         if share > BLINDING or cv2.meanStdDev(picture)[1].max() < BLANK:
             return state, Segmentation(np.zeros_like(different), thresholds)
         mask = clean(different, p.minimum_area)
-        background, still = kernels.update_background(
+        after = update_background(
             state.background,
             state.still,
             picture,
@@ -181,7 +186,7 @@ class AdaptiveForeground:
             p.update_frames,
             p.update_rate,
         )
-        return AdaptiveState(background, still), Segmentation(mask, thresholds)
+        return AdaptiveState(after.levels, after.still), Segmentation(mask, thresholds)
 
 
 def clean(mask: UInt8[ndarray, "h w"], minimum_area: int) -> UInt8[ndarray, "h w"]:

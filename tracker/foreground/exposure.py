@@ -18,9 +18,9 @@ from jaxtyping import UInt8
 from numpy import ndarray
 from scipy.optimize import isotonic_regression
 
-from tracker.foreground import kernels
 from tracker.foreground.segmentation import Segmentation
-from tracker.kernels import images
+from tracker.kernels.pictures import images
+from tracker.kernels.pictures.foreground import level_medians, upper_medians
 
 LEVELS = 16
 """Levels of the source at which a tone curve is measured."""
@@ -119,15 +119,15 @@ def tone_curve(
     levels = np.arange(256)
     curve = np.empty((1, 256, 3), dtype=np.uint8)
     enough = max(4, len(few) // 400)
-    totals, sums, medians = kernels.level_medians(few, other, LEVELS)
+    found = level_medians(few, other, LEVELS)
     for channel in range(3):
-        total = totals[channel]
+        total = found.totals[channel]
         used = (total >= enough).nonzero()[0]
         if not len(used):
             curve[0, :, channel] = levels
             continue
-        centres = sums[channel, used] / total[used]
-        rising = isotonic_regression(medians[channel, used], weights=total[used]).x
+        centres = found.sums[channel, used] / total[used]
+        rising = isotonic_regression(found.medians[channel, used], weights=total[used]).x
         mapped = levels + np.interp(levels, centres, rising - centres)
         curve[0, :, channel] = np.clip(np.rint(mapped), 0, 255)
     return curve
@@ -159,7 +159,7 @@ def median(
     for top in range(0, len(result), rows):
         check()
         stack = np.stack([picture[top : top + rows] for picture in pictures])
-        medians: ndarray = kernels.upper_medians(stack.reshape(len(stack), -1))
+        medians: ndarray = upper_medians(stack.reshape(len(stack), -1))
         result[top : top + rows] = medians.reshape(stack.shape[1:])
     return result
 

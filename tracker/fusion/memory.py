@@ -44,11 +44,11 @@ class Memory:
         nobody = GaussianMixture.empty(dimension)
         return Memory(nobody, nobody, np.zeros(0), np.zeros(0, dtype=np.int64))
 
-    def renamed(self, names: dict[int, int]) -> Memory:
+    def relabelled(self, changed: dict[int, int]) -> Memory:
         """The known under other labels; who is lost under one of them is found."""
-        back = np.isin(self.lost.labels, list(names.values()))
+        back = np.isin(self.lost.labels, list(changed.values()))
         kept = self.take(~back)
-        return Memory(self.known.renamed(names), kept.lost, kept.ages, kept.newer)
+        return Memory(self.known.relabelled(changed), kept.lost, kept.ages, kept.newer)
 
     def take(self, indices: ndarray) -> Memory:
         """Some of the lost."""

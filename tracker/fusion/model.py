@@ -12,10 +12,11 @@ from scipy.stats import chi2
 from tracker.filters import models
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion import visibility
-from tracker.fusion.measurement_births import Evidence, MeasurementBirths, Newborns
+from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths, Newborns
 from tracker.fusion.target_model import ExpectedBoxes, TargetModel
 from tracker.fusion.visibility import Visibility
 from tracker.kernels import linear_algebra
+from tracker.kernels.labelled.step import CameraBoxes
 from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
@@ -33,7 +34,7 @@ class FusionModel:
         self.cameras = sequence.cameras
         self.step_time = sequence.step_time
         self.target = TargetModel(
-            sequence.target_half_extents, p.measurement, p.update, p.low_share
+            sequence.target_half_extents, p.measurement, p.update, p.posture_share
         )
         self.motion = models.Motion.of(p, sequence.step_time)
         self.births = self.motion.at_rest(
@@ -58,19 +59,21 @@ class FusionModel:
             self.cameras,
             sequence.room,
             self.target,
-            birth_rate=p.birth_rate * sequence.step_time,
-            detection_probability=p.detection_probability,
-            clutter=self.clutter,
-            gate=self.gate,
-            margin=p.followed_margin,
-            largest_gap=2.0 * float(np.max(sequence.target_half_extents)),
+            BirthModel(
+                birth_rate=p.birth_rate * sequence.step_time,
+                detection_probability=p.detection_probability,
+                clutter=self.clutter,
+                gate=self.gate,
+                margin=p.followed_margin,
+                largest_gap=2.0 * float(np.max(sequence.target_half_extents)),
+            ),
         )
 
     def expected(self, index: int, mixture: GaussianMixture) -> ExpectedBoxes:
         """The box that a camera should give of every component."""
         return self.target.expected(self.cameras[index], mixture.means, mixture.covariances)
 
-    def chances(
+    def detection_probabilities(
         self, index: int, expected: ExpectedBoxes, mixture: GaussianMixture
     ) -> Float[ndarray, " J"]:
         """p_D of every component in one camera where nobody hides anybody."""
@@ -98,7 +101,7 @@ class FusionModel:
         """
         hiding = np.flatnonzero(occluders > CONFIRMED)
         return visibility.visibility(
-            self.chances(index, expected, mixture),
+            self.detection_probabilities(index, expected, mixture),
             expected,
             mixture,
             occluders=hiding,
@@ -122,7 +125,7 @@ class FusionModel:
         inside: ndarray = linear_algebra.inside_bounds(mixture.means, *self.followed)
         return inside
 
-    def doubles(
+    def duplicates(
         self,
         means: Float[ndarray, "n d"],
         weights: Float[ndarray, " n"],
@@ -136,21 +139,18 @@ class FusionModel:
         around one person, and two people cannot stand in one place. Among sure ones
         the older label stays; an unsure one never displaces a sure one.
         """
-        found: ndarray = linear_algebra.doubles(
+        found: ndarray = linear_algebra.duplicates(
             means, weights, labels, np.ascontiguousarray(sources), self.near, CONFIRMED
         )
         return found
 
 
-def all_boxes(
-    views: Many[ViewResult],
-) -> tuple[Float[ndarray, "B 4"], Float[ndarray, "B 4"], Int[ndarray, " C1"]]:
-    """The boxes of all cameras, one after another, their standard deviations, pixels, and where
-    each camera's begin, with the end."""
+def all_boxes(views: Many[ViewResult]) -> CameraBoxes:
+    """The boxes of all cameras, one after another."""
     starts = [0]
     for view in views:
         starts.append(starts[-1] + len(view.boxes))
-    return (
+    return CameraBoxes(
         np.concatenate([view.boxes for view in views], dtype=float),
         np.concatenate([view.sigmas for view in views], dtype=float),
         np.array(starts),

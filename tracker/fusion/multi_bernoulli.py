@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -17,14 +16,17 @@ from tracker import association
 from tracker.camera import stacked
 from tracker.filters import gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion import memory, names, visibility
+from tracker.fusion import memory, reidentification, visibility
 from tracker.fusion.measurement_births import Evidence, Newborns
 from tracker.fusion.memory import Memory
 from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
-from tracker.fusion.names import Names
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import WORTH_TELLING, Record, summed
+from tracker.fusion.reidentification import Identities
+from tracker.kernels.boxes import Occlusion
 from tracker.kernels.labelled import step as step_kernels
+from tracker.kernels.labelled.camera_update import CameraModel, Tracks
+from tracker.kernels.labelled.step import KeepingRule, Motion, StepModel
 from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
@@ -38,7 +40,7 @@ class MultiBernoulliState:
     undetected: GaussianMixture
     next_label: int
     memory: Memory
-    names: Names
+    identities: Identities
 
 
 class MultiBernoulli:
@@ -57,67 +59,87 @@ class MultiBernoulli:
         births = model.births
         if p.birth == "measurements":
             births = GaussianMixture.empty(motion.dimension)
-        self._fixed: tuple[Any, ...] = (
-            *(motion.transition, motion.noise[None], p.survival_probability),
-            *(births.weights, births.means, births.covariances),
-            *(p.measurement_sigma, *target.transforms, target.unscented, *target.numbers),
-            *(target.drift(motion.dimension), target.low_share),
-            *(*stacked(model.cameras), model.clutter, model.gate, p.edge == "soft"),
-            *(p.detection_probability, CONFIRMED, p.occlusion, model.near),
-            *(visibility.WORTH_TELLING, association.TOLERANCE, association.ITERATIONS),
-            *(WORTH_TELLING, p.pruning_threshold),
+        self._step_model = StepModel(
+            motion=Motion(motion.transition, motion.noise[None], p.survival_probability),
+            births=births.gaussians,
+            transform=target.transform,
+            sigma_factor=p.measurement_sigma,
+            target=target.target(motion.dimension),
+            cameras=stacked(model.cameras),
+            clutter=model.clutter,
+            update=CameraModel(
+                gate=model.gate,
+                soft=p.edge == "soft",
+                detection_probability=p.detection_probability,
+                confirmed=CONFIRMED,
+                occlusion=Occlusion(model.near, p.occlusion, visibility.WORTH_TELLING),
+                settling=association.SETTLING,
+                least_told=WORTH_TELLING,
+            ),
+            least_existence=p.pruning_threshold,
         )
-        """What :func:`tracker.kernels.labelled.step.predict_and_update` is told at every step."""
+        low, high = model.followed
+        self._keeping_rule = KeepingRule(
+            p.pruning_threshold, low, high, p.max_components, model.near, CONFIRMED
+        )
 
     def start(self) -> MultiBernoulliState:
         """Nobody is in the room."""
         dimension = self._model.motion.dimension
         empty = GaussianMixture.empty(dimension)
-        return MultiBernoulliState(empty, empty, 1, Memory.start(dimension), Names.none())
+        return MultiBernoulliState(empty, empty, 1, Memory.start(dimension), Identities.none())
 
     def step(
         self, state: MultiBernoulliState, views: Many[ViewResult]
     ) -> tuple[MultiBernoulliState, FusionResult]:
         """Predict one step ahead and update with every camera's boxes, in the cameras' order."""
-        p, before, unseen = self._parameters, state.tracks, state.undetected
-        boxes, sigmas, starts = all_boxes(views)
-        (
-            existences, means, covariances, labels, next_label,
-            left, unseen_means, unseen_covariances,
-            chances, hidden_by, sources, shares,
-            *told, values, noises, unexplained,
-        ) = step_kernels.predict_and_update(
-            *(before.weights, before.means, before.covariances, before.labels, state.next_label),
-            *(unseen.weights, unseen.means, unseen.covariances),
-            *(boxes, sigmas, starts, *self._fixed),
-        )  # fmt: skip
-        tracks = GaussianMixture(existences, means, covariances, labels)
-        record = Record(chances, sources, shares, hidden_by)
+        p, before = self._parameters, state.tracks
+        seen = all_boxes(views)
+        found = step_kernels.predict_and_update(
+            Tracks(before.weights, before.means, before.covariances, before.labels),
+            state.next_label,
+            state.undetected.gaussians,
+            seen,
+            self._step_model,
+        )
+        tracks, next_label = _mixture(found.tracks), found.next_label
+        record = Record(
+            found.record.detection_probabilities,
+            found.record.sources,
+            found.record.shares,
+            found.record.hidden_by,
+        )
         if p.birth != "entrances":
-            evidence = Evidence(boxes[:, :2], values, noises, unexplained, starts)
-            found = self._model.newborns(evidence)
-            if found is not None:
-                tracks, record, next_label = self._with_newborns(
-                    tracks, record, *found, state.next_label, next_label
+            evidence = Evidence(
+                seen.boxes[:, :2], found.measurements, found.unexplained, seen.starts
+            )
+            proposed = self._model.newborns(evidence)
+            if proposed is not None:
+                born, newborns = proposed
+                born = models.label_births(born, next_label)
+                next_label += born.size
+                tracks, record = self._with_newborns(
+                    tracks, record, born, newborns, state.next_label
                 )
         kept = step_kernels.kept_tracks(
-            *(tracks.weights, tracks.means, tracks.labels, record.sources, p.pruning_threshold),
-            *(*self._model.followed, p.max_components, self._model.near, CONFIRMED),
+            Tracks(tracks.weights, tracks.means, tracks.covariances, tracks.labels),
+            record.sources,
+            self._keeping_rule,
         )
         tracks, record = tracks.take(kept), record.take(kept)
         labels, lost = memory.recall(state.memory, tracks, self._model, state.next_label)
         posterior = GaussianMixture(tracks.weights, tracks.means, tracks.covariances, labels)
-        associations = summed(tracks.labels, *told)
-        recognised = state.names
+        associations = summed(tracks.labels, found.pairs)
+        recognised = state.identities
         if p.recognition:
-            renamed, recognised = names.recognise(
+            changed, recognised = reidentification.reidentify(
                 recognised, posterior, associations, views, lost.lost.labels, self._model.step_time
             )
-            if renamed:
-                posterior, lost = posterior.renamed(renamed), lost.renamed(renamed)
+            if changed:
+                posterior, lost = posterior.relabelled(changed), lost.relabelled(changed)
         undetected, _ = gaussian_mixture.reduce(
-            GaussianMixture(
-                left, unseen_means, unseen_covariances, np.zeros(len(left), dtype=np.int64)
+            GaussianMixture.of(
+                found.undetected, np.zeros(len(found.undetected.weights), dtype=np.int64)
             ),
             pruning_threshold=p.pruning_threshold,
             merging_threshold=p.merging_threshold,
@@ -135,18 +157,21 @@ class MultiBernoulli:
         born: GaussianMixture,
         newborns: Newborns,
         first_new_label: int,
-        next_label: int,
-    ) -> tuple[GaussianMixture, Record, int]:
+    ) -> tuple[GaussianMixture, Record]:
         """The tracks with those that begin where unexplained boxes of several cameras agree."""
         # a track begun at an entrance by one of the same boxes is the same person
         own, theirs = record.sources[:, :, None], newborns.sources[:, None, :]
         shared = ((own == theirs) & (theirs >= 0)).any(axis=(0, 2))
         others = np.flatnonzero(~(shared & (tracks.labels >= first_new_label)))
         first = len(others)
-        labelled = models.label_births(born, next_label)
-        tracks = gaussian_mixture.concatenate([tracks.take(others), labelled])
+        tracks = gaussian_mixture.concatenate([tracks.take(others), born])
         record = record.take(others).extended(born.size)
         record.sources[:, first:] = newborns.sources
         record.source_weights[:, first:] = newborns.sources >= 0
         record.detection_probabilities[:, first:] = self._parameters.detection_probability
-        return tracks, record, next_label + born.size
+        return tracks, record
+
+
+def _mixture(tracks: Tracks) -> GaussianMixture:
+    """Tracks as a mixture whose weights are existences."""
+    return GaussianMixture(tracks.existences, tracks.means, tracks.covariances, tracks.labels)

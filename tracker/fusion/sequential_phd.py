@@ -22,6 +22,7 @@ from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import Ledger, Record
 from tracker.kernels import linear_algebra
+from tracker.kernels.gating import Measurements
 from tracker.kernels.intensity import mixture as mixture_kernels
 from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
@@ -48,8 +49,10 @@ class _Work:
     """Labels of this step's births."""
     sure: dict[int, float]
     """Predicted weight of each label, where it is enough to hide others."""
-    measured: list[tuple[ndarray, ndarray, ndarray]]
-    """Of each camera: the boxes as measurements, their noises, what nobody explains of each."""
+    measured: list[Measurements]
+    """The boxes of each camera as measurements."""
+    unexplained: list[ndarray]
+    """What nobody explains of each camera's boxes."""
     ledger: Ledger
 
 
@@ -93,6 +96,7 @@ class SequentialPhd:
             range(state.next_label, next_label),
             sure,
             measured=[],
+            unexplained=[],
             ledger=Ledger(),
         )
         for index, view in enumerate(views):
@@ -102,7 +106,7 @@ class SequentialPhd:
         inside = self._model.stays(work.mixture)
         mixture, record = work.mixture.take(inside), work.record.take(inside)
         if p.misses == "per_person":
-            single = self._without_doubles(mixture, record)
+            single = self._without_duplicates(mixture, record)
             mixture, record = mixture.take(single), record.take(single)
         associations = work.ledger.associations(mixture.labels)
         labels, next_label = _one_person_a_label(mixture, previous, work.next_label)
@@ -114,20 +118,18 @@ class SequentialPhd:
     def _update(self, work: _Work, index: int, view: ViewResult) -> None:
         """The update by the boxes of one camera, and its reduction."""
         p, model, mixture = self._parameters, self._model, work.mixture
-        values, noises = model.target.measured(view, p.measurement_sigma)
+        measurements = model.target.measured(view, p.measurement_sigma)
         expected = model.expected(index, mixture)
         seen = model.visible(index, expected, mixture, _occluders(mixture, work.sure))
         updated = phd.update(
             mixture,
-            values,
-            expected=expected.values,
-            jacobians=expected.jacobians,
-            noise=noises,
-            spread=expected.spreads,
+            measurements.values,
+            expected=expected.upright,
+            noise=measurements.noises,
             detection_probability=seen.detection_probabilities,
             clutter_intensity=model.clutter[index],
             gate=model.gate,
-            other=expected.other,
+            other=expected.posture,
         )
         owners = None
         if p.misses == "per_person":
@@ -138,7 +140,7 @@ class SequentialPhd:
                 births=work.births,
                 next_label=work.next_label,
             )
-            work.next_label += len(values)
+            work.next_label += len(measurements.values)
             owners = one_person.owners(updated.posterior)
         posterior, parents, sources = updated.posterior, updated.parents, updated.measurements
         record = work.record.take(parents)
@@ -156,15 +158,20 @@ class SequentialPhd:
             owners=owners,
         )
         work.record = record.take(leaders)
-        work.measured.append((values, noises, 1.0 - updated.measurement_weights))
+        work.measured.append(measurements)
+        work.unexplained.append(1.0 - updated.measurement_weights)
 
     def _add_newborns(self, work: _Work, views: Many[ViewResult]) -> None:
         """Components where unexplained boxes of several cameras agree on a place."""
-        values, noises, unexplained = (
-            np.concatenate(part) for part in zip(*work.measured, strict=True)
+        measured = Measurements(
+            np.concatenate([each.values for each in work.measured]),
+            np.concatenate([each.noises for each in work.measured]),
         )
-        boxes, _, starts = all_boxes(views)
-        found = self._model.newborns(Evidence(boxes[:, :2], values, noises, unexplained, starts))
+        seen = all_boxes(views)
+        unexplained = np.concatenate(work.unexplained)
+        found = self._model.newborns(
+            Evidence(seen.boxes[:, :2], measured, unexplained, seen.starts)
+        )
         if found is None:
             return
         born, newborns = found
@@ -177,16 +184,17 @@ class SequentialPhd:
         work.record.source_weights[:, first:] = newborns.sources >= 0
         work.record.detection_probabilities[:, first:] = self._parameters.detection_probability
 
-    def _without_doubles(self, mixture: GaussianMixture, record: Record) -> Int[ndarray, " K"]:
+    def _without_duplicates(self, mixture: GaussianMixture, record: Record) -> Int[ndarray, " K"]:
         """Indices of the components of those labels that do not only repeat another."""
-        labels, label = linear_algebra.group_labels(mixture.labels)
+        grouped = linear_algebra.group_labels(mixture.labels)
+        labels, label = grouped.labels, grouped.places
         held = np.bincount(label, mixture.weights, len(labels))
         # the heaviest component of a label has the last word on where its person is
         heaviest = mixture_kernels.heaviest_of_groups(mixture.weights, label, len(labels))
-        double = self._model.doubles(
+        duplicate = self._model.duplicates(
             mixture.means[heaviest], held, labels, record.sources[:, heaviest]
         )
-        return np.flatnonzero(~double[label])
+        return np.flatnonzero(~duplicate[label])
 
 
 def _relabelled(mixture: GaussianMixture, labels: Int[ndarray, " J"]) -> GaussianMixture:

@@ -3,8 +3,8 @@
 numba keeps machine code beside the source, where an installed package may be read-only,
 and looks at the file of a kernel only, not at those of the kernels that it calls. So the
 code goes to the cache folder, under the hash of the kernel's file and of those that it
-takes kernels from: a change leaves nothing stale behind, and what does not depend on it
-stays. ``NUMBA_CACHE_DIR`` names another place.
+takes kernels, tuples and constants from: a change leaves nothing stale behind, and what
+does not depend on it stays. ``NUMBA_CACHE_DIR`` names another place.
 
 While another process compiles (:func:`while_compiling`), a kernel whose machine code is
 not there yet runs as plain Python: the same source, and so the same numbers, some eighty
@@ -52,7 +52,8 @@ _HAS_KERNELS = re.compile(rb"^@(?:pixel_)?kernel$", re.MULTILINE)
 def kernel(function: _F) -> _F:
     """Compile on the first call, keep the machine code on disk, release the interpreter."""
     compiled: Any = pixel_kernel(function)
-    compiled._compile_for_args = _Chooser(compiled)
+    if not _config.DISABLE_JIT:  # numba's own variable: then it is the function itself
+        compiled._compile_for_args = _Chooser(compiled)
     return cast(_F, compiled)
 
 
@@ -177,16 +178,22 @@ def _folder_of(file: Path) -> Path:
 
 
 def _with_used(file: Path, known: set[Path]) -> set[Path]:
-    """A file and those with kernels that it imports from, however far."""
+    """A file and those that make part of its machine code, which it imports, however far."""
     if file not in known and file.is_file():
         text = file.read_bytes()
-        if not known or _HAS_KERNELS.search(text):
+        if not known or _is_compiled_in(file, text):
             known.add(file)
             for name in _imported(text):
                 path = _ROOT.parent.joinpath(*name.split("."))
                 _with_used(path.with_suffix(".py"), known)
                 _with_used(path / "__init__.py", known)
     return known
+
+
+def _is_compiled_in(file: Path, text: bytes) -> bool:
+    """Whether a file has kernels, or the tuples and constants of the kernels' room."""
+    in_room = _ROOT / "kernels" in file.parents and file.name != Path(__file__).name
+    return in_room or _HAS_KERNELS.search(text) is not None
 
 
 def _imported(source: bytes) -> Iterator[str]:
@@ -211,7 +218,7 @@ def _digest(files: Iterable[Path]) -> str:
 @cache
 def _mark() -> Path:
     """A file that says that all kernels were compiled."""
-    with_kernels = [p for p in _ROOT.rglob("*.py") if _HAS_KERNELS.search(p.read_bytes())]
+    with_kernels = [p for p in _ROOT.rglob("*.py") if _is_compiled_in(p, p.read_bytes())]
     return kernel_folder() / f"{_digest(with_kernels)}.complete"
 
 

@@ -41,7 +41,7 @@ class FusionParams(Params):
     ] = "box"
     """What is used of a box: its centre; its horizontal centre, top and bottom; and its width."""
 
-    low_share: Annotated[float, Field(ge=0.0, le=0.5), ui("ε", step=0.01, published=0.0)] = 0.1
+    posture_share: Annotated[float, Field(ge=0.0, le=0.5), ui("ε", step=0.01, published=0.0)] = 0.1
     """Share of the boxes that show a person lying, crouching or bent; 0: everybody stands."""
 
     update: Annotated[Literal["extended", "unscented"], ui("h(x)")] = "extended"

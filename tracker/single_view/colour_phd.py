@@ -19,6 +19,7 @@ from scipy.stats import chi2
 from tracker.filters import gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.foreground import pack
+from tracker.kernels.kalman import Expected
 from tracker.parameters import ColourPhdParams, ForegroundParams
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
@@ -118,8 +119,7 @@ class ColourPhd:
         updated = phd.update(
             predicted,
             peaks.boxes,
-            expected=predicted.means,
-            jacobians=np.eye(4)[None],
+            expected=Expected.of(predicted.means, np.eye(4)[None]),
             noise=noise,
             detection_probability=p.detection_probability,
             clutter_intensity=self._clutter,

@@ -18,6 +18,7 @@ from scipy.stats import chi2
 from tracker.filters import gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.filters.phd import PhdUpdate
+from tracker.kernels.kalman import Expected
 from tracker.parameters import DetectionPhdParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.detector_boxes import Detected, DetectorBoxes, trust
@@ -89,8 +90,7 @@ class DetectionPhd:
         updated = phd.update(
             predicted,
             found.boxes[good],
-            expected=predicted.means,
-            jacobians=np.eye(4)[None],
+            expected=Expected.of(predicted.means, np.eye(4)[None]),
             noise=found.sigmas[good][:, :, None] ** 2 * np.eye(4),
             detection_probability=p.detection_probability,
             clutter_intensity=self._clutter

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
+from tracker.boxes import Boxes
 from tracker.camera import Camera
 from tracker.parameters import DetectionBoxParams
 from tracker.sequences.sequence import Room, Sequence
@@ -48,8 +49,7 @@ class DetectorBoxes:
         p, all_boxes = parameters, view.detections
         above = all_boxes.scores >= p.score_threshold
         self._frames, scores = all_boxes.frames[above], all_boxes.scores[above]
-        half_sizes = all_boxes.boxes[above, 2:] / 2.0
-        boxes = np.concatenate([all_boxes.boxes[above, :2] + half_sizes, half_sizes], axis=1)
+        boxes = Boxes.from_left_top(all_boxes.boxes[above]).centred
         sigmas = trust(boxes, p)
         nearest, farthest = standing_between(
             view.camera,

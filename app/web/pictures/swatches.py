@@ -10,6 +10,7 @@ from numpy import ndarray
 from app.errors import ApiError
 from app.state.snapshot import Snapshot
 from tracker import colour
+from tracker.boxes import Boxes
 
 CROP_HEIGHT = 88
 """Pixels: twice what the page shows, for fine screens."""
@@ -50,8 +51,8 @@ class Swatches:
         Raises:
             ApiError: If there is no such picture.
         """
-        picture, (left, top, width, height) = _picture(snapshot, sequence_key, camera, step, box)
-        place = np.array([[left + width / 2, top + height / 2, width / 2, height / 2]])
+        picture, left_top = _picture(snapshot, sequence_key, camera, step, box)
+        place = Boxes.from_left_top(np.array([left_top], dtype=float)).centred
         bins = colour.bin_map(picture, "hue_saturation")
         found = colour.histograms(bins, place, "hue_saturation", "epanechnikov")[0]
         return bars(found)

@@ -9,6 +9,7 @@ from app import models
 from app.scene.geometry import FUTURE_SECONDS, TRAIL_SECONDS
 from app.state.pairs import pairs_at
 from app.web.pictures.likelihood import key_of
+from tracker.boxes import Boxes
 from tracker.fusion.protocol import FusionResult
 from tracker.pipeline import Run
 from tracker.sequences.sequence import Sequence
@@ -228,5 +229,4 @@ def _box(values: ndarray) -> models.Box:
 
 def _corner_boxes(boxes: ndarray) -> list[models.Box]:
     """Centre and half sizes as left, top, width, height."""
-    corners = np.column_stack([boxes[:, :2] - boxes[:, 2:], 2.0 * boxes[:, 2:]])
-    return [_box(row) for row in corners]
+    return [_box(row) for row in Boxes(boxes).left_top]

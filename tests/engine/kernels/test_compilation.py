@@ -98,23 +98,29 @@ def test_the_digest_follows_imports(
     monkeypatch.setattr(compilation, "_ROOT", root)
     files = {
         "a_kernels.py": f"{importing}\n@kernel\ndef f(): ...\n",
-        "b_kernels.py": "from tracker.plain import y\n@kernel\ndef g(): ...\n",
+        "b_kernels.py": "from tracker.plain import y\nfrom tracker.kernels.pairs import Pair\n"
+        "from tracker.kernels.compilation import kernel\n@kernel\ndef g(): ...\n",
+        "kernels/pairs.py": "class Pair(NamedTuple): ...\n",
+        "kernels/compilation.py": "def kernel(): ...\n",
         "plain.py": "from tracker.c_kernels import z\n",
         "c_kernels.py": "@kernel\ndef h(): ...\n",
     }
+    (root / "kernels").mkdir()
     for name, text in files.items():
         (root / name).write_text(text, encoding="utf-8")
 
     def digest() -> str:
         known = compilation._with_used(root / "a_kernels.py", set())
-        assert {path.name for path in known} == {"a_kernels.py", "b_kernels.py"}
+        assert {path.name for path in known} == {"a_kernels.py", "b_kernels.py", "pairs.py"}
         return compilation._digest(known)
 
     before = digest()
     (root / "c_kernels.py").write_text("@kernel\ndef other(): ...\n", encoding="utf-8")
     assert digest() == before
-    (root / "b_kernels.py").write_text(files["b_kernels.py"] + "# changed\n", encoding="utf-8")
-    assert digest() != before
+    for name in ("b_kernels.py", "kernels/pairs.py"):
+        (root / name).write_text(files[name] + "# changed\n", encoding="utf-8")
+        assert digest() != before
+        before = digest()
 
 
 def test_what_was_not_used_for_long_is_deleted(

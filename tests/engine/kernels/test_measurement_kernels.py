@@ -7,7 +7,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.engine.synthetic import CAMERAS
-from tracker.camera import NEAREST_DEPTH
 from tracker.fusion.target_model import MeasurementKind, TargetModel
 from tracker.kernels import boxes as box_kernels
 from tracker.kernels import measurement
@@ -19,12 +18,13 @@ KINDS: tuple[MeasurementKind, ...] = ("centre", "box", "box_and_width")
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_box_and_its_noise_are_transformed_alike(kind: MeasurementKind) -> None:
     rng = np.random.default_rng(0)
-    transform, products = TargetModel(HALF_EXTENTS, kind).transforms
+    transform = TargetModel(HALF_EXTENTS, kind).transform
     boxes, variances = rng.uniform(5.0, 200.0, (7, 4)), rng.uniform(1.0, 30.0, (7, 4))
-    values, noises = measurement.measured_boxes(boxes, variances, transform, products)
-    assert_allclose(values, boxes @ transform.T, rtol=1e-12)
+    values, noises = measurement.measured_boxes(boxes, variances, transform)
+    matrix = transform.matrix
+    assert_allclose(values, boxes @ matrix.T, rtol=1e-12)
     assert_allclose(
-        noises, np.einsum("pa,ma,qa->mpq", transform, variances, transform), rtol=1e-12, atol=1e-12
+        noises, np.einsum("pa,ma,qa->mpq", matrix, variances, matrix), rtol=1e-12, atol=1e-12
     )
 
 
@@ -43,11 +43,11 @@ def test_the_unscented_regression_is_that_of_numpy(kind: MeasurementKind) -> Non
         spread = covariance[:3, :3]
         lower = np.linalg.cholesky(spread)
         offsets = np.sqrt(3.0) * np.concatenate([lower.T, -lower.T])
-        values, _, _, _, ahead = box_kernels.expected_boxes(
-            state[:3] + offsets, model.half_height, model.half_width, model.size,
-            camera.image_size, *camera.numbers, NEAREST_DEPTH, camera.largest_radius,
-        )  # fmt: skip
-        assert ahead.all()
+        drawn = box_kernels.expected_boxes(
+            state[:3] + offsets, model.half_height, model.half_width, model.size, camera.calibration
+        )
+        values = drawn.values
+        assert drawn.valid.all()
         off = values - values.mean(axis=0)
         slopes = (off.T @ offsets / 6.0) @ np.linalg.inv(spread)
         assert_allclose(found.values[j], values.mean(axis=0), rtol=1e-12)

@@ -15,13 +15,26 @@ from tracker.filters import gaussian_mixture
 from tracker.filters.gaussian_mixture import GaussianMixture, concatenate
 from tracker.fusion.target_model import TargetModel
 from tracker.kernels import linear_algebra
+from tracker.kernels.association.belief_propagation import Settling
+from tracker.kernels.boxes import Occlusion
+from tracker.kernels.gating import Measurements
 from tracker.kernels.kalman import Alternative
 from tracker.kernels.labelled import camera_update, step
+from tracker.kernels.labelled.camera_update import CameraModel, Tracks
+from tracker.kernels.measurement import ExpectedBoxes
 
 CLUTTER = np.array([1e-6, 3e-6, 2e-6])
 GATE, P_D, P_S, CONFIRMED, STRENGTH, NEAR, COVERED = 30.0, 0.9, 0.98, 0.5, 0.8, 0.3, 0.2
-TOLERANCE, ITERATIONS, TOLD, LEAST = 1e-6, 200, 0.01, 1e-4
-FACTOR = 1.3
+TOLD, LEAST, FACTOR = 0.01, 1e-4, 1.3
+CAMERA_MODEL = CameraModel(
+    gate=GATE,
+    soft=True,
+    detection_probability=P_D,
+    confirmed=CONFIRMED,
+    occlusion=Occlusion(NEAR, STRENGTH, COVERED),
+    settling=Settling(1e-6, 200),
+    least_told=TOLD,
+)
 TRANSITION = np.eye(6) + 0.1 * np.eye(6, k=3)
 NOISE = np.diag([1e-3, 1e-3, 1e-4, 0.01, 0.01, 1e-3])
 
@@ -59,7 +72,7 @@ def one_by_one(
     columns: dict[str, list[ndarray]] = {name: [] for name in ("p_d", "by", "best", "share")}
     told, unexplained = [], []
     for c, camera in enumerate(CAMERAS):
-        transform, _ = model.transforms
+        transform = model.transform.matrix
         values = boxes[c] @ transform.T
         noises = np.einsum("pa,ma,qa->mpq", transform, (FACTOR * sigmas[c]) ** 2, transform)
         expected = model.expected(
@@ -67,19 +80,23 @@ def one_by_one(
             np.concatenate([unseen.means, tracks.means]),
             np.concatenate([unseen.covariances, tracks.covariances]),
         )
-        (
-            existences, means, covariances, p_d, by, best, share,
-            left, newcomer, born_means, born_covariances, free, who, what, chance,
-        ) = camera_update.update_by_camera(
-            *(unseen.weights, unseen.means, unseen.covariances),
-            *(tracks.weights, tracks.means, tracks.covariances, tracks.labels, occluding),
-            *(values, noises, CLUTTER[c], GATE),
-            *(expected.values, expected.jacobians, expected.spreads),
-            *(expected.boxes, expected.depths, expected.valid),
-            *(expected.other or Alternative.none(model.size, 6)),
-            *(camera.image_size, True, P_D, CONFIRMED, STRENGTH, NEAR, COVERED),
-            *(TOLERANCE, ITERATIONS, TOLD),
-        )  # fmt: skip
+        found = camera_update.update_by_camera(
+            unseen.gaussians,
+            Tracks(tracks.weights, tracks.means, tracks.covariances, tracks.labels),
+            occluding,
+            Measurements(values, noises),
+            ExpectedBoxes(
+                *(expected.upright, expected.boxes, expected.depths, expected.valid),
+                expected.posture or Alternative.none(model.size, 6),
+            ),
+            camera.calibration.image_size,
+            CLUTTER[c],
+            CAMERA_MODEL,
+        )
+        p_d, by, best, share = found.record
+        newcomer, born_means, born_covariances = found.newcomers
+        who, what, chance = found.pairs
+        free = found.unexplained
         born = np.flatnonzero(free * newcomer > LEAST)
         labels = next_label + np.arange(len(born))
         next_label += len(born)
@@ -92,10 +109,10 @@ def one_by_one(
         newborn = GaussianMixture(
             (free * newcomer)[born], born_means[born], born_covariances[born], labels
         )
-        tracks = GaussianMixture(existences, means, covariances, tracks.labels)
+        tracks = GaussianMixture.of(found.tracks, tracks.labels)
         tracks = concatenate([tracks, newborn])
         occluding = np.append(occluding, np.zeros(len(born)))
-        unseen = GaussianMixture(left, unseen.means, unseen.covariances, unseen.labels)
+        unseen = GaussianMixture(found.undetected, unseen.means, unseen.covariances, unseen.labels)
         for name, old, new in (
             ("p_d", p_d, np.full(len(born), P_D)),
             ("by", by, np.full(len(born), -1)),
@@ -119,27 +136,40 @@ def one_by_one(
 
 @pytest.mark.parametrize("update", ["extended", "unscented"])
 @pytest.mark.parametrize(("tracks", "unseen"), [(3, 2), (0, 2), (4, 0)])
-@pytest.mark.parametrize("low_share", [0.0, 0.1])
-def test_one_call_is_all_cameras(update: Any, tracks: int, unseen: int, low_share: float) -> None:
+@pytest.mark.parametrize("posture_share", [0.0, 0.1])
+def test_one_call_is_all_cameras(
+    update: Any, tracks: int, unseen: int, posture_share: float
+) -> None:
     rng = np.random.default_rng(7 + tracks)
-    model = TargetModel(np.array([0.3, 0.3, 0.84]), "box", update, low_share)
+    model = TargetModel(np.array([0.3, 0.3, 0.84]), "box", update, posture_share)
     known, undetected, births = people(rng, tracks, 10), people(rng, unseen, 0), people(rng, 2, 0)
     births = GaussianMixture(np.full(2, 0.2), births.means, births.covariances, births.labels)
     places = np.concatenate([known.means, undetected.means, births.means[:1]])
     boxes, sigmas = seen(model, places, rng)
     starts = np.cumsum([0, *(len(one) for one in boxes)])
-    (
-        existences, means, covariances, labels, next_label, left, unseen_means, unseen_covariances,
-        p_d, by, best, share, cameras, names, what, chance, values, noises, free,
-    ) = step.predict_and_update(
-        *(known.weights, known.means, known.covariances, known.labels, 20),
-        *(undetected.weights, undetected.means, undetected.covariances),
-        *(np.concatenate(boxes), np.concatenate(sigmas), starts, TRANSITION, NOISE[None], P_S),
-        *(births.weights, births.means, births.covariances),
-        *(FACTOR, *model.transforms, model.unscented, *model.numbers, model.drift(6), low_share),
-        *(*stacked(CAMERAS), CLUTTER, GATE, True, P_D, CONFIRMED, STRENGTH, NEAR, COVERED),
-        *(TOLERANCE, ITERATIONS, TOLD, LEAST),
-    )  # fmt: skip
+    found = step.predict_and_update(
+        Tracks(known.weights, known.means, known.covariances, known.labels),
+        20,
+        undetected.gaussians,
+        step.CameraBoxes(np.concatenate(boxes), np.concatenate(sigmas), starts),
+        step.StepModel(
+            motion=step.Motion(TRANSITION, NOISE[None], P_S),
+            births=births.gaussians,
+            transform=model.transform,
+            sigma_factor=FACTOR,
+            target=model.target(6),
+            cameras=stacked(CAMERAS),
+            clutter=CLUTTER,
+            update=CAMERA_MODEL,
+            least_existence=LEAST,
+        ),
+    )
+    existences, means, covariances, labels = found.tracks
+    left, unseen_means, unseen_covariances = found.undetected
+    p_d, by, best, share = found.record
+    cameras, names, what, chance = found.pairs
+    values, noises = found.measurements
+    next_label, free = found.next_label, found.unexplained
     wanted = one_by_one(model, known, undetected, births, boxes, sigmas, 20)
     assert len(existences) > tracks, "somebody is new"
     assert next_label == wanted["next"]
@@ -154,12 +184,12 @@ def test_one_call_is_all_cameras(update: Any, tracks: int, unseen: int, low_shar
         (np.column_stack([cameras, names, what, chance]), np.array(wanted["told"])),
     ):  # fmt: skip
         assert_allclose(one, other, rtol=1e-8, atol=1e-10)
-    transform, _ = model.transforms
+    transform = model.transform.matrix
     assert_allclose(values, np.concatenate(boxes) @ transform.T, rtol=1e-12)
     assert noises.shape == (len(values), 3, 3)
 
 
-def test_the_kept_are_neither_faint_nor_strayed_nor_doubles_nor_too_many() -> None:
+def test_the_kept_are_neither_faint_nor_strayed_nor_duplicates_nor_too_many() -> None:
     rng = np.random.default_rng(3)
     low, high = np.full(3, -1.0), np.full(3, 1.0)
     for _ in range(30):
@@ -171,11 +201,13 @@ def test_the_kept_are_neither_faint_nor_strayed_nor_doubles_nor_too_many() -> No
             i for i in range(count) if existences[i] >= 0.2 and (np.abs(means[i, :3]) <= 1.0).all()
         ]
         order = np.array(sorted(alive, key=lambda i: -existences[i])[:5], dtype=np.int64)
-        double = linear_algebra.doubles(
+        duplicate = linear_algebra.duplicates(
             means[order], existences[order], labels[order],
             np.ascontiguousarray(sources[:, order]), 0.8, CONFIRMED,
         )  # fmt: skip
         found = step.kept_tracks(
-            existences, means, labels, sources, 0.2, low, high, 5, 0.8, CONFIRMED
+            Tracks(existences, means, np.zeros((count, 6, 6)), labels),
+            sources,
+            step.KeepingRule(0.2, low, high, 5, 0.8, CONFIRMED),
         )
-        assert found.tolist() == order[~double].tolist()
+        assert found.tolist() == order[~duplicate].tolist()

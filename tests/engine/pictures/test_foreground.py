@@ -13,8 +13,9 @@ from numpy.testing import assert_array_equal
 
 from tests.engine.rooms import SKIN, clip, empty_room, person_mask, photograph, with_person
 from tracker import foreground
-from tracker.foreground import BackgroundModel, LearntForeground, kernels, tone_curve
-from tracker.kernels import images
+from tracker.foreground import BackgroundModel, LearntForeground, tone_curve
+from tracker.kernels.pictures import images
+from tracker.kernels.pictures.foreground import level_medians, upper_medians
 
 
 def learnt(gains: ndarray) -> BackgroundModel:
@@ -156,19 +157,20 @@ def test_medians_agree_with_sorting(count: int) -> None:
     rng = np.random.default_rng(count)
     values = rng.choice(np.array([0, 3, 16, 17, 200, 255], dtype=np.uint8), (count, 2500))
     values[:, 1000:] = rng.integers(0, 256, (count, 1500))
-    assert_array_equal(kernels.upper_medians(values), np.sort(values, axis=0)[count // 2])
+    assert_array_equal(upper_medians(values), np.sort(values, axis=0)[count // 2])
 
 
 def test_medians_of_levels_agree_with_counting_one_by_one() -> None:
     rng = np.random.default_rng(4)
     source = rng.integers(0, 200, (900, 3), dtype=np.uint8)
     target = rng.integers(0, 256, (900, 3), dtype=np.uint8)
-    totals, sums, medians = kernels.level_medians(source, target, 16)
+    found = level_medians(source, target, 16)
+    totals, medians = found.totals, found.medians
     for channel in range(3):
         for group in range(16):
             here = source[:, channel] // 16 == group
             assert totals[channel, group] == here.sum()
-            assert sums[channel, group] == source[here, channel].sum()
+            assert found.sums[channel, group] == source[here, channel].sum()
             values = np.sort(target[here, channel])
             assert medians[channel, group] == (values[(len(values) - 1) // 2] if len(values) else 0)
     assert (totals[:, 13:] == 0).all()

@@ -83,7 +83,11 @@ class Appearance:
         self.model = read_templates(sequence, colour_space, histogram_kernel, reader)
         camera, room, half_extents = view.camera, sequence.room, sequence.target_half_extents
         # no parameter has a say in it, so that a moved slider does not wait for it again
-        numbers = (*camera.numbers, room.minimum, room.maximum, half_extents)
+        lens = camera.calibration
+        numbers = (
+            *(lens.rotation, lens.translation, lens.intrinsics, lens.distortion),
+            *(room.minimum, room.maximum, half_extents),
+        )
         self.sizes = reader.once(
             ("sizes", camera.image_size, *(number.tobytes() for number in numbers)),
             lambda: BoxSizes.of(camera, room, half_extents),

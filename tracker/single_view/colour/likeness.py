@@ -10,6 +10,7 @@ from numpy import ndarray
 from scipy.special import softmax
 
 from tracker import colour
+from tracker.boxes import Boxes
 from tracker.colour import ColourModel
 from tracker.parameters import ColourPhdParams
 from tracker.sequences.frames import FrameReader
@@ -62,8 +63,8 @@ class Likeness:
         """
         people = len(self._model.names)
         height, width = picture.shape[:2]
-        low = np.floor(np.clip(boxes[:, :2] - boxes[:, 2:] - 1.0, 0.0, [width, height]))
-        high = np.ceil(np.clip(boxes[:, :2] + boxes[:, 2:] + 2.0, 0.0, [width, height]))
+        low = np.floor(np.clip(Boxes(boxes).low - 1.0, 0.0, [width, height]))
+        high = np.ceil(np.clip(Boxes(boxes).high + 2.0, 0.0, [width, height]))
         told = np.full((len(boxes), people), 1.0 / people)
         inside = np.flatnonzero((high > low).all(axis=1))
         if not len(inside):

@@ -13,6 +13,7 @@ from jaxtyping import Float, UInt8
 from numpy import ndarray
 
 from tracker.blobs import blobs
+from tracker.boxes import Boxes
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.foreground import ForegroundModel, box_shares, integral, learn
 from tracker.parameters import ForegroundParams, JpdaParams, RunParameters
@@ -150,8 +151,7 @@ class _Foreground:
         if self._sizes is None:
             boxes = blobs(found.mask, self._minimum_area).boxes
             pieces = boxes
-            edges = np.concatenate([boxes[:, :2] - boxes[:, 2:], boxes[:, :2] + boxes[:, 2:]], 1)
-            scores = box_shares(integral(found.mask), edges)
+            scores = box_shares(integral(found.mask), Boxes(boxes).corners)
         else:
             targets = crowns(found.mask, self._sizes, self._minimum_area)
             boxes, pieces, scores = targets.boxes, targets.pieces, targets.inside
