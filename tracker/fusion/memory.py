@@ -8,13 +8,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.optimize import linear_sum_assignment
-from scipy.stats import chi2
 
 from tracker.filters import gaussian_mixture
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.model import CONFIRMED, FusionModel
 
-_REACH = float(chi2.ppf(0.9, df=3))
+_REACH = gaussian_mixture.gate_distance(0.9, 3)
 """Squared Mahalanobis distance within which a newcomer may be somebody lately lost."""
 
 

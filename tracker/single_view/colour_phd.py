@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
-from scipy.stats import chi2
 
 from tracker.filters import gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
@@ -27,7 +26,7 @@ from tracker.single_view.box_sizes import entrance_boxes
 from tracker.single_view.colour.peaks import PeakFinder, Peaks
 from tracker.single_view.protocol import ViewResult
 
-GATE = float(chi2.ppf(0.9999, df=4))
+GATE = gaussian_mixture.gate_distance(0.9999, 4)
 """Squared Mahalanobis distance: a person's own peak lies inside with this probability."""
 
 

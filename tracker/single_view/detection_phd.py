@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
-from scipy.stats import chi2
 
 from tracker.filters import gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
@@ -24,7 +23,7 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.detector_boxes import Detected, DetectorBoxes, trust
 from tracker.single_view.protocol import ViewResult
 
-GATE = float(chi2.ppf(0.9999, df=4))
+GATE = gaussian_mixture.gate_distance(0.9999, 4)
 """Squared Mahalanobis distance: a person's own box lies inside with this probability."""
 
 BELIEVED = 0.5

@@ -7,7 +7,9 @@ from typing import Any
 
 from latex2mathml.converter import convert
 
-_CODE = re.compile(r"^(?P<fence>`{3,})(?P<kind>\S*)[^\n]*\n(?P<body>.*?)^(?P=fence)$|`[^`\n]+`", re.M | re.S)
+_CODE = re.compile(
+    r"^(?P<fence>`{3,})(?P<kind>\S*)[^\n]*\n(?P<body>.*?)^(?P=fence)$|`[^`\n]+`", re.M | re.S
+)
 _INLINE = re.compile(r"(?<![\\$])\$(?!\s)([^$\n]+?)(?<!\s)\$(?!\d)")
 
 
@@ -17,7 +19,9 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
     for code in _CODE.finditer(markdown):
         parts.append(_inline(markdown[at : code.start()]))
         if code["kind"] == "math":
-            parts.append(f'<div class="equation">{convert(code["body"].strip(), display="block")}</div>\n')
+            parts.append(
+                f'<div class="equation">{convert(code["body"].strip(), display="block")}</div>\n'
+            )
         else:
             parts.append(code[0])
         at = code.end()

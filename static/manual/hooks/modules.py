@@ -54,8 +54,8 @@ def _index(rooms: dict[str, list[str]]) -> str:
     lines = [
         "# API",
         "",
-        "The engine, `tracker`, is a library of its own: arrays in, arrays out, and neither web nor",
-        "viewer. These pages are made from its docstrings, without running it. Start with",
+        "The engine, `tracker`, is a library of its own: arrays in, arrays out, and neither web",
+        "nor viewer. These pages are made from its docstrings, without running it. Start with",
         "[`tracker.pipeline`](modules.md#tracker.pipeline) and the [examples](../examples.md).",
         "",
         "The routes of a running workbench, with their types, are at `/docs` of its address.",
