@@ -30,4 +30,5 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
 
 
 def _inline(text: str) -> str:
-    return _INLINE.sub(lambda found: convert(found[1]), text)
+    # in a span: Markdown takes an element that it does not know for a block of its own
+    return _INLINE.sub(lambda found: f"<span>{convert(found[1])}</span>", text)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from pathlib import Path
 
 from mkdocs.config.defaults import MkDocsConfig
@@ -10,6 +11,8 @@ from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).resolve().parents[3]
 PACKAGE = "tracker"
+
+_ROLE = re.compile(r":(?:func|class|attr|meth|mod|data|exc|const):<code>~?")
 
 
 def modules() -> dict[str, list[str]]:
@@ -86,3 +89,8 @@ def on_files(files: Files, *, config: MkDocsConfig) -> Files:
     for address, text in pages().items():
         files.append(File.generated(config, address, content=text))
     return files
+
+
+def on_page_content(html: str, **_: object) -> str:
+    """MkDocs asks this of every page: docstrings name things by the roles of Sphinx."""
+    return _ROLE.sub("<code>", html)
