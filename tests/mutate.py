@@ -88,7 +88,7 @@ def copy(folder: Path) -> Path:
     return folder
 
 
-def tested(root: Path, tests: tuple[str, ...]) -> tuple[int, str]:
+def outcome(root: Path, tests: tuple[str, ...], seconds: float = SECONDS) -> tuple[int, str]:
     """pytest's status in a copy of the tree, and what it said."""
     environment = {
         **os.environ,
@@ -102,10 +102,10 @@ def tested(root: Path, tests: tuple[str, ...]) -> tuple[int, str]:
     line += ["-W", "ignore::RuntimeWarning", *tests]
     try:
         done = subprocess.run(
-            line, cwd=root, env=environment, capture_output=True, text=True, timeout=SECONDS
+            line, cwd=root, env=environment, capture_output=True, text=True, timeout=seconds
         )
     except subprocess.TimeoutExpired:
-        return FAILED, f"not done within {SECONDS:.0f} s"
+        return FAILED, f"not done within {seconds:.0f} s"
     return done.returncode, done.stdout + done.stderr
 
 
@@ -129,7 +129,7 @@ def dies(mutant: Mutant, copies: Queue[Path]) -> tuple[bool, float]:
     root, begin = copies.get(), time.monotonic()
     try:
         with changed(mutant, root):
-            status, said = tested(root, mutant.tests)
+            status, said = outcome(root, mutant.tests)
     finally:
         copies.put(root)
     if status not in (PASSED, FAILED):
@@ -149,7 +149,7 @@ def try_all(mutants: list[Mutant], workers: int) -> int:
         every = sorted({test for mutant in mutants for test in mutant.tests})
         shares = [tuple(every[number::workers]) for number in range(workers)]
         roots = [Path(folder) / str(number) for number in range(workers)]
-        for status, said in pool.map(tested, roots, shares):
+        for status, said in pool.map(outcome, roots, shares, [len(every) * SECONDS] * workers):
             if status != PASSED:
                 raise Unfit(f"the tests do not pass without a change:\n{said[-4000:]}")
         lived = 0

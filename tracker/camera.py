@@ -22,6 +22,7 @@ NEAREST_DEPTH = 0.05
 """Metres: a point nearer than this in front of the lens counts as behind the camera."""
 
 _LENS_ITERATIONS = 12
+"""Of Newton's method at most, which doubles the digits with each."""
 
 _CORNER_SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 

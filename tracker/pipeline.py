@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from tracker import fusion
 from tracker import trajectories as tracks_stage
 from tracker.parameters import RunParameters, Stage
+from tracker.runs.fitting import default_parameters
 from tracker.runs.run import Cancelled, Progress, Run, stage_keys
 from tracker.runs.single_views import Cancel, SingleViews
 from tracker.runs.stage_cache import FusionColumn, StageCache, ViewColumn
@@ -22,26 +23,6 @@ __all__ = [
 
 PROGRESS_SECONDS = 0.05
 """At most this often a run tells how far it is."""
-
-
-def default_parameters(sequence: Sequence) -> RunParameters:
-    """Which methods follow from what the sequence has: pictures with templates, or boxes.
-
-    People are fused by ``multi_bernoulli`` in either case.
-
-    Raises:
-        ValueError: If the sequence has neither.
-    """
-    if sequence.has_pictures and sequence.templates:
-        return RunParameters(single_view="colour_phd", fusion_method="multi_bernoulli")
-    if sequence.has_detections:
-        return RunParameters(single_view="none", fusion_method="multi_bernoulli")
-    if sequence.has_pictures:
-        return RunParameters(single_view="colour_phd", fusion_method="multi_bernoulli")
-    raise ValueError(
-        f"{sequence.name}: every camera needs pictures (video or images), or every camera "
-        "needs detections; add what is missing to sequence.toml"
-    )
 
 
 def compute(
@@ -150,12 +131,12 @@ class _Telling:
     def _extract(self) -> Trajectories:
         run = self._run
         p = run.parameters.fusion
-        sequential = run.parameters.fusion_method == "sequential_phd"
+        used = run.parameters.method("fusion_method").used(run.parameters)
         return tracks_stage.extract(
             run.fused[run.done :],
             cameras=len(run.sequence.views),
             extraction_threshold=p.extraction_threshold,
-            rule=p.extraction if sequential else "components",
+            rule=p.extraction if used.reads_number("fusion", "extraction") else "components",
             bounds=Bounds(
                 run.sequence.room,
                 p.room_margin,

@@ -27,7 +27,8 @@ import numpy as np
 from tracker import pipeline
 from tracker.camera import Camera
 from tracker.kernels import compilation
-from tracker.parameters import METHODS, PRESETS, RunParameters, with_values
+from tracker.parameters import METHODS, PRESETS, MethodKey, RunParameters, with_values
+from tracker.parameters.registry import FOLLOWING, ORIGINS, REGISTERED
 from tracker.sequences.sequence import Detections, Entrance, Room, Sequence, Template, View
 
 STEPS = 36
@@ -46,10 +47,6 @@ _COLOURS = ((40, 40, 220), (220, 60, 40))
 
 HALVES = ("first", "second")
 """Two processes' work: the fusion's step is the longest to compile, and goes by itself."""
-
-_FUSION = "multi_bernoulli"
-_FIRST = ("colour_phd", "none")
-"""What a sequence starts with: for pictures, for boxes."""
 
 _OTHER_WAYS = (
     {"fusion.update": "unscented"},
@@ -74,6 +71,10 @@ def compile_kernels(
         ready: Called by the first half when the methods that a sequence starts with have the
             kernels that cannot run as plain Python.
     """
+    for methods in REGISTERED.values():
+        for method in methods.values():
+            if method.name not in ORIGINS:
+                method.load()  # its kernels are counted from the beginning
     with (
         tempfile.TemporaryDirectory() as folder,
         compilation.followed(lambda: told(*compilation.counts())),
@@ -81,8 +82,8 @@ def compile_kernels(
         recording = _recording(Path(folder))
         if half == HALVES[0]:
             with compilation.only_of_pixels():
-                for single_view in _FIRST:
-                    pipeline.compute(recording, _chosen(single_view, _FUSION))
+                for single_view in FOLLOWING:
+                    pipeline.compute(recording, RunParameters(single_view=single_view))
             ready()
         for parameters in _ways(half):
             pipeline.compute(recording, parameters)
@@ -93,24 +94,24 @@ def _ways(half: str) -> Iterable[RunParameters]:
     of_views = (
         with_values(RunParameters(), {**preset, "single_view": single_view})
         for preset in PRESETS.values()
-        for single_view in METHODS["single_view"]
+        for single_view in _own("single_view")
     )
     of_fusions = (
         with_values(
             RunParameters(), {"single_view": "none", **values, "fusion_method": fusion_method}
         )
         for values in (*PRESETS.values(), *_OTHER_WAYS)
-        for fusion_method in METHODS["fusion_method"]
+        for fusion_method in _own("fusion_method")
     )
     if half == HALVES[0]:
-        return chain([_chosen("none", _FUSION)], of_fusions)
-    return chain([_chosen("detection_phd", "sequential_phd")], of_views)
+        return chain([RunParameters(single_view="none")], of_fusions)
+    boxes = RunParameters(single_view="detection_phd", fusion_method="sequential_phd")
+    return chain([boxes], of_views)
 
 
-def _chosen(single_view: str, fusion_method: str) -> RunParameters:
-    return with_values(
-        RunParameters(), {"single_view": single_view, "fusion_method": fusion_method}
-    )
+def _own(key: MethodKey) -> list[str]:
+    """The methods of this project: another package compiles its kernels when they are called."""
+    return [name for name in METHODS[key] if name not in ORIGINS]
 
 
 def _recording(folder: Path) -> Sequence:

@@ -15,7 +15,7 @@ import tyro
 from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subcommand
 
 from tracker import parameters as table
-from tracker.parameters import METHODS, PRESETS, Parameter, ParameterError
+from tracker.parameters import FOLLOWS, METHODS, PRESETS, Parameter, ParameterError
 
 DEFAULT_SEQUENCE = "room44-3p"
 
@@ -55,7 +55,7 @@ class Track:
     """The file to write. It appears when it is complete."""
     single_view: Annotated[
         str | None,
-        arg(metavar="|".join(METHODS["single_view"]), help_behavior_hint="(default: what fits)"),
+        arg(metavar="|".join(METHODS["single_view"]), help_behavior_hint=f"({FOLLOWS})"),
     ] = None
     """Method of stage 1."""
     fusion_method: Annotated[
@@ -63,7 +63,7 @@ class Track:
         arg(
             name="fusion",
             metavar="|".join(METHODS["fusion_method"]),
-            help_behavior_hint="(default: what fits)",
+            help_behavior_hint=f"(default: {table.RunParameters().fusion_method})",
         ),
     ] = None
     """Method of stage 2."""

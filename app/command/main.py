@@ -299,8 +299,9 @@ def _parameters() -> None:
         "fusion_method": "Method of stage 2 (--fusion).",
     }
     defaults = table.RunParameters()
-    rows = [
-        (key, "", "|".join(choices), "", show(table.value(defaults, key)), methods[key])
+    chosen = {"fusion_method": defaults.fusion_method, "single_view": table.FOLLOWS}
+    rows: list[tuple[str, ...]] = [
+        (key, "", "|".join(choices), "", chosen[key], methods[key])
         for key, choices in table.METHODS.items()
     ]
     rows += [

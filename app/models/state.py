@@ -134,6 +134,9 @@ class State(Model):
     command: str
     """The command that computes the same in a terminal; empty while nothing is open."""
     methods: MethodsInfo
+    unfit: dict[str, dict[str, str]]
+    """Methods that cannot work on the sequence with the values chosen: by ``single_view`` or
+    ``fusion_method``, the sentence why by the method's name."""
     presets: list[str]
     """Names of those that a person has saved."""
     preset: str | None
@@ -172,6 +175,8 @@ class ParameterInfo(Model):
     log: bool
     choices: list[str]
     advanced: bool
+    essential: bool
+    """Among the few that are shown first."""
 
 
 class GroupInfo(Model):

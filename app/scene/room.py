@@ -25,6 +25,8 @@ LARGE = 12.0
 GRID_MARGIN = 1.0
 """Metres that the floor reaches beyond the volume."""
 RIM_POINTS = 48
+LARGEST_FRUSTUM = 1.6
+"""Metres that a frustum reaches, however large the room."""
 FRUSTUM_WIDTH = 320
 """Pixels of the picture on a frustum."""
 BACKDROP_WIDTH = 960
@@ -188,7 +190,8 @@ class FrustumNodes:
         while len(self._handles) < len(cameras):
             self._grow()
         corners = geometry.box_corners(room.minimum, room.maximum)
-        self._size = 0.115 * float(np.linalg.norm(room.maximum - room.minimum))
+        size = 0.115 * float(np.linalg.norm(room.maximum - room.minimum))
+        self._size = min(size, LARGEST_FRUSTUM)
         self._through = through
         tags: list[Tag] = []
         for index, camera in enumerate(cameras):

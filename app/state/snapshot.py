@@ -11,8 +11,9 @@ from typing import Any, Literal
 from app.colours import Theme
 from app.state.scores import Scores
 from tracker import parameters as table
-from tracker.parameters import RunParameters
+from tracker.parameters import MethodKey, RunParameters
 from tracker.pipeline import Run
+from tracker.runs.fitting import unfit_methods
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
@@ -111,6 +112,8 @@ class Snapshot:
     presets: Presets = field(default_factory=lambda: MappingProxyType({}))
     playhead: int = 0
     playhead_origin: str = ""
+    sought: bool = False
+    """Whether the playhead was moved since the sequence was opened."""
     selection: int | None = None
     run: Run | None = None
     """What is shown; steps below its ``done`` are there."""
@@ -139,6 +142,13 @@ class Snapshot:
             if own == {k: v for k, v in meant.items() if v != table.value(self.defaults, k)}:
                 return name
         return None
+
+    @property
+    def unfit(self) -> dict[MethodKey, dict[str, str]]:
+        """The methods that cannot work on the open sequence, each with the reason."""
+        if self.sequence is None:
+            return {key: {} for key in table.METHODS}
+        return unfit_methods(self.sequence, self.parameters)
 
     def named(self, sequence: Sequence) -> Sequence:
         """What a run was made of, by its name now: it is another since a copy was saved."""

@@ -21,6 +21,7 @@ from starlette.types import Scope
 from app import errors
 from app.errors import sentence
 from app.paths import static_folder
+from app.state import opening_step
 from app.state.compiling import Compiling
 from app.state.evaluator import Evaluator
 from app.state.history import History
@@ -154,6 +155,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
     told.start()
+    opening_step.follow(workbench)
     room = _Room(workbench, teaching)
     if settings.with_viser:
         door.prepare()

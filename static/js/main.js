@@ -7,8 +7,10 @@ import { mountControls, pressed } from "./panes/controls.js";
 import { mountLayout } from "./panes/layout.js";
 import { mountNotes } from "./panes/notes.js";
 import { mountSheets } from "./panes/sheets.js";
+import { mountPlaces } from "./panes/places.js";
 import { mountTimeline } from "./panes/timeline.js";
 import { mountTop } from "./panes/top.js";
+import { mountTour } from "./panes/tour.js";
 import { mountView3d } from "./panes/view3d.js";
 import { createPlayback } from "./play/playback.js";
 import { createActions } from "./state/actions.js";
@@ -54,7 +56,9 @@ const context = {
 	press: (event) => pressed(event, store, actions),
 };
 mountTop(one(".top"), context);
+mountPlaces(one(".places"), context);
 mountNotes(one(".notes"), context);
+mountTour(one(".tour"), context);
 mountView3d(one(".view"), context);
 mountCameras(one(".cams"), context);
 mountSide(one(".side"), context);

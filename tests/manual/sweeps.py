@@ -13,6 +13,7 @@ from tests.manual.places import RECORDS
 from tracker import pipeline
 from tracker.evaluation import evaluate_sequence
 from tracker.parameters import PARAMETERS, Parameter, RunParameters, with_values
+from tracker.parameters.registry import REGISTERED
 from tracker.pipeline import Run
 from tracker.sequences.library import open_sequence
 from tracker.sequences.reader import read_sequence
@@ -107,7 +108,9 @@ def _base(group: str, parameter: Parameter) -> dict[str, Any]:
     if group in ("fusion", "foreground"):
         changes["single_view"] = "colour_phd"
     else:
-        changes["single_view"] = "none" if group == "detection_boxes" else group
+        changes["single_view"] = next(
+            name for name, method in REGISTERED["single_view"].items() if method.own_group == group
+        )
     # a help text that begins with one of a choice's values tells what it belongs to
     word = parameter.help.partition(":")[0].strip().lower().replace(" ", "_")
     for other in PARAMETERS.values():

@@ -15,8 +15,6 @@ from jaxtyping import Float, Int, UInt8, UInt16
 from numpy import ndarray
 
 from tracker.foreground.exposure import (
-    DARKEST_SHADOW,
-    SHADOW_TINT,
     BackgroundModel,
     median,
     tone_curve,
@@ -34,14 +32,10 @@ ITERATIONS = 20
 """Of the c-means at most; most come to rest after five to eight."""
 
 CLOSING = np.ones((3, 3), dtype=np.uint8)
+"""Gaps that are closed, as published."""
+
 AROUND_FOREGROUND = np.ones((5, 5), dtype=np.uint8)
 """What is this near to the foreground does not change the background."""
-
-BLINDING = 0.6
-"""A picture of which more than this share differs shows another scene or another light."""
-
-BLANK = 4.0
-"""A picture whose grey levels deviate by less than this shows nothing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,12 +162,12 @@ class AdaptiveForeground:
         difference = cv2.absdiff(picture, shown)
         if p.drop_shadows:
             clear_shadows(
-                difference, picture, shown, DARKEST_SHADOW, SHADOW_TINT, p.least_threshold
+                difference, picture, shown, p.darkest_shadow, p.shadow_tint, p.least_threshold
             )
         thresholds = self.thresholds(difference)
         different = above(difference, thresholds)
         share = cv2.countNonZero(different) / different.size
-        if share > BLINDING or cv2.meanStdDev(picture)[1].max() < BLANK:
+        if share > p.blinding_share or cv2.meanStdDev(picture)[1].max() < p.blank_deviation:
             return state, Segmentation(np.zeros_like(different), thresholds)
         mask = clean(different, p.minimum_area)
         after = update_background(

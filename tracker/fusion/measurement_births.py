@@ -16,7 +16,7 @@ from tracker.kernels.births import Refinement
 from tracker.kernels.gating import Measurements
 from tracker.sequences.sequence import Room
 
-_REFINEMENTS = 3
+_REFINEMENTS = 3  # Gauss-Newton steps: from where two rays meet, the third moves hardly
 _MOST_SEEDS = 1000  # of a crowd of boxes that nobody explains, where the rays meet best
 _START_SIGMA = 1.0  # metres: how loosely the meeting point of two rays binds the refinement
 _UNEXPLAINED = 0.5  # a box that somebody made with more than this probability starts nobody

@@ -13,9 +13,6 @@ from tracker.filters import gaussian_mixture
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.model import CONFIRMED, FusionModel
 
-_REACH = gaussian_mixture.gate_distance(0.9, 3)
-"""Squared Mahalanobis distance within which a newcomer may be somebody lately lost."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Memory:
@@ -74,7 +71,7 @@ def recall(
     bearers = _first_of_each(labels, (mixture.weights > CONFIRMED).nonzero()[0])
     missing = _missing(memory, labels[bearers], model, first_label)
     if missing.lost.size and len(bearers):
-        labels, back = _returned(missing, mixture.take(bearers), labels)
+        labels, back = _returned(missing, mixture.take(bearers), labels, model.memory_reach)
         missing = missing.take(~back)
     known = GaussianMixture(
         mixture.weights.take(bearers),
@@ -121,7 +118,7 @@ def _missing(
 
 
 def _returned(
-    memory: Memory, people: GaussianMixture, labels: Int[ndarray, " J"]
+    memory: Memory, people: GaussianMixture, labels: Int[ndarray, " J"], reach: float
 ) -> tuple[Int[ndarray, " J"], Bool[ndarray, " L"]]:
     """The labels with the old names of those who are back, and which of the lost these are."""
     lost, back = memory.lost, np.zeros(memory.lost.size, dtype=bool)
@@ -129,7 +126,7 @@ def _returned(
     spread = lost.covariances[:, None, :3, :3] + people.covariances[None, :, :3, :3]
     solved = np.linalg.solve(spread, offsets[..., None])[..., 0]
     distances = (offsets * solved).sum(axis=2)
-    may = (distances <= _REACH) & (people.labels[None, :] >= memory.newer[:, None])
+    may = (distances <= reach) & (people.labels[None, :] >= memory.newer[:, None])
     if not may.any():
         return labels, back
     labels = labels.copy()

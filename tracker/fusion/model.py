@@ -21,7 +21,8 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 
 CONFIRMED = 0.5
-"""A component surer than this stands for a person: it may hide others."""
+"""A component surer than this stands for a person, who may hide others: he is there more likely
+than not."""
 
 
 class FusionModel:
@@ -33,7 +34,7 @@ class FusionModel:
         self.cameras = sequence.cameras
         self.step_time = sequence.step_time
         self.target = TargetModel(
-            sequence.target_half_extents, p.measurement, p.update, p.posture_share
+            sequence.target_half_extents, p.measurement, p.update, p.posture_share, p
         )
         self.motion = models.Motion.of(p, sequence.step_time)
         self.births = self.motion.at_rest(
@@ -49,6 +50,8 @@ class FusionModel:
         """κ of each camera, per unit of the measurement space."""
         self.gate = gaussian_mixture.gate_distance(p.gate_probability, self.target.size)
         """Squared Mahalanobis distance of the innovation."""
+        self.memory_reach = gaussian_mixture.gate_distance(p.memory_gate_probability, 3)
+        """Squared Mahalanobis distance within which a newcomer may be somebody lately lost."""
         self.near = p.duplicate_distance * 2.0 * float(np.mean(sequence.target_half_extents[:2]))
         """Metres within which two components may be one person."""
         margin = p.followed_margin

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,9 +28,11 @@ from tracker.kernels.boxes import Occlusion
 from tracker.kernels.labelled import step as step_kernels
 from tracker.kernels.labelled.camera_update import CameraModel, Tracks
 from tracker.kernels.labelled.step import KeepingRule, Motion, StepModel
-from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
+
+if TYPE_CHECKING:
+    from tracker.parameters import RunParameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,8 +55,8 @@ class MultiBernoulli:
     and so do unexplained boxes of several cameras that agree on a place.
     """
 
-    def __init__(self, sequence: Sequence, parameters: FusionParams) -> None:
-        p, model = parameters, FusionModel(sequence, parameters)
+    def __init__(self, sequence: Sequence, parameters: RunParameters) -> None:
+        p, model = parameters.fusion, FusionModel(sequence, parameters.fusion)
         self._parameters, self._model = p, model
         motion, target = model.motion, model.target
         births = model.births
@@ -133,7 +136,13 @@ class MultiBernoulli:
         recognised = state.identities
         if p.recognition:
             changed, recognised = reidentification.reidentify(
-                recognised, posterior, associations, views, lost.lost.labels, self._model.step_time
+                recognised,
+                posterior,
+                associations,
+                views,
+                lost.lost.labels,
+                self._model.step_time,
+                p,
             )
             if changed:
                 posterior, lost = posterior.relabelled(changed), lost.relabelled(changed)

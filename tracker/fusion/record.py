@@ -13,7 +13,7 @@ from tracker.fusion.protocol import Associations, FusionResult
 from tracker.kernels.linear_algebra import ToldPairs, sum_pairs
 
 WORTH_TELLING = 0.01
-"""Association probability below which a pair is not kept."""
+"""Association probability below which a pair is not told: a hundredth is no news to anybody."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

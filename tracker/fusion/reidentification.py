@@ -13,24 +13,13 @@ from scipy.optimize import linear_sum_assignment
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.model import CONFIRMED
 from tracker.fusion.protocol import Associations
+from tracker.parameters import FusionParams
 from tracker.single_view.protocol import ViewResult
 
-_DOUBT = 0.1
-"""Probability that a box's colours tell nothing of who it is."""
-
-_FRESH = 1.0
-"""Seconds after which a look counts as a new one: pictures of one moment agree, right or wrong."""
-
-_SWAP = 30.0
-"""Seconds in which a track may come to be of somebody else: no evidence lasts for ever."""
-
-_SURE = float(np.log(20.0))
-"""Log odds of the best naming against any without the pair, from which the pair holds."""
-
-_OWN = float(np.log(3.0))
-"""Log odds of a track's own looks, from which it may be named: nobody is by exclusion alone."""
-
 _NEVER = -1e3
+"""Instead of the log probability of a pair that may not be: e to this is 0 beside any other."""
+
+_DEFAULTS = FusionParams()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,6 +56,7 @@ def reidentify(
     views: Many[ViewResult],
     waiting: Int[ndarray, " L"],
     step_time: float,
+    parameters: FusionParams = _DEFAULTS,
 ) -> tuple[dict[int, int], Identities]:
     """Look at this step's boxes, and say which labels change.
 
@@ -77,6 +67,7 @@ def reidentify(
         views: The boxes with their likenesses; of less than two people nothing is told.
         waiting: Labels of people lost from sight, whose looks are kept.
         step_time: Δt, seconds.
+        parameters: How far colours are believed, and from which odds.
 
     Returns:
         New label by old one, each at most once on either side; and the identities after it.
@@ -84,15 +75,17 @@ def reidentify(
     people = max((view.likenesses.shape[1] for view in views), default=0)
     if people < 2:
         return {}, identities
-    labels, looks = _looked(identities, posterior, associations, views, people, waiting, step_time)
+    p, seen = parameters, (identities, posterior, associations, views, people, waiting, step_time)
+    labels, looks = _looked(*seen, p)
     owners = identities.owners if len(identities.owners) else np.full(people, -1, dtype=np.int64)
     sure = posterior.labels.compress(posterior.weights > CONFIRMED)
     told = looks.take(np.searchsorted(labels, sure), 0)
-    if _is_settled(told, sure, owners):
+    own_odds = float(np.log(p.recognition_own_odds))
+    if _is_settled(told, sure, owners, own_odds):
         return {}, Identities(labels, looks, owners)
     wanted: dict[int, int] = {}
     owners = owners.copy()
-    for track, person in _named(told):
+    for track, person in _named(told, own_odds, float(np.log(p.recognition_odds))):
         label = int(sure[track])
         if owners[person] < 0 and label not in owners:
             owners[person] = label
@@ -116,6 +109,7 @@ def _looked(
     people: int,
     waiting: Int[ndarray, " L"],
     step_time: float,
+    p: FusionParams,
 ) -> tuple[Int[ndarray, " K"], Float[ndarray, "K G"]]:
     """The labels that are there or waited for, ascending, and log π of each after this step."""
     labels = np.unique(np.concatenate([posterior.labels, waiting]))
@@ -124,7 +118,7 @@ def _looked(
         place = identities.labels.searchsorted(labels).clip(max=len(identities.labels) - 1)
         known = identities.labels.take(place) == labels
         before[known] = identities.looks.take(place.compress(known), 0)
-    leak = min(step_time / _SWAP, 1.0)
+    leak = min(step_time / p.recognition_swap, 1.0)
     beliefs = np.exp(before)
     looks = np.log((1.0 - leak) * beliefs / beliefs.sum(axis=1, keepdims=True) + leak / people)
     # a camera without a picture tells nothing
@@ -137,23 +131,25 @@ def _looked(
             strict=True,
         )
         likeness = np.array([views[camera].likenesses[box] for camera, box in pairs])
-        told = np.log((1.0 - _DOUBT) * likeness + _DOUBT / people)
-        share = associations.probabilities.take(rows).astype(float) * min(step_time / _FRESH, 1.0)
+        doubt = p.recognition_doubt
+        told = np.log((1.0 - doubt) * likeness + doubt / people)
+        fresh = min(step_time / p.recognition_interval, 1.0)
+        share = associations.probabilities.take(rows).astype(float) * fresh
         whose = labels.searchsorted(posterior.labels.take(associations.components.take(rows)))
         np.add.at(looks, whose, share[:, None] * told)
     return labels, looks
 
 
 def _is_settled(
-    looks: Float[ndarray, "n G"], labels: Int[ndarray, " n"], owners: Int[ndarray, " G"]
+    looks: Float[ndarray, "n G"], labels: Int[ndarray, " n"], owners: Int[ndarray, " G"], own: float
 ) -> bool:
     """Whether whoever may be named has that name already: so it is at nearly every step."""
     ordered = np.sort(looks, axis=1)
-    clear = ordered[:, -1] - ordered[:, -2] >= _OWN
+    clear = ordered[:, -1] - ordered[:, -2] >= own
     return bool((owners.take(looks.argmax(axis=1)) == labels).compress(clear).all())
 
 
-def _named(looks: Float[ndarray, "n G"]) -> list[tuple[int, int]]:
+def _named(looks: Float[ndarray, "n G"], own: float, odds: float) -> list[tuple[int, int]]:
     """The pairs of track and person that hold: one to one, with sure odds against any other."""
     count = len(looks)
     if not count:
@@ -166,15 +162,12 @@ def _named(looks: Float[ndarray, "n G"]) -> list[tuple[int, int]]:
     best = table[rows, columns].sum()
     pairs = []
     for track, person in zip(rows.tolist(), columns.tolist(), strict=True):
-        if (
-            person >= people
-            or scores[track, person] - np.delete(scores[track], person).max() < _OWN
-        ):
+        if person >= people or scores[track, person] - np.delete(scores[track], person).max() < own:
             continue
         without = table.copy()
         without[track, person] = 2.0 * _NEVER
         others = linear_sum_assignment(-without)
-        if best - without[others].sum() > _SURE:
+        if best - without[others].sum() > odds:
             pairs.append((track, person))
     return pairs
 

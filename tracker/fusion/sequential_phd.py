@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -24,9 +25,11 @@ from tracker.fusion.record import Ledger, Record
 from tracker.kernels import linear_algebra
 from tracker.kernels.gating import Measurements
 from tracker.kernels.intensity import mixture as mixture_kernels
-from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
+
+if TYPE_CHECKING:
+    from tracker.parameters import RunParameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,9 +69,9 @@ class SequentialPhd:
     one value of a parameter, and the ``published`` preset sets them all.
     """
 
-    def __init__(self, sequence: Sequence, parameters: FusionParams) -> None:
-        self._parameters = parameters
-        self._model = FusionModel(sequence, parameters)
+    def __init__(self, sequence: Sequence, parameters: RunParameters) -> None:
+        self._parameters = parameters.fusion
+        self._model = FusionModel(sequence, parameters.fusion)
 
     def start(self) -> SequentialPhdState:
         """Nobody is in the room."""

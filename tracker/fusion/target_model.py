@@ -14,6 +14,7 @@ from tracker.kernels import measurement
 from tracker.kernels.gating import Measurements
 from tracker.kernels.kalman import Alternative, Expected
 from tracker.kernels.measurement import Target, Transform
+from tracker.parameters import FusionParams
 from tracker.single_view.protocol import ViewResult
 
 MeasurementKind = Literal["centre", "box", "box_and_width"]
@@ -31,14 +32,7 @@ _FROM_BOX: dict[MeasurementKind, Float[ndarray, "m 4"]] = {
     ),
 }
 
-# a person who lies or bends, seen in perspective and from any side, against one who stands: in
-# half heights of the standing one, what his box should be and how far it may be off
-_POSTURE_HALF_HEIGHT, _POSTURE_HALF_WIDTH = 0.5, 0.6
-_POSTURE_SIGMAS = np.array(
-    [0.15, 0.15, 0.5, 0.25]
-)  # centre across and down, half width, half height
-_DROP = 0.3  # how far his middle moves from one camera's box to the next
-
+_DEFAULTS = FusionParams()
 _NO_COVARIANCES = np.zeros((0, 3, 3))
 
 
@@ -108,6 +102,7 @@ class TargetModel:
         kind: MeasurementKind,
         update: UpdateKind = "extended",
         posture_share: float = 0.0,
+        parameters: FusionParams = _DEFAULTS,
     ) -> None:
         """Prepare for targets of one size.
 
@@ -117,6 +112,7 @@ class TargetModel:
             update: How the bend of the projection is met.
             posture_share: Share of the boxes that show a person in another posture than upright:
                 lying, crouching, bent.
+            parameters: What the box of such a person should be, and how far it may be off.
         """
         self.kind: MeasurementKind = kind
         self.size = SIZES[kind]
@@ -130,22 +126,33 @@ class TargetModel:
         products = np.einsum("pa,qa->apq", transform, transform).reshape(4, self.size**2).copy()
         self.transform = Transform(transform, products)
         """What is measured of a box."""
-        noise = (_POSTURE_SIGMAS**2 @ products).reshape(self.size, self.size)
+        p = parameters
+        sigmas = np.array(
+            [
+                p.posture_centre_sigma,
+                p.posture_centre_sigma,
+                p.posture_width_sigma,
+                p.posture_height_sigma,
+            ]
+        )
+        noise = (sigmas**2 @ products).reshape(self.size, self.size)
         self._posture_noise = noise if self.posture_share else np.zeros((0, 0))
+        self._parameters = p
         self._targets: dict[int, Target] = {}
 
     def target(self, dimension: int) -> Target:
         """The target as kernels know it, for states of ``dimension``."""
         if dimension not in self._targets:
+            p = self._parameters
             drift = np.zeros((dimension, dimension))
-            drift[2, 2] = (_DROP * self.half_height) ** 2
+            drift[2, 2] = (p.posture_drop * self.half_height) ** 2
             self._targets[dimension] = Target(
                 self.half_height,
                 self.half_width,
                 self.size,
                 self.unscented,
-                _POSTURE_HALF_HEIGHT * self.half_height,
-                _POSTURE_HALF_WIDTH * self.half_height,
+                p.posture_height * self.half_height,
+                p.posture_width * self.half_height,
                 self._posture_noise,
                 drift,
                 self.posture_share,

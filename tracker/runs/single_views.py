@@ -12,7 +12,7 @@ import numpy as np
 
 from tracker import single_view
 from tracker.runs.run import Cancelled, Run
-from tracker.sequences.frames import FrameReader, Picture
+from tracker.sequences.frames import Picture, Pictures
 from tracker.single_view.colour.likeness import Likeness
 from tracker.single_view.protocol import SingleViewMethod, ViewResult
 
@@ -30,7 +30,7 @@ class SingleViews:
     def __init__(
         self,
         run: Run,
-        reader: FrameReader,
+        reader: Pictures,
         cancelled: Cancel,
         thread_begins: Callable[[], None] = lambda: None,
     ) -> None:
@@ -87,7 +87,7 @@ class SingleViews:
         method = single_view.create(
             run.parameters.single_view, run.sequence, camera, run.parameters, self._reader
         )
-        run.costly = run.costly or method.needs_pictures
+        run.costly = run.costly or _looks_at_pictures(run)
         state = run.view_states[camera] if run.view_states is not None else method.start()
         return _CameraWorker(method, state, camera, run, self._reader, self._is_stopped)
 
@@ -101,7 +101,7 @@ class _CameraWorker:
         state: Any,
         camera: int,
         run: Run,
-        reader: FrameReader,
+        reader: Pictures,
         stopped: Cancel,
     ) -> None:
         self._method = method
@@ -111,8 +111,9 @@ class _CameraWorker:
         self._frames = run.sequence.frames
         self._seed = run.seed
         self._stopped = stopped
-        self._pictures = reader.iterate(camera, self._frame) if method.needs_pictures else None
-        self._likeness = Likeness.of(run.sequence, reader) if method.needs_pictures else None
+        looks = _looks_at_pictures(run)
+        self._pictures = reader.iterate(camera, self._frame) if looks else None
+        self._likeness = Likeness.of(run.sequence, reader) if looks else None
 
     def block(self, steps: int) -> list[tuple[ViewResult, Any]]:
         """The next few steps: result and state of each; none at the end."""
@@ -129,14 +130,18 @@ class _CameraWorker:
         return done
 
 
-class _StoppingReader(FrameReader):
+def _looks_at_pictures(run: Run) -> bool:
+    return run.parameters.method("single_view").used(run.parameters).pictures
+
+
+class _StoppingReader:
     """The pictures of another reader, until the run is to stop: then :class:`Cancelled` is raised.
 
     A background or the templates take many pictures before the first step: nobody waits for
     the rest of them.
     """
 
-    def __init__(self, reader: FrameReader, stopped: Cancel) -> None:
+    def __init__(self, reader: Pictures, stopped: Cancel) -> None:
         self._reader = reader
         self._stopped = stopped
 
@@ -154,6 +159,3 @@ class _StoppingReader(FrameReader):
     def check(self) -> None:
         if self._stopped():
             raise Cancelled
-
-    def close(self) -> None:
-        """Whoever opened the other one closes it."""

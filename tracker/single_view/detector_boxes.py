@@ -13,8 +13,6 @@ from tracker.camera import Camera
 from tracker.parameters import DetectionBoxParams
 from tracker.sequences.sequence import Room, Sequence
 
-_DEPTH_SIGMAS = 3.0  # a box's size may be off by so many standard deviations
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detected:
@@ -55,7 +53,7 @@ class DetectorBoxes:
             view.camera,
             boxes,
             float(sequence.target_half_extents[2]),
-            _DEPTH_SIGMAS * sigmas[:, 3] / boxes[:, 3],
+            p.depth_sigmas * sigmas[:, 3] / boxes[:, 3],
         )
         plausible = meets(sequence.room, nearest, farthest, p.room_tolerance)
         self._found = Detected(boxes, scores, sigmas, plausible)

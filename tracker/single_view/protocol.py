@@ -94,8 +94,6 @@ class SingleViewMethod(Protocol):
     the background is learnt); its steps are pure: state in, state out.
     """
 
-    needs_pictures: bool
-
     def start(self) -> Any:
         """The state before the first step."""
         ...

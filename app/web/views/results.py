@@ -28,6 +28,7 @@ def state_of(snapshot: Snapshot) -> models.State:
         methods=models.MethodsInfo(
             single_view=parameters.single_view, fusion_method=parameters.fusion_method
         ),
+        unfit={str(key): names for key, names in snapshot.unfit.items()},
         presets=list(snapshot.presets),
         preset=snapshot.preset,
         playhead=snapshot.playhead,

@@ -11,6 +11,7 @@ from app.state.pairs import pairs_at
 from app.web.pictures.likelihood import key_of
 from tracker.boxes import Boxes
 from tracker.fusion.protocol import FusionResult
+from tracker.parameters import ColourPhdParams
 from tracker.pipeline import Run
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
@@ -42,7 +43,7 @@ def step_of(
     computed = run is not None and step < run.done
     likelihood = None
     if run is not None and sequence.templates:
-        likelihood = key_of(sequence, run.parameters.colour_phd)
+        likelihood = key_of(sequence, run.parameters.of(ColourPhdParams))
     cameras = [
         models.CameraStep(
             name=view.camera.name,

@@ -6,6 +6,8 @@ import { faded } from "./colours.js";
 import { stroke, trace } from "./canvas.js";
 
 const WHITE = "#f4f4f4";
+/** Of samples: no track and no line has it. */
+const SAMPLE = "#ffd84d";
 
 /**
  * @param {Box} box
@@ -163,8 +165,8 @@ function drawSamples(g, samples, scale) {
 	for (const [x, y, weight] of samples) {
 		g.globalAlpha = opacity * (0.25 + 0.75 * Math.sqrt(Math.max(0, weight) / heaviest));
 		for (const [colour, size] of /** @type {[string, number][]} */ ([
-			["rgb(0 0 0 / .5)", 3],
-			[WHITE, 1.5],
+			["rgb(0 0 0 / .7)", 4.5],
+			[SAMPLE, 3],
 		])) {
 			g.fillStyle = colour;
 			g.fillRect(Math.round(x * scale) - size / 2, Math.round(y * scale) - size / 2, size, size);

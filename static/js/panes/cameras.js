@@ -236,7 +236,7 @@ export function mountCameras(root, { store, actions, playback }) {
 								h(
 									"small",
 									{},
-									`, ${Math.round(100 * fed.share)} % sure, weight ${fed.weight.toFixed(2)}`,
+									`, ${Math.round(100 * fed.share)} % sure, weight ${show(Number(fed.weight.toPrecision(2)))}`,
 								),
 							]
 						: ["no box here"]),

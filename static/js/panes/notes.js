@@ -69,9 +69,12 @@ export function mountNotes(root, { store, actions, retry }) {
 				),
 			);
 		}
-		for (const { id, level, title, text, remedy } of notes) {
+		for (const { id, level, title, text, remedy, once } of notes) {
 			const kind = { error: "bad", warn: "warn", info: "busy" }[level];
-			const gone = () => store.set({ notes: store.get().notes.filter((other) => other.id !== id) });
+			const gone = () => {
+				store.set({ notes: store.get().notes.filter((other) => other.id !== id) });
+				if (once) store.set({ dismissed: [...store.get().dismissed, once] });
+			};
 			const mend = () => {
 				gone();
 				remedy?.act();

@@ -7,6 +7,7 @@ import { drawCardinality, drawErrors, drawParts } from "../draw/strips.js";
 import { isAlone, ordered, resultOf, scoresOf, trueCount } from "../state/events.js";
 import { faded, palette } from "../draw/colours.js";
 import { shownDone } from "../play/playback.js";
+import { hintLines, mountHint } from "./hint.js";
 import { mountTransport } from "./transport.js";
 
 /** @type {Pane} */
@@ -188,7 +189,7 @@ export function mountTimeline(root, context) {
 			const count = result ? `, ${result.tracks.length} people` : "";
 			seekBar.setAttribute(
 				"aria-valuetext",
-				`step ${at} of ${frames}, ${secondsOf(at, fps)} s${count}`,
+				`step ${at} of ${frames - 1}, ${secondsOf(at, fps)} s${count}`,
 			);
 		}
 		fill(
@@ -227,7 +228,10 @@ export function mountTimeline(root, context) {
 			if (lanes.children[index] !== label) lanes.insertBefore(label, lanes.children[index] ?? null);
 		});
 		const { run, sequence, laneOrder } = store.get();
-		write(order, laneOrder === "longest" ? "tracks, longest first" : "tracks, first born first");
+		const fit = Math.floor(lanes.clientHeight / token("h-lane"));
+		const words = laneOrder === "longest" ? "longest first" : "first born first";
+		// Who does not see all of them is told how many there are.
+		write(order, fit < tracks.length ? `${fit} of ${tracks.length}, ${words}` : `tracks, ${words}`);
 		const idle = tracks.length === 0 && sequence && run?.state !== "computing";
 		write(
 			empty,
@@ -247,14 +251,9 @@ export function mountTimeline(root, context) {
 		event.preventDefault();
 		plot.setPointerCapture(event.pointerId);
 		const box = plot.getBoundingClientRect();
-		const lane = Math.floor(
-			(event.clientY - box.top - above() + lanes.scrollTop) / token("h-lane"),
-		);
-		const inLanes =
-			event.clientY - box.top > above() && event.clientY - box.top < above() + lanes.clientHeight;
-		const track = shownTracks()[lane];
+		const track = laneAt(event);
 		const at = stepAt(event.clientX - box.left, view);
-		if (inLanes && track && at >= track.first && at <= track.last) actions.select(track.id);
+		if (track && at >= track.first && at <= track.last) actions.select(track.id);
 		store.set({ playing: 0 });
 		playback.seek(at);
 	});
@@ -268,9 +267,8 @@ export function mountTimeline(root, context) {
 			event.preventDefault();
 			const box = plot.getBoundingClientRect();
 			const { frames } = store.get();
-			const overLanes =
-				event.clientY - box.top > above() && lanes.scrollHeight > lanes.clientHeight;
-			if (overLanes && !event.ctrlKey && !event.shiftKey) lanes.scrollTop += event.deltaY;
+			// The wheel zooms wherever the plot is; beside it, over the names, it scrolls the lanes.
+			if (event.altKey) lanes.scrollTop += event.deltaY;
 			else if (event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY))
 				look(
 					panned(
@@ -283,6 +281,18 @@ export function mountTimeline(root, context) {
 		},
 		{ passive: false },
 	);
+	/** The track whose lane is under the pointer. @param {PointerEvent} event */
+	function laneAt({ clientY }) {
+		const y = clientY - plot.getBoundingClientRect().top - above();
+		if (y < 0 || y >= lanes.clientHeight) return undefined;
+		return shownTracks()[Math.floor((y + lanes.scrollTop) / token("h-lane"))];
+	}
+	mountHint(plot, (event) => {
+		const { sequence } = store.get();
+		if (!sequence) return [];
+		const at = stepAt(event.clientX - plot.getBoundingClientRect().left, view);
+		return hintLines(store.get(), at, laneAt(event));
+	});
 	actions.zoom = (factor) =>
 		look(
 			zoomed(

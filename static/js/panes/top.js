@@ -76,12 +76,18 @@ export function mountTop(root, { store, actions }) {
 		for (const [key, select] of Object.entries({ single_view, fusion_method })) {
 			const now = server?.parameters[key] ?? "";
 			const names = schema?.methods[key] ?? [];
+			const unfit = server?.unfit[key] ?? {};
 			fill(
 				select,
 				(names.includes(now) ? names : [now, ...names]).map((name) =>
-					h("option", { value: name }, name),
+					h(
+						"option",
+						{ value: name, title: unfit[name] },
+						unfit[name] ? `${name} · not here` : name,
+					),
 				),
 			);
+			select.title = unfit[now] ?? "";
 			select.value = now;
 			select.disabled = link !== "open" || !size;
 		}

@@ -35,7 +35,7 @@ export function mountTransport(root, { store, playback }) {
 
 	store.on(["shown", "sequence"], ({ shown, frames, fps }) => {
 		write(step, String(Math.max(0, shown)));
-		write(of, `/ ${frames}`);
+		write(of, `/ ${Math.max(0, frames - 1)}`);
 		write(seconds, secondsOf(Math.max(0, shown), fps));
 		// Room for the largest number, so that nothing moves sideways.
 		step.style.minWidth = `${String(frames).length}ch`;

@@ -1,6 +1,15 @@
 /** The 3D pane: viser's page inside ours, with its layers and view points. */
 import { all, fill, h, icon, parts } from "../elements/dom.js";
 
+/** What draws WebGL here where it is no graphics card; empty where it is one, or not told. */
+function softwareRenderer() {
+	const gl = document.createElement("canvas").getContext("webgl2");
+	const info = gl?.getExtension("WEBGL_debug_renderer_info");
+	const name = String((info && gl?.getParameter(info.UNMASKED_RENDERER_WEBGL)) ?? "");
+	gl?.getExtension("WEBGL_lose_context")?.loseContext();
+	return /swiftshader|llvmpipe|softpipe|software/i.test(name) ? name : "";
+}
+
 /** @type {Pane} */
 export function mountView3d(root, { store, actions, retry, press }) {
 	const { views, frame, blank } = parts(root);
@@ -9,6 +18,15 @@ export function mountView3d(root, { store, actions, retry, press }) {
 	let tries = 0;
 	/** @type {Timer} */
 	let timer;
+
+	if (softwareRenderer())
+		actions.note(
+			"info",
+			"The 3D view is drawn without a graphics card",
+			"It follows a few times a second; pictures, timeline and tables keep their speed.",
+			undefined,
+			"software",
+		);
 
 	/**
 	 * Load viser's page, but only once it answers: a browser's error page inside ours says nothing.

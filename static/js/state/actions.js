@@ -67,12 +67,13 @@ export function createActions({ store, seek, send, receive }) {
 
 	/** @type {Actions} */
 	const actions = {
-		note(level, title, text, remedy) {
+		note(level, title, text, remedy, once) {
+			if (once && store.get().dismissed.includes(once)) return;
 			const id = (noteId += 1);
 			// The same thing said twice is one note.
 			const others = store.get().notes.filter((other) => other.title !== title);
-			store.set({ notes: [...others.slice(-3), { id, level, title, text, remedy }] });
-			if (level === "info")
+			store.set({ notes: [...others.slice(-3), { id, level, title, text, remedy, once }] });
+			if (level === "info" && !once)
 				setTimeout(
 					() => store.set({ notes: store.get().notes.filter((other) => other.id !== id) }),
 					6000,
@@ -264,6 +265,8 @@ export function createActions({ store, seek, send, receive }) {
 				tab,
 				layout: { ...store.get().layout, ...(store.get().layout.max && { max: "side" }) },
 			}),
+		showTour: () =>
+			store.set({ dismissed: store.get().dismissed.filter((name) => name !== "tour") }),
 		toggleTheme() {
 			const theme = store.get().theme === "dark" ? "light" : "dark";
 			store.set({ theme });

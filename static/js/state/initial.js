@@ -64,6 +64,7 @@ export function initialState() {
 		notes: [],
 		asked: "",
 		moved: false,
+		place: "tune",
 		dismissed: [],
 		undoable: [0, 0],
 		...kept,

@@ -41,6 +41,8 @@ type Note = {
 	title: string;
 	text: string;
 	remedy?: Remedy;
+	/** Once closed, it is not told again in this browser. */
+	once?: string;
 };
 
 interface PageState {
@@ -103,6 +105,8 @@ interface PageState {
 	notes: Note[];
 	/** What this page asked the server to open. */
 	asked: string;
+	/** Which of the page's places is looked at. */
+	place: string;
 	/** Whether somebody has chosen a step of this sequence. */
 	moved: boolean;
 	/** Every step is shown, however late; else steps are left out to keep real time. */
@@ -137,7 +141,13 @@ interface Command {
 
 /** What a person can do. */
 interface Actions {
-	note: (level: "info" | "warn" | "error", title: string, text: string, remedy?: Remedy) => void;
+	note: (
+		level: "info" | "warn" | "error",
+		title: string,
+		text: string,
+		remedy?: Remedy,
+		once?: string,
+	) => void;
 	/** Null after a failure, which is told. */
 	ask: (method: "POST" | "PATCH" | "DELETE", path: string, body?: object) => Promise<any>;
 	togglePlay: () => void;
@@ -188,6 +198,7 @@ interface Actions {
 	editRoom: () => void;
 	saveTaught: () => void;
 	showTab: (tab: PageState["tab"]) => void;
+	showTour: () => void;
 	toggleTheme: () => void;
 	/** Null: all panes as they were at first. */
 	maximise: (pane: PaneName | null) => void;

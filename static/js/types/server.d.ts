@@ -292,6 +292,8 @@ declare namespace Server {
 		log: boolean;
 		choices: string[];
 		advanced: boolean;
+		/** Among the few that are shown first. */
+		essential: boolean;
 	}
 
 	/** A person's position error over time. */
@@ -458,6 +460,11 @@ declare namespace Server {
 		/** The command that computes the same in a terminal; empty while nothing is open. */
 		command: string;
 		methods: MethodsInfo;
+		/**
+		 * Methods that cannot work on the sequence with the values chosen: by ``single_view`` or
+		 * ``fusion_method``, the sentence why by the method's name.
+		 */
+		unfit: Record<string, Record<string, string>>;
 		/** Names of those that a person has saved. */
 		presets: string[];
 		/** The one whose values the parameters have, built in or saved. */

@@ -79,10 +79,10 @@ def test_stage_1_is_kept_for_the_next_run_unless_told_otherwise(
     line = ("track", data / "numbers", "-o", out, "--colour-phd.samples", "60")
     status, _, stderr = run(*line, "--no-cache")
     assert status == 0
-    assert not (tmp_path / "cache").exists()
+    assert not (tmp_path / "cache" / "stages").exists()
     first = out.read_text(encoding="utf-8")
     assert "was kept" not in run(*line)[2]
-    assert len(list((tmp_path / "cache").rglob("*.npz"))) == 1
+    assert len(list((tmp_path / "cache" / "stages").rglob("*.npz"))) == 1
     out.unlink()
     status, _, stderr = run(*line)
     assert (status, "stage 1 was kept from an earlier run" in stderr) == (0, True)

@@ -49,14 +49,16 @@ def test_newcomers_are_expected_by_the_second(fps: float) -> None:
     assert made.births.cardinality * fps == pytest.approx(0.05 * len(made.room.entrances))
 
 
-def test_two_within_a_share_of_a_persons_width_are_one() -> None:
+def test_two_within_a_share_of_a_persons_width_are_one_unless_each_has_a_box() -> None:
     made = model(duplicate_distance=0.5)
     width = 2.0 * float(HALF_EXTENTS[:2].mean())
-    old, new = np.array([0.0, 0.0, 0.85]), np.array([0.0, 0.0, 0.85])
-    for apart, double in ((0.49 * width, True), (0.51 * width, False)):
-        new[0] = apart
-        found = made.duplicates(
-            np.stack([old, new]), np.array([0.9, 0.9]), np.array([1, 2]),
-            np.full((4, 2), -1, dtype=np.int64),
-        )  # fmt: skip
-        assert found.tolist() == [False, double]
+    nobodys, their_own = np.full((4, 2), -1), np.array([[-1, -1], [3, 4], [0, -1], [2, 2]])
+    for apart, sources, duplicate in (
+        (0.49 * width, nobodys, True),
+        (0.51 * width, nobodys, False),
+        (0.49 * width, their_own, False),  # the second camera gave each a box
+        (0.24 * width, their_own, True),  # but two people cannot stand in one place
+    ):
+        means = np.array([[0.0, 0.0, 0.85], [apart, 0.0, 0.85]])
+        found = made.duplicates(means, np.array([0.9, 0.9]), np.array([1, 2]), sources)
+        assert found.tolist() == [False, duplicate]

@@ -12,6 +12,8 @@ from numpy import ndarray
 from tracker.kernels.pictures.following import follow_colours
 
 ITERATIONS = 20
+"""At most; a climb that goes on for longer goes nowhere."""
+
 TOLERANCE = 0.1
 """Pixels: a shift shorter than this is the last one."""
 

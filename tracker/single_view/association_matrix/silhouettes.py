@@ -19,26 +19,16 @@ from tracker.camera import Camera
 from tracker.foreground import integral, shape_scores
 from tracker.kernels.pictures import silhouettes
 from tracker.kernels.pictures.silhouettes import Acceptance, SizeTable
+from tracker.parameters import AssociationMatrixParams
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BoxSizes
 
 SIZES = 6
-"""So many sizes of targets are tried at each place."""
+"""So many sizes of targets are tried at each place: the best are averaged, so more only cost."""
 
 STRIDE = 2
-"""Pixels between the columns of a piece of foreground in which crowns are looked for."""
-
-INSIDE_WEIGHT, AROUND_WEIGHT = 3.0, 3.0
-"""Of the foreground inside the box, and above and beside it, in a box's score."""
-
-LEAST_INSIDE = 0.4
-"""A box with a smaller share of foreground is nobody's."""
-
-WIDTH = 0.5
-"""Half sizes over which boxes that fit nearly as well are averaged."""
-
-APART = 1.0
-"""Half sizes that two boxes keep."""
+"""Pixels between the columns of a piece of foreground in which crowns are looked for: the
+best are averaged, so all of them only cost."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,10 +73,7 @@ class Silhouettes:
         mask: UInt8[ndarray, "h w"],
         pieces: Blobs,
         wanted: Int[ndarray, " J"],
-        *,
-        acceptance: float,
-        further_acceptance: float,
-        spare_acceptance: float,
+        parameters: AssociationMatrixParams,
     ) -> Fits:
         """The targets in each piece of foreground.
 
@@ -94,24 +81,27 @@ class Silhouettes:
             mask: Foreground.
             pieces: Its pieces.
             wanted: How many targets each piece is believed to hold.
-            acceptance: Least score of a piece's best box.
-            further_acceptance: Least score of its others.
-            spare_acceptance: Least score of boxes beyond the number that is believed.
+            parameters: How scores are made, and the least of a piece's best box, of its others
+                and of boxes beyond the number that is believed.
         """
+        p = parameters
         sizes = SizeTable(
             self._table, self._possible, self._sizes.cell, self._sizes.columns, self._sizes.rows
         )
         hanging = silhouettes.candidates(pieces.owners, pieces.boxes, sizes, self._usual, STRIDE)
         scores, inside = shape_scores(
-            integral(mask), hanging.boxes, inside_weight=INSIDE_WEIGHT, around_weight=AROUND_WEIGHT
+            integral(mask),
+            hanging.boxes,
+            inside_weight=p.inside_weight,
+            around_weight=p.around_weight,
         )
-        good = inside >= LEAST_INSIDE
+        good = inside >= p.least_inside
         chosen = silhouettes.choose(
             silhouettes.Candidates(hanging.boxes[good], hanging.owners[good]),
             scores[good],
             np.asarray(wanted, dtype=np.int64),
-            Acceptance(acceptance, further_acceptance, spare_acceptance),
-            WIDTH,
-            APART,
+            Acceptance(p.acceptance, p.further_acceptance, p.spare_acceptance),
+            p.averaging_width,
+            p.apart,
         )
         return Fits(chosen.boxes, chosen.scores, chosen.owners)

@@ -13,7 +13,7 @@ from tracker import colour
 from tracker.boxes import Boxes
 from tracker.colour import ColourModel
 from tracker.parameters import ColourPhdParams
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.templates import read_templates
 
@@ -36,7 +36,7 @@ class Likeness:
         self._model = model
 
     @staticmethod
-    def of(sequence: Sequence, reader: FrameReader) -> Likeness | None:
+    def of(sequence: Sequence, reader: Pictures) -> Likeness | None:
         """Read the templates; None where there are not two people to tell apart.
 
         A template that cannot be read is told to the log: a method that needs none goes on.

@@ -7,12 +7,12 @@ import numpy as np
 from tracker import colour
 from tracker.boxes import Boxes
 from tracker.colour import ColourModel, ColourSpaceName, KernelName
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 
 
 def read_templates(
-    sequence: Sequence, space: ColourSpaceName, kernel: KernelName, reader: FrameReader
+    sequence: Sequence, space: ColourSpaceName, kernel: KernelName, reader: Pictures
 ) -> ColourModel:
     """The colour model of the sequence's templates, read once for all cameras that ask for it.
 
@@ -37,7 +37,7 @@ def read_templates(
 
 
 def _read(
-    sequence: Sequence, space: ColourSpaceName, kernel: KernelName, reader: FrameReader
+    sequence: Sequence, space: ColourSpaceName, kernel: KernelName, reader: Pictures
 ) -> ColourModel:
     names = [camera.name for camera in sequence.cameras]
     histograms = []

@@ -1,4 +1,4 @@
-"""Who begins, who ends and who is back: the life of the targets of one camera."""
+"""Track management of one camera: which targets begin, which end, and which are back."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ FAR = 1e9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lives:
-    """The targets after one step, and what became of whom."""
+class Managed:
+    """The targets after the track management of one step, and what it did."""
 
     targets: Targets
     """Those that were there and still are, then those that are back, then newcomers."""
@@ -34,7 +34,7 @@ class Lives:
     vanished_labels: tuple[int, ...]
 
 
-def live_on(
+def manage(
     targets: Targets,
     vanished: Targets,
     next_label: int,
@@ -44,8 +44,8 @@ def live_on(
     *,
     gate: float,
     longest_hidden: int,
-) -> Lives:
-    """End what has ended, and begin what begins.
+) -> Managed:
+    """End the tracks that have ended, and begin or continue those that a measurement is left for.
 
     Args:
         targets: After the update of this step.
@@ -89,7 +89,7 @@ def live_on(
     still = vanished.take(np.setdiff1d(np.arange(vanished.size), back))
     still = still.take(np.flatnonzero(still.misses < p.vanish_steps + p.return_steps))
     lost = replace(lost, misses=np.full(lost.size, p.vanish_steps))
-    return Lives(
+    return Managed(
         targets=replace(after, labels=labels),
         vanished=concatenate([still, lost]),
         next_label=next_label + len(counting),

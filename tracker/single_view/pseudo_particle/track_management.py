@@ -1,4 +1,4 @@
-"""Who is in one camera's picture, who was and may return, and what happens to them."""
+"""Track management of one camera: who is there, who was and may return, who begins and ends."""
 
 from __future__ import annotations
 
@@ -12,12 +12,6 @@ from tracker.single_view.protocol import ViewEvent
 
 UNCONFIRMED = 0
 """Label of a target that has not been found often enough to have one."""
-
-UNCONFIRMED_MISSES = 2
-"""Steps without a mode after which an unconfirmed target is given up."""
-
-VELOCITY_MEMORY = 0.8
-"""Share of the mean displacement that a new one leaves as it is."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +92,7 @@ class Departed:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Register:
+class Tracks:
     """Who is there, who was, and the next free label."""
 
     targets: Targets
@@ -106,13 +100,13 @@ class Register:
     next_label: int
 
     @staticmethod
-    def empty() -> Register:
+    def empty() -> Tracks:
         """Nobody has been seen yet."""
-        return Register(Targets.nobody(), Departed.nobody(), next_label=1)
+        return Tracks(Targets.nobody(), Departed.nobody(), next_label=1)
 
 
-def follow(
-    register: Register,
+def manage(
+    tracks: Tracks,
     expected: Targets,
     modes: Float[ndarray, "M 4"],
     existences: Float[ndarray, " M"],
@@ -122,7 +116,9 @@ def follow(
     confirmation: int,
     patience: int,
     memory: int,
-) -> tuple[Register, tuple[ViewEvent, ...]]:
+    newcomer_misses: int,
+    velocity_memory: float,
+) -> tuple[Tracks, tuple[ViewEvent, ...]]:
     """Who is there after a step's modes have been assigned.
 
     A target takes its mode; without one it stays where it is expected for ``patience``
@@ -131,7 +127,7 @@ def follow(
     ``memory`` steps, he has returned.
 
     Args:
-        register: Before the step.
+        tracks: Before the step.
         expected: Its targets, where they were expected.
         modes: This step's, pixels.
         existences: Probability that each is somebody.
@@ -140,13 +136,21 @@ def follow(
         confirmation: Steps, ≥ 1.
         patience: Steps.
         memory: Steps.
+        newcomer_misses: Steps without a mode after which an unconfirmed target is given up.
+        velocity_memory: Share of the mean displacement that a new one leaves as it is.
     """
     count = len(expected)
     known = columns < count
     newcomers = (columns >= count) & (columns < count + len(vacant))
     persons = vacant[columns[newcomers] - count]
     updated = _updated(
-        register.targets, expected, modes[known], existences[known], columns[known], patience
+        tracks.targets,
+        expected,
+        modes[known],
+        existences[known],
+        columns[known],
+        patience,
+        velocity_memory,
     )
     targets = updated.joined(
         Targets(
@@ -159,15 +163,15 @@ def follow(
             existences=existences[newcomers],
         )
     )
-    lost = targets.misses > np.where(targets.confirmed, patience, UNCONFIRMED_MISSES - 1)
+    lost = targets.misses > np.where(targets.confirmed, patience, newcomer_misses - 1)
     gone = targets.take(lost & targets.confirmed)
     targets = targets.take(~lost)
-    departed = register.departed
+    departed = tracks.departed
     departed = Departed(departed.labels, departed.persons, departed.ages + 1)
     departed = departed.take(departed.ages <= memory)
     events = [ViewEvent("vanished", (int(label),)) for label in gone.labels]
 
-    labels, next_label = targets.labels.copy(), register.next_label
+    labels, next_label = targets.labels.copy(), tracks.next_label
     due = ~targets.confirmed & (targets.hits >= confirmation) & (targets.misses == 0)
     for index in np.flatnonzero(due):
         # the last who vanished of those who look like this one
@@ -186,7 +190,7 @@ def follow(
         np.concatenate([departed.persons, gone.persons]),
         np.concatenate([departed.ages, np.zeros(len(gone), dtype=np.int64)]),
     )
-    after = Register(replace(targets, labels=labels), departed, next_label)
+    after = Tracks(replace(targets, labels=labels), departed, next_label)
     return after, tuple(events)
 
 
@@ -197,6 +201,7 @@ def _updated(
     found: Float[ndarray, " K"],
     owners: Int[ndarray, " K"],
     patience: int,
+    velocity_memory: float,
 ) -> Targets:
     """Targets that were found at their modes, the others where they are expected."""
     boxes, velocities = expected.boxes.copy(), expected.velocities.copy()
@@ -205,7 +210,7 @@ def _updated(
     boxes[owners] = modes
     shifts = modes[:, :2] - before.boxes[owners, :2]
     velocities[owners] = (
-        VELOCITY_MEMORY * before.velocities[owners] + (1.0 - VELOCITY_MEMORY) * shifts
+        velocity_memory * before.velocities[owners] + (1.0 - velocity_memory) * shifts
     )
     hits[owners] += 1
     misses[owners] = 0
