@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
+from scipy.special import gammaincinv
 
 from tracker.kernels import linear_algebra
 from tracker.kernels.intensity import merging
@@ -244,6 +245,19 @@ def reduce(
     )
     leaders = reduced.leaders
     return GaussianMixture.of(reduced, mixture.labels.take(leaders)), leaders
+
+
+def gate_distance(probability: float, dimension: int) -> float:
+    """Squared Mahalanobis distance within which a Gaussian has a share of its mass.
+
+    The quantile of χ² with d degrees of freedom, 2 P⁻¹(d/2, P_G), with the regularised
+    incomplete gamma function P. (``scipy.stats`` has it too, and takes half a second to import.)
+
+    Args:
+        probability: P_G, 0 … 1.
+        dimension: d.
+    """
+    return float(2.0 * gammaincinv(dimension / 2.0, probability))
 
 
 def _check(threshold: float) -> None:
