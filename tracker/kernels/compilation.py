@@ -32,6 +32,7 @@ from typing import Any, TypeVar, cast
 import numba
 import numpy as np
 from numba.core import event
+from numba.core.compiler_lock import global_compiler_lock
 
 from tracker.folders import cache_folder
 
@@ -99,7 +100,9 @@ class _Chooser:
         """Whether the other process has put the machine code on disk by now."""
         dispatcher = self._dispatcher
         signature = tuple(dispatcher.typeof_pyval(each) for each in arguments)
-        return dispatcher._cache.load_overload(signature, dispatcher.targetctx) is not None
+        with global_compiler_lock:  # what it reads into is shared by all threads
+            found = dispatcher._cache.load_overload(signature, dispatcher.targetctx)
+        return found is not None
 
 
 class _Elsewhere:
