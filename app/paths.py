@@ -1,12 +1,19 @@
-"""Where the page's files are."""
+"""Where the page's files and the manual are."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+_PACKAGE = Path(__file__).resolve().parent
+
 
 def static_folder() -> Path:
     """The folder of the page: inside the package when installed, beside it in a checkout."""
-    package = Path(__file__).resolve().parent
-    inside = package / "static"
-    return inside if inside.is_dir() else package.parent / "static"
+    inside = _PACKAGE / "static"
+    return inside if inside.is_dir() else _PACKAGE.parent / "static"
+
+
+def manual_folder() -> Path:
+    """The folder of the built manual: inside the package, or where a checkout builds it."""
+    inside = _PACKAGE / "manual"
+    return inside if inside.is_dir() else _PACKAGE.parent / "build" / "manual"

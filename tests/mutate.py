@@ -168,6 +168,8 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=min(4, os.cpu_count() or 1))
     arguments = parser.parse_args()
     mutants = [mutant for mutant in read() if arguments.word in str(mutant)]
+    if not mutants:
+        parser.error(f"{arguments.word}: no change of {LIST.name} holds this")
     begin = time.monotonic()
     try:
         lived = try_all(mutants, max(1, min(arguments.workers, len(mutants))))

@@ -13,7 +13,6 @@ from app.command.terminal import Bar, CommandError, print_table, say
 from tracker import __version__, export
 from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
 from tracker.evaluation.figures import number
-from tracker.evaluation.report.page import write_report
 from tracker.export import TrackFile
 from tracker.parameters import ParameterError
 from tracker.sequences import library
@@ -43,6 +42,8 @@ def evaluate(command: Evaluate) -> None:
     check_fit(sequence, tracks, str(command.tracks))
     evaluation = evaluate_sequence(sequence, tracks, settings, steps=tracks.done)
     if command.html is not None:
+        from tracker.evaluation.report.page import write_report  # brings plotly
+
         seed = tracks.settings.get("seed", "")
         write_report(
             command.html,

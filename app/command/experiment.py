@@ -10,7 +10,7 @@ from app.command.flags import Experiment as Command
 from app.command.terminal import Bar, CommandError, check_data, print_table, say
 from tracker.experiments import EXPERIMENTS, Context, Experiment, Result, Unavailable
 from tracker.experiments.laboratory.pool import cores
-from tracker.experiments.laboratory.writing import write
+from tracker.experiments.laboratory.writing import can_draw, write
 from tracker.parameters import ParameterError
 
 
@@ -37,6 +37,11 @@ def experiment(command: Command) -> None:
     if command.output.exists() and not command.output.is_dir():
         raise CommandError(f"--output {command.output}: expected a folder, found a file")
     chosen = list(EXPERIMENTS.values()) if command.all else [EXPERIMENTS[str(command.name)]]
+    if not can_draw():
+        say(
+            "numbers without figures, since matplotlib is not installed: "
+            'pip install "multiview-phd[figures]" brings it'
+        )
     with _Bars() as bars:
         context = Context(quick=command.quick, data=command.data, processes=cores(), told=bars.told)
         for one in chosen:

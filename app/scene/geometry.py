@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
-from scipy.stats import chi2
 
+from tracker.filters.gaussian_mixture import gate_distance
 from tracker.trajectories import Trajectories
 
 DEFAULT_MASS = 0.9
@@ -33,7 +33,7 @@ def mass_radius(mass: float, dimension: int = 3) -> float:
     """
     if not 0.0 < mass < 1.0:
         raise ValueError(f"mass must be above 0 and below 1 (a probability), got {mass}")
-    return float(np.sqrt(chi2.ppf(mass, dimension)))
+    return float(np.sqrt(gate_distance(mass, dimension)))
 
 
 def quaternions(rotations: Float[ndarray, "N 3 3"]) -> Float[ndarray, "N 4"]:

@@ -42,6 +42,7 @@ label[for]::after { font-size: 80%; vertical-align: -0.25em; }
   letter-spacing: 0 !important; font-weight: 400 !important; color: var(--mvp-ink-2) !important;
   overflow-wrap: normal !important; }
 label[for] > wbr { display: none; }
+label[for] { cursor: help; }
 .mantine-Slider-root { padding: 0 !important; align-self: center; }
 .mantine-Slider-mark, .mantine-Slider-markLabel { display: none !important; }
 .mantine-Slider-thumb { background: var(--mvp-thumb) !important;

@@ -27,6 +27,18 @@ HAS_FOCUS = b"<script>Document.prototype.hasFocus=()=>true</script>"
 """viser's client reconnects only while its document has the focus, which inside
 a frame it mostly has not."""
 
+LABELS_LEAD_TO_THE_MANUAL = b"""<script>
+addEventListener("click", (event) => {
+  const label = event.target.closest?.("label[for]");
+  const place = label && document.getElementById(`help-${label.htmlFor}`)?.dataset.manual;
+  if (!place) return;
+  event.preventDefault();
+  open(place, "manual");
+}, true);
+</script>"""
+"""viser's labels are plain text with a hint; a click on one opens what the panel says of it,
+in :meth:`app.scene.panel.controls.Controls`, as ``<i id="help-UUID" data-manual="...">``."""
+
 START_SECONDS = 15.0
 """How long a request waits for viser while it starts."""
 
@@ -65,7 +77,7 @@ class Gateway:
 
         page = Path(viser.__file__).parent / "client" / "build" / "index.html"
         head, mark, rest = page.read_bytes().partition(b"<head>")
-        self._page = head + mark + HAS_FOCUS + rest
+        self._page = head + mark + HAS_FOCUS + LABELS_LEAD_TO_THE_MANUAL + rest
         self._etag = f'"{hashlib.sha256(self._page).hexdigest()[:20]}"'
         self._port = server.get_port()
         if self._ready is not None:

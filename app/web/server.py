@@ -32,6 +32,7 @@ from app.state.workbench import Workbench
 from app.web import api, gateway, stream, teaching_routes
 from app.web.evaluation import routes as evaluation
 from app.web.gateway import Gateway
+from app.web.manual import Manual
 from app.web.pictures import foreground, likelihood_routes
 from app.web.pictures.jpegs import Pictures
 from app.web.pictures.likelihood import Likelihoods
@@ -115,6 +116,7 @@ def create_app(settings: Settings) -> FastAPI:
         return response
 
     app.mount("/static", files, name="static")
+    app.mount("/manual", Manual(), name="manual")
     return app
 
 

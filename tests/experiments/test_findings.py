@@ -158,3 +158,14 @@ def test_a_figure_that_fails_leaves_nothing(experiment: Experiment, tmp_path: Pa
 def test_a_number_that_json_has_not_is_refused(experiment: Experiment, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="JSON"):
         write(experiment, Result(("a",), (), {"a": float("nan")}, ()), tmp_path)
+
+
+def test_without_matplotlib_the_numbers_are_written(
+    experiment: Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_figure() -> Any:
+        raise AssertionError("nothing can draw it")
+
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    files = write(experiment, result(figure=no_figure), tmp_path)
+    assert [path.name for path in files] == ["try.json"]

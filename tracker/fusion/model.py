@@ -7,9 +7,8 @@ from collections.abc import Sequence as Many
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
-from scipy.stats import chi2
 
-from tracker.filters import models
+from tracker.filters import gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion import sight, visibility
 from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths, Newborns
@@ -50,9 +49,9 @@ class FusionModel:
             ]
         )
         """κ of each camera, per unit of the measurement space."""
-        self.gate = float(chi2.ppf(p.gate_probability, df=self.target.size))
+        self.gate = gaussian_mixture.gate_distance(p.gate_probability, self.target.size)
         """Squared Mahalanobis distance of the innovation."""
-        self.memory_reach = float(chi2.ppf(p.memory_gate_probability, df=3))
+        self.memory_reach = gaussian_mixture.gate_distance(p.memory_gate_probability, 3)
         """Squared Mahalanobis distance within which a newcomer may be somebody lately lost."""
         self.near = p.duplicate_distance * 2.0 * float(np.mean(sequence.target_half_extents[:2]))
         """Metres within which two components may be one person."""

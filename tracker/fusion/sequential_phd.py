@@ -136,12 +136,11 @@ class SequentialPhd:
         updated = phd.update(
             mixture,
             measurements.values,
-            expected=expected.upright,
+            expected=expected.expected,
             noise=measurements.noises,
             detection_probability=seen.detection_probabilities,
             clutter_intensity=model.clutter[index],
             gate=model.gate,
-            other=expected.posture,
         )
         owners = None
         if p.misses == "per_person":

@@ -196,16 +196,16 @@ def _is_compiled_in(file: Path, text: bytes) -> bool:
     return in_room or _HAS_KERNELS.search(text) is not None
 
 
-def _imported(source: bytes) -> Iterator[str]:
+@cache  # every kernel file asks of those that it uses, and reading one takes milliseconds
+def _imported(source: bytes) -> tuple[str, ...]:
     """Every module of the engine that a source may import, in whatever way it says so."""
+    found: list[str] = []
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
+            found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
-            names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-        else:
-            continue
-        yield from (name for name in names if name.split(".")[0] == _ROOT.name)
+            found += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    return tuple(name for name in found if name.split(".")[0] == _ROOT.name)
 
 
 def _digest(files: Iterable[Path]) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from tracker.camera import Camera
 from tracker.filters import models
@@ -181,7 +181,7 @@ class BoxSizes:
 def _bring_to_entrance_heights(positions: Float[ndarray, "N 3"], room: Room) -> None:
     """Move most of the positions to the heights of the entrances, in turn, in place."""
     moved = positions[: round(AT_ENTRANCE_HEIGHT * len(positions))]
-    spread = norm.ppf(_even_points(len(moved))[:, 2])
+    spread = ndtri(_even_points(len(moved))[:, 2])
     for number, entrance in enumerate(room.entrances):
         mine = slice(number, None, len(room.entrances))
         moved[mine, 2] = entrance.position[2] + HEIGHT_FACTOR * entrance.sigma[2] * spread[mine]
@@ -218,7 +218,7 @@ def entrance_boxes(
         weight: Of each component.
     """
     births = models.entrance_births(room, weight)
-    normals = norm.ppf(_even_points(500))
+    normals = ndtri(_even_points(500))
     means, covariances = [], []
     for mean, covariance in zip(births.means, births.covariances, strict=True):
         positions = mean + normals * np.sqrt(np.diag(covariance))

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
-from scipy.stats import chi2
 
 from tracker.filters import gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
@@ -77,7 +76,7 @@ class ColourPhd:
         """
         self._parameters = p = parameters.of(ColourPhdParams)
         self._finder = PeakFinder(sequence, camera_index, p, parameters.foreground, reader)
-        self._gate = float(chi2.ppf(p.gate_probability, df=4))
+        self._gate = gaussian_mixture.gate_distance(p.gate_probability, 4)
         self._step_time = sequence.step_time
         camera = sequence.cameras[camera_index]
         births = GaussianMixture.empty(4)

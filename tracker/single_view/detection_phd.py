@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
-from scipy.stats import chi2
 
 from tracker.filters import gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
@@ -71,7 +70,7 @@ class DetectionPhd:
         """
         self._parameters = p = parameters.of(DetectionPhdParams)
         self._boxes = DetectorBoxes(sequence, camera_index, p)
-        self._gate = float(chi2.ppf(p.gate_probability, df=4))
+        self._gate = gaussian_mixture.gate_distance(p.gate_probability, 4)
         self._step_time = sequence.step_time
         width, height = sequence.cameras[camera_index].image_size
         # half sizes up to half of the picture's, as the fusion's clutter has them

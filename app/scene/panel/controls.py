@@ -19,7 +19,14 @@ import viser
 from app.scene import style
 from app.scene.keys import hotkeys
 from app.scene.panel import finding
-from app.scene.panel.sliders import Scale, hint_text, label_text, number_text, symbol_parts
+from app.scene.panel.sliders import (
+    Scale,
+    hint_text,
+    label_text,
+    manual_places,
+    number_text,
+    symbol_parts,
+)
 from app.scene.worker import LatestWorker
 from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
@@ -119,6 +126,9 @@ class Controls:
             "Reset all", hint="Every value and method to its default."
         )
         self._reset_all.on_click(lambda _: self._reset(None))
+        server.gui.add_html(
+            manual_places({key: handle._impl.uuid for key, handle in self._inputs.items()})
+        )
         for hotkey in hotkeys():
             command = server.gui.add_command(
                 hotkey.title, hotkey=hotkey.key, modifier=hotkey.modifier

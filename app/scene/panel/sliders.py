@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tracker.parameters import Parameter
@@ -101,8 +102,25 @@ def label_text(parameter: Parameter, *, changed: bool) -> str:
     return f"{'• ' if changed else ''}{parameter.label} {letter}"
 
 
+def manual_places(identifiers: Mapping[str, str]) -> str:
+    """Where the manual tells of each input, as HTML without anything to see.
+
+    Args:
+        identifiers: Of the inputs in viser's page, by the key of the parameter or method.
+    """
+    places = (
+        f'<i id="help-{identifier}" data-manual="/manual/tuning/#{key}"></i>'
+        for key, identifier in identifiers.items()
+    )
+    return f"<div hidden>{''.join(places)}</div>"
+
+
 def hint_text(parameter: Parameter) -> str:
-    """What a parameter does, its range and its default."""
+    """What a parameter does, its range and its default, and that its label leads on."""
+    return f"{_short_help(parameter)} A click opens the manual."
+
+
+def _short_help(parameter: Parameter) -> str:
     if parameter.kind in ("float", "int"):
         assert parameter.minimum is not None
         assert parameter.maximum is not None

@@ -15,7 +15,6 @@ from app.web.dependencies import ERRORS, Bench, Part, file_name, nothing_open
 from app.web.evaluation import messages, models
 from app.web.views import results
 from tracker.evaluation import Evaluation
-from tracker.evaluation.report.page import report_html
 
 router = APIRouter(prefix="/api", responses=ERRORS)
 
@@ -130,6 +129,8 @@ async def unpin(bench: Bench) -> State:
 )
 def export_report(bench: Bench, evaluator: Scorer) -> Response:
     """The run scored last as one HTML file; ``X-Run-Partial`` says whether steps are missing."""
+    from tracker.evaluation.report.page import report_html  # brings plotly
+
     snapshot = bench.snapshot()
     scored, evaluated = _evaluated(snapshot, snapshot.scores.shown)
     reference = snapshot.scores.reference

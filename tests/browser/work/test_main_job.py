@@ -68,7 +68,7 @@ def test_a_slider_in_the_3d_panel_changes_the_run_and_the_csv_is_the_engines(
     scene = viser(page)
     before = server.get("/api/state").json()
     row = scene.locator("div:has(> .mantine-Text-root > label)", has_text="Detection probability")
-    number = row.locator("xpath=..").locator("input.mantine-NumberInput-input").last
+    number = row.locator("xpath=..").locator("input.mantine-NumberInput-input").first
     number.fill("0.6")
     number.press("Enter")
     state = server.wait(
@@ -104,7 +104,7 @@ def test_a_slider_moved_twenty_times_in_a_second_ends_in_one_run(
     key = "fusion.detection_probability"
     before = server.wait_for_run()["parameters"][key]
     row = scene.locator("div:has(> .mantine-Text-root > label)", has_text="Detection probability")
-    thumb = row.locator("xpath=..").get_by_role("slider").last
+    thumb = row.locator("xpath=..").get_by_role("slider").first
     thumb.focus()
     begin = time.monotonic()
     for _ in range(20):

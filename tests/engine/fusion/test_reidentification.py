@@ -86,6 +86,16 @@ def test_people_who_look_alike_keep_their_labels() -> None:
     assert names.owners.tolist() == [-1, -1]
 
 
+def test_a_track_is_named_once_the_odds_are_twenty_to_one() -> None:
+    names, named = Identities.none(), []
+    for _ in range(12):
+        _, names = step(names, [1], [FIRST])
+        named.append(bool(names.owners[0] == 1))
+        assert named[-1] == (np.ptp(names.looks[0]) > np.log(20.0))
+    assert named == sorted(named)
+    assert 3 < sum(named) < 9
+
+
 def test_looks_that_nobody_renews_are_forgotten_at_the_rate_of_the_leak() -> None:
     names = watched(Identities.none(), [1, 2], [FIRST, SECOND], 30)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import secrets
@@ -10,6 +11,11 @@ from typing import Any
 
 from tracker import __version__
 from tracker.experiments.laboratory.experiment import Experiment, Result
+
+
+def can_draw() -> bool:
+    """Whether what draws the figures is installed: the extra ``figures``."""
+    return importlib.util.find_spec("matplotlib") is not None
 
 
 def document(experiment: Experiment, result: Result, *, quick: bool) -> dict[str, Any]:
@@ -34,7 +40,8 @@ def document(experiment: Experiment, result: Result, *, quick: bool) -> dict[str
 def write(
     experiment: Experiment, result: Result, folder: Path, *, quick: bool = False
 ) -> list[Path]:
-    """Write ``NAME.json`` and, where there is a figure, ``NAME.png``.
+    """Write ``NAME.json`` and, where there is a figure and something to
+    draw it, ``NAME.png``.
 
     Args:
         experiment: Which one.
@@ -53,7 +60,7 @@ def write(
         document(experiment, result, quick=quick), indent=1, ensure_ascii=False, allow_nan=False
     )
     contents = {folder / f"{experiment.name}.json": (text + "\n").encode()}
-    if result.figure is not None:
+    if result.figure is not None and can_draw():
         from tracker.experiments.laboratory.drawing import png
 
         contents[folder / f"{experiment.name}.png"] = png(result.figure)

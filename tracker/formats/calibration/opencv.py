@@ -87,4 +87,4 @@ def _matrix(file: SourceFile, field: str, sizes: Any, data: Any) -> list[float]:
     found = numbers(file, field, data)
     if count < 1 or len(found) % count:  # several numbers an element, where it has channels
         raise file.error(f"expected {count:g} numbers, found {len(found)} ({shown(data)})", field)
-    return list(map(float, found))
+    return [float(each) for each in found]

@@ -56,7 +56,8 @@ def rewritten(
     if taught_in(got, after) != after or _rest_of(got) != _rest_of(values):
         raise SequenceError(
             f"{where}: is written in a way that cannot be kept while it changes; write [room] and "
-            "[[template]] as tables of their own, as the README shows them, then save again"
+            "[[template]] as tables of their own, as the manual shows them under Format, then save "
+            "again"
         )
     return result
 

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import UInt8
 from numpy import ndarray
-from scipy.stats import chi2
 
 from tracker.association import validation_matrix
+from tracker.filters.gaussian_mixture import gate_distance
 from tracker.foreground import pack
 from tracker.parameters import JpdaParams
 from tracker.sequences.frames import Pictures
@@ -82,7 +82,7 @@ class Jpda:
         self._source = source_of(sequence, camera_index, parameters, reader)
         self._step_time = sequence.step_time
         self._longest_hidden = max(1, round(p.longest_hidden * sequence.fps))
-        self._gate = float(chi2.ppf(p.gate_probability, df=2))
+        self._gate = gate_distance(p.gate_probability, 2)
         width, height = sequence.cameras[camera_index].image_size
         self._area = float(width * height)
 

@@ -1,0 +1,30 @@
+"""Starting takes what the main job needs, and leaves the rest to the moment of use."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+LATER = {
+    "matplotlib": "figures of the experiments",
+    "plotly": "the report",
+    "scipy.stats": "half a second for one quantile",
+    "viser": "the 3D view, which starts beside the page",
+    "PIL": "viser's",
+    "trimesh": "viser's",
+    "tqdm": "the bars of a terminal",
+    "mkdocs": "the manual is built before",
+}
+"""What neither the web nor the engine imports before it is used, and what it is for."""
+
+
+def test_the_web_imports_what_the_first_page_needs() -> None:
+    told = subprocess.run(
+        [sys.executable, "-c", "import app.web.server, sys; print(*sys.modules)"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    imported = set(told.stdout.split())
+    assert "tracker.pipeline" in imported
+    assert not imported & set(LATER)

@@ -1,0 +1,42 @@
+"""Make what the manual says of the code and of the records anew: ``python3 -m tests.manual``.
+
+``--record`` first runs experiments (all that are named, or every one) and keeps their tables,
+from which alone the page of results is made; ``--sweeps`` runs short pieces over values of
+parameters, and keeps what the pictures of the page of tuning show.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from tests.conftest import DATA
+from tests.manual import results, sweeps
+from tests.manual.places import ROOT, made_pages
+from tracker.experiments import EXPERIMENTS
+
+
+def main() -> int:
+    """Write the files that differ, and say which."""
+    parser = argparse.ArgumentParser(prog="python3 -m tests.manual", description=__doc__)
+    parser.add_argument(
+        "--record", nargs="*", metavar="EXPERIMENT", choices=[*EXPERIMENTS, []], default=None
+    )
+    parser.add_argument("--sweeps", nargs="*", metavar="GROUP", default=None)
+    parser.add_argument("--data", type=Path, default=DATA, help="folder of the real recordings")
+    arguments = parser.parse_args()
+    if arguments.record is not None:
+        results.record(arguments.record or list(EXPERIMENTS), arguments.data)
+    if arguments.sweeps is not None:
+        sweeps.record(arguments.sweeps, arguments.data)
+    for path, make in made_pages().items():
+        text = make()
+        if not path.is_file() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+            print(f"written: {path.relative_to(ROOT)}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,68 @@
+"""The page of the command line, from what the program itself answers to ``--help``."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+
+from tests.manual.places import ROOT
+
+INTRODUCTION = """# Command line
+
+This is what the program answers to `--help`. Status 0 means success, 1 a failure that is told
+in one line, 2 wrong usage, 130 that it was ended by Ctrl-C.
+
+```sh
+multiview-phd serve [SEQUENCE] [--data DIR]           # the workbench; without SEQUENCE: room44-3p
+multiview-phd track SEQUENCE -o tracks.csv            # the pipeline without a browser
+multiview-phd track SEQUENCE -o tracks.csv --preset published --set fusion.clutter_rate=1.5
+multiview-phd evaluate SEQUENCE tracks.csv --html report.html
+multiview-phd render room35-2p FOLDER --cameras 3     # a rendered room as an ordinary sequence
+```
+
+`SEQUENCE` is a folder or a built-in name. Every parameter is a flag of `track` as well; what each
+does stands on the page [Tuning](tuning.md).
+
+Two places are kept outside the sequences: compiled kernels and what cameras found in
+`~/.cache/multiview-phd` or `$MULTIVIEW_PHD_CACHE`, your presets in `~/.config/multiview-phd` or
+`$MULTIVIEW_PHD_SETTINGS`. With `MULTIVIEW_PHD_TRACEBACK=1` an unexpected failure shows where it
+happened.
+"""
+
+WIDTH = "88"
+"""Columns: what a page shows without scrolling."""
+
+
+def page() -> str:
+    """The whole page."""
+    commands = re.findall(r"• ([a-z-]+)", answer())
+    parts = [INTRODUCTION, "## All commands", "", fenced(answer()), ""]
+    for command in commands:
+        parts += [f"## {command}", "", fenced(answer(command)), ""]
+    return "\n".join(parts)
+
+
+def fenced(text: str) -> str:
+    """Text as it stands."""
+    return f"```text\n{text}\n```"
+
+
+def answer(*arguments: str) -> str:
+    """What the program prints to ``--help``, the same on every machine."""
+    environment = {
+        key: value
+        for key, value in os.environ.items()
+        if key not in ("DISPLAY", "WAYLAND_DISPLAY", "FORCE_COLOR", "TERM")
+    }
+    environment |= {"COLUMNS": WIDTH, "NO_COLOR": "1", "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-m", "app", *arguments, "--help"],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=ROOT,
+        env=environment,
+    )
+    return "\n".join(line.rstrip() for line in done.stdout.strip().splitlines())

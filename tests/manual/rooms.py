@@ -1,0 +1,49 @@
+"""The rooms of the house and who may import whom, from the import contracts."""
+
+from __future__ import annotations
+
+import ast
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from tests.manual.places import PAGES, ROOT, between
+
+
+def page() -> str:
+    """The page of the architecture with its rooms made anew."""
+    text = (PAGES / "architecture.md").read_text(encoding="utf-8")
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    contracts = settings["tool"]["importlinter"]["contracts"]
+    return between(text, "rooms", "\n\n".join(map(_section, contracts)))
+
+
+def _section(contract: dict[str, Any]) -> str:
+    title = f"### {contract['name']}\n\n"
+    if contract["type"] != "layers":
+        sources, others = (_listed(contract[k]) for k in ("source_modules", "forbidden_modules"))
+        return f"{title}{sources} imports none of {others}."
+    container = contract.get("containers", [""])[0]
+    lines = [
+        "Each line may import what stands below it; rooms of one line do not know each other.",
+        "",
+        "| room | what it is |",
+        "|---|---|",
+    ]
+    for layer in contract["layers"]:
+        rooms = [f"{container}.{name}".lstrip(".") for name in layer.split(" : ")]
+        words = "<br>".join(f"`{room}`: {_says(room)}" for room in rooms)
+        lines.append(f"| {_listed(room.rpartition('.')[2] for room in rooms)} | {words} |")
+    return title + "\n".join(lines)
+
+
+def _listed(names: Any) -> str:
+    return ", ".join(f"`{name}`" for name in names)
+
+
+def _says(room: str) -> str:
+    """The first sentence of a package's or module's docstring."""
+    path = ROOT.joinpath(*room.split("."))
+    file: Path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    text = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
+    return " ".join(text.partition("\n\n")[0].split()).replace("|", "\\|")
