@@ -1,4 +1,4 @@
-"""The command line: serve, track, evaluate, experiment, benchmark, sequences, …
+"""The command line: serve, track, evaluate, experiment, benchmark, import, check, …
 
 Status 0 for success, 1 for a failure told in one line on standard error, 2 for
 wrong usage, 130 after Ctrl-C. The engine is imported by the command that needs it.
@@ -19,8 +19,12 @@ from typing import Any
 from app.command.flags import (
     Arguments,
     Benchmark,
+    Check,
     Evaluate,
     Experiment,
+    ExportCalibration,
+    Formats,
+    Import,
     Parameters,
     Render,
     Sequences,
@@ -76,6 +80,10 @@ def _run(command: Arguments) -> int:
             experiment(command)
         case Benchmark():
             return _benchmark(command)
+        case Import() | Check() | Formats() | ExportCalibration():
+            from app.command.importing import run
+
+            return run(command)
         case Sequences():
             _sequences(command)
         case Render():
@@ -196,11 +204,18 @@ def _track(command: Track) -> None:
 
     from app.state.compiling import Compiling
     from tracker import export, pipeline
+    from tracker.checks import check
+    from tracker.runs.outcome import why_no_tracks
     from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
 
     with Bar("rendering", "frame") as rendering:
         sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    for sentence in sequence.warnings:
+        say(sentence)
+    for found in check(sequence, quick=True):
+        if found.status == "warning" and str(found) not in sequence.warnings:
+            say(str(found))
     parameters = table.with_values(pipeline.default_parameters(sequence), changes)
     begin = time.perf_counter()
     stages: set[table.Stage] = set()
@@ -227,6 +242,8 @@ def _track(command: Track) -> None:
         f"{sequence.frames} steps, {targets} tracks, {sequence.frames / seconds:.0f} steps/s "
         f"({sequence.frames / seconds / sequence.fps:.1f} × real time{kept}), written to {output}"
     )
+    if (reason := why_no_tracks(run)) is not None:
+        say(reason)
 
 
 # the rest

@@ -62,6 +62,7 @@ class Stream:
         self._pages: set[_Page] = set()
         self._unheard: str | None = None
         """What was said last while there was no page, for the first that comes."""
+        self._unheard_level = ""
         self._state: tuple[int, str] = (-1, "")
         self._steps: OrderedDict[tuple[Any, ...], str] = OrderedDict()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -91,7 +92,8 @@ class Stream:
 
     def _note(self, change: Change) -> None:
         if change == "sequence":
-            self._unheard = None  # what went wrong before it was opened is over
+            if self._unheard_level == "error":
+                self._unheard = None  # what went wrong before it was opened is over
         for page in self._pages:
             page.news.add(change)
             page.wake.set()
@@ -104,7 +106,7 @@ class Stream:
                 notice = {"type": "notice", "level": level, "message": message, "hint": hint}
                 text = json.dumps(notice)
                 if not self._pages:
-                    self._unheard = text
+                    self._unheard, self._unheard_level = text, level
         for page in self._pages:
             page.messages = [*page.messages, text][-MOST_NOTICES:]
             page.wake.set()

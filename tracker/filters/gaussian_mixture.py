@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -17,6 +18,17 @@ from tracker.kernels.linear_algebra import Gaussians
 
 _NOBODY = np.zeros(0, dtype=np.int64)
 """Instead of owners, where no component has one."""
+
+
+class _Weighted(Protocol):
+    """What a compiled kernel gives of J components: (J,), (J, d) and (J, d, d)."""
+
+    @property
+    def weights(self) -> ndarray: ...
+    @property
+    def means(self) -> ndarray: ...
+    @property
+    def covariances(self) -> ndarray: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +69,7 @@ class GaussianMixture:
         )
 
     @staticmethod
-    def of(gaussians: Gaussians, labels: Int[ndarray, " J"]) -> GaussianMixture:
+    def of(gaussians: _Weighted, labels: Int[ndarray, " J"]) -> GaussianMixture:
         """The components that a compiled kernel gave, with their labels."""
         return GaussianMixture(gaussians.weights, gaussians.means, gaussians.covariances, labels)
 
@@ -223,14 +235,16 @@ def reduce(
     """
     _check(merging_threshold)
     reduced = merging.reduce_mixture(
-        mixture.gaussians,
+        mixture.weights,
+        mixture.means,
+        mixture.covariances,
         _NOBODY if owners is None else owners,
         pruning_threshold,
         merging_threshold,
         max_components,
     )
-    labels = mixture.labels.take(reduced.leaders)
-    return GaussianMixture.of(reduced.components, labels), reduced.leaders
+    leaders = reduced.leaders
+    return GaussianMixture.of(reduced, mixture.labels.take(leaders)), leaders
 
 
 def gate_distance(probability: float, dimension: int) -> float:

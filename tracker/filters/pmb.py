@@ -17,7 +17,7 @@ from tracker import association
 from tracker.association import Marginals
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.kernels.gating import Measurements
-from tracker.kernels.kalman import Alternative, Expected
+from tracker.kernels.kalman import Expected
 from tracker.kernels.labelled import marginals as marginal_kernels
 
 
@@ -39,7 +39,6 @@ def update(
     detection_probability: Float[ndarray, " n"],
     unexplained_intensity: Float[ndarray, " M"],
     gate: float,
-    other: Alternative | None = None,
 ) -> PmbUpdate:
     """Update every track by the measurements that may be its own ([W15] TOMB/P).
 
@@ -58,7 +57,6 @@ def update(
         detection_probability: p_i of each track.
         unexplained_intensity: ρ_j = κ(z_j) + e_j, clutter and newborns at each measurement.
         gate: Squared Mahalanobis distance beyond which a pair is left out.
-        other: What else a measurement may be; nothing, if none.
     """
     updated = marginal_kernels.bernoulli_update(
         tracks.gaussians,
@@ -70,11 +68,10 @@ def update(
         detection_probability,
         unexplained_intensity,
         gate,
-        other or Alternative.none(noise.shape[1], tracks.dimension),
         association.SETTLING,
     )
-    rows = updated.marginals.rows
+    rows = updated.rows
     return PmbUpdate(
-        GaussianMixture.of(updated.tracks, tracks.labels),
-        Marginals(rows[:, 1:], rows[:, 0], updated.marginals.unexplained),
+        GaussianMixture(updated.existences, updated.means, updated.covariances, tracks.labels),
+        Marginals(rows[:, 1:], rows[:, 0], updated.unexplained),
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.special import expit
 
@@ -34,6 +34,8 @@ class Evidence:
     """Probability that no target made the box."""
     starts: Int[ndarray, " C1"]
     """Where each camera's boxes begin, and the end."""
+    seeing: Bool[ndarray, " C"] | None = None
+    """Which cameras have a frame at this step: others miss nobody; None where all have."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -173,16 +175,19 @@ class MeasurementBirths:
             np.zeros(len(kept)),
             fitted.sources[:, kept],
         )
-        existences = expit(self._log_odds(found, fitted.fits[:, kept]))
+        existences = expit(self._log_odds(found, fitted.fits[:, kept], evidence.seeing))
         return Newborns(found.positions, found.covariances, existences, found.sources)
 
-    def _log_odds(self, found: Newborns, fits: Float[ndarray, "C N"]) -> Float[ndarray, " N"]:
+    def _log_odds(
+        self, found: Newborns, fits: Float[ndarray, "C N"], seeing: Bool[ndarray, " C"] | None
+    ) -> Float[ndarray, " N"]:
         """log Λ of each newcomer, of whose boxes ``fits`` are the log likelihoods."""
         log_odds = self._log_density + 1.5 * np.log(2.0 * np.pi)
         log_odds = log_odds + 0.5 * np.linalg.slogdet(found.covariances)[1]
         for c, camera in enumerate(self._cameras):
             hit = found.sources[c] >= 0
             missed = ~hit & camera.sees(found.positions)
-            log_odds[missed] += self._log_miss
+            if seeing is None or seeing[c]:
+                log_odds[missed] += self._log_miss
             log_odds[hit] += self._log_hit - self._log_clutter[c] + fits[c][hit]
         return np.asarray(log_odds)

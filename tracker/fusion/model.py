@@ -10,8 +10,9 @@ from numpy import ndarray
 
 from tracker.filters import gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion import visibility
+from tracker.fusion import sight, visibility
 from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths, Newborns
+from tracker.fusion.sight import Glimpse, Recent
 from tracker.fusion.target_model import ExpectedBoxes, TargetModel
 from tracker.fusion.visibility import Visibility
 from tracker.kernels import linear_algebra
@@ -116,8 +117,36 @@ class FusionModel:
         """Newcomers where unexplained boxes of several cameras agree: components without labels,
         and what says so; None for nobody."""
         found = self._newborns.propose(evidence)
-        if found is None:
-            return None
+        return None if found is None else self._at_rest(found)
+
+    def newborns_and_recent(
+        self,
+        evidence: Evidence,
+        boxes: Float[ndarray, "B 4"],
+        views: Many[ViewResult],
+        recent: Recent,
+    ) -> tuple[tuple[GaussianMixture, Newborns] | None, Recent]:
+        """As :meth:`newborns`, and what is to be remembered of this step's frames.
+
+        Args:
+            evidence: What the cameras leave unexplained.
+            boxes: Camera after camera, centre and half sizes, pixels.
+            views: Which cameras have a frame.
+            recent: What was remembered at the end of the step before; empty at the start.
+        """
+        blind = np.array([view.blind for view in views])
+        now = Glimpse(evidence, boxes, blind)
+        later = sight.remember(recent, now, self.step_time)
+        if not blind.any():
+            return self.newborns(evidence), later
+        joined = sight.with_recent(now, recent, self.step_time, self.target.half_height)
+        proposed = self._newborns.propose(joined)
+        if proposed is None:
+            return None, later
+        found = sight.of_this_step(proposed, blind)
+        return (self._at_rest(found) if len(found.existences) else None), later
+
+    def _at_rest(self, found: Newborns) -> tuple[GaussianMixture, Newborns]:
         nameless = np.zeros(len(found.existences), dtype=np.int64)
         born = GaussianMixture(found.existences, found.positions, found.covariances, nameless)
         return self.motion.at_rest(born), found

@@ -18,7 +18,7 @@ from tracker.filters.phd import PhdUpdate
 from tracker.fusion.model import CONFIRMED
 from tracker.kernels import linear_algebra
 from tracker.kernels.labelled import marginals
-from tracker.kernels.labelled.marginals import BirthLabels, LabelledWeights, PairOdds
+from tracker.kernels.labelled.marginals import LabelledWeights, PairOdds
 
 _LARGEST_ODDS = 600.0  # the logarithm of what still fits a float with room to spare
 
@@ -59,7 +59,8 @@ def share_boxes(
     owner, box = updated.parents[size:], updated.measurements[size:]
     shared = marginals.share_boxes(
         LabelledWeights(predicted.weights, predicted.labels, detection_probability),
-        BirthLabels(births.start, births.stop),
+        births.start,
+        births.stop,
         PairOdds(owner, box, updated.log_odds, boxes),
         _LARGEST_ODDS,
         association.SETTLING,

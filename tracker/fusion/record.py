@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.protocol import Associations, FusionResult
-from tracker.kernels.linear_algebra import ToldPairs, sum_pairs
+from tracker.kernels.linear_algebra import sum_pairs
 
 WORTH_TELLING = 0.01
 """Association probability below which a pair is not told: a hundredth is no news to anybody."""
@@ -97,23 +97,30 @@ class Ledger:
             return Associations.none()
         return summed(
             labels,
-            ToldPairs(
-                np.concatenate(self._cameras),
-                np.concatenate(self._labels),
-                np.concatenate(self._boxes),
-                np.concatenate(self._probabilities),
-            ),
+            np.concatenate(self._cameras),
+            np.concatenate(self._labels),
+            np.concatenate(self._boxes),
+            np.concatenate(self._probabilities),
         )
 
 
-def summed(labels: Int[ndarray, " J"], pairs: ToldPairs) -> Associations:
+def summed(
+    labels: Int[ndarray, " J"],
+    cameras: Int[ndarray, " A"],
+    of_pairs: Int[ndarray, " A"],
+    boxes: Int[ndarray, " A"],
+    probabilities: Float[ndarray, " A"],
+) -> Associations:
     """The pairs of those labels that lived on; several of one label and box are summed.
 
     Args:
         labels: Of the posterior's components, the heaviest first.
-        pairs: Of all cameras.
+        cameras: Of the pairs, as the further ones.
+        of_pairs: Their labels.
+        boxes: Their boxes.
+        probabilities: Theirs.
     """
-    if not len(labels) or not len(pairs.cameras):
+    if not len(labels) or not len(cameras):
         return Associations.none()
-    found = sum_pairs(labels, pairs)
+    found = sum_pairs(labels, cameras, of_pairs, boxes, probabilities)
     return Associations(found.cameras, found.components, found.boxes, found.probabilities)

@@ -16,12 +16,13 @@ from numpy import ndarray
 
 from tracker.filters import gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion import memory, one_person
+from tracker.fusion import memory, one_person, sight
 from tracker.fusion.measurement_births import Evidence
 from tracker.fusion.memory import Memory
 from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import Ledger, Record
+from tracker.fusion.sight import Recent
 from tracker.kernels import linear_algebra
 from tracker.kernels.gating import Measurements
 from tracker.kernels.intensity import mixture as mixture_kernels
@@ -39,6 +40,8 @@ class SequentialPhdState:
     mixture: GaussianMixture
     next_label: int
     memory: Memory
+    recent: Recent = ()
+    """What each camera left unexplained in the last frames."""
 
 
 @dataclass(slots=True, eq=False)
@@ -104,8 +107,9 @@ class SequentialPhd:
         )
         for index, view in enumerate(views):
             self._update(work, index, view)
+        recent = state.recent
         if p.birth != "entrances":
-            self._add_newborns(work, views)
+            recent = self._add_newborns(work, views, recent)
         inside = self._model.stays(work.mixture)
         mixture, record = work.mixture.take(inside), work.record.take(inside)
         if p.misses == "per_person":
@@ -116,23 +120,27 @@ class SequentialPhd:
         mixture = _relabelled(mixture, labels)
         labels, lost = memory.recall(state.memory, mixture, self._model, state.next_label)
         mixture = _relabelled(mixture, labels)
-        return SequentialPhdState(mixture, next_label, lost), record.result(mixture, associations)
+        after = SequentialPhdState(mixture, next_label, lost, recent)
+        return after, record.result(mixture, associations)
 
     def _update(self, work: _Work, index: int, view: ViewResult) -> None:
         """The update by the boxes of one camera, and its reduction."""
         p, model, mixture = self._parameters, self._model, work.mixture
         measurements = model.target.measured(view, p.measurement_sigma)
+        if view.blind:
+            work.measured.append(measurements)
+            work.unexplained.append(np.zeros(0))
+            return
         expected = model.expected(index, mixture)
         seen = model.visible(index, expected, mixture, _occluders(mixture, work.sure))
         updated = phd.update(
             mixture,
             measurements.values,
-            expected=expected.upright,
+            expected=expected.expected,
             noise=measurements.noises,
             detection_probability=seen.detection_probabilities,
             clutter_intensity=model.clutter[index],
             gate=model.gate,
-            other=expected.posture,
         )
         owners = None
         if p.misses == "per_person":
@@ -164,19 +172,19 @@ class SequentialPhd:
         work.measured.append(measurements)
         work.unexplained.append(1.0 - updated.measurement_weights)
 
-    def _add_newborns(self, work: _Work, views: Many[ViewResult]) -> None:
-        """Components where unexplained boxes of several cameras agree on a place."""
+    def _add_newborns(self, work: _Work, views: Many[ViewResult], recent: Recent) -> Recent:
+        """Components where unexplained boxes of several cameras agree on a place; what is to be
+        remembered of this step's frames."""
         measured = Measurements(
             np.concatenate([each.values for each in work.measured]),
             np.concatenate([each.noises for each in work.measured]),
         )
         seen = all_boxes(views)
         unexplained = np.concatenate(work.unexplained)
-        found = self._model.newborns(
-            Evidence(seen.boxes[:, :2], measured, unexplained, seen.starts)
-        )
+        evidence = Evidence(seen.boxes[:, :2], measured, unexplained, seen.starts)
+        found, later = self._model.newborns_and_recent(evidence, seen.boxes, views, recent)
         if found is None:
-            return
+            return later
         born, newborns = found
         born = models.label_births(born, work.next_label)
         work.next_label += born.size
@@ -185,7 +193,10 @@ class SequentialPhd:
         work.record = work.record.extended(born.size)
         work.record.sources[:, first:] = newborns.sources
         work.record.source_weights[:, first:] = newborns.sources >= 0
-        work.record.detection_probabilities[:, first:] = self._parameters.detection_probability
+        cameras = sight.seeing(views)
+        seeing = slice(None) if cameras is None else cameras
+        work.record.detection_probabilities[seeing, first:] = self._parameters.detection_probability
+        return later
 
     def _without_duplicates(self, mixture: GaussianMixture, record: Record) -> Int[ndarray, " K"]:
         """Indices of the components of those labels that do not only repeat another."""

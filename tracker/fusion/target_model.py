@@ -12,8 +12,8 @@ from numpy import ndarray
 from tracker.camera import Camera
 from tracker.kernels import measurement
 from tracker.kernels.gating import Measurements
-from tracker.kernels.kalman import Alternative, Expected
-from tracker.kernels.measurement import Target, Transform
+from tracker.kernels.kalman import Expected
+from tracker.kernels.measurement import Target
 from tracker.parameters import FusionParams
 from tracker.single_view.protocol import ViewResult
 
@@ -40,33 +40,32 @@ _NO_COVARIANCES = np.zeros((0, 3, 3))
 class ExpectedBoxes:
     """What one camera should measure of J states."""
 
-    upright: Expected
+    expected: Expected
     """Values: centre (x, y), or horizontal centre, top, bottom (and width), in pixels. Their
     derivatives by the state, pixels a metre; zero for velocities. What the bend of the
-    projection adds to the noise, squared pixels: one each, or nothing."""
+    projection adds to the noise, squared pixels: one each, or nothing. The same of a person
+    who lies or is bent, where that is asked for."""
     boxes: Float[ndarray, "J 4"]
     """left, top, right, bottom in pixels, not clipped."""
     depths: Float[ndarray, " J"]
     """Distance from the lens, metres."""
     valid: Bool[ndarray, " J"]
     """Whether middle, head and foot lie in front of the lens."""
-    posture: Alternative | None = None
-    """The box of the same person lying or bent, where that is asked for."""
 
     @property
     def values(self) -> Float[ndarray, "J m"]:
         """Of the upright."""
-        return self.upright.values
+        return self.expected.values
 
     @property
     def jacobians(self) -> Float[ndarray, "J m d"]:
         """Of the upright."""
-        return self.upright.jacobians
+        return self.expected.jacobians
 
     @property
     def spreads(self) -> Float[ndarray, "K m m"]:
         """Of the upright."""
-        return self.upright.spreads
+        return self.expected.spreads
 
 
 class TargetModel:
@@ -93,7 +92,7 @@ class TargetModel:
 
     A person may also lie, crouch or bend, or half of him is behind a table. Then the
     box is of another shape: with ``posture_share`` a box is one of two kinds, and
-    ``posture`` holds the second, low and broad and known loosely.
+    ``expected`` holds the second, too, low and broad and known loosely.
     """
 
     def __init__(
@@ -124,8 +123,8 @@ class TargetModel:
         transform = _FROM_BOX[kind]
         # R = T diag(σ²) Tᵀ is linear in σ²
         products = np.einsum("pa,qa->apq", transform, transform).reshape(4, self.size**2).copy()
-        self.transform = Transform(transform, products)
-        """What is measured of a box."""
+        self.transforms = transform, products
+        """T (m, 4) and (4, m²), as :func:`tracker.kernels.measurement.measured_boxes` has them."""
         p = parameters
         sigmas = np.array(
             [
@@ -181,8 +180,7 @@ class TargetModel:
             target,
             camera.calibration,
         )
-        posture = found.posture if self.posture_share else None
-        return ExpectedBoxes(found.upright, found.boxes, found.depths, found.valid, posture)
+        return ExpectedBoxes(found.expected, found.boxes, found.depths, found.valid)
 
     def measured(self, view: ViewResult, factor: float) -> Measurements:
         """The boxes of a camera as measurements z, and their noise R in squared pixels.
@@ -194,5 +192,5 @@ class TargetModel:
         return measurement.measured_boxes(
             np.ascontiguousarray(view.boxes, dtype=float),
             np.ascontiguousarray((factor * view.sigmas) ** 2, dtype=float),
-            self.transform,
+            *self.transforms,
         )

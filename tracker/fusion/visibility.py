@@ -12,7 +12,7 @@ from tracker.camera import Camera
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.target_model import ExpectedBoxes
 from tracker.kernels import boxes as box_kernels
-from tracker.kernels.boxes import Occluders, Occlusion
+from tracker.kernels.boxes import Occlusion
 
 WORTH_TELLING = 0.2
 """Share of a target's box that must be covered for its occluder to be named. It changes what is
@@ -95,7 +95,8 @@ def visibility(
         expected.depths,
         mixture.means,
         mixture.labels,
-        Occluders(occluders, weights),
+        occluders,
+        weights,
         Occlusion(near, strength, WORTH_TELLING),
     )
     return Visibility(found.detection_probabilities, found.hidden_by)

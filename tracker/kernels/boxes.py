@@ -27,15 +27,6 @@ class UprightBoxes(NamedTuple):
     """(J,), whether middle, head and foot lie in front of it."""
 
 
-class Occluders(NamedTuple):
-    """L targets that may hide others."""
-
-    indices: ndarray
-    """(L,), among all targets."""
-    weights: ndarray
-    """(L,), their existence; at most 1 counts."""
-
-
 class Occlusion(NamedTuple):
     """How far targets hide those behind them."""
 
@@ -182,7 +173,8 @@ def hide(
     depths: ndarray,
     means: ndarray,
     labels: ndarray,
-    occluders: Occluders,
+    occluders: ndarray,
+    weights: ndarray,
     occlusion: Occlusion,
 ) -> Hidden:
     """Lower each detection probability where other targets stand in front.
@@ -196,7 +188,8 @@ def hide(
         depths: (J,) metres.
         means: (J, d), position first.
         labels: (J,).
-        occluders: Those that may hide others.
+        occluders: (L,), indices of those that may hide others.
+        weights: (L,), their existence; at most 1 counts.
         occlusion: How far they do.
     """
     near, strength = occlusion.near, occlusion.strength
@@ -206,8 +199,8 @@ def hide(
     for j in range(count):
         area = max((boxes[j, 2] - boxes[j, 0]) * (boxes[j, 3] - boxes[j, 1]), 1e-9)
         strongest = occlusion.worth_telling
-        for k in range(len(occluders.indices)):
-            other = occluders.indices[k]
+        for k in range(len(occluders)):
+            other = occluders[k]
             if labels[other] == labels[j] or not depths[other] < depths[j]:
                 continue
             distance = 0.0
@@ -219,7 +212,7 @@ def hide(
             down = min(boxes[j, 3], boxes[other, 3]) - max(boxes[j, 1], boxes[other, 1])
             if across <= 0.0 or down <= 0.0:
                 continue
-            effect = min(occluders.weights[k], 1.0) * across * down / area
+            effect = min(weights[k], 1.0) * across * down / area
             result[j] *= max(1.0 - strength * effect, 0.0)
             if effect > strongest:
                 strongest = effect

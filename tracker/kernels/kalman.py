@@ -14,41 +14,44 @@ from tracker.kernels.gating import GatedPairs, Measurements, factor_innovation, 
 
 
 class Expected(NamedTuple):
-    """What J components predict of a measurement, linearised."""
+    """What J components predict of a measurement, linearised: of a target in one of two postures.
+
+        g(z|x) = (1 − ε) N(z; h(x), R + Ω) + ε N(z; h'(x'), R + Ω'),  x' = x + N(0, D)
+
+    What belongs to the other posture has no rows where there is none.
+    """
 
     values: ndarray
-    """(J, m), h of each mean."""
+    """h (J, m) of each mean."""
     jacobians: ndarray
-    """(J, m, d), its derivative H, or (1, m, d), one for all."""
+    """H (J, m, d), or (1, m, d), one for all."""
     spreads: ndarray
-    """(J, m, m), what a component adds to the noise, or (0, m, m) for nothing."""
+    """Ω (J, m, m), what a component adds to the noise, or (0, m, m) for nothing."""
+    posture_values: ndarray
+    """h' (J, m), or (0, m)."""
+    posture_jacobians: ndarray
+    """H' (J, m, d), or (0, m, d)."""
+    posture_spreads: ndarray
+    """Ω' (J, m, m), or (0, m, m)."""
+    posture_drift: ndarray
+    """D (d, d), how far a state may have moved with the change of posture."""
+    posture_share: float
+    """ε, of the measurements, above 0 and below 1."""
 
     @staticmethod
     def of(values: ndarray, jacobians: ndarray, spreads: ndarray | None = None) -> Expected:
-        """Arrays of any kind, as kernels take them; no spread is none."""
-        size = values.shape[1]
+        """Of one posture: arrays of any kind, as kernels take them; no spread is none."""
+        size, dimension = jacobians.shape[1:]
         return Expected(
             np.ascontiguousarray(values, dtype=float),
             np.ascontiguousarray(jacobians, dtype=float),
-            np.zeros((0, size, size)) if spreads is None else spreads,
+            np.empty((0, size, size)) if spreads is None else spreads,
+            np.empty((0, size)),
+            np.empty((0, size, dimension)),
+            np.empty((0, size, size)),
+            np.zeros((dimension, dimension)),
+            0.0,
         )
-
-
-class Alternative(NamedTuple):
-    """What else a measurement of J components may be: that of a target in another posture."""
-
-    expected: Expected
-    """Of no component where there is no other posture."""
-    drift: ndarray
-    """(d, d), how far a state may have moved with the change of posture: a covariance."""
-    share: float
-    """Of the measurements, above 0 and below 1."""
-
-    @staticmethod
-    def none(size: int, dimension: int) -> Alternative:
-        """There is no other posture."""
-        nothing = np.zeros((0, size)), np.zeros((0, size, dimension)), np.zeros((0, size, size))
-        return Alternative(Expected(*nothing), np.zeros((dimension, dimension)), 0.0)
 
 
 class Pairs(NamedTuple):
@@ -304,36 +307,50 @@ def kalman_pairs(
 
 
 @kernel
+def _in_posture(expected: Expected) -> Expected:
+    """What is predicted of those in the other posture, as of the only one."""
+    return Expected(
+        expected.posture_values,
+        expected.posture_jacobians,
+        expected.posture_spreads,
+        expected.posture_values[:0],
+        expected.posture_jacobians[:0],
+        expected.posture_spreads[:0],
+        expected.posture_drift,
+        expected.posture_share,
+    )
+
+
+@kernel
 def all_pairs(
     means: ndarray,
     covariances: ndarray,
     expected: Expected,
     measurements: Measurements,
     gate: float,
-    other: Alternative,
 ) -> Pairs:
-    """:func:`kalman_pairs` of a measurement that is of one of two kinds.
-
-        g(z|x) = (1 − ε) N(z; h(x), R + Ω) + ε N(z; h'(x'), R + Ω'),  x' = x + N(0, D)
+    """:func:`kalman_pairs` of a measurement of a target in one of two postures.
 
     Args:
         means: As the further ones, of :func:`kalman_pairs`.
-        other: h', H', Ω', D and ε.
 
     Returns:
-        The pairs of the first kind and then those of the other.
+        The pairs of the first posture and then those of the other.
     """
     first = kalman_pairs(means, covariances, expected, measurements, gate)
-    if len(other.expected.values) == 0:
+    if len(expected.posture_values) == 0:
         return first
-    more = kalman_pairs(means, covariances + other.drift, other.expected, measurements, gate)
+    more = kalman_pairs(
+        means, covariances + expected.posture_drift, _in_posture(expected), measurements, gate
+    )
+    share = expected.posture_share
     return Pairs(
         np.concatenate((first.components, more.components)),
         np.concatenate((first.measured, more.measured)),
         np.concatenate(
             (
-                first.log_likelihoods + math.log(1.0 - other.share),
-                more.log_likelihoods + math.log(other.share),
+                first.log_likelihoods + math.log(1.0 - share),
+                more.log_likelihoods + math.log(share),
             )
         ),
         np.concatenate((first.means, more.means)),

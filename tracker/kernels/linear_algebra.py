@@ -34,19 +34,6 @@ class LabelGroups(NamedTuple):
     """(J,), the place of each component's label among them."""
 
 
-class ToldPairs(NamedTuple):
-    """A pairs of a labelled component and a box, with the probability that it made the box."""
-
-    cameras: ndarray
-    """(A,)."""
-    labels: ndarray
-    """(A,)."""
-    boxes: ndarray
-    """(A,), counted within the camera."""
-    probabilities: ndarray
-    """(A,)."""
-
-
 class SummedPairs(NamedTuple):
     """K pairs of a component and a box, in the order of camera, component and box."""
 
@@ -224,14 +211,18 @@ def duplicates(
 
 
 @kernel
-def sum_pairs(labels: ndarray, pairs: ToldPairs) -> SummedPairs:
+def sum_pairs(
+    labels: ndarray, cameras: ndarray, of_pairs: ndarray, boxes: ndarray, weights: ndarray
+) -> SummedPairs:
     """Sum the pairs of one camera, component and box; pairs of absent labels are left out.
 
     Args:
         labels: (J,) of the components; of several with one label the first stands for it.
-        pairs: Of any labels.
+        cameras: (A,) of the pairs, as the further ones.
+        of_pairs: (A,) labels, known or not.
+        boxes: (A,), counted within the camera.
+        weights: (A,).
     """
-    boxes, of_pairs = pairs.boxes, pairs.labels
     count = len(of_pairs)
     width = 1
     for pair in range(count):
@@ -243,7 +234,7 @@ def sum_pairs(labels: ndarray, pairs: ToldPairs) -> SummedPairs:
         for component in range(len(labels)):
             if labels[component] == of_pairs[pair]:
                 # camera, component and box as the digits of one number
-                keys[kept] = (pairs.cameras[pair] * len(labels) + component) * width + boxes[pair]
+                keys[kept] = (cameras[pair] * len(labels) + component) * width + boxes[pair]
                 which[kept] = pair
                 kept += 1
                 break
@@ -255,7 +246,7 @@ def sum_pairs(labels: ndarray, pairs: ToldPairs) -> SummedPairs:
         if distinct == 0 or keys[place] != found[distinct - 1]:
             found[distinct] = keys[place]
             distinct += 1
-        sums[distinct - 1] += pairs.probabilities[which[place]]
+        sums[distinct - 1] += weights[which[place]]
     found = found[:distinct]
     rest = found // width
     size = max(len(labels), 1)

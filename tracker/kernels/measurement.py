@@ -10,7 +10,7 @@ from numpy import ndarray
 from tracker.kernels.boxes import expected_boxes
 from tracker.kernels.compilation import kernel
 from tracker.kernels.gating import Measurements
-from tracker.kernels.kalman import Alternative, Expected
+from tracker.kernels.kalman import Expected
 from tracker.kernels.lens import Calibration
 from tracker.kernels.linear_algebra import factorise, solve
 
@@ -37,32 +37,21 @@ class Target(NamedTuple):
     """(m, m), how far the box may then be off, for one pixel of the upright box's half height;
     (0, 0) where there is no other posture."""
     posture_drift: ndarray
-    """(d, d), as ``posture_share``, of :class:`tracker.kernels.kalman.Alternative`."""
+    """(d, d), as ``posture_share``, of :class:`tracker.kernels.kalman.Expected`."""
     posture_share: float
-
-
-class Transform(NamedTuple):
-    """What is measured of a box b: z = T b."""
-
-    matrix: ndarray
-    """T (m, 4)."""
-    products: ndarray
-    """(4, m²), what each variance of a box adds to each entry of the noise."""
 
 
 class ExpectedBoxes(NamedTuple):
     """What a camera should measure of J targets."""
 
-    upright: Expected
-    """Of those who stand."""
+    expected: Expected
+    """Of those who stand, and, infinite where there is nothing to see, in the other posture."""
     boxes: ndarray
     """(J, 4) left, top, right, bottom of those who stand, not clipped, pixels."""
     depths: ndarray
     """(J,), distance from the lens, metres."""
     valid: ndarray
     """(J,), whether there is anything to see."""
-    posture: Alternative
-    """In the other posture; values are infinite where there is nothing to see."""
 
 
 class _SigmaPoints(NamedTuple):
@@ -75,22 +64,24 @@ class _SigmaPoints(NamedTuple):
 
 
 @kernel
-def measured_boxes(boxes: ndarray, variances: ndarray, transform: Transform) -> Measurements:
+def measured_boxes(
+    boxes: ndarray, variances: ndarray, transform: ndarray, products: ndarray
+) -> Measurements:
     """Boxes as measurements z = T b, and their noise T diag(σ²) Tᵀ.
 
     Args:
         boxes: b (M, 4).
         variances: σ² (M, 4).
-        transform: T.
+        transform: T (m, 4).
+        products: (4, m²), what each variance adds to each entry of the noise.
     """
-    matrix, products = transform.matrix, transform.products
-    count, size = len(boxes), len(matrix)
+    count, size = len(boxes), len(transform)
     values = np.zeros((count, size))
     noises = np.zeros((count, size, size))
     for i in range(count):
         for part in range(4):
             for a in range(size):
-                values[i, a] += matrix[a, part] * boxes[i, part]
+                values[i, a] += transform[a, part] * boxes[i, part]
                 for b in range(size):
                     noises[i, a, b] += variances[i, part] * products[part, a * size + b]
     return Measurements(values, noises)
@@ -132,15 +123,19 @@ def expected_measurements(
                     seen.values[j], seen.jacobians[j], spreads[j],
                 )  # fmt: skip
     return ExpectedBoxes(
-        Expected(seen.values, seen.jacobians, spreads),
-        seen.boxes,
-        seen.depths,
-        seen.valid,
-        Alternative(
-            Expected(posture.values, posture.jacobians, posture_spreads),
+        Expected(
+            seen.values,
+            seen.jacobians,
+            spreads,
+            posture.values,
+            posture.jacobians,
+            posture_spreads,
             target.posture_drift,
             target.posture_share,
         ),
+        seen.boxes,
+        seen.depths,
+        seen.valid,
     )
 
 

@@ -162,44 +162,44 @@ class FusionParams(Params):
     posture_height: Annotated[
         float,
         Field(ge=0.1, le=1.0),
-        ui("h_l", unit="half heights", step=0.05, advanced=True, when=_BOXES),
+        ui("h_p", unit="half heights", step=0.05, advanced=True, when=_BOXES),
     ] = 0.5
-    """Low posture: half height of the box, seen in perspective and from any side."""
+    """Other posture: half height of the box, seen in perspective and from any side."""
 
     posture_width: Annotated[
         float,
         Field(ge=0.1, le=2.0),
-        ui("w_l", unit="half heights", step=0.05, advanced=True, when=_BOXES),
+        ui("w_p", unit="half heights", step=0.05, advanced=True, when=_BOXES),
     ] = 0.6
-    """Low posture: half width of the box."""
+    """Other posture: half width of the box."""
 
     posture_centre_sigma: Annotated[
         float,
         Field(ge=0.01, le=2.0),
-        ui("σ_lc", unit="half heights", step=0.01, advanced=True, when=_BOXES),
+        ui("σ_pc", unit="half heights", step=0.01, advanced=True, when=_BOXES),
     ] = 0.15
-    """Low posture: deviation of the box's centre, across and down."""
+    """Other posture: deviation of the box's centre, across and down."""
 
     posture_width_sigma: Annotated[
         float,
         Field(ge=0.01, le=2.0),
-        ui("σ_lw", unit="half heights", step=0.01, advanced=True, when=_BOXES),
+        ui("σ_pw", unit="half heights", step=0.01, advanced=True, when=_BOXES),
     ] = 0.5
-    """Low posture: deviation of its half width."""
+    """Other posture: deviation of its half width."""
 
     posture_height_sigma: Annotated[
         float,
         Field(ge=0.01, le=2.0),
-        ui("σ_lh", unit="half heights", step=0.01, advanced=True, when=_BOXES),
+        ui("σ_ph", unit="half heights", step=0.01, advanced=True, when=_BOXES),
     ] = 0.25
-    """Low posture: deviation of its half height."""
+    """Other posture: deviation of its half height."""
 
     posture_drop: Annotated[
         float,
         Field(ge=0.0, le=1.0),
-        ui("σ_ld", unit="half heights", step=0.05, advanced=True, when=_BOXES),
+        ui("σ_pd", unit="half heights", step=0.05, advanced=True, when=_BOXES),
     ] = 0.3
-    """Low posture: how far the middle moves from one box to the next."""
+    """Other posture: how far the middle moves from one box to the next."""
 
     memory_gate_probability: Annotated[
         float, Field(ge=0.1, le=0.9999), ui("P_m", step=0.01, advanced=True)

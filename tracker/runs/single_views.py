@@ -107,6 +107,7 @@ class _CameraWorker:
         self._method = method
         self._state = state
         self._camera = camera
+        self._view = run.sequence.views[camera]
         self._frame = len(run.views)
         self._frames = run.sequence.frames
         self._seed = run.seed
@@ -120,8 +121,14 @@ class _CameraWorker:
         done: list[tuple[ViewResult, Any]] = []
         while len(done) < steps and self._frame < self._frames and not self._stopped():
             picture = next(self._pictures, None) if self._pictures is not None else None
+            if self._pictures is None and not self._view.was_looked_at(self._frame):
+                done.append((ViewResult.of_no_frame(), self._state))
+                self._frame += 1
+                continue
             rng = np.random.default_rng((self._seed, self._camera, self._frame))
             self._state, result = self._method.step(self._state, self._frame, picture, rng)
+            if self._pictures is not None and picture is None:
+                result = without_boxes(result)
             if picture is not None and self._likeness is not None:
                 likenesses = self._likeness.of_boxes(picture, result.boxes)
                 result = replace(result, likenesses=likenesses)
@@ -132,6 +139,19 @@ class _CameraWorker:
 
 def _looks_at_pictures(run: Run) -> bool:
     return run.parameters.method("single_view").used(run.parameters).pictures
+
+
+def without_boxes(result: ViewResult) -> ViewResult:
+    """What a method makes of a missing picture: its own estimates, and nothing to the fusion."""
+    nothing = ViewResult.of_no_frame()
+    return replace(
+        result,
+        boxes=nothing.boxes,
+        weights=nothing.weights,
+        labels=nothing.labels,
+        sigmas=nothing.sigmas,
+        blind=True,
+    )
 
 
 class _StoppingReader:

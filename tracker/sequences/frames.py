@@ -250,8 +250,10 @@ class _Source:
 
     def read(self, step: int) -> Picture | None:
         """Decode one step; None where there is no picture of the camera's size."""
-        frame = self.view.first_frame + step
+        frame = self.view.frame_at(step)
         picture = None
+        if frame < 0:
+            return None
         if self.view.video is not None:
             picture = self._read_video(frame)
         elif frame < len(self.view.images):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -62,6 +62,8 @@ class ViewResult:
     """Probability that the colours of each box are those of each of P people with templates,
     if they are one's; (0, 0) where there was no picture, or fewer than two have templates. A
     method leaves it: :mod:`tracker.single_view.colour.likeness` tells it of all."""
+    blind: bool = False
+    """Whether the camera had no frame at this step, and so says nothing of who is there."""
 
     @staticmethod
     def of_boxes(
@@ -85,6 +87,12 @@ class ViewResult:
             sample_weights=np.zeros(0, dtype=np.float32),
             information={},
         )
+
+    @staticmethod
+    def of_no_frame() -> ViewResult:
+        """The camera had no frame at this step."""
+        nothing = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
+        return replace(nothing, blind=True)
 
 
 class SingleViewMethod(Protocol):

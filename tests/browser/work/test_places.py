@@ -22,12 +22,12 @@ def test_a_link_restores_step_selection_camera_and_parameters(
     name = server.get("/api/state").json()["sequence"]["name"]
     context = browser.new_context(viewport={"width": 1440, "height": 900})
     page = context.new_page()
-    page.goto(f"{server.address}?seq={name}&step=33&sel=1&cam=2&p.{P_D}=0.71&zoom=3")
+    page.goto(f"{server.address}?seq={name}&step=33&sel=1&cam=2&p.{P_D}=0.71&zooom=3")
     until(page, lambda: readout(page) == "33", "the step of the link")
     state = server.wait(lambda state: state["parameters"][P_D] == 0.71)
     assert state["selection"] == 1
     expect(page.locator(".cam").nth(1)).to_have_attribute("aria-pressed", "true")
-    expect(page.get_by_text("unknown parts: zoom")).to_be_visible()
+    expect(page.get_by_text("unknown parts: zooom")).to_be_visible()
     until(page, lambda: f"p.{P_D}=0.71" in page.url, "the address keeps it")
     context.close()
     as_at_first(server)

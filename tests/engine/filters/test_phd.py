@@ -164,6 +164,24 @@ def test_a_gate_that_is_wide_enough_changes_nothing() -> None:
     assert_array_equal(shut.measurement_weights, np.zeros(5))
 
 
+@pytest.mark.parametrize("gate", [1.0, 4.0, 30.0])
+def test_within_the_gate_are_the_pairs_of_so_small_a_mahalanobis_distance(gate: float) -> None:
+    mixture = random_mixture(np.random.default_rng(4), 30, 4)
+    linear = Linear(mixture, 7, count=30)
+    updated = linear.update(mixture, 0.9, 0.1, gate=gate)
+    distances = np.empty((30, 30))
+    for j in range(30):
+        for z in range(30):
+            noise = linear.noise[z if len(linear.noise) > 1 else 0]
+            spread = linear.matrix @ mixture.covariances[j] @ linear.matrix.T + noise
+            residual = linear.measurements[z] - linear.expected[j]
+            distances[j, z] = residual @ np.linalg.solve(spread, residual)
+    wanted = set(zip(*(side.tolist() for side in np.nonzero(distances <= gate)), strict=True))
+    pairs = zip(updated.parents[30:].tolist(), updated.measurements[30:].tolist(), strict=True)
+    assert set(pairs) == wanted
+    assert ((distances > gate) & (distances < 1.2 * gate)).any(), "some are just outside"
+
+
 def test_a_component_that_cannot_be_detected_is_left_alone() -> None:
     mixture = random_mixture(np.random.default_rng(2), 3, 2)
     linear = Linear(mixture, 5, count=2)
@@ -314,7 +332,7 @@ def test_a_noise_that_is_no_covariance_is_refused() -> None:
         update_kernels.kalman_pairs(
             np.zeros((1, 2)),
             np.zeros((1, 2, 2)),
-            Expected(np.zeros((1, 2)), np.eye(2)[None], np.zeros((0, 2, 2))),
+            Expected.of(np.zeros((1, 2)), np.eye(2)[None]),
             Measurements(np.zeros((1, 2)), np.zeros((1, 2, 2))),
             np.inf,
         )

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from tests.engine.association.test_association import exact
 from tracker.filters import pmb
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.kernels.kalman import Alternative, Expected
+from tracker.kernels.kalman import Expected
 
 H = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
 R = 0.3 * np.eye(2)
@@ -174,15 +174,21 @@ def test_a_box_of_two_kinds_is_bayes_over_both() -> None:
     before, box = tracks([0.7], 3), rng.normal(0.0, 0.5, (1, 2))
     share, drift, more = 0.3, np.diag([0.2, 0.0, 0.0, 0.0]), 0.4 * np.eye(2)
     shifted = before.means @ H.T + [0.3, -0.2]
+    both = Expected.of(before.means @ H.T, H[None])._replace(
+        posture_values=shifted,
+        posture_jacobians=2.0 * H[None],
+        posture_spreads=more[None],
+        posture_drift=drift,
+        posture_share=share,
+    )
     found = pmb.update(
         before,
         box,
-        expected=Expected.of(before.means @ H.T, H[None]),
+        expected=both,
         noise=R[None],
         detection_probability=np.array([0.9]),
         unexplained_intensity=np.array([0.05]),
         gate=np.inf,
-        other=Alternative(Expected(shifted, 2.0 * H[None], more[None]), drift, share),
     ).tracks
     parts, weights = [(before.means[0], before.covariances[0])], [0.7 * 0.1]
     for expected, slope, noise, spread, part in (

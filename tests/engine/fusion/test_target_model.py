@@ -106,7 +106,7 @@ def update(
     found = kalman.kalman_pairs(
         mean[None],
         covariance[None],
-        expected.upright,
+        expected.expected,
         Measurements(z[None], noise[None]),
         np.inf,
     )
@@ -199,34 +199,38 @@ def test_who_lies_or_bends_has_a_low_and_broad_box(kind: MeasurementKind) -> Non
     # average over the sides from which he may be seen
     states = np.array([[0.3, 0.4, 0.3, 0.0, 0.0, 0.0], [-0.5, 1.0, 0.25, 0.0, 0.0, 0.0]])
     expected = TargetModel(HALF_EXTENTS, kind, posture_share=0.2).expected(NEAR, states)
-    low = expected.posture
-    assert low is not None
-    assert low.share == 0.2
+    low = expected.expected
+    assert low.posture_share == 0.2
     heights = expected.boxes[:, 3] - expected.boxes[:, 1]
     flat = TargetModel(HALF_EXTENTS * [1.0, 1.0, 0.5], kind).expected(NEAR, states)
-    assert_allclose(low.expected.values[:, :3], flat.values[:, :3])
-    assert_allclose(low.expected.jacobians[:, :3], flat.jacobians[:, :3])
-    spreads = low.expected.spreads
+    assert_allclose(low.posture_values[:, :3], flat.values[:, :3])
+    assert_allclose(low.posture_jacobians[:, :3], flat.jacobians[:, :3])
+    spreads = low.posture_spreads
     assert_allclose(np.sqrt(spreads[:, 0, 0]), 0.15 * heights / 2.0)
     assert (spreads[:, 1, 1] > spreads[:, 0, 0]).all()
     assert np.linalg.eigvalsh(spreads).min() > 0.0
-    assert_allclose(np.flatnonzero(low.drift), [2 * 6 + 2], err_msg="only the height may jump")
+    assert_allclose(
+        np.flatnonzero(low.posture_drift), [2 * 6 + 2], err_msg="only the height may jump"
+    )
     if kind == "box_and_width":
-        values = low.expected.values
+        values = low.posture_values
         assert_allclose(values[:, 3] / (values[:, 2] - values[:, 1]), 1.2)
 
 
 def test_a_centre_looks_the_same_in_any_posture_and_behind_the_lens_there_is_none() -> None:
     states = np.array([[0.3, 0.4, 0.85], [0.0, -3.0, 0.85]])
-    assert (
-        TargetModel(HALF_EXTENTS, "centre", posture_share=0.2).expected(NEAR, states).posture
-        is None
-    )
-    assert TargetModel(HALF_EXTENTS, "box").expected(NEAR, states).posture is None
-    low = TargetModel(HALF_EXTENTS, "box", posture_share=0.2).expected(NEAR, states).posture
-    assert low is not None
-    assert np.isfinite(low.expected.values[0]).all()
-    assert np.isinf(low.expected.values[1]).all(), "beyond every gate"
+    for model in (
+        TargetModel(HALF_EXTENTS, "centre", posture_share=0.2),
+        TargetModel(HALF_EXTENTS, "box"),
+    ):
+        one = model.expected(NEAR, states).expected
+        assert len(one.values) == 2
+        assert (
+            len(one.posture_values) == len(one.posture_jacobians) == len(one.posture_spreads) == 0
+        )
+    low = TargetModel(HALF_EXTENTS, "box", posture_share=0.2).expected(NEAR, states).expected
+    assert np.isfinite(low.posture_values[0]).all()
+    assert np.isinf(low.posture_values[1]).all(), "beyond every gate"
 
 
 def test_nobody_has_no_box() -> None:

@@ -12,12 +12,9 @@ from tracker.filters import phd, pmb
 from tracker.fusion.target_model import TargetModel
 from tracker.fusion.visibility import inside_probability, visibility
 from tracker.kernels import linear_algebra
-from tracker.kernels.association.belief_propagation import Settling
-from tracker.kernels.boxes import Occlusion
 from tracker.kernels.gating import Measurements
-from tracker.kernels.kalman import Alternative
 from tracker.kernels.labelled import camera_update
-from tracker.kernels.labelled.camera_update import CameraModel, Tracks
+from tracker.kernels.labelled.camera_update import CameraRule, Tracks
 from tracker.kernels.measurement import ExpectedBoxes
 
 CLUTTER, GATE, P_D, NEAR, STRENGTH, TOLD = 1e-6, 30.0, 0.9, 0.3, 0.8, 0.01
@@ -48,27 +45,21 @@ def test_one_call_is_all_its_parts(
         Tracks(known.weights, known.means, known.covariances, known.labels),
         occluding,
         Measurements(boxes, noises),
-        ExpectedBoxes(
-            *(expected.upright, expected.boxes, expected.depths, expected.valid),
-            expected.posture or Alternative.none(3, 6),
-        ),
+        ExpectedBoxes(expected.expected, expected.boxes, expected.depths, expected.valid),
         camera.calibration.image_size,
         CLUTTER,
-        CameraModel(
-            GATE, True, P_D, 0.5, Occlusion(NEAR, STRENGTH, 0.2), Settling(1e-6, 200), TOLD
-        ),
+        CameraRule(GATE, True, P_D, 0.5, NEAR, STRENGTH, 0.2, 1e-6, 200, TOLD),
     )
 
     seen = model.expected(camera, undetected.means, undetected.covariances)
     new = phd.update(
         undetected,
         boxes,
-        expected=seen.upright,
+        expected=seen.expected,
         noise=noises,
         detection_probability=P_D * inside_probability(camera, seen, undetected.covariances),
         clutter_intensity=CLUTTER,
         gate=GATE,
-        other=seen.posture,
     )
     newcomer = np.minimum(new.measurement_weights, 1.0 - 1e-9)
     mine = model.expected(camera, known.means, known.covariances)
@@ -85,12 +76,11 @@ def test_one_call_is_all_its_parts(
     updated = pmb.update(
         known,
         boxes,
-        expected=mine.upright,
+        expected=mine.expected,
         noise=noises,
         detection_probability=hidden.detection_probabilities,
         unexplained_intensity=CLUTTER / (1.0 - newcomer),
         gate=GATE,
-        other=mine.posture,
     )
     marginals = updated.marginals
     pairs = slice(unseen, None)
@@ -122,7 +112,7 @@ def test_one_call_is_all_its_parts(
     )
     assert tracks == 0 or len(who)
     found = (
-        *updated_at_once.tracks,
+        *(updated_at_once.existences, updated_at_once.means, updated_at_once.covariances),
         *updated_at_once.record,
         *(updated_at_once.undetected, *updated_at_once.newcomers, updated_at_once.unexplained),
         *updated_at_once.pairs,

@@ -149,7 +149,7 @@ def test_every_pair_inside_the_gate_is_found_and_no_other(
     component, measured, likelihood, means, covariances = kalman.kalman_pairs(
         mixture.means,
         mixture.covariances,
-        Expected(expected, jacobians, spreads),
+        Expected.of(expected, jacobians, spreads),
         Measurements(measurements, noises),
         gate,
     )

@@ -18,13 +18,12 @@ KINDS: tuple[MeasurementKind, ...] = ("centre", "box", "box_and_width")
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_box_and_its_noise_are_transformed_alike(kind: MeasurementKind) -> None:
     rng = np.random.default_rng(0)
-    transform = TargetModel(HALF_EXTENTS, kind).transform
+    transform, products = TargetModel(HALF_EXTENTS, kind).transforms
     boxes, variances = rng.uniform(5.0, 200.0, (7, 4)), rng.uniform(1.0, 30.0, (7, 4))
-    values, noises = measurement.measured_boxes(boxes, variances, transform)
-    matrix = transform.matrix
-    assert_allclose(values, boxes @ matrix.T, rtol=1e-12)
+    values, noises = measurement.measured_boxes(boxes, variances, transform, products)
+    assert_allclose(values, boxes @ transform.T, rtol=1e-12)
     assert_allclose(
-        noises, np.einsum("pa,ma,qa->mpq", matrix, variances, matrix), rtol=1e-12, atol=1e-12
+        noises, np.einsum("pa,ma,qa->mpq", transform, variances, transform), rtol=1e-12, atol=1e-12
     )
 
 

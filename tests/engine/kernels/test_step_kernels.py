@@ -15,24 +15,24 @@ from tracker.filters import gaussian_mixture
 from tracker.filters.gaussian_mixture import GaussianMixture, concatenate
 from tracker.fusion.target_model import TargetModel
 from tracker.kernels import linear_algebra
-from tracker.kernels.association.belief_propagation import Settling
-from tracker.kernels.boxes import Occlusion
 from tracker.kernels.gating import Measurements
-from tracker.kernels.kalman import Alternative
 from tracker.kernels.labelled import camera_update, step
-from tracker.kernels.labelled.camera_update import CameraModel, Tracks
+from tracker.kernels.labelled.camera_update import CameraRule, Tracks
 from tracker.kernels.measurement import ExpectedBoxes
 
 CLUTTER = np.array([1e-6, 3e-6, 2e-6])
 GATE, P_D, P_S, CONFIRMED, STRENGTH, NEAR, COVERED = 30.0, 0.9, 0.98, 0.5, 0.8, 0.3, 0.2
 TOLD, LEAST, FACTOR = 0.01, 1e-4, 1.3
-CAMERA_MODEL = CameraModel(
+RULE = CameraRule(
     gate=GATE,
     soft=True,
     detection_probability=P_D,
     confirmed=CONFIRMED,
-    occlusion=Occlusion(NEAR, STRENGTH, COVERED),
-    settling=Settling(1e-6, 200),
+    near=NEAR,
+    strength=STRENGTH,
+    worth_telling=COVERED,
+    tolerance=1e-6,
+    iterations=200,
     least_told=TOLD,
 )
 TRANSITION = np.eye(6) + 0.1 * np.eye(6, k=3)
@@ -72,7 +72,7 @@ def one_by_one(
     columns: dict[str, list[ndarray]] = {name: [] for name in ("p_d", "by", "best", "share")}
     told, unexplained = [], []
     for c, camera in enumerate(CAMERAS):
-        transform = model.transform.matrix
+        transform, _ = model.transforms
         values = boxes[c] @ transform.T
         noises = np.einsum("pa,ma,qa->mpq", transform, (FACTOR * sigmas[c]) ** 2, transform)
         expected = model.expected(
@@ -85,13 +85,10 @@ def one_by_one(
             Tracks(tracks.weights, tracks.means, tracks.covariances, tracks.labels),
             occluding,
             Measurements(values, noises),
-            ExpectedBoxes(
-                *(expected.upright, expected.boxes, expected.depths, expected.valid),
-                expected.posture or Alternative.none(model.size, 6),
-            ),
+            ExpectedBoxes(expected.expected, expected.boxes, expected.depths, expected.valid),
             camera.calibration.image_size,
             CLUTTER[c],
-            CAMERA_MODEL,
+            RULE,
         )
         p_d, by, best, share = found.record
         newcomer, born_means, born_covariances = found.newcomers
@@ -109,7 +106,7 @@ def one_by_one(
         newborn = GaussianMixture(
             (free * newcomer)[born], born_means[born], born_covariances[born], labels
         )
-        tracks = GaussianMixture.of(found.tracks, tracks.labels)
+        tracks = GaussianMixture(found.existences, found.means, found.covariances, tracks.labels)
         tracks = concatenate([tracks, newborn])
         occluding = np.append(occluding, np.zeros(len(born)))
         unseen = GaussianMixture(found.undetected, unseen.means, unseen.covariances, unseen.labels)
@@ -147,46 +144,55 @@ def test_one_call_is_all_cameras(
     places = np.concatenate([known.means, undetected.means, births.means[:1]])
     boxes, sigmas = seen(model, places, rng)
     starts = np.cumsum([0, *(len(one) for one in boxes)])
+    transform, products = model.transforms
     found = step.predict_and_update(
         Tracks(known.weights, known.means, known.covariances, known.labels),
         20,
         undetected.gaussians,
         step.CameraBoxes(np.concatenate(boxes), np.concatenate(sigmas), starts),
         step.StepModel(
-            motion=step.Motion(TRANSITION, NOISE[None], P_S),
-            births=births.gaussians,
-            transform=model.transform,
+            transition=TRANSITION,
+            motion_noise=NOISE[None],
+            survival_probability=P_S,
+            birth_weights=births.weights,
+            birth_means=births.means,
+            birth_covariances=births.covariances,
+            transform=transform,
+            products=products,
             sigma_factor=FACTOR,
-            target=model.target(6),
-            cameras=stacked(CAMERAS),
             clutter=CLUTTER,
-            update=CAMERA_MODEL,
             least_existence=LEAST,
         ),
+        model.target(6),
+        stacked(CAMERAS),
+        RULE,
     )
-    existences, means, covariances, labels = found.tracks
-    left, unseen_means, unseen_covariances = found.undetected
-    p_d, by, best, share = found.record
-    cameras, names, what, chance = found.pairs
-    values, noises = found.measurements
-    next_label, free = found.next_label, found.unexplained
     wanted = one_by_one(model, known, undetected, births, boxes, sigmas, 20)
-    assert len(existences) > tracks, "somebody is new"
-    assert next_label == wanted["next"]
-    assert_array_equal(labels, wanted["tracks"].labels)
+    assert len(found.existences) > tracks, "somebody is new"
+    assert found.next_label == wanted["next"]
+    assert_array_equal(found.labels, wanted["tracks"].labels)
     for one, other in (
-        (existences, wanted["tracks"].weights), (means, wanted["tracks"].means),
-        (covariances, wanted["tracks"].covariances), (left, wanted["unseen"].weights),
-        (unseen_means, wanted["unseen"].means),
-        (unseen_covariances, wanted["unseen"].covariances),
-        (p_d, wanted["p_d"]), (by, wanted["by"]), (best, wanted["best"]),
-        (share, wanted["share"]), (free, wanted["free"]),
-        (np.column_stack([cameras, names, what, chance]), np.array(wanted["told"])),
-    ):  # fmt: skip
+        (found.existences, wanted["tracks"].weights),
+        (found.means, wanted["tracks"].means),
+        (found.covariances, wanted["tracks"].covariances),
+        (found.undetected_weights, wanted["unseen"].weights),
+        (found.undetected_means, wanted["unseen"].means),
+        (found.undetected_covariances, wanted["unseen"].covariances),
+        (found.detection_probabilities, wanted["p_d"]),
+        (found.hidden_by, wanted["by"]),
+        (found.sources, wanted["best"]),
+        (found.shares, wanted["share"]),
+        (found.unexplained, wanted["free"]),
+        (
+            np.column_stack(
+                [found.pair_cameras, found.pair_labels, found.pair_boxes, found.pair_probabilities]
+            ),
+            np.array(wanted["told"]),
+        ),
+    ):
         assert_allclose(one, other, rtol=1e-8, atol=1e-10)
-    transform = model.transform.matrix
-    assert_allclose(values, np.concatenate(boxes) @ transform.T, rtol=1e-12)
-    assert noises.shape == (len(values), 3, 3)
+    assert_allclose(found.values, np.concatenate(boxes) @ transform.T, rtol=1e-12)
+    assert found.noises.shape == (len(found.values), 3, 3)
 
 
 def test_the_kept_are_neither_faint_nor_strayed_nor_duplicates_nor_too_many() -> None:
@@ -206,7 +212,9 @@ def test_the_kept_are_neither_faint_nor_strayed_nor_duplicates_nor_too_many() ->
             np.ascontiguousarray(sources[:, order]), 0.8, CONFIRMED,
         )  # fmt: skip
         found = step.kept_tracks(
-            Tracks(existences, means, np.zeros((count, 6, 6)), labels),
+            existences,
+            means,
+            labels,
             sources,
             step.KeepingRule(0.2, low, high, 5, 0.8, CONFIRMED),
         )

@@ -17,8 +17,7 @@ from tracker.kernels import births as birth_kernels
 from tracker.kernels import linear_algebra
 from tracker.kernels.gating import Measurements
 from tracker.kernels.labelled import marginals as marginal_kernels
-from tracker.kernels.labelled.marginals import BirthLabels, LabelledWeights, PairOdds
-from tracker.kernels.linear_algebra import ToldPairs
+from tracker.kernels.labelled.marginals import LabelledWeights, PairOdds
 
 seeds = st.integers(0, 10_000)
 
@@ -82,7 +81,8 @@ def test_shared_boxes(seed: int, size: int, boxes: int) -> None:
     log_odds = rng.normal(0.0, 3.0, len(pairs))
     factors, shares, known = marginal_kernels.share_boxes(
         LabelledWeights(weights, labels, p_d),
-        BirthLabels(births.start, births.stop),
+        births.start,
+        births.stop,
         PairOdds(parents, measured, log_odds, boxes),
         600.0,
         association.SETTLING,
@@ -113,7 +113,7 @@ def test_pairs_are_summed_by_camera_component_and_box(seed: int, count: int, siz
         if name in labels:
             key = (camera, labels.tolist().index(name), box)
             expected[key] = expected.get(key, 0.0) + weight
-    found = linear_algebra.sum_pairs(labels, ToldPairs(cameras, names, boxes, weights))
+    found = linear_algebra.sum_pairs(labels, cameras, names, boxes, weights)
     assert [tuple(map(int, key)) for key in zip(*found[:3], strict=True)] == sorted(expected)
     assert found[3].dtype == np.float32
     assert_allclose(found[3], [min(expected[key], 1.0) for key in sorted(expected)], rtol=1e-6)

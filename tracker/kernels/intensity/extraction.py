@@ -10,7 +10,7 @@ from numpy import ndarray
 from tracker.kernels.compilation import kernel
 from tracker.kernels.intensity.mixture import heaviest_of_groups
 from tracker.kernels.intensity.phd import UpdatedIntensity
-from tracker.kernels.linear_algebra import Gaussians, merge_moments
+from tracker.kernels.linear_algebra import merge_moments
 
 
 class Payments(NamedTuple):
@@ -27,7 +27,12 @@ class Payments(NamedTuple):
 class Reported(NamedTuple):
     """The T targets that an update reports."""
 
-    targets: Gaussians
+    weights: ndarray
+    """(T,)."""
+    means: ndarray
+    """(T, d)."""
+    covariances: ndarray
+    """(T, d, d)."""
     heaviest: ndarray
     """(T,), the heaviest of the components that each was made of."""
 
@@ -92,8 +97,7 @@ def report(
         spare: What a component may spend beyond its weight, or beyond one target.
     """
     size = len(predicted)
-    components = updated.components
-    weights, means, covariances = components.weights, components.means, components.covariances
+    weights, means, covariances = updated.weights, updated.means, updated.covariances
     paid = pay_for_measurements(
         np.maximum(predicted, 1.0) + spare,
         weights[size:],
@@ -107,12 +111,10 @@ def report(
     heaviest = size + heaviest_of_groups(paid.spent, paid.places, paid.reported)
     missed = np.flatnonzero(weights[:size] > threshold)
     if len(missed) == 0:
-        return Reported(found, heaviest)
+        return Reported(found.weights, found.means, found.covariances, heaviest)
     return Reported(
-        Gaussians(
-            np.concatenate((found.weights, weights[missed])),
-            np.concatenate((found.means, means[missed])),
-            np.concatenate((found.covariances, covariances[missed])),
-        ),
+        np.concatenate((found.weights, weights[missed])),
+        np.concatenate((found.means, means[missed])),
+        np.concatenate((found.covariances, covariances[missed])),
         np.concatenate((heaviest, missed)),
     )

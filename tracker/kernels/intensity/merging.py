@@ -21,7 +21,7 @@ from numpy import ndarray
 
 from tracker.kernels.compilation import kernel
 from tracker.kernels.intensity.mixture import heaviest_first
-from tracker.kernels.linear_algebra import Gaussians, merge_moments
+from tracker.kernels.linear_algebra import merge_moments
 
 _CLASSES = 16
 """Components whose reach agrees within a factor of two share a grid: a few very wide ones do
@@ -40,8 +40,12 @@ class Groups(NamedTuple):
 class Reduced(NamedTuple):
     """A mixture after pruning, merging and capping."""
 
-    components: Gaussians
-    """K of them, heaviest first."""
+    weights: ndarray
+    """(K,), heaviest first."""
+    means: ndarray
+    """(K, d)."""
+    covariances: ndarray
+    """(K, d, d)."""
     leaders: ndarray
     """(K,), the component that led each."""
 
@@ -330,7 +334,9 @@ def merge_groups(
 
 @kernel
 def reduce_mixture(
-    mixture: Gaussians,
+    weights: ndarray,
+    means: ndarray,
+    covariances: ndarray,
     owners: ndarray,
     pruning_threshold: float,
     merging_threshold: float,
@@ -341,13 +347,14 @@ def reduce_mixture(
     Only the moments of what stays are computed, and nothing is moved in between.
 
     Args:
-        mixture: J components.
+        weights: (J,).
+        means: (J, d).
+        covariances: (J, d, d).
         owners: (J,), or (0,), of :func:`merge_groups`.
         pruning_threshold: The least weight.
         merging_threshold: Squared Mahalanobis distance.
         max_components: How many may stay.
     """
-    weights, means, covariances = mixture.weights, mixture.means, mixture.covariances
     kept = np.flatnonzero(weights >= pruning_threshold)
     order = kept[heaviest_first(weights[kept])]
     groups = merge_groups(means, covariances, order, owners, merging_threshold)
@@ -364,4 +371,4 @@ def reduce_mixture(
     merged = merge_moments(weights, means, covariances, group, len(heaviest))
     if len(heaviest) < len(leaders):
         merged.weights[:] *= sums.sum() / merged.weights.sum()
-    return Reduced(merged, leaders[heaviest])
+    return Reduced(merged.weights, merged.means, merged.covariances, leaders[heaviest])

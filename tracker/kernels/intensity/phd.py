@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tracker.kernels.compilation import kernel
 from tracker.kernels.gating import Measurements
-from tracker.kernels.kalman import Alternative, Expected, all_pairs
+from tracker.kernels.kalman import Expected, all_pairs
 from tracker.kernels.linear_algebra import Gaussians
 
 
@@ -28,8 +28,12 @@ class PairWeights(NamedTuple):
 class UpdatedIntensity(NamedTuple):
     """An intensity after one measurement set: J components as missed, then P pairs."""
 
-    components: Gaussians
-    """K = J + P."""
+    weights: ndarray
+    """(K,), K = J + P."""
+    means: ndarray
+    """(K, d)."""
+    covariances: ndarray
+    """(K, d, d)."""
     parents: ndarray
     """(K,), the component that each comes from."""
     measured: ndarray
@@ -97,14 +101,18 @@ def _matrices(values: ndarray, which: ndarray) -> ndarray:
 
 @kernel
 def _picked(expected: Expected, which: ndarray, size: int) -> Expected:
-    """What the components ``which`` of ``size`` predict; of nothing that is empty anything."""
+    """What the components ``which`` of ``size`` predict."""
     nothing, of_all = which[:0], np.zeros(1, dtype=np.int64)
-    there = which if len(expected.values) else nothing
-    own = which if len(expected.jacobians) == size else of_all
+    there = which if len(expected.posture_values) else nothing
     return Expected(
-        _vectors(expected.values, there),
-        _matrices(expected.jacobians, own if len(expected.values) else nothing),
+        _vectors(expected.values, which),
+        _matrices(expected.jacobians, which if len(expected.jacobians) == size else of_all),
         _matrices(expected.spreads, which if len(expected.spreads) else nothing),
+        _vectors(expected.posture_values, there),
+        _matrices(expected.posture_jacobians, there),
+        _matrices(expected.posture_spreads, there),
+        expected.posture_drift,
+        expected.posture_share,
     )
 
 
@@ -116,7 +124,6 @@ def phd_update(
     detection_probabilities: ndarray,
     clutter: ndarray,
     gate: float,
-    other: Alternative,
 ) -> UpdatedIntensity:
     """The GM-PHD update: every component as missed, then one for every gated pair.
 
@@ -127,7 +134,6 @@ def phd_update(
         detection_probabilities: (J,).
         clutter: (M,), κ(z).
         gate: Squared Mahalanobis distance.
-        other: What else a measurement may be.
     """
     weights, means, covariances = predicted.weights, predicted.means, predicted.covariances
     size, dimension = means.shape
@@ -138,7 +144,6 @@ def phd_update(
         _picked(expected, detectable, size),
         measurements,
         gate,
-        Alternative(_picked(other.expected, detectable, size), other.drift, other.share),
     )
     parent, measured = found.components, found.measured
     new_means, new_covariances = found.means, found.covariances
@@ -177,7 +182,9 @@ def phd_update(
                     covariances[k, a, b] if k < size else new_covariances[pair, a, b]
                 )
     return UpdatedIntensity(
-        Gaussians(all_weights, all_means, all_covariances),
+        all_weights,
+        all_means,
+        all_covariances,
         parents,
         sources,
         shares.log_odds,

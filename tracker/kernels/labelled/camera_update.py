@@ -11,11 +11,11 @@ import numpy as np
 from numpy import ndarray
 
 from tracker.kernels.association.belief_propagation import Settling
-from tracker.kernels.boxes import Occluders, Occlusion, hide, inside_probability
+from tracker.kernels.boxes import Occlusion, hide, inside_probability
 from tracker.kernels.compilation import kernel
 from tracker.kernels.gating import Measurements
 from tracker.kernels.intensity.phd import phd_update
-from tracker.kernels.kalman import Alternative, Expected
+from tracker.kernels.kalman import Expected
 from tracker.kernels.labelled.marginals import bernoulli_update
 from tracker.kernels.linear_algebra import Gaussians, merge_moments
 from tracker.kernels.measurement import ExpectedBoxes
@@ -34,7 +34,7 @@ class Tracks(NamedTuple):
     """(n,)."""
 
 
-class CameraModel(NamedTuple):
+class CameraRule(NamedTuple):
     """How every camera's boxes are taken."""
 
     gate: float
@@ -45,9 +45,13 @@ class CameraModel(NamedTuple):
     """Of somebody in full view."""
     confirmed: float
     """Whoever occludes with more weight than this hides others."""
-    occlusion: Occlusion
-    settling: Settling
-    """Of the belief propagation."""
+    near: float
+    """As the next two, of :class:`tracker.kernels.boxes.Occlusion`."""
+    strength: float
+    worth_telling: float
+    tolerance: float
+    """As the next, of :class:`tracker.kernels.association.belief_propagation.Settling`."""
+    iterations: int
     least_told: float
     """Association probability from which a pair is told."""
 
@@ -90,8 +94,12 @@ class TrackPairs(NamedTuple):
 class CameraUpdate(NamedTuple):
     """Everybody in a room after one camera's boxes."""
 
-    tracks: Gaussians
-    """Weights are existence probabilities."""
+    existences: ndarray
+    """(n,)."""
+    means: ndarray
+    """(n, d)."""
+    covariances: ndarray
+    """(n, d, d)."""
     record: CameraRecord
     undetected: ndarray
     """(U,), weights of those never yet detected."""
@@ -104,11 +112,17 @@ class CameraUpdate(NamedTuple):
 @kernel
 def _part(expected: Expected, first: int, last: int) -> Expected:
     """What the components from ``first`` to ``last``, exclusive, predict."""
-    spreads = expected.spreads
+    spreads, others = expected.spreads, len(expected.posture_values) > 0
+    begin, end = (first, last) if others else (0, 0)
     return Expected(
         expected.values[first:last],
         expected.jacobians[first:last],
         spreads[first:last] if len(spreads) > 0 else spreads,
+        expected.posture_values[begin:end],
+        expected.posture_jacobians[begin:end],
+        expected.posture_spreads[begin:end],
+        expected.posture_drift,
+        expected.posture_share,
     )
 
 
@@ -118,10 +132,10 @@ def update_by_camera(
     tracks: Tracks,
     occluding: ndarray,
     measurements: Measurements,
-    expected: ExpectedBoxes,
+    seen: ExpectedBoxes,
     image_size: ndarray,
     clutter: float,
-    model: CameraModel,
+    rule: CameraRule,
 ) -> CameraUpdate:
     """The update of n tracks, and of the U people never yet detected, by one camera's M boxes.
 
@@ -134,86 +148,78 @@ def update_by_camera(
         tracks: n of them.
         occluding: (n,), the weight with which each track may hide others.
         measurements: M of them, each with its noise or all with one.
-        expected: Of U + n.
+        seen: What the camera should see of U + n.
         image_size: (2,) width and height, pixels.
         clutter: κ.
-        model: How the boxes are taken.
+        rule: How the boxes are taken.
     """
     size, count = len(undetected.weights), len(measurements.values)
     everybody = size + len(tracks.existences)
-    posture = expected.posture
-    other = posture.expected
-    boxes, valid, jacobians = expected.boxes, expected.valid, expected.upright.jacobians
-    first = size if len(other.values) > 0 else 0
-    last = everybody if len(other.values) > 0 else 0
+    expected, boxes, valid = seen.expected, seen.boxes, seen.valid
+    jacobians = expected.jacobians
     new = phd_update(
         undetected,
-        _part(expected.upright, 0, size),
+        _part(expected, 0, size),
         measurements,
-        model.detection_probability
+        rule.detection_probability
         * inside_probability(
             boxes[:size],
             jacobians[:size],
             undetected.covariances,
             valid[:size],
             image_size,
-            model.soft,
+            rule.soft,
         ),
         np.full(count, clutter),
-        model.gate,
-        Alternative(_part(other, 0, first), posture.drift, posture.share),
+        rule.gate,
     )
-    components = new.components
     born = merge_moments(
-        components.weights[size:],
-        components.means[size:],
-        components.covariances[size:],
-        new.measured[size:],
-        count,
+        new.weights[size:], new.means[size:], new.covariances[size:], new.measured[size:], count
     )
     newcomer = np.minimum(new.sums, 1.0 - 1e-9)
 
     hiding = np.arange(0)
-    if model.occlusion.strength > 0.0:
-        hiding = np.flatnonzero(occluding > model.confirmed)
-    seen = hide(
-        model.detection_probability
+    if rule.strength > 0.0:
+        hiding = np.flatnonzero(occluding > rule.confirmed)
+    hidden = hide(
+        rule.detection_probability
         * inside_probability(
             boxes[size:],
             jacobians[size:],
             tracks.covariances,
             valid[size:],
             image_size,
-            model.soft,
+            rule.soft,
         ),
         boxes[size:],
-        expected.depths[size:],
+        seen.depths[size:],
         tracks.means,
         tracks.labels,
-        Occluders(hiding, occluding[hiding]),
-        model.occlusion,
+        hiding,
+        occluding[hiding],
+        Occlusion(rule.near, rule.strength, rule.worth_telling),
     )
     updated = bernoulli_update(
         Gaussians(tracks.existences, tracks.means, tracks.covariances),
-        _part(expected.upright, size, everybody),
+        _part(expected, size, everybody),
         measurements,
-        seen.detection_probabilities,
+        hidden.detection_probabilities,
         clutter / (1.0 - newcomer),
-        model.gate,
-        Alternative(_part(other, first, last), posture.drift, posture.share),
-        model.settling,
+        rule.gate,
+        Settling(rule.tolerance, rule.iterations),
     )
-    rows = updated.marginals.rows
-    likeliest = _likeliest(rows)
+    likeliest = _likeliest(updated.rows)
     return CameraUpdate(
-        updated.tracks,
+        updated.existences,
+        updated.means,
+        updated.covariances,
         CameraRecord(
-            seen.detection_probabilities, seen.hidden_by, likeliest.boxes, likeliest.shares
+            hidden.detection_probabilities, hidden.hidden_by, likeliest.boxes, likeliest.shares
         ),
-        components.weights[:size].copy(),
+        new.weights[:size].copy(),
         Newcomers(newcomer, born.means, born.covariances),
-        updated.marginals.unexplained,
-        _told(rows, model.least_told),
+        updated.unexplained,
+        _told(updated.rows, rule.least_told),
     )
 
 

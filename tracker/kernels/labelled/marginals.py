@@ -9,23 +9,28 @@ import numpy as np
 from numpy import ndarray
 
 from tracker.kernels.association.belief_propagation import (
-    Marginals,
     Settling,
     belief_propagation,
 )
 from tracker.kernels.compilation import kernel
 from tracker.kernels.gating import Measurements
-from tracker.kernels.kalman import Alternative, Expected, all_pairs
+from tracker.kernels.kalman import Expected, all_pairs
 from tracker.kernels.linear_algebra import Gaussians, group_labels, merge_moments
 
 
 class UpdatedBernoullis(NamedTuple):
     """n Bernoulli tracks after one measurement set."""
 
-    tracks: Gaussians
-    """Weights are existence probabilities."""
-    marginals: Marginals
-    """Whose the measurements are."""
+    existences: ndarray
+    """(n,)."""
+    means: ndarray
+    """(n, d)."""
+    covariances: ndarray
+    """(n, d, d)."""
+    rows: ndarray
+    """(n, 1 + M), of a miss and of each measurement."""
+    unexplained: ndarray
+    """(M,), that no track made the measurement."""
 
 
 class LabelledWeights(NamedTuple):
@@ -37,14 +42,6 @@ class LabelledWeights(NamedTuple):
     """(J,)."""
     detection_probabilities: ndarray
     """(J,)."""
-
-
-class BirthLabels(NamedTuple):
-    """The labels of a step's births, which stay Poisson."""
-
-    first: int
-    last: int
-    """Exclusive."""
 
 
 class PairOdds(NamedTuple):
@@ -79,7 +76,6 @@ def bernoulli_update(
     detection_probabilities: ndarray,
     unexplained: ndarray,
     gate: float,
-    other: Alternative,
     settling: Settling,
 ) -> UpdatedBernoullis:
     """The update of Bernoulli tracks by one measurement set, of which each gets its share.
@@ -91,13 +87,12 @@ def bernoulli_update(
         detection_probabilities: (n,).
         unexplained: (M,), intensity of clutter and newcomers at each measurement, > 0.
         gate: Squared Mahalanobis distance.
-        other: What else a measurement may be.
         settling: Of :func:`tracker.kernels.association.belief_propagation.belief_propagation`.
     """
     existences, means, covariances = tracks.weights, tracks.means, tracks.covariances
     size, dimension = means.shape
     count = len(measurements.values)
-    found = all_pairs(means, covariances, expected, measurements, gate, other)
+    found = all_pairs(means, covariances, expected, measurements, gate)
     track, measured = found.components, found.measured
     pairs = len(track)
     missed = np.empty(size)
@@ -133,13 +128,16 @@ def bernoulli_update(
     merged = merge_moments(weights, parts, spread, group, size)
     for i in range(size):
         merged.weights[i] = min(merged.weights[i], 1.0)
-    return UpdatedBernoullis(merged, marginals)
+    return UpdatedBernoullis(
+        merged.weights, merged.means, merged.covariances, rows, marginals.unexplained
+    )
 
 
 @kernel
 def share_boxes(
     people: LabelledWeights,
-    births: BirthLabels,
+    first_birth: int,
+    last_birth: int,
     odds_of_pairs: PairOdds,
     largest_odds: float,
     settling: Settling,
@@ -148,7 +146,8 @@ def share_boxes(
 
     Args:
         people: J components.
-        births: Which of them are births.
+        first_birth: Labels from here up to ``last_birth``, exclusive, stay Poisson.
+        last_birth: Likewise.
         odds_of_pairs: Of each against clutter.
         largest_odds: Logarithm of what counts as certain.
         settling: Of :func:`tracker.kernels.association.belief_propagation.belief_propagation`.
@@ -159,7 +158,7 @@ def share_boxes(
     grouped = group_labels(labels)
     distinct, place = grouped.labels, grouped.places
     count = len(distinct)
-    person = (distinct < births.first) | (distinct >= births.last)
+    person = (distinct < first_birth) | (distinct >= last_birth)
     held, there = np.zeros(count), np.zeros(count)
     for j in range(len(labels)):
         held[place[j]] += weights[j]

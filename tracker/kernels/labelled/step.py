@@ -13,15 +13,10 @@ from numpy import ndarray
 from tracker.kernels.compilation import kernel
 from tracker.kernels.gating import Measurements
 from tracker.kernels.intensity.mixture import heaviest_first, predict
-from tracker.kernels.labelled.camera_update import (
-    CameraModel,
-    CameraRecord,
-    Tracks,
-    update_by_camera,
-)
+from tracker.kernels.labelled.camera_update import CameraRule, Tracks, update_by_camera
 from tracker.kernels.lens import Calibrations, one_camera
-from tracker.kernels.linear_algebra import Gaussians, ToldPairs, duplicates, inside_bounds
-from tracker.kernels.measurement import Target, Transform, expected_measurements, measured_boxes
+from tracker.kernels.linear_algebra import Gaussians, duplicates, inside_bounds
+from tracker.kernels.measurement import Target, expected_measurements, measured_boxes
 
 
 class CameraBoxes(NamedTuple):
@@ -35,46 +30,57 @@ class CameraBoxes(NamedTuple):
     """(C + 1,), where each camera's boxes begin, and the end."""
 
 
-class Motion(NamedTuple):
-    """How people move in one step, and whether they stay."""
+class StepModel(NamedTuple):
+    """What stays from step to step, beside target, cameras and how their boxes are taken."""
 
     transition: ndarray
     """F (d, d)."""
-    noise: ndarray
+    motion_noise: ndarray
     """Q (1, d, d)."""
     survival_probability: float
-
-
-class StepModel(NamedTuple):
-    """What stays from step to step: motion, births, cameras and how their boxes are taken."""
-
-    motion: Motion
-    births: Gaussians
-    """They join the undetected."""
-    transform: Transform
+    birth_weights: ndarray
+    """(G,), as the next two (G, d) and (G, d, d): births join the undetected."""
+    birth_means: ndarray
+    birth_covariances: ndarray
+    transform: ndarray
+    """As ``products``, of :func:`tracker.kernels.measurement.measured_boxes`."""
+    products: ndarray
     sigma_factor: float
     """On the boxes' standard deviations."""
-    target: Target
-    cameras: Calibrations
     clutter: ndarray
     """κ (C,)."""
-    update: CameraModel
     least_existence: float
     """Of a track that begins."""
 
 
 class StepResult(NamedTuple):
-    """Everybody in a room after one step, and why."""
+    """n tracks, U undetected people, B boxes and A pairs worth telling after one step."""
 
-    tracks: Tracks
+    existences: ndarray
+    """(n,), as the next (n, d), (n, d, d) and (n,) of the tracks."""
+    means: ndarray
+    covariances: ndarray
+    labels: ndarray
     next_label: int
     """The first that is free."""
-    undetected: Gaussians
-    record: CameraRecord
-    """Of each camera and track: (C, n) each."""
-    pairs: ToldPairs
-    measurements: Measurements
-    """The boxes as such."""
+    undetected_weights: ndarray
+    """(U,), as the next two (U, d) and (U, d, d)."""
+    undetected_means: ndarray
+    undetected_covariances: ndarray
+    detection_probabilities: ndarray
+    """(C, n), as the next three: of each camera the fields of
+    :class:`tracker.kernels.labelled.camera_update.CameraRecord`."""
+    hidden_by: ndarray
+    sources: ndarray
+    shares: ndarray
+    pair_cameras: ndarray
+    """(A,), as the next three: of the pairs camera, label, box and probability."""
+    pair_labels: ndarray
+    pair_boxes: ndarray
+    pair_probabilities: ndarray
+    values: ndarray
+    """(B, m), the boxes as measurements, and (B, m, m) their noises."""
+    noises: ndarray
     unexplained: ndarray
     """(B,), the probability that no track made each."""
 
@@ -101,6 +107,9 @@ def predict_and_update(
     undetected: Gaussians,
     seen: CameraBoxes,
     model: StepModel,
+    target: Target,
+    cameras: Calibrations,
+    rule: CameraRule,
 ) -> StepResult:
     """Predict n tracks and the U people never yet detected, update them by C cameras' boxes.
 
@@ -112,41 +121,45 @@ def predict_and_update(
         next_label: The first that is free.
         undetected: Of the step before.
         seen: What the cameras show.
-        model: Of the room, its cameras and its people.
+        model: Of the room and how people move in it.
+        target: Of their size and postures.
+        cameras: C of them.
+        rule: How their boxes are taken.
     """
-    starts, clutter, update = seen.starts, model.clutter, model.update
-    survival_probability, labels = model.motion.survival_probability, tracks.labels
+    starts, labels = seen.starts, tracks.labels
     count = len(seen.boxes)
-    cameras = len(starts) - 1
-    moved = predict(tracks.means, tracks.covariances, model.motion.transition, model.motion.noise)
+    views = len(starts) - 1
+    moved = predict(tracks.means, tracks.covariances, model.transition, model.motion_noise)
     means, covariances = moved.means, moved.covariances
-    existences = tracks.existences * survival_probability
+    existences = tracks.existences * model.survival_probability
     waiting = predict(
-        undetected.means, undetected.covariances, model.motion.transition, model.motion.noise
+        undetected.means, undetected.covariances, model.transition, model.motion_noise
     )
-    left = np.concatenate((undetected.weights * survival_probability, model.births.weights))
-    undetected_means = np.concatenate((waiting.means, model.births.means))
-    undetected_covariances = np.concatenate((waiting.covariances, model.births.covariances))
-    measured = measured_boxes(seen.boxes, (model.sigma_factor * seen.sigmas) ** 2, model.transform)
+    left = np.concatenate((undetected.weights * model.survival_probability, model.birth_weights))
+    undetected_means = np.concatenate((waiting.means, model.birth_means))
+    undetected_covariances = np.concatenate((waiting.covariances, model.birth_covariances))
+    measured = measured_boxes(
+        seen.boxes, (model.sigma_factor * seen.sigmas) ** 2, model.transform, model.products
+    )
 
     most = len(existences) + count
     occluding = np.zeros(most)
     for i in range(len(existences)):
-        if existences[i] > update.confirmed:
+        if existences[i] > rule.confirmed:
             occluding[i] = existences[i]
-    detection_probabilities = np.zeros((cameras, most))
-    shares = np.zeros((cameras, most))
-    hidden_by = np.full((cameras, most), -1, dtype=np.int64)
-    sources = np.full((cameras, most), -1, dtype=np.int64)
+    detection_probabilities = np.zeros((views, most))
+    shares = np.zeros((views, most))
+    hidden_by = np.full((views, most), -1, dtype=np.int64)
+    sources = np.full((views, most), -1, dtype=np.int64)
     unexplained = np.empty(count)
     capacity = 4 * most
     told = np.empty((capacity, 3), dtype=np.int64)
     told_probabilities = np.empty(capacity)
     pairs = 0
-    for c in range(cameras):
+    for c in range(views):
         own = slice(starts[c], starts[c + 1])
         size = len(existences)
-        camera = one_camera(model.cameras, c)
+        camera = one_camera(cameras, c)
         found = update_by_camera(
             Gaussians(left, undetected_means, undetected_covariances),
             Tracks(existences, means, covariances, labels),
@@ -155,15 +168,14 @@ def predict_and_update(
             expected_measurements(
                 np.concatenate((undetected_means, means)),
                 np.concatenate((undetected_covariances, covariances)),
-                model.target,
+                target,
                 camera,
             ),
             camera.image_size,
-            clutter[c],
-            update,
+            model.clutter[c],
+            rule,
         )
-        existences, means = found.tracks.weights, found.tracks.means
-        covariances = found.tracks.covariances
+        existences, means, covariances = found.existences, found.means, found.covariances
         left = found.undetected
         unexplained[own] = found.unexplained
         record = found.record
@@ -189,9 +201,9 @@ def predict_and_update(
             continue
         for k in range(len(born)):
             z = born[k]
-            detection_probabilities[c, size + k] = update.detection_probability
+            detection_probabilities[c, size + k] = rule.detection_probability
             sources[c, size + k], shares[c, size + k] = z, 1.0
-            if born_existences[z] >= update.least_told:
+            if born_existences[z] >= rule.least_told:
                 told[pairs, 0], told[pairs, 1], told[pairs, 2] = c, next_label + k, z
                 told_probabilities[pairs] = born_existences[z]
                 pairs += 1
@@ -202,38 +214,43 @@ def predict_and_update(
         next_label += len(born)
     everybody = len(existences)
     return StepResult(
-        Tracks(existences, means, covariances, labels),
+        existences,
+        means,
+        covariances,
+        labels,
         next_label,
-        Gaussians(left, undetected_means, undetected_covariances),
-        CameraRecord(
-            detection_probabilities[:, :everybody].copy(),
-            hidden_by[:, :everybody].copy(),
-            sources[:, :everybody].copy(),
-            shares[:, :everybody].copy(),
-        ),
-        ToldPairs(
-            told[:pairs, 0].copy(),
-            told[:pairs, 1].copy(),
-            told[:pairs, 2].copy(),
-            told_probabilities[:pairs].copy(),
-        ),
-        measured,
+        left,
+        undetected_means,
+        undetected_covariances,
+        detection_probabilities[:, :everybody].copy(),
+        hidden_by[:, :everybody].copy(),
+        sources[:, :everybody].copy(),
+        shares[:, :everybody].copy(),
+        told[:pairs, 0].copy(),
+        told[:pairs, 1].copy(),
+        told[:pairs, 2].copy(),
+        told_probabilities[:pairs].copy(),
+        measured.values,
+        measured.noises,
         unexplained,
     )
 
 
 @kernel
-def kept_tracks(tracks: Tracks, sources: ndarray, rule: KeepingRule) -> ndarray:
+def kept_tracks(
+    existences: ndarray, means: ndarray, labels: ndarray, sources: ndarray, rule: KeepingRule
+) -> ndarray:
     """Indices of the tracks that live on, the surest first.
 
     Left out are the faint, those who strayed, who are too many, and duplicates of others.
 
     Args:
-        tracks: n of them.
+        existences: (n,).
+        means: (n, d), position first, world metres.
+        labels: (n,).
         sources: (C, n), the box that each camera gave each, -1 for none.
         rule: Which of them.
     """
-    existences, means, labels = tracks.existences, tracks.means, tracks.labels
     alive = inside_bounds(means, rule.low, rule.high)
     alive = alive[existences[alive] >= rule.least_existence]
     order = alive[heaviest_first(existences[alive])][: rule.most]
