@@ -172,9 +172,15 @@ class TargetModel:
             view: Boxes and how far each is to be trusted.
             factor: On the standard deviations.
         """
+        return self.measured_all(view.boxes, view.sigmas, factor)
+
+    def measured_all(
+        self, boxes: Float[ndarray, "M 4"], sigmas: Float[ndarray, "M 4"], factor: float
+    ) -> tuple[Float[ndarray, "M m"], Float[ndarray, "M m m"]]:
+        """As :meth:`measured`, of boxes and their standard deviations, pixels."""
         measured: tuple[ndarray, ndarray] = measurement.measured_boxes(
-            np.ascontiguousarray(view.boxes, dtype=float),
-            np.ascontiguousarray((factor * view.sigmas) ** 2, dtype=float),
+            np.ascontiguousarray(boxes, dtype=float),
+            np.ascontiguousarray((factor * sigmas) ** 2, dtype=float),
             *self.transforms,
         )
         return measured

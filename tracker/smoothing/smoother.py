@@ -1,0 +1,255 @@
+"""The fusion's own models over whole paths: best states given boxes, and boxes given states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Many
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from tracker import association
+from tracker.fusion import visibility
+from tracker.fusion.model import CONFIRMED, FusionModel
+from tracker.fusion.target_model import ExpectedBoxes
+from tracker.kernels.kalman import Alternative
+from tracker.kernels.smoothing import evidence, passes
+from tracker.parameters import FusionParams
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.protocol import ViewResult
+from tracker.smoothing.calibration import (
+    FEWEST,
+    NARROWEST,
+    OFFSET_RIDGE,
+    SIZE_RIDGE,
+    WIDEST,
+    Calibration,
+    upright,
+)
+from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.recording import CameraBoxes
+
+START_SIGMA = 10.0
+"""Metres: how little is known of a path's first place but by its boxes."""
+
+_LEAST = 0.01  # association probability of a pair worth keeping
+_SURE = 0.9  # association probability of a box that tells of its person's size
+_ODD = 0.4  # half heights: who is so far off is not standing
+_MEDIAN = 0.4549  # of a squared standard normal
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitted:
+    """Paths fitted to their boxes."""
+
+    paths: Paths
+    odds: Float[ndarray, " N"]
+    """log of what each row's boxes say, given the rows before, against all being clutter."""
+    jumps: Float[ndarray, " N"]
+    """Squared Mahalanobis distance between what the rows before and from this one on say."""
+    traces: Float[ndarray, " N"]
+    """Of the position's covariance before the backward pass, square metres."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shared:
+    """Who made which box, at all steps and in all C cameras."""
+
+    links: Links
+    chances: Float[ndarray, "C N"]
+    """p_D of each row."""
+    missed: Float[ndarray, "C N"]
+    """Probability that the camera missed it."""
+    hidden_by: Int[ndarray, "C N"]
+    """Label of who hides it, -1 for nobody."""
+
+
+class Smoother:
+    """Batch estimation over a recording with the fusion's motion, measurement and visibility."""
+
+    def __init__(
+        self,
+        sequence: Sequence,
+        parameters: FusionParams,
+        views: Many[tuple[ViewResult, ...]],
+    ) -> None:
+        """Prepare for the boxes of some steps from step 0 on."""
+        self.parameters = parameters
+        self.model = model = FusionModel(sequence, parameters)
+        self.frames = len(views)
+        self.cameras = [
+            CameraBoxes.of([step[c] for step in views], model.target, parameters.measurement_sigma)
+            for c in range(len(model.cameras))
+        ]
+        motion = model.motion
+        self.prior = np.zeros((motion.dimension, motion.dimension))
+        self.prior[:3, :3] = START_SIGMA**2 * np.eye(3)
+        self.prior[3:, 3:] = max(motion.start_velocity, 1e-6) ** 2 * np.eye(motion.dimension - 3)
+        size = model.room.maximum - model.room.minimum
+        self.log_place = float(
+            1.5 * np.log(2.0 * np.pi) + 3.0 * np.log(START_SIGMA) - np.log(np.prod(size))
+        )
+        """What turns the density of a first place under the prior into one over the room."""
+
+    def fit(
+        self, paths: Paths, links: Links, iterations: int = 1, learnt: Calibration | None = None
+    ) -> Fitted:
+        """The most likely states of every path given its boxes: iterated Kalman smoothing.
+
+        Each iteration straightens the projection at the states of the one before: Gauss and
+        Newton's way to the least-squares solution over the whole path (Bell, "The iterated
+        Kalman smoother as a Gauss-Newton method", SIAM J. Optimization 4(3), 1994). A box that
+        is a path's with probability a counts with a times its information.
+
+        Args:
+            paths: Their states are where the projection is straightened first.
+            links: Whose box each is.
+            iterations: At least 1.
+            learnt: Of the boxes; as stated, if none.
+        """
+        motion, model, owners = self.model.motion, self.model, paths.owners
+        learnt = learnt or self.stated(paths)
+        for _ in range(iterations):
+            rows = len(paths.states)
+            information, vectors = np.zeros((rows, 3, 3)), np.zeros((rows, 3))
+            constants = np.zeros(rows)
+            for c, camera in enumerate(self.cameras):
+                own = links.take(links.cameras == c)
+                expected = model.target.expected(
+                    model.cameras[c], paths.states[own.rows], paths.covariances[own.rows]
+                )
+                # who stands behind the lens cannot have made the box
+                own_valid = expected.valid
+                evidence.add_information(
+                    own.rows, own.boxes, np.where(own_valid, own.shares, 0.0), paths.states,
+                    paths.covariances,
+                    expected.values + learnt.shift(c, owners[own.rows], expected),
+                    expected.jacobians, expected.spreads, camera.values,
+                    learnt.noises[c] ** 2 * camera.noises, *self._other(expected), information,
+                    vectors, constants,
+                )  # fmt: skip
+                log_hit = np.log(self.parameters.detection_probability / model.clutter[c])
+                np.add.at(constants, own.rows, own.shares * log_hit)
+            begins = paths.states[paths.starts[:-1]].copy()
+            begins[:, 3:] = 0.0
+            means, covariances, fits, traces, jumps = passes.smooth_paths(
+                paths.starts, begins, information, vectors, motion.transition, motion.noise,
+                self.prior,
+            )  # fmt: skip
+            paths = paths.with_states(means, covariances)
+        return Fitted(paths, fits + constants, jumps, traces)
+
+    def stated(self, paths: Paths) -> Calibration:
+        """The boxes as stage 1 states them, for some paths."""
+        return Calibration.none(len(paths.labels), len(self.cameras), self.model.target.size)
+
+    def share(
+        self,
+        paths: Paths,
+        existences: Float[ndarray, " N"] | None = None,
+        learnt: Calibration | None = None,
+    ) -> Shared:
+        """Which path made which box, at every step, given where all paths lie.
+
+        Association marginals by belief propagation, with the fusion's detection probabilities:
+        people behind people, the picture's edge.
+        """
+        p, model = self.parameters, self.model
+        steps = paths.steps
+        order = np.argsort(steps, kind="stable")
+        step_starts = np.searchsorted(steps[order], np.arange(self.frames + 1))
+        existences = np.ones(len(steps)) if existences is None else existences
+        owners = paths.owners
+        labels = paths.labels[owners]
+        learnt = learnt or self.stated(paths)
+        parts, chances, missed, hidden = [], [], [], []
+        for c, camera in enumerate(self.cameras):
+            expected = model.target.expected(model.cameras[c], paths.states, paths.covariances)
+            rows, boxes, shares, chance, miss, hidden_by = evidence.share_camera(
+                order, step_starts, camera.starts, existences, paths.states, paths.covariances,
+                labels, expected.values + learnt.shift(c, owners, expected), expected.jacobians,
+                expected.spreads, expected.boxes, expected.depths, expected.valid,
+                *self._other(expected), camera.values, learnt.noises[c] ** 2 * camera.noises, model.clutter[c], model.gate,
+                np.array(model.cameras[c].image_size), p.edge == "soft",
+                p.detection_probability, CONFIRMED, p.occlusion, model.near,
+                visibility.WORTH_TELLING, association.TOLERANCE, association.ITERATIONS, _LEAST,
+            )  # fmt: skip
+            parts.append(Links(np.full(len(rows), c, dtype=np.int64), rows, boxes, shares))
+            chances.append(chance)
+            missed.append(miss)
+            hidden.append(hidden_by)
+        return Shared(
+            Links.joined(parts), np.array(chances), np.array(missed), np.array(hidden)
+        )
+
+    def learn(self, paths: Paths, links: Links, learnt: Calibration) -> Calibration:
+        """What the boxes say of themselves, given where the paths lie: a step of EM.
+
+        Sizes and offsets are means of the residuals of boxes that are somebody's, drawn
+        towards 0 by their priors; the noise is the median of r² + H P Hᵀ over its stated value.
+        """
+        size, owners = self.model.target.size, paths.owners
+        u = upright(size)
+        people = len(paths.labels)
+        told, count = np.zeros(people), np.zeros(people)
+        offsets, noises = np.zeros_like(learnt.offsets), learnt.noises.copy()
+        for c, camera in enumerate(self.cameras):
+            own = links.take((links.cameras == c) & (links.shares > _SURE))
+            expected = self.model.target.expected(
+                self.model.cameras[c], paths.states[own.rows], paths.covariances[own.rows]
+            )
+            half = np.maximum((expected.boxes[:, 3] - expected.boxes[:, 1]) / 2.0, 1.0)
+            plain = camera.values[own.boxes] - expected.values
+            whole = expected.valid & (
+                np.abs(expected.jacobians[:, :, :3]).max(axis=2) > 0.0
+            ).all(axis=1)
+            left = (plain - learnt.shift(c, owners[own.rows], expected)) / half[:, None]
+            # a box of another posture is no witness of a person's height
+            whole &= (np.abs(left) < _ODD).all(axis=1)
+            if not whole.any():
+                continue
+            rows, plain, half = owners[own.rows[whole]], plain[whole], half[whole]
+            shares = plain / half[:, None]
+            rest = shares - learnt.sizes[rows, None] * u
+            offsets[c] = rest.sum(axis=0) / (len(rest) + OFFSET_RIDGE)
+            if size >= 3:
+                taller = shares - offsets[c]
+                told += np.bincount(rows, (taller @ u) / (u @ u), people)
+                count += np.bincount(rows, minlength=people)
+            if len(rest) >= FEWEST:
+                h = expected.jacobians[whole][:, :, :3]
+                p = paths.covariances[own.rows[whole]][:, :3, :3]
+                spread = np.einsum("lpa,lab,lpb->lp", h, p, h)
+                own_noise = np.diagonal(camera.noises[own.boxes[whole]], axis1=1, axis2=2)
+                square = (half[:, None] * left[whole]) ** 2
+                ratio = np.median(square / own_noise) / _MEDIAN + np.median(spread / own_noise)
+                alike = _alike(own.rows[whole], owners, left[whole])
+                noises[c] = np.clip(
+                    np.sqrt(ratio * (1.0 + alike) / (1.0 - alike)), NARROWEST, WIDEST
+                )
+        return Calibration(told / (count + SIZE_RIDGE), offsets, noises)
+
+    def _other(self, expected: ExpectedBoxes) -> Alternative:
+        return expected.other or Alternative.none(
+            self.model.target.size, self.model.motion.dimension
+        )
+
+
+def _alike(
+    rows: Int[ndarray, " L"], owners: Int[ndarray, " N"], residuals: Float[ndarray, "L m"]
+) -> float:
+    """ρ, the correlation of the errors of a path's boxes in consecutive steps, 0 … 0.95.
+
+    A mean of errors that follow e' = ρ e + v varies (1 + ρ)/(1 − ρ) times as much as one of
+    independent errors of the same size: that factor on R lets a filter that takes them as
+    independent trust the boxes as far as they deserve.
+    """
+    order = np.argsort(rows, kind="stable")
+    rows, residuals = rows[order], residuals[order]
+    next_step = (np.diff(rows) == 1) & (np.diff(owners[rows]) == 0)
+    if next_step.sum() < FEWEST:
+        return 0.0
+    here, after = residuals[:-1][next_step], residuals[1:][next_step]
+    correlation = (here * after).sum() / np.sqrt((here**2).sum() * (after**2).sum() + 1e-300)
+    return float(np.clip(correlation, 0.0, 0.95))
