@@ -62,11 +62,11 @@ class Evaluator:
             return scored.evaluation
         key = (scored.key, steps)
         with self._condition:
-            known = self._beginnings.get(key)
-        if known is None:
+            tracks, known = self._beginnings.get(key, (None, None))
+        if known is None or tracks is not scored.tracks:
             known = self._score(replace(scored, steps=steps))
             with self._condition:
-                self._beginnings[key] = known
+                self._beginnings[key] = scored.tracks, known
                 while len(self._beginnings) > KEPT:
                     self._beginnings.popitem(last=False)
         return known
@@ -96,6 +96,7 @@ class Evaluator:
         if run is not None and run.done:
             scored, shown = Scored.of(run), scores.shown
             is_new = shown is None or (shown.key, shown.steps) != (scored.key, scored.steps)
+            is_new = is_new or (shown is not None and shown.tracks is not scored.tracks)
             if is_new and (scored.key, scored.steps) not in self._failed:
                 over = scored.complete or snapshot.run_state.state != "computing"
                 if self._newest != (scored.key, over):

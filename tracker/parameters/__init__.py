@@ -25,7 +25,8 @@ from tracker.parameters.foreground import ForegroundParams
 from tracker.parameters.fusion import FusionParams
 from tracker.parameters.jpda import JpdaParams
 from tracker.parameters.pseudo_particle import PseudoParticleParams
-from tracker.parameters.run import FusionName, RunParameters, SingleViewName
+from tracker.parameters.run import FusionName, RunParameters, SingleViewName, SmoothingName
+from tracker.parameters.smoothing import SmoothingParams
 from tracker.parameters.table import GROUPS, METHODS, PARAMETERS, PRESETS, Parameter
 
 __all__ = [
@@ -48,6 +49,8 @@ __all__ = [
     "PseudoParticleParams",
     "RunParameters",
     "SingleViewName",
+    "SmoothingName",
+    "SmoothingParams",
     "Stage",
     "changed",
     "stage_values",

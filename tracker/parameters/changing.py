@@ -106,6 +106,10 @@ def stage_values(parameters: RunParameters, stage: Stage) -> dict[str, Any]:
         values["single_view"] = parameters.single_view
     if stage == "fusion":
         values["fusion_method"] = parameters.fusion_method
+    if stage == "smoothing":
+        values["smoothing_method"] = parameters.smoothing_method
+        if parameters.smoothing_method == "none":
+            return values
     for key, parameter in PARAMETERS.items():
         if parameter.stage == stage and (stage != "single_view" or _reads(parameters, parameter)):
             values[key] = value(parameters, key)

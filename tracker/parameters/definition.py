@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-Stage = Literal["single_view", "fusion", "tracks"]
+Stage = Literal["single_view", "fusion", "smoothing", "tracks"]
 
 
 def ui(

@@ -12,11 +12,13 @@ from tracker.parameters.foreground import ForegroundParams
 from tracker.parameters.fusion import FusionParams
 from tracker.parameters.jpda import JpdaParams
 from tracker.parameters.pseudo_particle import PseudoParticleParams
+from tracker.parameters.smoothing import SmoothingParams
 
 SingleViewName = Literal[
     "colour_phd", "jpda", "pseudo_particle", "association_matrix", "detection_phd", "none"
 ]
 FusionName = Literal["sequential_phd", "multi_bernoulli"]
+SmoothingName = Literal["none", "positions", "identities"]
 
 
 FOREGROUND_METHODS: frozenset[SingleViewName] = frozenset(
@@ -34,6 +36,9 @@ class RunParameters(Params):
     fusion_method: FusionName = "sequential_phd"
     """Method of stage 2: how the cameras' boxes become 3D positions."""
 
+    smoothing_method: SmoothingName = "identities"
+    """Method of stage 3: the filter's tracks as they are; each smoothed; or who is who as well."""
+
     colour_phd: ColourPhdParams = ColourPhdParams()
     jpda: JpdaParams = JpdaParams()
     pseudo_particle: PseudoParticleParams = PseudoParticleParams()
@@ -42,3 +47,4 @@ class RunParameters(Params):
     detection_phd: DetectionPhdParams = DetectionPhdParams()
     foreground: ForegroundParams = ForegroundParams()
     fusion: FusionParams = FusionParams()
+    smoothing: SmoothingParams = SmoothingParams()

@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 from pydantic.fields import FieldInfo
 
 from tracker.parameters.definition import Params, Stage
-from tracker.parameters.run import FusionName, RunParameters, SingleViewName
+from tracker.parameters.run import FusionName, RunParameters, SingleViewName, SmoothingName
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,8 @@ class Parameter:
 
 
 def _group_stage(group: str) -> Stage:
-    return "fusion" if group == "fusion" else "single_view"
+    later: dict[str, Stage] = {"fusion": "fusion", "smoothing": "smoothing"}
+    return later.get(group, "single_view")
 
 
 def _describe(group: str, name: str, field: FieldInfo) -> Parameter:
@@ -97,14 +98,16 @@ GROUPS: dict[str, str] = {
 METHODS: dict[str, tuple[str, ...]] = {
     "single_view": get_args(SingleViewName),
     "fusion_method": get_args(FusionName),
+    "smoothing_method": get_args(SmoothingName),
 }
-"""The methods that can be chosen for stage 1 and stage 2."""
+"""The methods that can be chosen for stages 1, 2 and 3."""
 
 PRESETS: dict[str, dict[str, Any]] = {
     "robust": {},
     "published": {
         **{key: p.published for key, p in PARAMETERS.items() if p.published is not None},
         "fusion_method": "sequential_phd",
+        "smoothing_method": "none",
     },
 }
 """Named sets of values, each against the defaults: ``robust`` is the defaults themselves."""

@@ -59,6 +59,10 @@ class Calibration:
         """As stated: nothing learnt."""
         return Calibration(np.zeros(people), np.zeros((cameras, size)), np.ones(cameras))
 
+    def of_people(self, people: ndarray) -> Calibration:
+        """Of some of the people, in that order."""
+        return Calibration(self.sizes[people], self.offsets, self.noises)
+
     def shift(self, camera: int, people: ndarray, expected: ExpectedBoxes) -> Float[ndarray, "L m"]:
         """What is added to the expected measurements of some boxes, pixels.
 

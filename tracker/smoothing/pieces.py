@@ -69,6 +69,11 @@ def moved(links: Links, kept: Int[ndarray, " M"], rows: int) -> Links:
     """The links of rows that were kept, by their new rows."""
     place = np.full(rows, -1, dtype=np.int64)
     place[kept] = np.arange(len(kept))
+    return moved_to(links, place)
+
+
+def moved_to(links: Links, place: Int[ndarray, " N"]) -> Links:
+    """The links of rows that have a new place, -1 for none, by that place."""
     new = place[links.rows]
     chosen = links.take(new >= 0)
     return Links(chosen.cameras, new[new >= 0], chosen.boxes, chosen.shares)
