@@ -11,20 +11,14 @@ from tracker.kernels.compilation import kernel
 
 
 @kernel
-def _log_add(a: float, b: float) -> float:
-    """log(eᵃ + eᵇ)."""
-    low, high = min(a, b), max(a, b)
-    return high if low == -np.inf else high + math.log1p(math.exp(low - high))
-
-
-@kernel
 def presence(
     starts: ndarray, lasts: ndarray, votes: ndarray, stay: float, change: float, end: int
 ) -> tuple[ndarray, ndarray]:
-    """The probability at each step that a path's person was there, forward and backward.
+    """How surely a path's person was there at each step, exactly, by Viterbi's recursion both ways.
 
     A person is away or there; coming and leaving have the probability e^change each, staying
-    has e^stay, being away costs nothing.
+    has e^stay, being away costs nothing. At each step the best sequence in which he is there
+    is set against the best in which he is not.
 
     Args:
         starts: (n + 1,), where each path's rows begin, and the end.
@@ -35,30 +29,31 @@ def presence(
         end: The recording's last step: who is there at it has not left.
 
     Returns:
-        (N,) probability of being there; (n,) log odds of somebody at some step against nobody.
+        (N,) probability of being there; (n,) log odds of the best sequence with somebody at
+        some step against nobody at any.
     """
     chances = np.zeros(len(votes))
     odds = np.full(len(starts) - 1, -np.inf)
     for path in range(len(starts) - 1):
         first, count = starts[path], starts[path + 1] - starts[path]
-        # log weight of all ways up to each step: never there, there, and there before
-        here, after = np.empty(count), np.empty(count)
-        present, gone = -np.inf, -np.inf
+        here, away = np.empty(count), np.empty(count)
+        # the best up to each step: there, and away; and never there so far
+        present, absent, been = -np.inf, 0.0, -np.inf
         for k in range(count):
-            left = _log_add(gone, present + change)
-            came = _log_add(_log_add(0.0, gone) + change, present + stay)
-            present, gone = came + votes[first + k], left
-            here[k], after[k] = present, gone
+            left = max(absent, present + change)
+            been = max(been, present + change)
+            present = max(absent + change, present + stay) + votes[first + k]
+            absent = left
+            here[k], away[k] = present, absent
         leaving = 0.0 if lasts[path] >= end else change
-        total = _log_add(here[count - 1] + leaving, after[count - 1]) if count else -np.inf
-        odds[path] = total
-        whole = _log_add(total, 0.0)
+        odds[path] = max(present + leaving, been)
         behind_present, behind_away = leaving, 0.0
         for k in range(count - 1, -1, -1):
-            chances[first + k] = math.exp(min(here[k] + behind_present - whole, 0.0))
+            difference = away[k] + behind_away - here[k] - behind_present
+            chances[first + k] = 1.0 / (1.0 + math.exp(min(max(difference, -500.0), 500.0)))
             vote = votes[first + k]
             behind_present, behind_away = (
-                _log_add(stay + vote + behind_present, change + behind_away),
-                _log_add(change + vote + behind_present, behind_away),
+                max(stay + vote + behind_present, change + behind_away),
+                max(change + vote + behind_present, behind_away),
             )
     return chances, odds
