@@ -73,6 +73,7 @@ class MethodsInfo(Model):
 
     single_view: str
     fusion_method: str
+    smoothing_method: str
 
 
 class RunInfo(Model):

@@ -14,6 +14,7 @@ from app.state.scores import Scored
 from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
 from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
+from tracker.trajectories import Trajectories
 
 logger = logging.getLogger("app")
 
@@ -43,7 +44,9 @@ class Evaluator:
         self._newest: tuple[str, bool] = ("", False)
         self._newest_since = 0.0
         self._failed: set[tuple[str, int]] = set()
-        self._beginnings: OrderedDict[tuple[str, int], Evaluation] = OrderedDict()
+        self._beginnings: OrderedDict[tuple[str, int], tuple[Trajectories, Evaluation]] = (
+            OrderedDict()
+        )
         self._unsubscribe = workbench.subscribe(self._on_change)
         self._thread = threading.Thread(target=self._work, name="evaluation", daemon=True)
         self._thread.start()

@@ -68,7 +68,7 @@ interface ServerState {
 	changed: string[];
 	/** The command that computes the same in a terminal. */
 	command: string;
-	methods: {single_view: string, fusion_method: string};
+	methods: {single_view: string, fusion_method: string, smoothing_method: string};
 	/** Those that somebody has saved. */
 	presets: string[];
 	/** The one whose values the parameters have. */

@@ -24,7 +24,7 @@ class SmoothingParams(Params):
     """Time within which boxes and misses of a camera repeat each other rather than tell anew."""
 
     change: Annotated[float, Field(ge=0.0, le=20.0), ui("c", step=0.5)] = 4.0
-    """Log odds that it takes to believe that a person came or left where no track begins or ends."""
+    """Log odds that it takes to believe that a person came, or left, or was away for a while."""
 
     reach: Annotated[float, Field(ge=0.0, le=10.0), ui("t_e", unit="s", step=0.1)] = 1.0
     """How far beyond its first and last box a track looks for more."""
@@ -39,7 +39,7 @@ class SmoothingParams(Params):
     """Identities: a track is cut where nobody saw it for longer."""
 
     longest: Annotated[float, Field(ge=0.1, le=60.0), ui("t_j", unit="s", step=0.5)] = 2.0
-    """Identities: pieces are joined by their motion over gaps up to this; longer, by looks alone."""
+    """Identities: pieces are joined by motion over gaps up to this; over longer ones by looks."""
 
     keeping: Annotated[float, Field(ge=0.0, le=20.0), ui("k", step=0.5)] = 2.0
     """Identities: log odds with which the filter's own label holds two of its pieces together."""

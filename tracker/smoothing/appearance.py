@@ -130,9 +130,7 @@ class Appearance:
         return np.asarray((ratio * known).sum(axis=1)), known.any(axis=1)
 
 
-def _clean(
-    links: Links, cameras: Many[CameraBoxes], looks: Many[ndarray]
-) -> Bool[ndarray, " L"]:
+def _clean(links: Links, cameras: Many[CameraBoxes], looks: Many[ndarray]) -> Bool[ndarray, " L"]:
     """Links of boxes that are surely somebody's, touch no other box, and have looks."""
     clean = links.shares > _OWN
     for c, camera in enumerate(cameras):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -74,9 +75,7 @@ def settle(
     own = Shared(links, shared.chances[:, kept], shared.missed[:, kept], shared.hidden_by[:, kept])
     worths, births, deaths = _odds(smoother, refitted, own, parameters)
     pairs, stays = _pairs(smoother, refitted.paths, links, births, deaths, parameters, looks)
-    following, used = joining.join(
-        worths, births, deaths, pairs.earlier, pairs.later, pairs.gains
-    )
+    following, used = joining.join(worths, births, deaths, pairs.earlier, pairs.later, pairs.gains)
     chains = joining.chains(following, used)
     labels = _labels(cut, chains)
     decisions = [*_cuts(cut, fitted.paths, kept, reasons, chains, labels)]
@@ -107,7 +106,8 @@ def _cut(
     gaps = _long_gaps(paths, fed, round(p.gap / step_time))
     reasons[gaps | (there < 0.5)] = 3
     around = round(_AROUND / step_time)
-    jumps = np.flatnonzero(fitted.jumps > p.jump)
+    # where boxes err alike for a while, past and future contradict each other by less than it seems
+    jumps = np.flatnonzero(fitted.jumps * independence(step_time, p.memory) > p.jump)
     owners = paths.owners
     for offset in range(-around, around):
         near = np.clip(jumps + offset, 0, rows - 1)
@@ -207,9 +207,7 @@ def _pairs(
         ratio, known = alike.log_ratio(earlier, later)
         earlier, later, ratio = earlier[known], later[known], ratio[known]
         back = anew[later] - np.log(gone[later])
-        gains[earlier, later] = (
-            np.maximum(gains[earlier, later], back) + p.appearance * ratio
-        )
+        gains[earlier, later] = np.maximum(gains[earlier, later], back) + p.appearance * ratio
     one = np.flatnonzero(paths.labels[1:] == paths.labels[:-1])
     gains[one, one + 1] = np.maximum(gains[one, one + 1], anew[one + 1]) + p.keeping
     earlier, later = np.nonzero(np.isfinite(gains))
@@ -331,9 +329,7 @@ def _cuts(
             why = 1
         step = int(before.steps[first])
         found.append(
-            Decision(
-                "cut", step, labels[one], int(cut.labels[piece]), 1.0, 0.0, _REASONS[why]
-            )
+            Decision("cut", step, labels[one], int(cut.labels[piece]), 1.0, 0.0, _REASONS[why])
         )
     return found
 
@@ -359,7 +355,7 @@ def _joins(
         by_later.setdefault(j, []).append(g)
     found = []
     for chain, label in zip(chains, labels, strict=True):
-        for i, j in zip(chain, chain[1:], strict=False):
+        for i, j in pairwise(chain):
             if cut.labels[i] == cut.labels[j]:
                 continue
             every = np.array([*by_later[j], anew[j]])

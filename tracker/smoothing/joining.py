@@ -66,9 +66,7 @@ def join(
         place[own] = np.arange(size)
         pairs = pairs_by_group[pair_bounds[g] : pair_bounds[g + 1]]
         table = np.full((2 * size, 2 * size), -np.inf)
-        table[place[earlier[pairs]], place[later[pairs]]] = (
-            worths[earlier[pairs]] + gains[pairs]
-        )
+        table[place[earlier[pairs]], place[later[pairs]]] = worths[earlier[pairs]] + gains[pairs]
         inner = np.arange(size)
         table[inner, inner] = 0.0
         table[inner, size + inner] = worths[own] + deaths[own]

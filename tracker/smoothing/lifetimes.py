@@ -9,7 +9,7 @@ from numpy import ndarray
 from tracker.kernels.smoothing.presence import presence
 from tracker.parameters import SmoothingParams
 from tracker.smoothing.paths import Paths
-from tracker.smoothing.smoother import Fitted, Shared, Smoother
+from tracker.smoothing.smoother import Shared, Smoother
 
 _AWAY_FROM_BOXES = 0.3
 """Existence with which a row beyond a path's ends competes for boxes."""
@@ -52,9 +52,7 @@ def lifetimes(
     return chances, odds
 
 
-def extended(
-    smoother: Smoother, paths: Paths, steps: int
-) -> tuple[Paths, Float[ndarray, " N"]]:
+def extended(smoother: Smoother, paths: Paths, steps: int) -> tuple[Paths, Float[ndarray, " N"]]:
     """The paths with more steps at both ends, where the motion model takes them.
 
     Returns:

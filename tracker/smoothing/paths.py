@@ -31,13 +31,14 @@ class Paths:
     @property
     def owners(self) -> Int[ndarray, " N"]:
         """The path of each row."""
-        return np.repeat(np.arange(len(self.labels)), np.diff(self.starts))
+        return np.asarray(np.repeat(np.arange(len(self.labels)), np.diff(self.starts)))
 
     @property
     def steps(self) -> Int[ndarray, " N"]:
         """The step of each row."""
         lengths = np.diff(self.starts)
-        return np.arange(self.starts[-1]) + np.repeat(self.firsts - self.starts[:-1], lengths)
+        offsets = np.repeat(self.firsts - self.starts[:-1], lengths)
+        return np.asarray(np.arange(self.starts[-1]) + offsets)
 
     def with_states(
         self, states: Float[ndarray, "N d"], covariances: Float[ndarray, "N d d"]
@@ -78,10 +79,13 @@ class Links:
     @staticmethod
     def joined(parts: Many[Links]) -> Links:
         """The pairs of several cameras."""
-        names = ("cameras", "rows", "boxes", "shares")
-        empty = Links(*(np.zeros(0, dtype=np.int64) for _ in names[:3]), np.zeros(0))
+        nothing = np.zeros(0, dtype=np.int64)
+        every = [Links(nothing, nothing, nothing, np.zeros(0)), *parts]
         return Links(
-            *(np.concatenate([getattr(one, name) for one in (empty, *parts)]) for name in names)
+            np.concatenate([one.cameras for one in every]),
+            np.concatenate([one.rows for one in every]),
+            np.concatenate([one.boxes for one in every]),
+            np.concatenate([one.shares for one in every]),
         )
 
     def take(self, chosen: ndarray) -> Links:

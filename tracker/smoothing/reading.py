@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence as Many
 
 import numpy as np
-from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.fusion.protocol import FusionResult
@@ -56,18 +55,17 @@ def _before_their_report(
     """Of each label the steps before its first report at which a box fed it, and the component."""
     found: dict[int, list[tuple[int, int]]] = {}
     for step, result in enumerate(fused):
-        fed = (result.sources >= 0).any(axis=0)
+        fed = np.flatnonzero((result.sources >= 0).any(axis=0))
         there: set[int] = set()
-        for component, label in enumerate(result.posterior.labels.tolist()):
-            if fed[component] and label not in there and step < reported.get(label, -1):
+        labels = result.posterior.labels[fed].tolist()
+        for component, label in zip(fed.tolist(), labels, strict=True):
+            if label not in there and step < reported.get(label, -1):
                 there.add(label)
                 found.setdefault(label, []).append((step, component))
     return found
 
 
-def read_links(
-    fused: Many[FusionResult], paths: Paths, cameras: Many[CameraBoxes]
-) -> Links:
+def read_links(fused: Many[FusionResult], paths: Paths, cameras: Many[CameraBoxes]) -> Links:
     """The association probabilities that the fusion recorded, for the rows of the paths."""
     row_of = {label: i for i, label in enumerate(paths.labels.tolist())}
     lasts = paths.lasts
@@ -92,5 +90,3 @@ def read_links(
             )
         )
     return Links.joined([Links(*part) for part in found])
-
-

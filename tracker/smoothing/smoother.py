@@ -170,7 +170,8 @@ class Smoother:
                 order, step_starts, camera.starts, existences, paths.states, paths.covariances,
                 labels, expected.values + learnt.shift(c, owners, expected), expected.jacobians,
                 expected.spreads, expected.boxes, expected.depths, expected.valid,
-                *self._other(expected), camera.values, learnt.noises[c] ** 2 * camera.noises, model.clutter[c], model.gate,
+                *self._other(expected), camera.values, learnt.noises[c] ** 2 * camera.noises,
+                model.clutter[c], model.gate,
                 np.array(model.cameras[c].image_size), p.edge == "soft",
                 p.detection_probability, CONFIRMED, p.occlusion, model.near,
                 visibility.WORTH_TELLING, association.TOLERANCE, association.ITERATIONS, _LEAST,
@@ -179,9 +180,7 @@ class Smoother:
             chances.append(chance)
             missed.append(miss)
             hidden.append(hidden_by)
-        return Shared(
-            Links.joined(parts), np.array(chances), np.array(missed), np.array(hidden)
-        )
+        return Shared(Links.joined(parts), np.array(chances), np.array(missed), np.array(hidden))
 
     def learn(self, paths: Paths, links: Links, learnt: Calibration) -> Calibration:
         """What the boxes say of themselves, given where the paths lie: a step of EM.
@@ -201,9 +200,9 @@ class Smoother:
             )
             half = np.maximum((expected.boxes[:, 3] - expected.boxes[:, 1]) / 2.0, 1.0)
             plain = camera.values[own.boxes] - expected.values
-            whole = expected.valid & (
-                np.abs(expected.jacobians[:, :, :3]).max(axis=2) > 0.0
-            ).all(axis=1)
+            whole = expected.valid & (np.abs(expected.jacobians[:, :, :3]).max(axis=2) > 0.0).all(
+                axis=1
+            )
             left = (plain - learnt.shift(c, owners[own.rows], expected)) / half[:, None]
             # a box of another posture is no witness of a person's height
             whole &= (np.abs(left) < _ODD).all(axis=1)

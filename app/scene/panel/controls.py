@@ -31,8 +31,17 @@ PANEL_WIDTH = 276
 OWN_VALUES = "own values"
 """What the values are while they are no preset's, as on the page."""
 
-STAGES: dict[Stage, str] = {"single_view": "Single view", "fusion": "Fusion", "tracks": "Tracks"}
-METHOD_STAGE: dict[str, Stage] = {"single_view": "single_view", "fusion_method": "fusion"}
+STAGES: dict[Stage, str] = {
+    "single_view": "Single view",
+    "fusion": "Fusion",
+    "smoothing": "Smoothing",
+    "tracks": "Tracks",
+}
+METHOD_STAGE: dict[str, Stage] = {
+    "single_view": "single_view",
+    "fusion_method": "fusion",
+    "smoothing_method": "smoothing",
+}
 
 Input = (
     viser.GuiInputHandle[float]

@@ -154,9 +154,7 @@ def _add_tracks(message: models.Step, sequence: Sequence, run: Run, step: int) -
             whole = bool(np.isfinite(boxes[i]).all())
             # the filter knew nothing of whom the smoothing alone found
             unknown = component < 0
-            probability = (
-                0.0 if unknown else float(fused.detection_probabilities[index, component])
-            )
+            probability = 0.0 if unknown else float(fused.detection_probabilities[index, component])
             hider = -1 if unknown else int(fused.hidden_by[index, component])
             hidden_by = id_of_label.get(hider) if hider >= 0 else None
             reason: models.Reason | None = None

@@ -14,9 +14,7 @@ from tracker.kernels.linear_algebra import factorise, solve
 
 
 @kernel
-def _posture(
-    difference: ndarray, noise: ndarray, jacobian: ndarray, covariance: ndarray
-) -> float:
+def _posture(difference: ndarray, noise: ndarray, jacobian: ndarray, covariance: ndarray) -> float:
     """log N(z; h, R + H P Hᵀ)."""
     size = len(difference)
     s = noise.copy()
@@ -252,9 +250,7 @@ def share_camera(
                         length += difference[p] * solved[p]
                     if length > gate:
                         continue
-                    log_density = -0.5 * (
-                        length + log_determinant + size * math.log(2.0 * math.pi)
-                    )
+                    log_density = -0.5 * (length + log_determinant + size * math.log(2.0 * math.pi))
                     detected[i, j] += weights[i] * seen[i] * share * math.exp(log_density)
         told, _ = belief_propagation(
             1.0 - weights * seen, detected, np.full(count, clutter), tolerance, iterations
