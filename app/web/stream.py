@@ -46,7 +46,7 @@ class _Page:
         self.wake = asyncio.Event()
         self.wake.set()
         self.told_step: tuple[Any, ...] = ()
-        self.told_timeline: tuple[str, str, int, bool] = ("", "", 0)
+        self.told_timeline: tuple[str, str, int, bool] = ("", "", 0, False)
         self.told_evaluation: tuple[str, int] | None = None
         self.due: set[str] = set()
         """Kinds of message that are held back for a moment."""

@@ -24,7 +24,7 @@ class SmoothingParams(Params):
     """Time within which boxes and misses of a camera repeat each other rather than tell anew."""
 
     change: Annotated[float, Field(ge=0.0, le=20.0), ui("c", step=0.5)] = 4.0
-    """Log odds that it takes to believe that a person came, or left, or was away for a while."""
+    """Log odds against a person's going away within a track, and against his coming back."""
 
     reach: Annotated[float, Field(ge=0.0, le=10.0), ui("t_e", unit="s", step=0.1)] = 1.0
     """How far beyond its first and last box a track looks for more."""

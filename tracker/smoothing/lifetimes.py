@@ -15,6 +15,10 @@ _AWAY_FROM_BOXES = 0.3
 """Existence with which a row beyond a path's ends competes for boxes."""
 
 
+_ENTER = 0.5
+"""Log odds against a track's coming and against its leaving: the filter has found it already."""
+
+
 def independence(step_time: float, memory: float) -> float:
     """The share of a step's evidence that is new: pictures of one moment agree, right or wrong."""
     return min(step_time / memory, 1.0)
@@ -46,6 +50,7 @@ def lifetimes(
         paths.lasts,
         weight * (votes + misses(shared)),
         float(np.log(p.survival_probability)) if p.survival_probability < 1.0 else -1e-9,
+        -_ENTER,
         -parameters.change,
         smoother.frames - 1,
     )

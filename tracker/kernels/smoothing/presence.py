@@ -12,20 +12,28 @@ from tracker.kernels.compilation import kernel
 
 @kernel
 def presence(
-    starts: ndarray, lasts: ndarray, votes: ndarray, stay: float, change: float, end: int
+    starts: ndarray,
+    lasts: ndarray,
+    votes: ndarray,
+    stay: float,
+    enter: float,
+    change: float,
+    end: int,
 ) -> tuple[ndarray, ndarray]:
     """How surely a path's person was there at each step, exactly, by Viterbi's recursion both ways.
 
-    A person is away or there; coming and leaving have the probability e^change each, staying
-    has e^stay, being away costs nothing. At each step the best sequence in which he is there
-    is set against the best in which he is not.
+    A person comes once and leaves once, with the probability e^enter each, and may be away in
+    between, with e^change for each going and returning; staying has e^stay, being away costs
+    nothing. At each step the best sequence in which he is there is set against the best in
+    which he is not.
 
     Args:
         starts: (n + 1,), where each path's rows begin, and the end.
         lasts: (n,), the last step of each path.
         votes: (N,), log of what each row's evidence says for somebody against nobody.
-        stay: Log probability.
-        change: Log probability.
+        stay: Log probability, as the next two.
+        enter: Of coming and of leaving.
+        change: Of going away for a while, and of returning.
         end: The recording's last step: who is there at it has not left.
 
     Returns:
@@ -36,24 +44,27 @@ def presence(
     odds = np.full(len(starts) - 1, -np.inf)
     for path in range(len(starts) - 1):
         first, count = starts[path], starts[path + 1] - starts[path]
-        here, away = np.empty(count), np.empty(count)
-        # the best up to each step: there, and away; and never there so far
-        present, absent, been = -np.inf, 0.0, -np.inf
+        here, between, gone = np.empty(count), np.empty(count), np.empty(count)
+        present, away, left = -np.inf, -np.inf, -np.inf
         for k in range(count):
-            left = max(absent, present + change)
-            been = max(been, present + change)
-            present = max(absent + change, present + stay) + votes[first + k]
-            absent = left
-            here[k], away[k] = present, absent
-        leaving = 0.0 if lasts[path] >= end else change
-        odds[path] = max(present + leaving, been)
-        behind_present, behind_away = leaving, 0.0
+            away, left, present = (
+                max(away, present + change),
+                max(left, present + enter),
+                max(enter, max(away + change, present + stay)) + votes[first + k],
+            )
+            here[k], between[k], gone[k] = present, away, left
+        leaving = 0.0 if lasts[path] >= end else enter
+        odds[path] = max(present + leaving, left)
+        # what can still come, from each state
+        if_present, if_never, if_away = leaving, 0.0, -np.inf
         for k in range(count - 1, -1, -1):
-            difference = away[k] + behind_away - here[k] - behind_present
+            absent = max(if_never, max(between[k] + if_away, gone[k]))
+            difference = absent - here[k] - if_present
             chances[first + k] = 1.0 / (1.0 + math.exp(min(max(difference, -500.0), 500.0)))
-            vote = votes[first + k]
-            behind_present, behind_away = (
-                max(stay + vote + behind_present, change + behind_away),
-                max(change + vote + behind_present, behind_away),
+            on = votes[first + k] + if_present
+            if_present, if_never, if_away = (
+                max(stay + on, max(change + if_away, enter)),
+                max(if_never, enter + on),
+                max(if_away, change + on),
             )
     return chances, odds
