@@ -25,7 +25,7 @@ from tracker.parameters import (
     with_values,
 )
 
-STAGES: tuple[Stage, ...] = ("single_view", "fusion", "tracks")
+STAGES: tuple[Stage, ...] = ("single_view", "fusion", "smoothing", "tracks")
 DEFAULTS = RunParameters()
 
 every_parameter = pytest.mark.parametrize("parameter", PARAMETERS.values(), ids=lambda p: p.key)
