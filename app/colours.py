@@ -64,6 +64,8 @@ class Palette:
     line: Rgb
     """Frusta, and components that belong to no track."""
     volume: Rgb
+    ground: Rgb
+    """The floor of the volume."""
     entrance: Rgb
     truth: Rgb
     pinned: Rgb
@@ -108,7 +110,8 @@ PALETTES: dict[Theme, Palette] = {
         grid_minor=from_hex("#262626"),
         grid_major=from_hex("#383838"),
         line=from_hex("#8b8b8b"),
-        volume=from_hex("#5c5c5c"),
+        volume=from_hex("#6b6f75"),
+        ground=from_hex("#121a23"),
         entrance=from_hex("#4a4a4a"),
         truth=from_hex("#ababab"),
         pinned=from_hex("#d9d9d9"),
@@ -120,7 +123,8 @@ PALETTES: dict[Theme, Palette] = {
         grid_minor=from_hex("#ececea"),
         grid_major=from_hex("#d9d9d6"),
         line=from_hex("#6e6e6e"),
-        volume=from_hex("#a9a9a5"),
+        volume=from_hex("#9a9c9f"),
+        ground=from_hex("#eaf0f6"),
         entrance=from_hex("#bdbdb9"),
         truth=from_hex("#5a5a5a"),
         pinned=from_hex("#333333"),

@@ -60,12 +60,12 @@ def body(detail: ErrorDetail) -> dict[str, Any]:
 
 
 def parameter_detail(error: ParameterError) -> ErrorDetail:
-    """A parameter that does not exist or does not fit; the message has its range."""
+    """A parameter, or what else was asked for, that does not exist or does not fit."""
     return ErrorDetail(
         code="bad_parameter",
         message=str(error),
         field=error.key,
-        hint="GET /api/schema lists every parameter with its range.",
+        hint=error.hint or "GET /api/schema lists every parameter with its range.",
     )
 
 

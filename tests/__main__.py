@@ -1,44 +1,104 @@
 """Everything that must hold, with one command: ``python3 -m tests``.
 
 Needs nothing but Python 3.11 or newer: makes the environment ``.venv``, installs
-the project and its test tools into it, then checks style, types and the import
-rule and runs the tests and the short benchmarks. ``python3 -m tests --only tests
--- -k camera`` runs some of it; what follows ``--`` goes to pytest.
+the project and its test tools into it, and checks style, types, the import rules,
+every law and oracle, and the main job in a browser: within six minutes on two cores,
+the first time too. ``python3 -m tests --all`` checks the rest as well: all of the
+browser, processes, recordings, long forms, benchmarks and mutants; what has already
+passed on these very files is not run again.
+
+``python3 -m tests --only tests -- -k camera`` runs some of it; what follows ``--`` goes
+to pytest. How long what takes is written in ``tests/README.md``.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import os
 import shutil
 import subprocess
 import sys
+import threading
 import time
 import venv
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 ENVIRONMENT = ROOT / ".venv"
-NEEDS = {"page": "Node.js", "page types": "TypeScript 5.5 or newer (tsc)"}
 BIN = ENVIRONMENT / ("Scripts" if os.name == "nt" else "bin")
-PYTHON = BIN / ("python.exe" if os.name == "nt" else "python")
+PYTHON = str(BIN / ("python.exe" if os.name == "nt" else "python"))
+STAMP = ENVIRONMENT / "installed-from"
+PASSED = ENVIRONMENT / "passed"
+"""A digest of the files on which the short form has passed."""
+
+WORKERS = min(4, os.cpu_count() or 1)
+"""Processes that run tests side by side; each takes up to a gigabyte."""
+
+SHORT = "not full and not long"
+FULL = "full or long"
 
 
-def set_up() -> None:
+@dataclass(frozen=True)
+class Check:
+    """Commands that must all end well."""
+
+    name: str
+    lines: tuple[tuple[str, ...], ...]
+    missing: str = ""
+    """What is not installed, where it cannot be run for that."""
+
+    def run(self, *, shown: bool = False) -> bool:
+        """Run it, and tell what it said where it failed or where that is asked for."""
+        if self.missing:
+            tell(f"── {self.name}: skipped, {self.missing} is not installed")
+            return True
+        begin, said, failed = time.monotonic(), "", False
+        if shown:
+            tell(f"── {self.name}")
+        for line in self.lines:
+            how = None if shown else subprocess.PIPE
+            done = subprocess.run(
+                line, cwd=ROOT, stdout=how, stderr=subprocess.STDOUT if how else None, text=True
+            )
+            said += done.stdout or ""
+            failed = failed or done.returncode != 0
+        words = f"── {self.name}: {'FAILED after ' if failed else ''}"
+        tell(f"{said if failed else ''}{words}{time.monotonic() - begin:.0f} s")
+        return not failed
+
+
+_telling = threading.Lock()
+
+
+def tell(words: str) -> None:
+    """One piece of output, whole."""
+    with _telling:
+        print(words, flush=True)
+
+
+def install() -> None:
     """Make the environment and install the project, unless nothing has changed since."""
-    if not PYTHON.exists():
+    if not Path(PYTHON).exists():
         venv.EnvBuilder(with_pip=True).create(ENVIRONMENT)
-    stamp = ENVIRONMENT / "installed-from"
     wanted = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    if stamp.exists() and stamp.read_text(encoding="utf-8") == wanted:
+    if STAMP.exists() and STAMP.read_text(encoding="utf-8") == wanted:
         return
-    pip = [str(PYTHON), "-m", "pip", "install", "--quiet"]
+    begin = time.monotonic()
+    # compiled when imported: the tests import a small part of what is installed
+    pip = [PYTHON, "-m", "pip", "install", "--quiet", "--no-compile"]
     subprocess.run([*pip, "--editable", f"{ROOT}[test]"], check=True)
     # by itself: its own requirements bring a second OpenCV that clashes with the headless one
     subprocess.run([*pip, "--no-deps", "trackeval>=1.3"], check=True)
-    stamp.write_text(wanted, encoding="utf-8")
+    STAMP.write_text(wanted, encoding="utf-8")
+    tell(f"── installation: {time.monotonic() - begin:.0f} s")
 
 
+@cache
 def type_checker() -> str | None:
     """TypeScript's compiler, which reads the types in the page's comments, where it is at hand."""
     tsc = shutil.which("tsc")
@@ -49,47 +109,114 @@ def type_checker() -> str | None:
     return tsc if version >= [5, 5] else None
 
 
-def commands(pytest_arguments: list[str]) -> dict[str, list[list[str]]]:
-    """What is run, by name, in order."""
-    node, tsc = shutil.which("node"), type_checker()
-    page_tests = sorted(str(path) for path in (ROOT / "tests" / "page").glob("*.test.mjs"))
+def page_checks() -> list[Check]:
+    """What needs nothing of the environment."""
+    node, tsc, prettier = shutil.which("node"), type_checker(), shutil.which("prettier")
+    scripts = sorted(str(path) for path in (ROOT / "tests" / "page").glob("*.test.mjs"))
+    types = ("--project", str(ROOT / "static" / "jsconfig.json"))
+    return [
+        Check("page", ((node or "", "--test", *scripts),), "" if node else "Node.js"),
+        Check(
+            "page style",
+            ((prettier or "", "--check", "static", "tests/page"),),
+            "" if prettier else "prettier 3",
+        ),
+        Check(
+            "page types",
+            ((tsc or "", *types),),
+            "" if tsc else "TypeScript 5.5 or newer (tsc)",
+        ),
+    ]
+
+
+def code_checks() -> list[Check]:
+    """What reads the code, and does not run it."""
+    ruff = str(BIN / "ruff")
+    return [
+        Check("style", ((ruff, "check", "."), (ruff, "format", "--check", "."))),
+        Check("types", ((str(BIN / "mypy"),),)),
+        Check("imports", ((str(BIN / "lint-imports"),),)),
+    ]
+
+
+def test_runs(arguments: list[str]) -> dict[str, Check]:
+    """The tests: the short form, and what it leaves out."""
+    line = (PYTHON, "-m", "pytest", "-n", str(WORKERS), "--dist", "worksteal")
     return {
-        "style": [
-            [str(BIN / "ruff"), "check", "."],
-            [str(BIN / "ruff"), "format", "--check", "."],
-        ],
-        "types": [[str(BIN / "mypy")]],
-        "imports": [[str(BIN / "lint-imports")]],
-        "page": [[node, "--test", *page_tests]] if node else [],
-        "page types": [[tsc, "--project", str(ROOT / "static" / "jsconfig.json")]] if tsc else [],
-        # at once for all processes that the tests start
-        "kernels": [[str(PYTHON), "-m", "tracker.warm_up"]],
-        "tests": [[str(PYTHON), "-m", "pytest", *pytest_arguments]],
-        "benchmarks": [[str(PYTHON), "-m", "tests.benchmarks", "--short"]],
+        name: Check(name, ((*line, "-m", marked, *arguments),))
+        for name, marked in (("tests", SHORT), ("full tests", FULL))
     }
 
 
+def digest() -> str:
+    """Of all files that a check may read."""
+    found = hashlib.sha256(sys.version.encode())
+    folders = [ROOT / name for name in ("app", "tracker", "static", "tests", ".ci")]
+    files = [path for folder in folders for path in folder.rglob("*")]
+    for path in sorted([*files, *ROOT.glob("*.*")]):
+        if path.is_file() and "__pycache__" not in path.parts:
+            found.update(str(path.relative_to(ROOT)).encode() + b"\0" + path.read_bytes())
+    return found.hexdigest()
+
+
+def already_passed() -> bool:
+    """Whether the short form has passed on these files."""
+    return PASSED.is_file() and PASSED.read_text(encoding="utf-8") == digest()
+
+
+def in_order(checks: Iterable[Check]) -> list[str]:
+    """Run some checks one after the other; the names of those that failed."""
+    return [check.name for check in checks if not check.run()]
+
+
 def main() -> int:
-    """Run all checks, tell every failure, and return 1 if there was one."""
-    parser = argparse.ArgumentParser(prog="python3 -m tests", description=__doc__)
-    names = list(commands([]))
-    parser.add_argument("--only", action="append", choices=names, help="run only this, repeatable")
+    """Run the checks, tell every failure, and return 1 if there was one."""
+    page, code = page_checks(), code_checks()
+    # at once for all processes that the tests start
+    kernels = Check("kernels", ((PYTHON, "-m", "tracker.warm_up"),))
+    benchmarks = Check("benchmarks", ((PYTHON, "-m", "tests.benchmarks", "--short"),))
+    mutants = Check("mutants", ((PYTHON, "-m", "tests.mutate"),))
+    names = [check.name for check in (*page, *code, kernels, *test_runs([]).values())]
+
+    parser = argparse.ArgumentParser(
+        prog="python3 -m tests",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--all", action="store_true", help="also what takes long")
+    parser.add_argument(
+        "--only",
+        action="append",
+        choices=[*names, benchmarks.name, mutants.name],
+        help="run only this, repeatable",
+    )
     parser.add_argument("pytest", nargs="*", help="arguments for pytest, after --")
     arguments = parser.parse_args()
-    set_up()
-    failed = []
-    for name, lines in commands(arguments.pytest).items():
-        if arguments.only and name not in arguments.only:
-            continue
-        if not lines:
-            print(f"── {name}: skipped, {NEEDS[name]} is not installed", flush=True)
-            continue
-        begin = time.monotonic()
-        print(f"── {name}", flush=True)
-        for line in lines:
-            if subprocess.run(line, cwd=ROOT).returncode != 0:
-                failed.append(name)
-        print(f"── {name}: {time.monotonic() - begin:.0f} s", flush=True)
+    only: list[str] = arguments.only or []
+    tests, full_tests = test_runs(arguments.pytest).values()
+
+    if only:
+        install()
+        everything = [*page, *code, kernels, tests, full_tests, benchmarks, mutants]
+        failed = [c.name for c in everything if c.name in only and not c.run(shown=True)]
+    else:
+        failed = []
+        if arguments.all and STAMP.exists() and already_passed():
+            tell("── what `python3 -m tests` checks has passed on these files")
+        else:
+            before = digest()
+            with ThreadPoolExecutor(2) as lanes:
+                reading = lanes.submit(in_order, page)
+                install()
+                compiling = lanes.submit(kernels.run)
+                failed += in_order(code) + reading.result()
+                failed += [] if compiling.result() else [kernels.name]
+            failed += [] if tests.run(shown=True) else [tests.name]
+            if not failed and not arguments.pytest:
+                PASSED.write_text(before, encoding="utf-8")
+        if arguments.all:
+            later = (full_tests, benchmarks, mutants)
+            failed += [check.name for check in later if not check.run(shown=True)]
     if failed:
         print(f"failed: {', '.join(dict.fromkeys(failed))}", file=sys.stderr)
     return 1 if failed else 0

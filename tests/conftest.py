@@ -29,11 +29,24 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 def pytest_addoption(parser: pytest.Parser) -> None:
     """``--long``: also what takes long; each such test has a short form that always runs."""
     parser.addoption("--long", action="store_true", help="also run the tests marked long")
+    parser.addoption(
+        "--update-golden",
+        action="store_true",
+        help="accept the numbers of tests/golden as they are",
+    )
     parser.addoption("--screenshots", type=Path, help="folder that keeps pictures of the page")
 
 
+@pytest.hookimpl(tryfirst=True)  # what is marked here, -m chooses by
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave the long tests out unless they were asked for, by ``--long`` or ``-m long``."""
+    """Mark what belongs to the full form alone; leave long tests out unless they are asked for.
+
+    Of the browser the main job is part of the short form; recordings are not everywhere.
+    """
+    for item in items:
+        marks = {mark.name for mark in item.iter_markers()}
+        if marks & {"browser", "data"} and "main_job" not in marks:
+            item.add_marker(pytest.mark.full)
     if config.getoption("--long") or "long" in config.getoption("-m"):
         return
     long = [item for item in items if item.get_closest_marker("long")]

@@ -16,11 +16,13 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from tracker.kernels import lens
+from tracker.kernels.lens import Calibration, Calibrations, Projection
 
 NEAREST_DEPTH = 0.05
 """Metres: a point nearer than this in front of the lens counts as behind the camera."""
 
 _LENS_ITERATIONS = 12
+"""Of Newton's method at most, which doubles the digits with each."""
 
 _CORNER_SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 
@@ -94,13 +96,17 @@ class Camera:
         return float(np.sqrt(real.min())) if len(real) else np.inf
 
     @cached_property
-    def numbers(self) -> tuple[ndarray, ndarray, ndarray, ndarray]:
-        """R, t, K and the lens in the form that the compiled kernels know."""
-        parts = (self.rotation, self.translation, self.intrinsics, self.distortion)
-        rotation, translation, intrinsics, distortion = (
-            np.ascontiguousarray(part, dtype=float) for part in parts
+    def calibration(self) -> Calibration:
+        """The camera in the form that the compiled kernels know."""
+        return Calibration(
+            np.array(self.image_size, dtype=float),
+            np.ascontiguousarray(self.rotation, dtype=float),
+            np.ascontiguousarray(self.translation, dtype=float),
+            np.ascontiguousarray(self.intrinsics, dtype=float),
+            np.ascontiguousarray(self.distortion, dtype=float),
+            NEAREST_DEPTH,
+            self.largest_radius,
         )
-        return rotation, translation, intrinsics, distortion
 
     def to_camera(self, points: Float[ndarray, "N 3"]) -> Float[ndarray, "N 3"]:
         """World points (metres) in camera axes."""
@@ -114,26 +120,16 @@ class Camera:
         Points behind the camera, and points so far aside that the lens model
         does not hold, come back as NaN and False.
         """
-        pixels, _, valid = self._project(points, with_jacobian=False)
-        return pixels, valid
+        projection = self._project(points, with_jacobian=False)
+        return projection.pixels, projection.valid
 
-    def project_with_jacobian(
-        self, points: Float[ndarray, "N 3"]
-    ) -> tuple[Float[ndarray, "N 2"], Float[ndarray, "N 2 3"], Bool[ndarray, " N"]]:
+    def project_with_jacobian(self, points: Float[ndarray, "N 3"]) -> Projection:
         """Pixels of world points, d pixel / d world (pixels a metre), and whether they hold."""
         return self._project(points, with_jacobian=True)
 
-    def _project(
-        self, points: Float[ndarray, "N 3"], *, with_jacobian: bool
-    ) -> tuple[Float[ndarray, "N 2"], Float[ndarray, "N 2 3"], Bool[ndarray, " N"]]:
-        pixels, jacobians, valid = lens.project_points(
-            np.ascontiguousarray(points, dtype=float),
-            *self.numbers,
-            NEAREST_DEPTH,
-            self.largest_radius,
-            with_jacobian,
-        )
-        return pixels, jacobians, valid
+    def _project(self, points: Float[ndarray, "N 3"], *, with_jacobian: bool) -> Projection:
+        places = np.ascontiguousarray(points, dtype=float)
+        return lens.project_points(places, self.calibration, with_jacobian)
 
     def back_project(self, pixels: Float[ndarray, "N 2"]) -> Float[ndarray, "N 3"]:
         """Unit directions, in world axes, of the rays from :attr:`centre` through the pixels.
@@ -141,12 +137,9 @@ class Camera:
         The lens model is inverted by Newton's method, to a thousandth of a pixel
         inside the picture.
         """
-        rotation, _, intrinsics, distortion = self.numbers
         rays: ndarray = lens.directions(
             np.ascontiguousarray(pixels, dtype=float),
-            rotation,
-            intrinsics,
-            distortion,
+            self.calibration,
             0 if self.is_pinhole else _LENS_ITERATIONS,
         )
         return rays
@@ -192,24 +185,15 @@ class Camera:
         return boxes, visible
 
 
-def stacked(
-    cameras: Many[Camera],
-) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray, float, ndarray]:
-    """C cameras in the form that compiled kernels know.
-
-    Returns:
-        Sizes of the pictures (C, 2), rotations (C, 3, 3), translations (C, 3), intrinsics
-        (C, 3, 3), lenses (C, 5), :data:`NEAREST_DEPTH` and the largest radii (C,).
-    """
-    rotations, translations, intrinsics, distortions = (
-        np.array([camera.numbers[part] for camera in cameras]) for part in range(4)
-    )
-    return (
-        np.array([camera.image_size for camera in cameras]),
-        rotations,
-        translations,
-        intrinsics,
-        distortions,
+def stacked(cameras: Many[Camera]) -> Calibrations:
+    """C cameras in the form that compiled kernels know."""
+    each = [camera.calibration for camera in cameras]
+    return Calibrations(
+        np.array([one.image_size for one in each]),
+        np.array([one.rotation for one in each]),
+        np.array([one.translation for one in each]),
+        np.array([one.intrinsics for one in each]),
+        np.array([one.distortion for one in each]),
         NEAREST_DEPTH,
-        np.array([camera.largest_radius for camera in cameras]),
+        np.array([one.largest_radius for one in each]),
     )

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
 from numpy import ndarray
 
-from tracker.kernels import images
+from tracker.kernels.pictures import images
 
 ColourSpaceName = Literal["hue_saturation", "rgb", "hsi"]
 KernelName = Literal["epanechnikov", "flat"]

@@ -13,13 +13,13 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.kernels import images
+from tracker.kernels.pictures import images
 
 ITERATIONS = 30
 """Steps after which a climb ends; most end after five to ten."""
 
 TOLERANCE = 0.01
-"""A climb ends when a step is shorter than this many half sizes."""
+"""A climb ends when a step is shorter than this many half sizes: far below any peak's deviation."""
 
 
 def starts(
@@ -67,7 +67,7 @@ def modes(
         The modes, densest first, and their densities. None for an empty sample, and
         none from a start that no sample is near to.
     """
-    found, densities = images.mean_shift(
+    climbed = images.mean_shift(
         np.ascontiguousarray(boxes, dtype=float),
         np.ascontiguousarray(weights, dtype=float),
         np.ascontiguousarray(start_boxes, dtype=float),
@@ -75,6 +75,7 @@ def modes(
         ITERATIONS,
         TOLERANCE,
     )
+    found, densities = climbed.boxes, climbed.densities
     order = np.argsort(-densities, kind="stable")
     kept = images.keep_apart(found, densities, order, merge_distance)
     return found.take(kept, 0), densities.take(kept)

@@ -23,7 +23,7 @@ ITERATIONS = 30
 """Steps after which a climb ends; most end after five."""
 
 TOLERANCE = 0.01
-"""A climb ends when a step is shorter than this many half sizes."""
+"""A climb ends when a step is shorter than this many half sizes: far below any mode's deviation."""
 
 
 def log_likelihoods(distances: Float[ndarray, "S G"], sharpness: float) -> Float[ndarray, " S"]:
@@ -124,18 +124,19 @@ def clusters(
         No modes for no particles.
     """
     weights = np.ascontiguousarray(counts, dtype=float)
-    points, densities = particles.epanechnikov_climb(
+    climbed = particles.epanechnikov_climb(
         np.ascontiguousarray(boxes, dtype=float), weights, groups, bandwidth, ITERATIONS, TOLERANCE
     )
-    order = np.argsort(-densities, kind="stable")
-    owners, leaders = particles.join_modes(points, weights, order, merge_distance)
+    order = np.argsort(-climbed.densities, kind="stable")
+    modes = particles.join_modes(climbed.points, weights, order, merge_distance)
+    owners, leaders = modes.owners, modes.leaders
     there = owners >= 0
     sums = np.bincount(owners[there], weights[there], minlength=len(leaders))
     by_size = np.argsort(-sums, kind="stable")
     ranks = np.empty(len(leaders) + 1, dtype=np.int64)
     ranks[by_size], ranks[-1] = np.arange(len(leaders)), -1
     shares = sums[by_size] / max(sums.sum(), 1.0)
-    return Clusters(points[leaders[by_size]], shares, ranks[owners])
+    return Clusters(climbed.points[leaders[by_size]], shares, ranks[owners])
 
 
 def redistribute(

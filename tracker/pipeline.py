@@ -9,12 +9,13 @@ from contextlib import ExitStack
 from tracker import fusion, smoothing
 from tracker import trajectories as tracks_stage
 from tracker.parameters import RunParameters, Stage
+from tracker.runs.fitting import default_parameters
 from tracker.runs.run import Cancelled, Progress, Run, stage_keys
 from tracker.runs.single_views import Cancel, SingleViews
 from tracker.runs.stage_cache import FusionColumn, StageCache, TrackColumn, ViewColumn
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
-from tracker.trajectories import Trajectories
+from tracker.trajectories import Bounds, Trajectories
 
 __all__ = [
     "Cancelled", "Progress", "Run", "compute", "default_parameters", "stage_keys",
@@ -22,26 +23,6 @@ __all__ = [
 
 PROGRESS_SECONDS = 0.05
 """At most this often a run tells how far it is."""
-
-
-def default_parameters(sequence: Sequence) -> RunParameters:
-    """Which methods follow from what the sequence has: pictures with templates, or boxes.
-
-    People are fused by ``multi_bernoulli`` in either case.
-
-    Raises:
-        ValueError: If the sequence has neither.
-    """
-    if sequence.has_pictures and sequence.templates:
-        return RunParameters(single_view="colour_phd", fusion_method="multi_bernoulli")
-    if sequence.has_detections:
-        return RunParameters(single_view="none", fusion_method="multi_bernoulli")
-    if sequence.has_pictures:
-        return RunParameters(single_view="colour_phd", fusion_method="multi_bernoulli")
-    raise ValueError(
-        f"{sequence.name}: every camera needs pictures (video or images), or every camera "
-        "needs detections; add what is missing to sequence.toml"
-    )
 
 
 def compute(
@@ -155,15 +136,13 @@ class _Telling:
     def _extract(self) -> Trajectories:
         run = self._run
         p = run.parameters.fusion
-        sequential = run.parameters.fusion_method == "sequential_phd"
+        used = run.parameters.method("fusion_method").used(run.parameters)
         return tracks_stage.extract(
             run.fused[run.done :],
             cameras=len(run.sequence.views),
             extraction_threshold=p.extraction_threshold,
-            rule=p.extraction if sequential else "components",
-            room=run.sequence.room,
-            margin=p.room_margin,
-            below=float(run.sequence.target_half_extents[2]) / 2.0,
+            rule=p.extraction if used.reads_number("fusion", "extraction") else "components",
+            bounds=_bounds(run),
             first_frame=run.done,
             ids=self.ids,
         )
@@ -218,21 +197,25 @@ def _smooth(run: Run, total: int, telling: _Telling, cancelled: Cancel) -> None:
 
     check()
     if run.smoothed is None:
-        run.smoothed = smoothing.smooth(
-            run.sequence, run.parameters, run.views[:total], run.fused[:total], check=check
-        )
-    p, half = run.parameters.fusion, run.sequence.target_half_extents
+        method = smoothing.create(run.sequence, run.parameters)
+        run.smoothed = method.smooth(run.views[:total], run.fused[:total], check)
+        if run.smoothed is None:
+            return
     run.tracks = smoothing.tracks_of(
         run.smoothed,
         run.fused,
         telling.ids,
-        extraction_threshold=p.extraction_threshold,
-        room=run.sequence.room,
-        margin=p.room_margin,
-        below=float(half[2]) / 2.0,
-        near=2.0 * float(half[:2].mean()),
+        extraction_threshold=run.parameters.fusion.extraction_threshold,
+        bounds=_bounds(run),
+        near=2.0 * float(run.sequence.target_half_extents[:2].mean()),
     )
     telling.now()
+
+
+def _bounds(run: Run) -> Bounds:
+    """Where people are reported."""
+    below = float(run.sequence.target_half_extents[2]) / 2.0
+    return Bounds(run.sequence.room, run.parameters.fusion.room_margin, below)
 
 
 def _adopt(run: Run, previous: Run | None) -> None:

@@ -68,15 +68,29 @@ class Trajectories:
         )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Bounds:
+    """Where people are tracked."""
+
+    room: Room
+    margin: float = np.inf
+    """Metres beyond the room's volume within which a target still counts."""
+    below: float = 0.0
+    """Metres more under its floor, where the middle of nobody can be: a person who lies there
+    has an error of height."""
+
+    def contain(self, positions: Float[ndarray, "N 3"]) -> Bool[ndarray, " N"]:
+        """Whether each position, world metres, counts."""
+        return self.room.contains(positions, self.margin, self.below)
+
+
 def extract(
     results: Iterable[FusionResult],
     *,
     cameras: int,
     extraction_threshold: float,
     rule: Rule = "components",
-    room: Room | None = None,
-    margin: float = np.inf,
-    below: float = 0.0,
+    bounds: Bounds | None = None,
     first_frame: int = 0,
     ids: dict[int, int] | None = None,
 ) -> Trajectories:
@@ -91,10 +105,7 @@ def extract(
         cameras: C.
         extraction_threshold: T_e; a component is a target where its weight is above it.
         rule: Whether the components that one box made count by themselves or together.
-        room: Where people are tracked; None for everywhere.
-        margin: Metres beyond the room's volume within which a target still counts.
-        below: Metres more under its floor, where the middle of nobody can be: a person who
-            lies there has an error of height.
+        bounds: Where people are tracked; None for everywhere.
         first_frame: The step of the first result.
         ids: Label → id so far; new labels are added. To go on from an earlier
             piece, pass the same one again.
@@ -110,8 +121,8 @@ def extract(
     targets = gaussian_mixture.concatenate([mixture for mixture, _ in gathered])
     steps = np.repeat(np.arange(len(results)), [mixture.size for mixture, _ in gathered])
     chosen = np.flatnonzero(targets.weights > extraction_threshold)
-    if room is not None:
-        chosen = chosen[room.contains(targets.means[chosen, :3], margin, below)]
+    if bounds is not None:
+        chosen = chosen[bounds.contain(targets.means[chosen, :3])]
     if not len(chosen):
         return Trajectories.empty(cameras)
     # step by step, label by label, the heaviest first
@@ -164,10 +175,10 @@ def by_boxes(result: FusionResult) -> tuple[GaussianMixture, Int[ndarray, " K"]]
     group[rest] = count + np.arange(len(rest))
     count += len(rest)
     leaders = mixture_kernels.heaviest_of_groups(posterior.weights, group, count)
-    weights, means, covariances = linear_algebra.merge_moments(
+    merged = linear_algebra.merge_moments(
         posterior.weights, posterior.means, posterior.covariances, group, count
     )
-    return GaussianMixture(weights, means, covariances, posterior.labels.take(leaders)), leaders
+    return GaussianMixture.of(merged, posterior.labels.take(leaders)), leaders
 
 
 def concatenate(parts: Iterable[Trajectories], cameras: int) -> Trajectories:

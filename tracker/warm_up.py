@@ -4,19 +4,22 @@ numba compiles a function when it is first called, for the arguments it is calle
 So a tiny made-up recording is tracked with each method and in each way that calls other
 kernels; what the first real run calls is then there.
 
-``python -m tracker.warm_up`` does it in a process of its own, which leaves the interpreter
-of the workbench alone, and tells how far it is: a line ``done total`` whenever a kernel
-has been compiled, a line ``shown`` when a sequence can be seen, a line ``ready`` when the
-default methods have all of theirs.
+``python -m tracker.warm_up`` does it in two processes, one a half of the methods, which
+leave the interpreter of the workbench alone. Each tells how far it is: a line ``done
+total`` whenever a kernel has been compiled; the first half tells ``ready`` when the methods
+that a sequence starts with have what cannot run as plain Python.
 """
 
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -24,7 +27,8 @@ import numpy as np
 from tracker import pipeline
 from tracker.camera import Camera
 from tracker.kernels import compilation
-from tracker.parameters import METHODS, PRESETS, RunParameters, with_values
+from tracker.parameters import METHODS, PRESETS, MethodKey, RunParameters, with_values
+from tracker.parameters.registry import FOLLOWING, ORIGINS, REGISTERED
 from tracker.sequences.sequence import Detections, Entrance, Room, Sequence, Template, View
 
 STEPS = 36
@@ -41,8 +45,8 @@ _WAYS = (((-1.2, 0.2, 0.84), (1.2, 0.2, 0.84)), ((1.2, -0.3, 0.84), (-1.2, -0.3,
 _COLOURS = ((40, 40, 220), (220, 60, 40))
 """Of the two people, blue green red."""
 
-_FIRST = ("colour_phd", "none")
-"""What a sequence starts with: for pictures, for boxes."""
+HALVES = ("first", "second")
+"""Two processes' work: the fusion's step is the longest to compile, and goes by itself."""
 
 _OTHER_WAYS = (
     {"fusion.update": "unscented"},
@@ -54,42 +58,60 @@ _OTHER_WAYS = (
 
 
 def compile_kernels(
+    half: str,
     told: Callable[[int, int], None] = lambda done, total: None,
-    shown: Callable[[], None] = lambda: None,
     ready: Callable[[], None] = lambda: None,
 ) -> None:
-    """Compile what has not been compiled on this machine; takes a minute where nothing was.
+    """Compile what has not been compiled on this machine.
 
     Args:
+        half: One of :data:`HALVES`.
         told: Called with the number of kernels that are ready and of all, whenever one has
             been compiled.
-        shown: Called when the cameras have theirs: a sequence can be seen.
-        ready: Called when the methods that a sequence starts with have their kernels.
+        ready: Called by the first half when the methods that a sequence starts with have the
+            kernels that cannot run as plain Python.
     """
+    for methods in REGISTERED.values():
+        for method in methods.values():
+            if method.name not in ORIGINS:
+                method.load()  # its kernels are counted from the beginning
     with (
         tempfile.TemporaryDirectory() as folder,
         compilation.followed(lambda: told(*compilation.counts())),
     ):
         recording = _recording(Path(folder))
-        recording.cameras[0].back_project(np.zeros((1, 2)))
-        shown()
-        for single_view in _FIRST:
-            values = {"single_view": single_view, "fusion_method": "multi_bernoulli"}
-            pipeline.compute(recording, with_values(RunParameters(), values))
-        ready()
-        for parameters in _ways():
+        if half == HALVES[0]:
+            with compilation.only_of_pixels():
+                for single_view in FOLLOWING:
+                    pipeline.compute(recording, RunParameters(single_view=single_view))
+            ready()
+        for parameters in _ways(half):
             pipeline.compute(recording, parameters)
-    compilation.mark_compiled()
 
 
-def _ways() -> Iterator[RunParameters]:
-    for preset in PRESETS.values():
-        for single_view in METHODS["single_view"]:
-            yield with_values(RunParameters(), {**preset, "single_view": single_view})
-    for values in (*PRESETS.values(), *_OTHER_WAYS):
-        for method in METHODS["fusion_method"]:
-            chosen = {"single_view": "none", **values, "fusion_method": method}
-            yield with_values(RunParameters(), chosen)
+def _ways(half: str) -> Iterable[RunParameters]:
+    """Ways of tracking that between them call every kernel, the usual ones first."""
+    of_views = (
+        with_values(RunParameters(), {**preset, "single_view": single_view})
+        for preset in PRESETS.values()
+        for single_view in _own("single_view")
+    )
+    of_fusions = (
+        with_values(
+            RunParameters(), {"single_view": "none", **values, "fusion_method": fusion_method}
+        )
+        for values in (*PRESETS.values(), *_OTHER_WAYS)
+        for fusion_method in _own("fusion_method")
+    )
+    if half == HALVES[0]:
+        return chain([RunParameters(single_view="none")], of_fusions)
+    boxes = RunParameters(single_view="detection_phd", fusion_method="sequential_phd")
+    return chain([boxes], of_views)
+
+
+def _own(key: MethodKey) -> list[str]:
+    """The methods of this project: another package compiles its kernels when they are called."""
+    return [name for name in METHODS[key] if name not in ORIGINS]
 
 
 def _recording(folder: Path) -> Sequence:
@@ -151,19 +173,39 @@ def _camera(name: str, place: float) -> Camera:
     return Camera(name, SIZE, intrinsics, rotation, -rotation @ position, distortion)
 
 
-def main() -> None:
-    """Compile everything and tell of it on standard output; whoever works goes first."""
-    if sys.platform != "win32":
-        os.nice(5)
+def start(half: str, **how: Any) -> subprocess.Popen[str]:
+    """The process that compiles one half; what it tells comes through its standard output."""
+    line = [sys.executable, "-m", "tracker.warm_up", half]
+    return subprocess.Popen(line, stdin=subprocess.DEVNULL, text=True, **how)
+
+
+def main() -> int:
+    """Compile one half and tell of it, or both and wait; whoever works goes first."""
+    if len(sys.argv) < 2:
+        statuses = [process.wait() for process in [start(half) for half in HALVES]]
+        if not any(statuses):
+            compilation.mark_compiled()
+        return max(statuses)
+    half = sys.argv[1]
+    _give_way(5 if half == HALVES[0] else 15)
 
     def say(words: str) -> None:
         sys.stdout.write(f"{words}\n")
         sys.stdout.flush()
 
-    compile_kernels(
-        lambda done, total: say(f"{done} {total}"), lambda: say("shown"), lambda: say("ready")
-    )
+    def ready() -> None:
+        say("ready")
+        _give_way(10)
+
+    compile_kernels(half, lambda done, total: say(f"{done} {total}"), ready)
+    return 0
+
+
+def _give_way(steps: int) -> None:
+    """Whoever renders or tracks goes first; what a run waits for goes before the rest."""
+    if sys.platform != "win32":
+        os.nice(steps)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

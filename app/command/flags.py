@@ -9,13 +9,13 @@ import os
 import sys
 from dataclasses import dataclass, field, make_dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import tyro
 from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subcommand
 
 from tracker import parameters as table
-from tracker.parameters import METHODS, PRESETS, Parameter, ParameterError
+from tracker.parameters import FOLLOWS, METHODS, PRESETS, Parameter, ParameterError
 
 DEFAULT_SEQUENCE = "room44-3p"
 
@@ -55,7 +55,7 @@ class Track:
     """The file to write. It appears when it is complete."""
     single_view: Annotated[
         str | None,
-        arg(metavar="|".join(METHODS["single_view"]), help_behavior_hint="(default: what fits)"),
+        arg(metavar="|".join(METHODS["single_view"]), help_behavior_hint=f"({FOLLOWS})"),
     ] = None
     """Method of stage 1."""
     fusion_method: Annotated[
@@ -63,7 +63,7 @@ class Track:
         arg(
             name="fusion",
             metavar="|".join(METHODS["fusion_method"]),
-            help_behavior_hint="(default: what fits)",
+            help_behavior_hint=f"(default: {table.RunParameters().fusion_method})",
         ),
     ] = None
     """Method of stage 2."""
@@ -157,6 +157,82 @@ class Experiment:
 
 
 @dataclass
+class Import:
+    """Make a sequence folder of recordings, calibrations and boxes in other programs' formats."""
+
+    sources: Annotated[
+        Positional[tuple[Path, ...]],
+        arg(metavar="SOURCE …", help="Files, or a folder with all in it; `formats` lists kinds."),
+    ]
+    output: Annotated[Path | None, arg(aliases=["-o"], metavar="FOLDER")] = None
+    """The folder to write; not needed with --dry-run."""
+    dry_run: FlagCreatePairsOff[bool] = False
+    """Only print what each file is taken for and what was found out."""
+    copy: FlagCreatePairsOff[bool] = False
+    """Copy videos and pictures, which are otherwise linked."""
+    name: str = ""
+    """Of the sequence; the folder's name if it is not given."""
+    unit: Annotated[
+        str | None, arg(metavar="m|cm|mm|METRES", help_behavior_hint="(default: found out)")
+    ] = None
+    """Unit of the calibration, or how many metres one of its units has."""
+    up: Annotated[
+        Literal["x", "y", "z", "-x", "-y", "-z"] | None,
+        arg(help_behavior_hint="(default: found out)"),
+    ] = None
+    """Axis of the calibration's world that points up."""
+    pose: Annotated[
+        Literal["world-to-camera", "camera-to-world"] | None,
+        arg(help_behavior_hint="(default: found out)"),
+    ] = None
+    """Where R and t lead."""
+    axes: Annotated[
+        Literal["opencv", "opengl"] | None, arg(help_behavior_hint="(default: found out)")
+    ] = None
+    """Axes of a camera: y down and z ahead, or y up and z back."""
+    boxes: Annotated[
+        Literal["ltwh", "xyxy", "cxcywh"] | None, arg(help_behavior_hint="(default: found out)")
+    ] = None
+    """What the four numbers of a box are: left, top and size; two corners; centre and size."""
+    first_index: Annotated[int | None, arg(help_behavior_hint="(default: found out)")] = None
+    """Number of the first frame in boxes and truth, 0 or 1."""
+    fps: Annotated[float | None, arg(help_behavior_hint="(default: the videos')")] = None
+    """Steps a second."""
+    camera: Annotated[
+        UseAppendAction[tuple[str, ...]],
+        arg(metavar="NAME=FILE", help_behavior_hint="(repeatable)"),
+    ] = ()
+    """Video, folder of pictures or boxes of a camera, where names do not tell."""
+
+
+@dataclass
+class Check:
+    """Check a sequence: calibration, boxes, room, sizes and time, each with what mends it."""
+
+    sequence: Annotated[
+        Positional[str], arg(metavar="SEQUENCE", help="A built-in room's name or a folder.")
+    ]
+
+
+@dataclass
+class Formats:
+    """List the formats that `import` reads and `export-calibration` writes."""
+
+
+@dataclass
+class ExportCalibration:
+    """Write a sequence's cameras in the form of another program."""
+
+    sequence: Annotated[
+        Positional[str], arg(metavar="SEQUENCE", help="A built-in room's name or a folder.")
+    ]
+    output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
+    """The file to write; it must not exist yet."""
+    form: Literal["opencv", "pose2sim"] = "opencv"
+    """OpenCV's FileStorage (YAML, or XML by the file's suffix) or Pose2Sim's TOML."""
+
+
+@dataclass
 class Sequences:
     """List the sequences that can be opened by name."""
 
@@ -188,6 +264,10 @@ class Benchmark:
     """The form of a minute or two that the checks run."""
     json: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
     """Write the figures to this file as well, with the machine and the versions."""
+    record: FlagCreatePairsOff[bool] = False
+    """Append the figures to the record of speed and accuracy over the commits."""
+    chart: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
+    """Measure nothing, but draw that record as one HTML page."""
 
 
 @dataclass
@@ -263,7 +343,20 @@ def _evaluate_with_flags() -> Any:
     return with_flags
 
 
-Arguments = Serve | Track | Evaluate | Experiment | Benchmark | Sequences | Render | Parameters
+Arguments = (
+    Serve
+    | Track
+    | Evaluate
+    | Experiment
+    | Benchmark
+    | Import
+    | Check
+    | Formats
+    | ExportCalibration
+    | Sequences
+    | Render
+    | Parameters
+)
 
 
 def parse(arguments: list[str] | None = None) -> Arguments:
@@ -278,6 +371,10 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         | Annotated[evaluate, subcommand("evaluate")]
         | Annotated[Experiment, subcommand("experiment")]
         | Annotated[Benchmark, subcommand("benchmark")]
+        | Annotated[Import, subcommand("import")]
+        | Annotated[Check, subcommand("check")]
+        | Annotated[Formats, subcommand("formats")]
+        | Annotated[ExportCalibration, subcommand("export-calibration")]
         | Annotated[Sequences, subcommand("sequences")]
         | Annotated[Render, subcommand("render")]
         | Annotated[Parameters, subcommand("parameters")]

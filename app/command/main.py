@@ -1,4 +1,4 @@
-"""The command line: serve, track, evaluate, experiment, benchmark, sequences, …
+"""The command line: serve, track, evaluate, experiment, benchmark, import, check, …
 
 Status 0 for success, 1 for a failure told in one line on standard error, 2 for
 wrong usage, 130 after Ctrl-C. The engine is imported by the command that needs it.
@@ -12,14 +12,19 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 from app.command.flags import (
     Arguments,
     Benchmark,
+    Check,
     Evaluate,
     Experiment,
+    ExportCalibration,
+    Formats,
+    Import,
     Parameters,
     Render,
     Sequences,
@@ -75,6 +80,10 @@ def _run(command: Arguments) -> int:
             experiment(command)
         case Benchmark():
             return _benchmark(command)
+        case Import() | Check() | Formats() | ExportCalibration():
+            from app.command.importing import run
+
+            return run(command)
         case Sequences():
             _sequences(command)
         case Render():
@@ -193,31 +202,31 @@ def _track(command: Track) -> None:
     if not output.parent.is_dir():
         raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
 
-    from app.state.compiling import WORDS
+    from app.state.compiling import Compiling
     from tracker import export, pipeline
-    from tracker.kernels import compilation
+    from tracker.checks import check
+    from tracker.runs.outcome import why_no_tracks
     from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
 
     with Bar("rendering", "frame") as rendering:
         sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    for sentence in sequence.warnings:
+        say(sentence)
+    for found in check(sequence, quick=True):
+        if found.status == "warning" and str(found) not in sequence.warnings:
+            say(str(found))
     parameters = table.with_values(pipeline.default_parameters(sequence), changes)
     begin = time.perf_counter()
     stages: set[table.Stage] = set()
-    is_told = False
-
-    def compiles() -> None:
-        nonlocal is_told
-        if not is_told:
-            is_told = True
-            say(WORDS)
 
     def told(_: pipeline.Run, progress: pipeline.Progress) -> None:
         stages.add(progress.stage)
         tracking.at(progress.done, progress.total)
 
-    with Bar("tracking", "step") as tracking, compilation.followed(compiles):
+    with Bar("tracking", "step") as tracking, closing(Compiling(say)) as compiling:
         tracking.at(0, sequence.frames)
+        compiling.wait(lambda done, total: None, lambda: False)
         run = pipeline.compute(
             sequence,
             parameters,
@@ -233,6 +242,8 @@ def _track(command: Track) -> None:
         f"{sequence.frames} steps, {targets} tracks, {sequence.frames / seconds:.0f} steps/s "
         f"({sequence.frames / seconds / sequence.fps:.1f} × real time{kept}), written to {output}"
     )
+    if (reason := why_no_tracks(run)) is not None:
+        say(reason)
 
 
 # the rest
@@ -249,6 +260,8 @@ def _benchmark(command: Benchmark) -> int:
     line = [sys.executable, "-m", "tests.benchmarks", *command.names]
     line += ["--short"] if command.short else []
     line += ["--json", str(command.json.absolute())] if command.json is not None else []
+    line += ["--record"] if command.record else []
+    line += ["--chart", str(command.chart.absolute())] if command.chart is not None else []
     return subprocess.run(line, cwd=root).returncode
 
 
@@ -304,8 +317,9 @@ def _parameters() -> None:
         "smoothing_method": "Method of stage 3 (--smoothing).",
     }
     defaults = table.RunParameters()
-    rows = [
-        (key, "", "|".join(choices), "", show(table.value(defaults, key)), methods[key])
+    chosen = {"fusion_method": defaults.fusion_method, "single_view": table.FOLLOWS}
+    rows: list[tuple[str, ...]] = [
+        (key, "", "|".join(choices), "", chosen[key], methods[key])
         for key, choices in table.METHODS.items()
     ]
     rows += [

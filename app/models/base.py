@@ -8,7 +8,11 @@ from pydantic import BaseModel, ConfigDict
 class Model(BaseModel):
     """A message; attribute docstrings become the descriptions of the OpenAPI page."""
 
-    model_config = ConfigDict(use_attribute_docstrings=True, extra="forbid")
+    model_config = ConfigDict(
+        use_attribute_docstrings=True,
+        extra="forbid",
+        json_schema_serialization_defaults_required=True,  # an answer has all of its fields
+    )
 
 
 Box = tuple[float, float, float, float]

@@ -45,6 +45,8 @@ class SequenceInfo(Model):
     key: str
     """Part of the pictures' addresses; another for every content."""
     name: str
+    opened_as: str
+    """The name or folder that opens it again."""
     description: str
     fps: float
     frames: int
@@ -133,6 +135,9 @@ class State(Model):
     command: str
     """The command that computes the same in a terminal; empty while nothing is open."""
     methods: MethodsInfo
+    unfit: dict[str, dict[str, str]]
+    """Methods that cannot work on the sequence with the values chosen: by ``single_view``,
+    ``fusion_method`` or ``smoothing_method``, the sentence why by the method's name."""
     presets: list[str]
     """Names of those that a person has saved."""
     preset: str | None
@@ -171,6 +176,8 @@ class ParameterInfo(Model):
     log: bool
     choices: list[str]
     advanced: bool
+    essential: bool
+    """Among the few that are shown first."""
 
 
 class GroupInfo(Model):

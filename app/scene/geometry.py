@@ -131,6 +131,42 @@ def unit_cube() -> tuple[Float[ndarray, "8 3"], Int[ndarray, "12 3"]]:
     return _CORNERS.copy(), np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
 
 
+@cache
+def figure(sides: int = 20) -> tuple[Float[ndarray, "V 3"], Int[ndarray, "F 3"]]:
+    """A standing body as a surface of revolution: z from 0 on the floor to 1, radius up to 1."""
+    profile = np.array(
+        [
+            (0.0, 0.0), (0.30, 0.0), (0.42, 0.06), (0.50, 0.25), (0.62, 0.45), (0.72, 0.60),
+            (0.78, 0.72), (0.70, 0.80), (0.34, 0.845), (0.30, 0.86), (0.42, 0.89), (0.46, 0.93),
+            (0.38, 0.975), (0.20, 0.995), (0.0, 1.0),
+        ]
+    )  # fmt: skip
+    angles = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    rings = np.concatenate(
+        [
+            profile[:, None, :1] * circle[None],
+            np.broadcast_to(profile[:, None, 1:], (len(profile), sides, 1)),
+        ],
+        axis=2,
+    )
+    here = np.arange((len(profile) - 1) * sides).reshape(-1, sides)
+    beside = np.roll(here, -1, axis=1)
+    triangles = [(here, beside, beside + sides), (here, beside + sides, here + sides)]
+    faces = np.concatenate([np.stack(t, axis=2).reshape(-1, 3) for t in triangles])
+    return rings.reshape(-1, 3), faces
+
+
+@cache
+def disc(sides: int = 32) -> tuple[Float[ndarray, "V 3"], Int[ndarray, "F 3"]]:
+    """The unit disc on the floor, looking up."""
+    angles = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
+    rim = np.stack([np.cos(angles), np.sin(angles), np.zeros(sides)], axis=1)
+    edge = np.arange(1, sides + 1)
+    faces = np.stack([np.zeros(sides, dtype=np.int64), edge, np.roll(edge, -1)], axis=1)
+    return np.concatenate([np.zeros((1, 3)), rim]), faces
+
+
 def box_corners(low: Float[ndarray, " 3"], high: Float[ndarray, " 3"]) -> Float[ndarray, "8 3"]:
     """The eight corners of a volume."""
     return np.asarray((low + high) / 2.0 + _CORNERS * (high - low) / 2.0)
@@ -184,6 +220,26 @@ def floor_grid(
     for i in range(first[1], last[1] + 1):
         lines[i % 2 == 0].append([[x0, i * cell, height], [x1, i * cell, height]])
     return np.array(lines[False]).reshape(-1, 2, 3), np.array(lines[True]).reshape(-1, 2, 3)
+
+
+def pieces(segments: Float[ndarray, "N 2 3"], length: float) -> Float[ndarray, "M 2 3"]:
+    """Segments cut into pieces of about a length, so that a line's colour can change along it."""
+    if len(segments) == 0:
+        return np.zeros((0, 2, 3))
+    start, step = segments[:, 0], segments[:, 1] - segments[:, 0]
+    counts = np.maximum(1, np.rint(np.linalg.norm(step, axis=1) / length)).astype(np.int64)
+    owner = np.repeat(np.arange(len(segments)), counts)
+    place = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
+    ends = np.stack([place, place + 1], axis=1) / counts[owner][:, None]
+    return np.asarray(start[owner][:, None] + ends[..., None] * step[owner][:, None])
+
+
+def distance_beside(
+    points: Float[ndarray, "*N 2"], low: Float[ndarray, " 2"], high: Float[ndarray, " 2"]
+) -> Float[ndarray, "*N"]:
+    """How far points lie beside a rectangle; 0 inside."""
+    outside = np.maximum(np.maximum(low - points, points - high), 0.0)
+    return np.asarray(np.linalg.norm(outside, axis=-1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -252,8 +308,8 @@ def overview(
 ) -> Pose:
     """A pose outside and above that has all points in the picture.
 
-    It looks through the widest gap between the cameras, so that none of them
-    stands in front of the volume.
+    Of the directions around, the one is taken that lets it come nearest, where a camera in
+    front of the volume counts as if it were a quarter farther.
 
     Args:
         points: What must be seen: corners of the volume, the cameras.
@@ -263,12 +319,27 @@ def overview(
         fov: Vertical field of view, radians.
         elevation: Angle above the floor, radians.
     """
-    azimuth = np.deg2rad(-52.0)
-    if len(eyes):
-        around = np.sort(np.arctan2(eyes[:, 1] - centre[1], eyes[:, 0] - centre[0]))
-        gaps = np.diff(np.append(around, around[0] + 2.0 * np.pi))
-        widest = int(np.argmax(gaps))
-        azimuth = around[widest] + gaps[widest] / 2.0
+    around = np.arctan2(eyes[:, 1] - centre[1], eyes[:, 0] - centre[0])
+    best: tuple[float, Pose] | None = None
+    for azimuth in np.deg2rad(-52.0) + np.arange(24) * np.pi / 12.0:
+        pose = _framed(points, centre, aspect, fov, elevation, float(azimuth))
+        near = np.max(np.cos(around - azimuth), initial=0.0)
+        cost = float(np.linalg.norm(pose.position - pose.look_at)) * (1.0 + 0.25 * near)
+        if best is None or cost < best[0] - 1e-9:
+            best = cost, pose
+    assert best is not None
+    return best[1]
+
+
+def _framed(
+    points: Float[ndarray, "N 3"],
+    centre: Float[ndarray, " 3"],
+    aspect: float,
+    fov: float,
+    elevation: float,
+    azimuth: float,
+) -> Pose:
+    """The nearest pose in a direction that has all points in the picture."""
     away = np.array(
         [
             np.cos(azimuth) * np.cos(elevation),
@@ -278,7 +349,7 @@ def overview(
     )
     right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
     up = np.cross(away, right)
-    tangent = np.tan(fov / 2.0) * 0.93  # a margin at the edges
+    tangent = np.tan(fov / 2.0) * 0.94  # a margin at the edges
     across, above, nearer = ((points - centre) @ np.stack([right, up, away], axis=1)).T
     shift_x = shift_y = 0.0
     distance = 1.0

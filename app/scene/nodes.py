@@ -17,6 +17,9 @@ from numpy import ndarray
 
 from app import colours
 
+DISC = 26.0
+"""Pixels across, of the disc behind a label of 12 pixels."""
+
 NO_TURN = np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -139,12 +142,15 @@ class Tag:
 
     position: tuple[float, float, float]
     text: str
+    colour: colours.Rgb | None = None
+    """Of what it names: a disc behind the words."""
 
 
 class Tags:
     """A pool of labels that face the viewer; it grows to the most that was needed.
 
-    viser writes them black on white, above everything else.
+    viser writes them black on white, above everything else. The disc behind one is a line
+    without length, which viser's client draws as round as it is thick.
     """
 
     def __init__(self, server: viser.ViserServer, name: str, size: int, scale: float) -> None:
@@ -159,6 +165,7 @@ class Tags:
         self._server = server
         self._name = name
         self._scale = scale
+        self._discs = Lines(server, f"{name}_discs", DISC * scale)
         self._nodes: list[viser.LabelHandle] = []
         for _ in range(size):
             self._grow()
@@ -169,7 +176,7 @@ class Tags:
                 f"{self._name}/{len(self._nodes):02d}",
                 "",
                 font_screen_scale=self._scale,
-                anchor="bottom-center",
+                anchor="center-center",
                 visible=False,
             )
         )
@@ -184,3 +191,8 @@ class Tags:
             node.visible = True
         for node in self._nodes[len(tags) :]:
             node.visible = False
+        marked = [tag for tag in tags if tag.colour is not None]
+        places = np.array([tag.position for tag in marked]).reshape(-1, 3)
+        ends = np.stack([places, places + np.array([0.0, 0.0, 1e-4])], axis=1)
+        shades = np.array([tag.colour for tag in marked], dtype=np.uint8).reshape(-1, 1, 3)
+        self._discs.show(ends, shades.repeat(2, axis=1))

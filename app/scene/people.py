@@ -9,13 +9,13 @@ import viser
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from app.colours import PALETTES, Palette
+from app.colours import PALETTES, Palette, mix
 from app.scene import geometry
 from app.scene.geometry import FUTURE_SECONDS, TRAIL_SECONDS
 from app.scene.nodes import Lines, Meshes, Tag, Tags
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.pipeline import Run
-from tracker.sequences.sequence import Sequence
+from tracker.sequences.sequence import Room, Sequence
 from tracker.trajectories import Trajectories
 
 TAGS = 16
@@ -46,7 +46,8 @@ class PeopleNodes:
         self._boxes = Lines(server, "/people/boxes", 1.5)
         self._selected_box = Lines(server, "/people/selected_box", 2.25)
         cube, sphere = geometry.unit_cube(), geometry.icosphere(2)
-        self._feet = Meshes(server, "/people/feet", *cube)
+        self._feet = Meshes(server, "/people/feet", *geometry.disc())
+        self._figures = Meshes(server, "/people/figures", *geometry.figure())
         self._bodies = Meshes(server, "/people/bodies", *cube, on_click=self._pick_box)
         self._ellipsoids = Meshes(
             server, "/people/ellipsoids", *sphere, on_click=self._pick_component
@@ -92,12 +93,14 @@ class PeopleNodes:
         boxes = layers["boxes"]
         drawn = slice(None if boxes else 0)
         self._show_boxes(ids[drawn], positions[drawn], half, selected)
+        standing = slice(None if layers["bodies"] else 0)
+        self._show_figures(ids[standing], positions[standing], half, sequence.room, selected)
         self._show_rays(sequence, tracks, now, selected if boxes else None)
         self._show_trails(
             tracks if layers["trails"] else Trajectories.empty(len(sequence.views)),
             step,
             sequence.fps,
-            float(half[2]),
+            float(sequence.room.minimum[2]),
             selected,
         )
         posterior = run.fused[step].posterior if run is not None else GaussianMixture.empty(3)
@@ -112,17 +115,17 @@ class PeopleNodes:
         self._show_components(
             posterior if layers["ellipsoids"] else GaussianMixture.empty(3), known, selected
         )
-        named = boxes or layers["ellipsoids"]
-        above = np.array([0.0, 0.0, half[2] + 0.03])
+        named = boxes or layers["ellipsoids"] or layers["bodies"]
+        shades = self._palette.of(ids)
+        above = np.array([0.0, 0.0, half[2] + 0.12])
         self._tags.show(
             [
                 Tag(
                     tuple((position + above).tolist()),
-                    f"{track} · {existence:.2f}" if track == selected else f"{track}",
+                    f"{track}",
+                    (int(shade[0]), int(shade[1]), int(shade[2])),
                 )
-                for track, position, existence in zip(
-                    ids, positions, tracks.existences[now], strict=True
-                )
+                for track, position, shade in zip(ids, positions, shades, strict=True)
                 if named
             ]
         )
@@ -140,11 +143,31 @@ class PeopleNodes:
         for node, rows in ((self._boxes, ~chosen), (self._selected_box, chosen)):
             node.show(edges[rows].reshape(-1, 2, 3), np.repeat(shades[rows], 12, axis=0)[:, None])
         sizes = np.broadcast_to(half, positions.shape)
-        feet = positions - np.array([0.0, 0.0, half[2] - 0.005])
-        flat = np.broadcast_to(np.array([half[0], half[1], 1e-3]), positions.shape)
-        self._feet.show(feet, flat, shades, np.where(chosen, 0.34, 0.2))
         self._box_ids = ids
         self._bodies.show(positions, sizes, shades, np.where(chosen, 0.12, 0.03))
+
+    def _show_figures(
+        self,
+        ids: Int[ndarray, " N"],
+        positions: Float[ndarray, "N 3"],
+        half: Float[ndarray, " 3"],
+        room: Room,
+        selected: int | None,
+    ) -> None:
+        """A soft body from the top of each box to the floor, and a disc where it stands."""
+        floor = float(room.minimum[2])
+        shades = self._palette.of(ids)
+        chosen = ids == (selected if selected is not None else -1)
+        feet = positions.copy()
+        feet[:, 2] = floor
+        tall = np.maximum(0.1, positions[:, 2] + half[2] - floor)
+        wide = np.broadcast_to(half[:2] * 0.9, (len(ids), 2))
+        self._figures.show(
+            feet, np.concatenate([wide, tall[:, None]], axis=1), shades, np.where(chosen, 0.7, 0.5)
+        )
+        feet = feet + np.array([0.0, 0.0, 0.006])  # in front of the floor
+        round_ = np.broadcast_to(np.array([*half[:2] * 1.35, 1.0]), positions.shape)
+        self._feet.show(feet, round_, shades, np.where(chosen, 0.55, 0.34))
 
     def _show_rays(
         self, sequence: Sequence, tracks: Trajectories, now: slice, selected: int | None
@@ -165,15 +188,17 @@ class PeopleNodes:
         self._rays.show(segments, shade[None])
 
     def _show_trails(
-        self, tracks: Trajectories, step: int, fps: float, drop: float, selected: int | None
+        self, tracks: Trajectories, step: int, fps: float, floor: float, selected: int | None
     ) -> None:
-        way = geometry.trails(tracks, step, TRAIL_SECONDS, fps, drop, FUTURE_SECONDS)
+        """Where people walked, on the floor."""
+        way = geometry.trails(tracks, step, TRAIL_SECONDS, fps, ahead=FUTURE_SECONDS)
+        way.segments[..., 2] = floor + 0.012
         past = way.ages[:, 1] >= 0.0
         span = np.where(past, TRAIL_SECONDS, -FUTURE_SECONDS)[:, None]
         full = np.where(past, 0.92, 0.5)[:, None]
         strength = full - (full - 0.12) * way.ages / span
         shades = self._palette.of(way.ids)[:, None].repeat(2, axis=1)
-        shades = self._palette.fade(shades, strength)
+        shades = mix(np.asarray(self._palette.ground), shades, strength)
         chosen = way.ids == (selected if selected is not None else -1)
         for node, rows in (
             (self._future, ~past),

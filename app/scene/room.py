@@ -19,16 +19,26 @@ from tracker.camera import Camera
 from tracker.sequences.sequence import Room
 
 GRID_CELL = 0.5
-"""Metres."""
+"""Metres; twice as much where a room is so large that finer lines would run together."""
+LARGE = 12.0
+"""Metres, of the longer side of a large room."""
 GRID_MARGIN = 1.0
 """Metres that the floor reaches beyond the volume."""
 RIM_POINTS = 48
+LARGEST_FRUSTUM = 1.6
+"""Metres that a frustum reaches, however large the room."""
 FRUSTUM_WIDTH = 320
 """Pixels of the picture on a frustum."""
 BACKDROP_WIDTH = 960
 """Pixels of the picture of the camera that somebody looks through."""
 FRUSTA = 4
 """Made at once; a sequence with more cameras adds some for good."""
+
+
+def grid_cell(room: Room) -> float:
+    """Metres between two lines of a room's floor."""
+    longer = float((room.maximum - room.minimum)[:2].max())
+    return GRID_CELL if longer <= LARGE else 2.0 * GRID_CELL
 
 
 class RoomNodes:
@@ -42,7 +52,20 @@ class RoomNodes:
         sphere = geometry.icosphere(2)
         self._entrances = Meshes(server, "/room/entrances", *sphere)
         self._rims = Lines(server, "/room/entrance_rims", 1.0)
-        self._names = Tags(server, "/labels/entrances", 4, 0.7)
+        self._names = Tags(server, "/labels/entrances", 4, 0.55)
+        self._heights = Tags(server, "/labels/heights", 3, 0.6)
+        cube = geometry.unit_cube()
+        self._ground = Meshes(server, "/room/ground", *cube)
+        # seen from inside alone: the walls behind are faint faces, those in front are their lines
+        self._walls = server.scene.add_mesh_simple(
+            "/room/walls",
+            *cube,
+            side="back",
+            flat_shading=True,
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=False,
+        )
 
     def show(self, room: Room, palette: Palette, *, volume: bool, floor: bool) -> None:
         """Draw a room.
@@ -55,11 +78,36 @@ class RoomNodes:
         """
         low, high = room.minimum, room.maximum
         height = float(low[2])
-        minor, major = geometry.floor_grid(
-            low[:2] - GRID_MARGIN, high[:2] + GRID_MARGIN, height, GRID_CELL
+        cell = grid_cell(room)
+        margin = max(GRID_MARGIN, 0.5 * float((high - low)[:2].min()))
+        for node, lines, shade in zip(
+            (self._minor, self._major),
+            geometry.floor_grid(low[:2] - margin, high[:2] + margin, height, cell),
+            (palette.grid_minor, palette.grid_major),
+            strict=True,
+        ):
+            pieces = geometry.pieces(lines[: None if floor else 0], cell)
+            beside = geometry.distance_beside(pieces[..., :2], low[:2], high[:2])
+            fading = np.broadcast_to(np.array(shade, dtype=np.uint8), pieces.shape)
+            node.show(pieces, palette.fade(fading, 1.0 - beside / margin))
+        middle, size = (low + high)[None] / 2.0, (high - low) / 2.0
+        inside = np.array([middle[0, 0], middle[0, 1], height - 0.003])[None]
+        flat = np.array([size[0], size[1], 1e-3])[None]
+        tint = np.array([palette.ground], dtype=np.uint8)
+        shown = slice(None if floor and volume else 0)
+        self._ground.show(inside[shown], flat[shown], tint[shown], np.ones(1)[shown])
+        self._walls.visible = volume and floor
+        if self._walls.visible:
+            self._walls.position, self._walls.scale = tuple(middle[0]), tuple(size)
+            self._walls.color, self._walls.opacity = palette.line, 0.05
+        corner = np.array([high[0], low[1]])
+        self._heights.show(
+            [
+                Tag((float(corner[0]), float(corner[1]), height + up), f"{up} m")
+                for up in range(int(high[2] - height) + 1)
+                if volume and floor and up < 4
+            ]
         )
-        self._minor.show(minor[: None if floor else 0], palette.grid_minor)
-        self._major.show(major[: None if floor else 0], palette.grid_major)
         edges = geometry.box_edges((low + high)[None] / 2.0, (high - low) / 2.0)[0]
         self._volume.show(edges if volume else edges[:0], palette.volume)
         entrances = room.entrances if volume and floor else ()
@@ -69,7 +117,7 @@ class RoomNodes:
         radius = geometry.mass_radius(geometry.DEFAULT_MASS, 2)
         axes = np.concatenate([sigmas[:, :2] * radius, np.full((len(sigmas), 1), 1e-3)], axis=1)
         grey = np.broadcast_to(np.array(palette.line, dtype=np.uint8), places.shape)
-        self._entrances.show(places, axes, grey, np.full(len(places), 0.06))
+        self._entrances.show(places, axes, grey, np.full(len(places), 0.05))
         self._rims.show(_rims(places, axes), palette.entrance)
         self._names.show([Tag(tuple(place.tolist()), "entrance") for place in places])
 
@@ -142,7 +190,8 @@ class FrustumNodes:
         while len(self._handles) < len(cameras):
             self._grow()
         corners = geometry.box_corners(room.minimum, room.maximum)
-        self._size = 0.115 * float(np.linalg.norm(room.maximum - room.minimum))
+        size = 0.115 * float(np.linalg.norm(room.maximum - room.minimum))
+        self._size = min(size, LARGEST_FRUSTUM)
         self._through = through
         tags: list[Tag] = []
         for index, camera in enumerate(cameras):
@@ -151,7 +200,7 @@ class FrustumNodes:
             if index == through:
                 depth = 1.2 * float(camera.to_camera(corners)[:, 2].max())
             else:
-                above = camera.centre + np.array([0.0, 0.0, 0.18 * self._size])
+                above = camera.centre + np.array([0.0, 0.0, 0.3 * self._size])
                 tags.append(Tag((above[0], above[1], above[2]), camera.name))
             handle.fov, handle.aspect = view.fov, view.aspect
             handle.color = palette.line
@@ -162,6 +211,17 @@ class FrustumNodes:
         for handle in self._handles[len(cameras) :]:
             handle.visible = False
         self._names.show(tags)
+
+    def corners(self, chosen: ndarray) -> Float[ndarray, "N 3"]:
+        """What the chosen frusta take of the scene: eyes, corners of the pictures, names."""
+        points = [np.zeros((0, 3))]
+        for index in np.flatnonzero(chosen):
+            camera, view = self._cameras[index], self.view(int(index))
+            half = self._size * np.tan(view.fov / 2.0)
+            rim = [(x * half * view.aspect, y * half, self._size) for x in (-1, 1) for y in (-1, 1)]
+            points += [camera.centre + np.array(rim) @ view.rotation, camera.centre[None]]
+            points.append(camera.centre[None] + np.array([0.0, 0.0, 0.6 * self._size]))
+        return np.concatenate(points)
 
     def view(self, index: int) -> StraightView:
         """The straight picture of a camera, as large as it is to be drawn now."""

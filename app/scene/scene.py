@@ -18,7 +18,7 @@ from app.scene import geometry
 from app.scene.geometry import Pose
 from app.scene.people import PeopleNodes
 from app.scene.reference import ReferenceNodes
-from app.scene.room import GRID_CELL, FrustumNodes, RoomNodes, pose_through
+from app.scene.room import FrustumNodes, RoomNodes, grid_cell, pose_through
 from app.scene.views import Views
 from app.scene.worker import LatestWorker
 from app.state.snapshot import Change, Snapshot, View
@@ -176,7 +176,11 @@ class Scene:
         eyes = np.array([camera.centre for camera in sequence.cameras]).reshape(-1, 3)
         corners = geometry.box_corners(room.minimum, room.maximum)
         centre = (room.minimum + room.maximum) / 2.0
-        return geometry.overview(np.concatenate([corners, eyes]), eyes, centre, aspect)
+        # with their pictures and names, but for those so far away that the room would be small
+        reach = np.linalg.norm(room.maximum - room.minimum)
+        near = np.linalg.norm(eyes - centre, axis=1) <= 1.2 * reach
+        rims = self._frusta.corners(near)
+        return geometry.overview(np.concatenate([corners, rims]), eyes[near], centre, aspect)
 
     def _set_home(self, snapshot: Snapshot) -> None:
         """Where viser's own "reset view" goes."""
@@ -247,7 +251,8 @@ def status_html(snapshot: Snapshot, run: Run | None) -> str:
     mass = round(100 * geometry.DEFAULT_MASS)
     return (
         f'<div class="mvp-status" data-step="{step}" data-state="{state}">'
-        f"<p><b>{step}</b> / {sequence.frames} · <b>{step / sequence.fps:.2f}</b> s"
+        f"<p><b>{step}</b> / {sequence.frames - 1} · <b>{step / sequence.fps:.2f}</b> s"
         f"<span>{words}</span></p>"
-        f"<small>grid {GRID_CELL:g} m · {size} m · ellipsoids hold {mass} %</small></div>"
+        f"<small>grid {grid_cell(sequence.room):g} m · {size} m"
+        f" · ellipsoids hold {mass} %</small></div>"
     )

@@ -12,6 +12,8 @@ PANEL = """<style>
 [data-mantine-color-scheme="light"] { --mvp-ink-1: #1b1b1b; --mvp-ink-2: #444444;
   --mvp-ink-3: #656565; --mvp-busy: #1a66b0; --mvp-field: #ffffff; --mvp-line: #dededb;
   --mvp-thumb: #ffffff; --mvp-rim: #1a66b0; }
+/* the page says by itself, and once, that there is no graphics card */
+.mantine-Notification-root:has([class*="Notification-title"]) { display: none; }
 /* the step */
 .mvp-status { padding: 0 16px 6px 10px; color: var(--mvp-ink-2); line-height: 16px; }
 .mvp-status p { margin: 0 0 2px; font-size: 13px; font-variant-numeric: tabular-nums; }
@@ -25,6 +27,16 @@ div:has(> .mantine-Flex-root > div > .mantine-Text-root > label[for]) {
 .mantine-Flex-root:has(> div > .mantine-Text-root > label[for]) { min-height: 25px; }
 div:has(> .mantine-Text-root > label[for]) { width: 128px !important; flex-shrink: 0;
   padding-right: 8px !important; }
+/* a slider lies under its words and as wide as they; its number stands beside them */
+.mantine-Flex-root:has(> div > .mantine-Text-root > label[for]):has(.mantine-Slider-root) {
+  flex-wrap: wrap; position: relative; min-height: 36px; }
+.mantine-Flex-root:has(.mantine-Slider-root) > div:has(> .mantine-Text-root > label[for]) {
+  width: 100% !important; padding-right: 60px !important; white-space: nowrap; }
+.mantine-Flex-root:has(.mantine-Slider-root) > div:has(> .mantine-Text-root) + div {
+  width: 100%; }
+.mantine-Flex-root > div + div .mantine-NumberInput-root { position: absolute !important;
+  right: 0; top: -4px; }
+label[for]::after { font-size: 80%; vertical-align: -0.25em; }
 .mantine-Flex-root:has(.mantine-Select-root) > div:first-child { width: 92px !important; }
 .mantine-Text-root:has(> label[for]) { font-size: 11px !important; line-height: 13px !important;
   letter-spacing: 0 !important; font-weight: 400 !important; color: var(--mvp-ink-2) !important;
@@ -58,6 +70,21 @@ label[for] > wbr { display: none; }
 NUMBER = """height: 22px; line-height: 20px; padding: 0 6px; border: 1px solid var(--mvp-line);
 border-radius: 3px; background: var(--mvp-field); color: var(--mvp-ink-1); font-size: 11px;
 box-sizing: border-box; white-space: nowrap; font-variant-numeric: tabular-nums;"""
+
+
+def symbols(indices: dict[str, tuple[str, str]]) -> str:
+    """Style that writes what stands low behind a symbol, and the unit after it.
+
+    Args:
+        indices: Index and unit, by the input's id.
+    """
+    rules = []
+    for uuid, (index, unit) in indices.items():
+        if index:
+            rules.append(f'label[for="{uuid}"]::after {{ content: "{index}"; }}')
+        if unit:
+            rules.append(f'*:has(> label[for="{uuid}"])::after {{ content: "  {unit}"; }}')
+    return f"<style>{' '.join(rules)}</style>"
 
 
 def values(numbers: dict[str, str], marked: list[str]) -> str:

@@ -1,14 +1,13 @@
-"""The process that compiles the kernels, where that was not yet done on this machine."""
+"""The processes that compile the kernels, where that was not yet done on this machine."""
 
 from __future__ import annotations
 
 import logging
 import subprocess
-import sys
 import threading
 from collections.abc import Callable
-from typing import Literal
 
+from tracker import warm_up
 from tracker.kernels import compilation
 
 logger = logging.getLogger("app")
@@ -19,11 +18,10 @@ _LOOKS_SECONDS = 0.1
 
 
 class Compiling:
-    """Compiles beside the server, whose interpreter stays free; what is ready is on disk.
+    """Compiles beside the program, whose interpreter stays free; what is ready is on disk.
 
-    What a sequence needs to be seen comes first, a few seconds, then the methods that
-    sequences start with: pictures and room are there before the first run can begin. The
-    other methods' kernels are compiled meanwhile.
+    The first run waits for the loops over pixels, a few seconds. Until the others are there
+    they run as plain Python, slower and with the same numbers.
     """
 
     def __init__(self, say: Callable[[str], None] = lambda words: None) -> None:
@@ -33,66 +31,69 @@ class Compiling:
             say: Told of its beginning and its end.
         """
         self._say = say
-        self._ready = {"shown": threading.Event(), "ready": threading.Event()}
-        self._counts = (0, 0)
-        self._process: subprocess.Popen[str] | None = None
+        self._ready = threading.Event()
+        self._counts: dict[str, tuple[int, int]] = {}
+        self._processes: dict[str, subprocess.Popen[str]] = {}
+        self._closed = False
         if compilation.is_compiled():
-            self._release()
+            self._ready.set()
             return
         say(WORDS)
         try:
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", "tracker.warm_up"],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                text=True,
-            )
+            for half in warm_up.HALVES:
+                self._processes[half] = warm_up.start(
+                    half, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+                )
         except OSError as error:  # each kernel is then compiled where it is first needed
             logger.warning("the kernels are compiled when they are needed: %s", error)
-            self._release()
+            self.close()
             return
-        threading.Thread(target=self._read, name="compiling", daemon=True).start()
+        compilation.while_compiling()
+        threading.Thread(target=self._follow, name="compiling", daemon=True).start()
 
-    def wait(
-        self,
-        what: Literal["shown", "ready"],
-        told: Callable[[int, int], None],
-        cancelled: Callable[[], bool],
-    ) -> None:
-        """Until the kernels are there that something needs.
+    def wait(self, told: Callable[[int, int], None], cancelled: Callable[[], bool]) -> None:
+        """Until a run can begin.
 
         Args:
-            what: To be shown without a run, or to be run with the first methods.
             told: Called now and then with the number of kernels that are ready and of all.
             cancelled: Asked as often.
         """
-        while not cancelled() and not self._ready[what].wait(_LOOKS_SECONDS):
-            told(*self._counts)
+        while not cancelled() and not self._ready.wait(_LOOKS_SECONDS):
+            told(*max(self._counts.values(), default=(0, 0)))
 
     def close(self) -> None:
         """Stop; what was compiled stays."""
-        self._release()
-        if self._process is not None:
-            self._process.terminate()
+        self._closed = True
+        compilation.no_longer_compiling()
+        self._ready.set()
+        for process in self._processes.values():
+            process.terminate()
 
-    def _release(self) -> None:
-        for event in self._ready.values():
-            event.set()
+    def _follow(self) -> None:
+        readers = [
+            threading.Thread(target=self._read, args=each, name=f"compiling {each[0]}", daemon=True)
+            for each in self._processes.items()
+        ]
+        for reader in readers:
+            reader.start()
+        for reader in readers:
+            reader.join()
+        statuses = [process.wait() for process in self._processes.values()]
+        compilation.no_longer_compiling()
+        if not any(statuses):
+            compilation.mark_compiled()
+            self._say("the kernels are compiled")
+        elif not self._closed:
+            logger.warning("compiling ended with status %s", max(statuses, key=abs))
+        self._ready.set()
 
-    def _read(self) -> None:
-        process = self._process
-        assert process is not None
+    def _read(self, half: str, process: subprocess.Popen[str]) -> None:
         assert process.stdout is not None
         with process.stdout:
             for line in process.stdout:
                 words = line.split()
-                if len(words) == 1 and words[0] in self._ready:
-                    self._ready[words[0]].set()
+                if words == ["ready"]:
+                    self._ready.set()
                 elif len(words) == 2:
-                    self._counts = int(words[0]), int(words[1])
-        if process.wait() == 0:
-            self._say("the kernels are compiled")
-        elif not self._ready["ready"].is_set():
-            logger.warning("compiling ended with status %s", process.returncode)
-        self._release()
+                    self._counts[half] = int(words[0]), int(words[1])
+                    compilation.news_of_compiling()

@@ -67,7 +67,11 @@ class History:
         """
         run = next((run for run in self.runs if run.number == number), None)
         if run is None:
-            raise ParameterError("number", f"expected the number of a listed run, got {number}")
+            raise ParameterError(
+                "number",
+                f"expected the number of a listed run, got {number}",
+                "GET /api/tables/runs lists them.",
+            )
         keys = (*table.METHODS, *table.PARAMETERS)
         values = {key: table.value(run.parameters, key) for key in keys}
         if not restore(run.taught, values):

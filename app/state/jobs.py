@@ -81,7 +81,7 @@ class Jobs:
             data: Its folders are sequences by name.
             seed: Of all runs.
             cache: Where columns of runs are kept; in memory only, if none is given.
-            compiling: Whom to wait for before a sequence is shown, and before the first run;
+            compiling: Whom to wait for before the first run;
                 closed with this.
         """
         self._workbench = workbench
@@ -146,8 +146,6 @@ class Jobs:
                 progress=partial(progress, "rendering"),
                 cancelled=cancelled.is_set,
             )
-            if self._compiling is not None:
-                self._compiling.wait("shown", partial(progress, WORDS), cancelled.is_set)
             parameters = pipeline.default_parameters(sequence)
             reader = FrameReader(sequence)
             with self._condition:
@@ -155,7 +153,8 @@ class Jobs:
                     reader.close()
                     raise Cancelled
                 self._opening = None
-            before = self._workbench.open(sequence, sequence.digest[:16], reader, parameters)
+            key = sequence.digest[:16]
+            before = self._workbench.open(sequence, key, reader, parameters, name)
         except Exception as error:
             if cancelled.is_set():
                 future.set_exception(Cancelled("another sequence was asked for"))
@@ -257,7 +256,7 @@ class Jobs:
 
         try:
             if self._compiling is not None:
-                self._compiling.wait("ready", on_compiling, wanted.cancelled.is_set)
+                self._compiling.wait(on_compiling, wanted.cancelled.is_set)
             pipeline.compute(
                 sequence,
                 snapshot.parameters,

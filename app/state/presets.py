@@ -17,6 +17,8 @@ from app.state.workbench import Workbench
 from tracker import parameters as table
 from tracker.parameters import ParameterError
 
+YOURS = "GET /api/state lists your presets."
+
 LONGEST_NAME = 60
 """Characters."""
 
@@ -64,7 +66,7 @@ class OwnPresets:
         presets = self._known(name)
         new = _checked(new)
         if new != name and new in presets:
-            raise ParameterError("name", f"expected a name that is free, got {new!r}")
+            raise ParameterError("name", f"expected a name that is free, got {new!r}", YOURS)
         self._put({new if key == name else key: values for key, values in presets.items()})
 
     def remove(self, name: str) -> None:
@@ -79,7 +81,9 @@ class OwnPresets:
         presets = self._workbench.snapshot().presets
         if name not in presets:
             known = ", ".join(presets) or "none is saved"
-            raise ParameterError("name", f"expected one of your presets ({known}), got {name!r}")
+            raise ParameterError(
+                "name", f"expected one of your presets ({known}), got {name!r}", YOURS
+            )
         return presets
 
     def _put(self, presets: Presets) -> None:
@@ -91,9 +95,13 @@ class OwnPresets:
 def _checked(name: str) -> str:
     name = " ".join(name.split())
     if not 0 < len(name) <= LONGEST_NAME:
-        raise ParameterError("name", f"expected 1 to {LONGEST_NAME} characters, got {len(name)}")
+        raise ParameterError(
+            "name", f"expected 1 to {LONGEST_NAME} characters, got {len(name)}", YOURS
+        )
     if name in table.PRESETS:
-        raise ParameterError("name", f"expected a name of your own: {name} is a built-in preset")
+        raise ParameterError(
+            "name", f"expected a name of your own: {name} is a built-in preset", YOURS
+        )
     return name
 
 

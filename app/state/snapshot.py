@@ -11,8 +11,9 @@ from typing import Any, Literal
 from app.colours import Theme
 from app.state.scores import Scores
 from tracker import parameters as table
-from tracker.parameters import RunParameters
+from tracker.parameters import MethodKey, RunParameters
 from tracker.pipeline import Run
+from tracker.runs.fitting import unfit_methods
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
@@ -27,7 +28,7 @@ RunPhase = Literal["idle", "computing", "done", "failed", "cancelled"]
 
 Level = Literal["info", "warn", "error"]
 
-LAYERS = ("boxes", "ellipsoids", "trails", "truth", "volume", "pinned", "others")
+LAYERS = ("boxes", "bodies", "ellipsoids", "trails", "truth", "volume", "pinned", "others")
 """The layers of the 3D view that can be switched; ``others`` are the tracks that are not
 selected, while one is."""
 
@@ -97,6 +98,8 @@ class Snapshot:
     """The same as its file has it."""
     editing_room: bool = False
     """Whether the 3D view has handles on the room."""
+    opened_as: str = ""
+    """The name or folder that opens the sequence again."""
     sequence_key: str = ""
     """Another for every content, so that pictures may be kept for ever."""
     reader: FrameReader | None = None
@@ -109,6 +112,8 @@ class Snapshot:
     presets: Presets = field(default_factory=lambda: MappingProxyType({}))
     playhead: int = 0
     playhead_origin: str = ""
+    sought: bool = False
+    """Whether the playhead was moved since the sequence was opened."""
     selection: int | None = None
     run: Run | None = None
     """What is shown; steps below its ``done`` are there."""
@@ -116,7 +121,8 @@ class Snapshot:
     scores: Scores = field(default_factory=Scores)
     """Runs against the truth, where there is one."""
     layers: Mapping[str, bool] = field(
-        default_factory=lambda: MappingProxyType(dict.fromkeys(LAYERS, True))
+        # the truth is in the pictures at first: in 3D twice as many boxes hide the people
+        default_factory=lambda: MappingProxyType({name: name != "truth" for name in LAYERS})
     )
     view: View = None
     flies: bool = True
@@ -136,6 +142,13 @@ class Snapshot:
             if own == {k: v for k, v in meant.items() if v != table.value(self.defaults, k)}:
                 return name
         return None
+
+    @property
+    def unfit(self) -> dict[MethodKey, dict[str, str]]:
+        """The methods that cannot work on the open sequence, each with the reason."""
+        if self.sequence is None:
+            return {key: {} for key in table.METHODS}
+        return unfit_methods(self.sequence, self.parameters)
 
     def named(self, sequence: Sequence) -> Sequence:
         """What a run was made of, by its name now: it is another since a copy was saved."""

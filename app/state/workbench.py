@@ -119,7 +119,11 @@ class Workbench:
             presets = {**now.presets, **table.PRESETS}
             if name not in presets:
                 known = ", ".join(presets)
-                raise ParameterError("preset", f"expected one of {known}, got {name!r}")
+                raise ParameterError(
+                    "preset",
+                    f"expected one of {known}, got {name!r}",
+                    "GET /api/schema has the built-in presets, GET /api/state your own.",
+                )
             changes = {"single_view": now.parameters.single_view, **presets[name]}
             return self._put_parameters(table.with_values(now.defaults, changes), origin)
 
@@ -139,8 +143,8 @@ class Workbench:
             sequence = now.sequence
             last = sequence.frames - 1 if sequence is not None else 0
             step = max(0, min(int(step), last))
-            if step != now.playhead:
-                self._put("playhead", playhead=step, playhead_origin=origin)
+            if step != now.playhead or not now.sought:
+                self._put("playhead", playhead=step, playhead_origin=origin, sought=True)
             return step
 
     def select(self, target: int | None) -> None:
@@ -162,7 +166,11 @@ class Workbench:
         """
         for name in changes:
             if name not in LAYERS:
-                raise ParameterError(f"layers.{name}", f"expected one of {', '.join(LAYERS)}")
+                raise ParameterError(
+                    f"layers.{name}",
+                    f"expected one of {', '.join(LAYERS)}",
+                    "GET /api/state has the layers.",
+                )
         with self._edit() as now:
             layers = {**now.layers, **{k: bool(v) for k, v in changes.items()}}
             if layers != now.layers:
@@ -195,7 +203,9 @@ class Workbench:
             cameras = len(now.sequence.views) if now.sequence is not None else 0
             if isinstance(view, int) and not 0 <= view < cameras:
                 raise ParameterError(
-                    "camera", f"expected an index below {cameras}, top or null, got {view}"
+                    "camera",
+                    f"expected an index below {cameras}, top or null, got {view}",
+                    "GET /api/state has the cameras of the open sequence.",
                 )
             if view != now.view:
                 self._put("view", view=view)
@@ -277,7 +287,12 @@ class Workbench:
                 self._put("opening", opening=opening)
 
     def open(
-        self, sequence: Sequence, key: str, reader: FrameReader, parameters: RunParameters
+        self,
+        sequence: Sequence,
+        key: str,
+        reader: FrameReader,
+        parameters: RunParameters,
+        opened_as: str = "",
     ) -> FrameReader | None:
         """Show another sequence, from its first step; the reader of the one before, to be closed.
 
@@ -286,6 +301,7 @@ class Workbench:
             key: Another for every content.
             reader: Its pictures.
             parameters: Its default parameters.
+            opened_as: The name or folder that opens it again; its own name where none is given.
         """
         with self._edit() as now:
             before = now.reader
@@ -295,6 +311,7 @@ class Workbench:
                 sequence=sequence,
                 saved=sequence,
                 editing_room=False,
+                opened_as=opened_as or sequence.name,
                 sequence_key=key,
                 reader=reader,
                 opening=None,
@@ -303,6 +320,7 @@ class Workbench:
                 parameters_origin="",
                 playhead=0,
                 playhead_origin="",
+                sought=False,
                 selection=None,
                 view=None,
                 run=None,
@@ -341,13 +359,16 @@ class Workbench:
     def run_ends(
         self, key: str, phase: Literal["done", "cancelled", "failed"], error: str | None = None
     ) -> None:
-        """The run with this key is over; after a failure the last good one is shown again."""
+        """The run with this key is over; after a failure the last good one is shown again.
+
+        Where none was finished yet, what was shown stays: an unfinished run says more than none.
+        """
         with self._edit() as now:
             if key != now.run_state.key:  # superseded
                 return
             run = now.run
             if phase == "failed":
-                run = self._last_good
+                run = self._last_good or run
             elif phase == "done":
                 self._last_good = run
             state = replace(now.run_state, state=phase, seconds_left=None, message="", error=error)

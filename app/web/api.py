@@ -4,80 +4,36 @@ from __future__ import annotations
 
 import asyncio
 import io
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 
 from app import models
-from app.errors import ApiError, ErrorBody, sentence
+from app.errors import ApiError, sentence
 from app.state.history import History
-from app.state.jobs import Jobs
-from app.state.presets import OwnPresets
 from app.state.teaching import Teaching
-from app.state.workbench import Workbench
+from app.web.dependencies import (
+    ERRORS,
+    FOR_EVER,
+    Bench,
+    Own,
+    Part,
+    Work,
+    file_name,
+    nothing_open,
+)
 from app.web.pictures.jpegs import Pictures
 from app.web.views import results, steps
-from app.web.views.timeline import BUCKETS, Timelines, Window
+from app.web.views.timeline import Timelines
 from tracker import export
 from tracker.pipeline import Cancelled
 from tracker.sequences import library
 
-FOR_EVER = "private, max-age=31536000, immutable"
-"""A picture's address names its content."""
-
 OPENING_SECONDS = 1.0
 """How long a request to open waits, so that what fails at once is told in the answer."""
 
-ERRORS: dict[int | str, dict[str, Any]] = {
-    "4XX": {"model": ErrorBody, "description": "What was expected, what was found, what to do."},
-    "5XX": {"model": ErrorBody, "description": "The server failed; what was open still is."},
-}
-
 router = APIRouter(prefix="/api", responses=ERRORS)
-
-
-def _workbench(request: Request) -> Workbench:
-    workbench: Workbench = request.app.state.workbench
-    return workbench
-
-
-def _jobs(request: Request) -> Jobs:
-    jobs: Jobs = request.app.state.jobs
-    return jobs
-
-
-def _own_presets(request: Request) -> OwnPresets:
-    presets: OwnPresets = request.app.state.presets
-    return presets
-
-
-@dataclass(frozen=True, slots=True)
-class Shown:
-    """The part of the steps that somebody looks at, and in how many values a curve."""
-
-    first: int
-    last: int | None
-    buckets: int
-
-    def window(self, frames: int) -> Window:
-        """As buckets of a sequence; bounds beyond it are its ends."""
-        return Window.of(frames, self.first, self.last, self.buckets)
-
-
-def _shown(
-    first: Annotated[int, Query(ge=0, description="First step.")] = 0,
-    last: Annotated[int | None, Query(ge=0, description="Last step, else the end.")] = None,
-    buckets: Annotated[int, Query(ge=1, le=1 << 14, description="Most values a curve.")] = BUCKETS,
-) -> Shown:
-    return Shown(first, last, buckets)
-
-
-Part = Annotated[Shown, Depends(_shown)]
-Bench = Annotated[Workbench, Depends(_workbench)]
-Own = Annotated[OwnPresets, Depends(_own_presets)]
-Work = Annotated[Jobs, Depends(_jobs)]
 
 
 @router.get("/state")
@@ -316,19 +272,3 @@ def export_tracks(bench: Bench) -> Response:
             "x-run-steps": f"{done}/{run.sequence.frames}",
         },
     )
-
-
-def nothing_open() -> ApiError:
-    """The answer to whoever asks for what only an open sequence has."""
-    return ApiError(
-        409,
-        "nothing_open",
-        "No sequence is open.",
-        hint="Open one with POST /api/sequence.",
-    )
-
-
-def file_name(name: str, ending: str) -> str:
-    """Of a download: plain letters only."""
-    plain = "".join(c if c.isascii() and (c.isalnum() or c in "-_.") else "-" for c in name)
-    return f"{plain}-{ending}"

@@ -21,6 +21,7 @@ from starlette.types import Scope
 from app import errors
 from app.errors import sentence
 from app.paths import static_folder
+from app.state import opening_step
 from app.state.compiling import Compiling
 from app.state.evaluator import Evaluator
 from app.state.history import History
@@ -51,6 +52,19 @@ logger = logging.getLogger("app")
 
 LARGEST_SOCKET_MESSAGE = 64 << 20
 """Bytes: viser's client may send a rendered picture of itself."""
+
+ROUTERS = (
+    api.router,
+    foreground.router,
+    likelihood_routes.router,
+    tables.router,
+    teaching_routes.router,
+    teaching_tables.router,
+    evaluation.router,
+    stream.router,
+    gateway.router,
+)
+"""What is served, the page's files apart; the page's types are made from their answers."""
 
 ASK_AGAIN = "no-cache"
 """The page's files are kept by the browser but checked by their ETag each time."""
@@ -90,15 +104,8 @@ def create_app(settings: Settings) -> FastAPI:
         addresses_are_fine=not is_loopback(settings.host),
     )
     errors.install(app)
-    app.include_router(api.router)
-    app.include_router(foreground.router)
-    app.include_router(likelihood_routes.router)
-    app.include_router(tables.router)
-    app.include_router(teaching_routes.router)
-    app.include_router(teaching_tables.router)
-    app.include_router(evaluation.router)
-    app.include_router(stream.router)
-    app.include_router(gateway.router)
+    for router in ROUTERS:
+        app.include_router(router)
     files = _PageFiles(directory=static_folder())
 
     @app.get("/", include_in_schema=False)
@@ -146,6 +153,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
     told.start()
+    opening_step.follow(workbench)
     room = _Room(workbench, teaching)
     if settings.with_viser:
         door.prepare()

@@ -60,9 +60,9 @@ class Stream:
     def __init__(self, workbench: Workbench) -> None:
         self._workbench = workbench
         self._pages: set[_Page] = set()
-        self._last_error: str | None = None
         self._unheard: str | None = None
         """What was said last while there was no page, for the first that comes."""
+        self._unheard_level = ""
         self._state: tuple[int, str] = (-1, "")
         self._steps: OrderedDict[tuple[Any, ...], str] = OrderedDict()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -92,7 +92,8 @@ class Stream:
 
     def _note(self, change: Change) -> None:
         if change == "sequence":
-            self._last_error = None
+            if self._unheard_level == "error":
+                self._unheard = None  # what went wrong before it was opened is over
         for page in self._pages:
             page.news.add(change)
             page.wake.set()
@@ -104,10 +105,8 @@ class Stream:
             case Notice(level, message, hint):
                 notice = {"type": "notice", "level": level, "message": message, "hint": hint}
                 text = json.dumps(notice)
-                if level == "error":
-                    self._last_error = text  # also for a page that is not there yet
-                elif not self._pages:
-                    self._unheard = text
+                if not self._pages:
+                    self._unheard, self._unheard_level = text, level
         for page in self._pages:
             page.messages = [*page.messages, text][-MOST_NOTICES:]
             page.wake.set()
@@ -116,7 +115,8 @@ class Stream:
         """One page, until it goes."""
         await socket.accept()
         page = _Page()
-        page.messages += [text for text in (self._last_error, self._unheard) if text is not None]
+        if self._unheard is not None:
+            page.messages.append(self._unheard)
         self._unheard = None
         self._pages.add(page)
         sender = asyncio.create_task(self._tell(socket, page))

@@ -21,7 +21,7 @@ from app.models.teaching import (
     ValueChange,
 )
 from app.state.teaching import Part, Side, Teaching
-from app.web.api import ERRORS, FOR_EVER, Bench, nothing_open
+from app.web.dependencies import ERRORS, FOR_EVER, Bench, nothing_open
 from app.web.pictures.swatches import Swatches
 from app.web.views import results
 from tracker.sequences.sequence import SequenceError

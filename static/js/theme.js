@@ -7,5 +7,6 @@
 	} catch {
 		// Storage may be switched off; the system's wish is a good default then, as at the first start.
 	}
-	document.documentElement.dataset.theme = chosen ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark");
+	document.documentElement.dataset.theme =
+		chosen ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark");
 }

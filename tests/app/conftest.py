@@ -72,6 +72,7 @@ def client(data: Path) -> Iterator[TestClient]:
     with TestClient(app, base_url=ADDRESS) as client:
         wait_until(run_is(client, "done"))
         wait_until(is_evaluated(client))
+        client.post("/api/seek", json={"step": 0})  # it was where something happens
         yield client
 
 

@@ -1,4 +1,8 @@
-"""Run the benchmarks, print a table, and fail where a ratio of our own is below its bound."""
+"""Run the benchmarks and print a table.
+
+It fails where a ratio of our own is below its bound, or a figure of accuracy is worse than the
+last one on record by more than its tolerance; a speed that is worse beyond noise is only told.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +11,24 @@ import json
 import sys
 from pathlib import Path
 
-from tests.benchmarks import growth, jpda, kernels, live, page, pipeline, server, stage_one, targets
+from tests.benchmarks import (
+    accuracy,
+    growth,
+    jpda,
+    kernels,
+    live,
+    page,
+    pipeline,
+    record,
+    server,
+    stage_one,
+)
 from tests.benchmarks.measure import Measurement, machine
+from tests.benchmarks.plane import targets
+from tests.benchmarks.record import chart
 
 SUITES = {
+    "accuracy": accuracy.run,
     "kernels": kernels.run,
     "targets": targets.run,
     "jpda": jpda.run,
@@ -29,7 +47,12 @@ def main() -> int:
     parser.add_argument("names", nargs="*", choices=[*SUITES, []], help="suites; all if none")
     parser.add_argument("--short", action="store_true", help="the form that CI runs")
     parser.add_argument("--json", type=Path, help="also write the figures to this file")
+    parser.add_argument("--record", action="store_true", help=f"append them to {record.FILE.name}")
+    parser.add_argument("--chart", type=Path, help="only draw the record, as an HTML file")
     arguments = parser.parse_args()
+    if arguments.chart:
+        chart.write(record.read(), arguments.chart)
+        return 0
     found: list[Measurement] = []
     for name in arguments.names or SUITES:
         for measurement in SUITES[name](arguments.short):
@@ -43,7 +66,16 @@ def main() -> int:
     if arguments.json:
         report = {"machine": machine(), "figures": [m.as_dict() for m in found]}
         arguments.json.write_text(json.dumps(report, indent=1), encoding="utf-8")
-    return 1 if any(measurement.failed for measurement in found) else 0
+    before = record.read()
+    worse = list(record.losses(found, before))
+    for sentence in record.slower(found, before, short=arguments.short):
+        print(f"slower: {sentence}")
+    for sentence in worse:
+        print(f"WORSE: {sentence}")
+    if arguments.record:
+        record.append(record.entry(found, short=arguments.short))
+        worse = []  # on purpose: it is in the record now
+    return 1 if worse or any(measurement.failed for measurement in found) else 0
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from tests.engine.filters.test_particles import reference_climb
 from tests.engine.mixtures import random_mixture, reference_merge, reference_update
 from tracker import colour, particles
 from tracker.filters import gaussian_mixture, phd
+from tracker.kernels.kalman import Expected
 
 
 def run(short: bool) -> Iterator[Measurement]:
@@ -26,8 +27,7 @@ def run(short: bool) -> Iterator[Measurement]:
         return phd.update(
             mixture,
             measurements,
-            expected=mixture.means,
-            jacobians=jacobians,
+            expected=Expected.of(mixture.means, jacobians),
             noise=noise,
             detection_probability=p_d,
             clutter_intensity=1e-3,
@@ -47,8 +47,7 @@ def run(short: bool) -> Iterator[Measurement]:
     posterior = phd.update(
         mixture,
         measurements,
-        expected=mixture.means,
-        jacobians=jacobians,
+        expected=Expected.of(mixture.means, jacobians),
         noise=noise,
         detection_probability=p_d,
         clutter_intensity=1e-3,

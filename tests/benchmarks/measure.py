@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
-from typing import Any
+from typing import Any, Literal
 
 PACKAGES = ["numpy", "scipy", "numba", "opencv-python-headless", "fastapi", "viser"]
 
@@ -25,11 +25,25 @@ class Measurement:
     """What it should reach, in words."""
     bound: float | None = None
     """For ratios of our own: the least value that passes."""
+    better: Literal["higher", "lower"] | None = None
+    """Which values are better; None: as the unit says, see :attr:`direction`."""
+    tolerance: float | None = None
+    """Of a figure of accuracy: by how much it may be worse than the last one on record, in its
+    own unit. None for a figure of speed."""
 
     @property
     def failed(self) -> bool:
         """Whether a ratio fell below its bound."""
         return self.bound is not None and self.value < self.bound
+
+    @property
+    def direction(self) -> Literal["higher", "lower"]:
+        """Which values are better: of times and sizes the lower, of ratios and rates the higher."""
+        if self.better is not None:
+            return self.better
+        return (
+            "higher" if self.unit.startswith(("×", "steps/s", "frames/s", "boxes/s")) else "lower"
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""

@@ -9,12 +9,14 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from tests.browser.looking import ask
 from tests.browser.serving import Server
 from tests.browser.walkers import write_walkers
 
 expect.set_options(timeout=30_000)  # the software renderer takes its time where others work too
 
 
+@pytest.hookimpl(tryfirst=True)  # the settings that all tests share ask for this mark
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Everything in this folder drives the browser."""
     for item in items:
@@ -27,6 +29,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """A workbench on a small recording of two walkers."""
     folder = write_walkers(tmp_path_factory.mktemp("data") / "walkers")
     running = Server(folder, tmp_path_factory.mktemp("cache"))
+    ask(running, "POST", "seek", {"step": 0})  # else it goes to where something happens
     yield running
     if running.process.poll() is None:
         running.stop()
@@ -54,6 +57,10 @@ def opened(browser: Browser, server: Server, *, flat: bool = False) -> Iterator[
     context.set_default_timeout(60_000)
     if flat:
         context.route("**/viser/**", lambda route: route.abort())
+    # what is said once to a new person covers nothing, but moves the panes
+    context.add_init_script(
+        "localStorage.page ??= JSON.stringify({ dismissed: ['software', 'tour'] })"
+    )
     page = context.new_page()
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))

@@ -85,7 +85,7 @@ def clear_overlays(page: Page) -> None:
 
 def readout(page: Page) -> str:
     """The step that the transport says is shown."""
-    return page.get_by_label("Go to step").inner_text().split("/")[0].strip()
+    return page.get_by_label("Go to step", exact=True).inner_text().split("/")[0].strip()
 
 
 def shown_in_3d(frame: Frame) -> str | None:

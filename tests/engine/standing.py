@@ -16,7 +16,7 @@ from tracker.fusion.multi_bernoulli import MultiBernoulli
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.sequential_phd import SequentialPhd
 from tracker.fusion.target_model import TargetModel
-from tracker.parameters import DetectionBoxParams, FusionParams
+from tracker.parameters import DetectionBoxParams, FusionParams, RunParameters
 from tracker.sequences.sequence import Entrance, GroundTruth, Room, Sequence, View
 from tracker.single_view.detector_boxes import trust
 from tracker.single_view.protocol import ViewResult
@@ -127,7 +127,7 @@ def fuse(
     parameters: FusionParams = RECOMMENDED,
 ) -> tuple[list[FusionResult], Trajectories]:
     """The posterior of every step, and its tracks."""
-    fusion = method(empty_room(fps, cameras, len(views)), parameters)
+    fusion = method(empty_room(fps, cameras, len(views)), RunParameters(fusion=parameters))
     state, results = fusion.start(), []
     for step in views:
         state, result = fusion.step(state, step)
@@ -136,9 +136,7 @@ def fuse(
         results,
         cameras=len(cameras),
         extraction_threshold=parameters.extraction_threshold,
-        room=ROOM,
-        margin=parameters.room_margin,
-        below=HALF_EXTENTS[2] / 2.0,
+        bounds=trajectories.Bounds(ROOM, parameters.room_margin, HALF_EXTENTS[2] / 2.0),
     )
     return results, tracks
 

@@ -41,6 +41,17 @@ def test_clear_keeps_the_pair_of_the_step_before():
     assert score.motp == pytest.approx(0.45)
 
 
+def test_clear_prefers_no_pair_of_an_earlier_step():
+    # at step 1 track 10 is out of the gate: at step 2 the nearer of both takes the person
+    truth = truth_of([(step, 1, 0, 0, 0) for step in range(3)])
+    tracks = tracks_of(
+        [(0, 10, 0.1, 0, 0), (1, 10, 1.5, 0, 0), (2, 10, 0.8, 0, 0), (2, 20, 0.1, 0, 0)]
+    )
+    score = clear(comparison(truth, tracks))
+    assert score.id_switches.tolist() == [0, 0, 1]
+    assert score.motp == pytest.approx(0.1)
+
+
 def test_identity():
     # within the gate together: 1–10 twice, 1–20 once, 2–20 once, 2–10 twice.
     # Either map gives IDTP = 3 of 7 estimates and 8 true positions.

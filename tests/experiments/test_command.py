@@ -98,6 +98,7 @@ def test_wrong_usage(
     assert err.count("\n") == 1
 
 
+@pytest.mark.full
 def test_all_in_short_show_the_direction_of_each_claim(tmp_path: Path) -> None:
     data = ["--data", str(DATA)] if DATA.is_dir() else []
     done = subprocess.run(

@@ -17,6 +17,8 @@ from tracker.experiments import Context
 from tracker.experiments.laboratory.pool import cores, spread
 from tracker.pipeline import Cancelled
 
+pytestmark = pytest.mark.full
+
 
 @pytest.mark.parametrize("processes", [1, 2])
 def test_answers_come_in_the_order_of_the_items(processes: int) -> None:

@@ -1,7 +1,7 @@
 // The arithmetic of steps: play, prefetch, axis.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import * as clock from "../../static/js/clock.js";
+import * as clock from "../../static/js/play/clock.js";
 
 const HOW = { fps: 25, speed: 1, direction: 1, first: 0, last: 99, loop: false };
 
@@ -41,7 +41,11 @@ test("fast play skips and stays on time, slow play waits", () => {
 });
 
 test("play ends on the last step, or begins again", () => {
-  assert.deepEqual(clock.advance({ step: 99, rest: 0.5 }, 1, HOW), { step: 99, rest: 0, ended: true });
+  assert.deepEqual(clock.advance({ step: 99, rest: 0.5 }, 1, HOW), {
+    step: 99,
+    rest: 0,
+    ended: true,
+  });
   assert.equal(clock.advance({ step: 99, rest: 0 }, 0.05, { ...HOW, loop: true }).step, 0);
   const back = { ...HOW, direction: -1, loop: true, first: 20, last: 40 };
   assert.equal(clock.advance({ step: 20, rest: 0 }, 0.05, back).step, 40);
@@ -60,13 +64,18 @@ test("the prefetch window begins with the step, looks ahead, and stays inside", 
 });
 
 test("neighbouring steps join into ranges", () => {
-  assert.deepEqual(clock.rangesOf([5, 1, 2, 3, 9, 2]), [[1, 3], [5, 5], [9, 9]]);
+  assert.deepEqual(clock.rangesOf([5, 1, 2, 3, 9, 2]), [
+    [1, 3],
+    [5, 5],
+    [9, 9],
+  ]);
   assert.deepEqual(clock.rangesOf([]), []);
 });
 
 test("a step and its place on the axis are inverse", () => {
   const view = { first: 40, last: 240, width: 733 };
-  for (let step = 40; step <= 240; step += 7) assert.equal(clock.stepAt(clock.xOf(step, view), view), step);
+  for (let step = 40; step <= 240; step += 7)
+    assert.equal(clock.stepAt(clock.xOf(step, view), view), step);
   assert.equal(clock.stepAt(-50, view), 40);
   assert.equal(clock.stepAt(9999, view), 240);
   assert.equal(clock.xOf(0, { first: 0, last: 0, width: 100 }), 0);
@@ -100,5 +109,6 @@ test("a typed step or time is understood, anything else is not", () => {
   assert.equal(clock.parseStep(" 10.56 s ", 25, 1500), 264);
   assert.equal(clock.parseStep("10,56s", 25, 1500), 264);
   assert.equal(clock.parseStep("9999", 25, 1500), 1499);
-  for (const wrong of ["", "abc", "-3", "1e3", "s"]) assert.equal(clock.parseStep(wrong, 25, 1500), null);
+  for (const wrong of ["", "abc", "-3", "1e3", "s"])
+    assert.equal(clock.parseStep(wrong, 25, 1500), null);
 });

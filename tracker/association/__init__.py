@@ -20,7 +20,13 @@ data association", patent CN101783020A, 2010.
 
 from __future__ import annotations
 
-from tracker.association.belief_propagation import ITERATIONS, TOLERANCE, Marginals, marginals
+from tracker.association.belief_propagation import (
+    ITERATIONS,
+    SETTLING,
+    TOLERANCE,
+    Marginals,
+    marginals,
+)
 from tracker.association.events import (
     JointEvents,
     log_weights,
@@ -34,6 +40,7 @@ from tracker.association.validation import clusters, validation_matrix
 __all__ = [
     "ITERATIONS",
     "MOST_ITEMS",
+    "SETTLING",
     "TOLERANCE",
     "JointEvents",
     "Marginals",

@@ -13,13 +13,17 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.kernels.labelled import marginals as marginal_kernels
+from tracker.kernels.association.belief_propagation import Settling, belief_propagation
 
 TOLERANCE = 1e-6
-"""Largest change of a message, relative to the intensity it meets, at which all are settled."""
+"""Largest change of a message, relative to the intensity it meets, at which all are settled:
+far below what a probability is told with."""
 
 ITERATIONS = 200
 """At most so many, should they not settle."""
+
+SETTLING = Settling(TOLERANCE, ITERATIONS)
+"""Both, for a kernel that propagates beliefs within."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,11 +60,10 @@ def marginals(
         tolerance: Largest change of a message at which the iteration stops.
         iterations: At most this many.
     """
-    row, column = marginal_kernels.belief_propagation(
+    found = belief_propagation(
         np.ascontiguousarray(missed, dtype=float),
         np.ascontiguousarray(detected, dtype=float),
         np.ascontiguousarray(unexplained, dtype=float),
-        tolerance,
-        iterations,
+        Settling(tolerance, iterations),
     )
-    return Marginals(row[:, 1:], row[:, 0], column)
+    return Marginals(found.rows[:, 1:], found.rows[:, 0], found.unexplained)

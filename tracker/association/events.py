@@ -13,8 +13,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.association import disjoint_kernels, kernels
 from tracker.association.belief_propagation import Marginals
+from tracker.kernels.association.disjoint import disjoint_matchings
+from tracker.kernels.association.matchings import best_matchings
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,7 +89,7 @@ def simplified_murty(
     weights = np.zeros((size, size))
     weights[:targets, :measurements] = np.log1p(detected / missed[:, None] / unexplained)
     most = max(1, targets + measurements) if count is None else count
-    columns = disjoint_kernels.disjoint_matchings(weights, most)
+    columns = disjoint_matchings(weights, most)
     columns[columns < 0] = measurements
     return JointEvents(_sources(columns, targets, measurements), targets)
 
@@ -120,7 +121,7 @@ def murty(
         np.fill_diagonal(cost[:targets, measurements:], -np.log(missed))
         np.fill_diagonal(cost[targets:, :measurements], -np.log(unexplained))
     cost[targets:, measurements:] = 0.0
-    columns = kernels.best_matchings(cost, targets, count)
+    columns = best_matchings(cost, targets, count)
     return JointEvents(_sources(columns, targets, measurements), targets)
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.association import kernels
 from tracker.association.belief_propagation import Marginals
+from tracker.kernels.association.subsets import subset_marginals
 
 MOST_ITEMS = 18
 """The smaller of the numbers of targets and measurements: beyond, memory grows too large."""
@@ -66,12 +66,12 @@ def exact_marginals(
     weights /= rows[:, None]
     missed /= rows
     if targets <= count:
-        none, chosen, left, total = kernels.subset_marginals(
-            unexplained, np.ascontiguousarray(weights.T), missed, factors
-        )
-        chosen, none, left = chosen.T, left, none
+        # measurement by measurement, each of which takes a target or none
+        sums = subset_marginals(unexplained, np.ascontiguousarray(weights.T), missed, factors)
+        detected, none, left = sums.chosen.T, sums.left, sums.none
     else:
-        none, chosen, left, total = kernels.subset_marginals(missed, weights, unexplained, factors)
-    if not total > 0.0:
+        sums = subset_marginals(missed, weights, unexplained, factors)
+        detected, none, left = sums.chosen, sums.none, sums.left
+    if not sums.total > 0.0:
         raise ValueError("no joint event has a positive weight; give every target a w_i0 above 0")
-    return Marginals(chosen / total, none / total, left / total)
+    return Marginals(detected / sums.total, none / sums.total, left / sums.total)

@@ -13,6 +13,7 @@ from numpy import ndarray
 
 from tracker import parameters as table
 from tracker import single_view
+from tracker.boxes import Boxes
 from tracker.evaluation.figures import number
 from tracker.evaluation.matching import assign
 from tracker.experiments.clips import clip as clips
@@ -188,7 +189,7 @@ def compare(clip: Clip, results: list[ViewResult]) -> Tracked:
 def _whole(clip: Clip, boxes: Float[ndarray, "T A 4"]) -> Bool[ndarray, "T A"]:
     """Whether an actor is wholly in the picture."""
     with np.errstate(invalid="ignore"):
-        low, high = boxes[:, :, :2] - boxes[:, :, 2:], boxes[:, :, :2] + boxes[:, :, 2:]
+        low, high = Boxes(boxes).low, Boxes(boxes).high
         return np.asarray(((low >= 0.0) & (high <= np.array(clip.size) - 1.0)).all(axis=2))
 
 

@@ -19,6 +19,7 @@ from scipy.optimize import linear_sum_assignment
 
 from tracker import parameters as table
 from tracker import single_view
+from tracker.boxes import Boxes
 from tracker.evaluation.figures import number
 from tracker.evaluation.matching import assign
 from tracker.experiments import cameras
@@ -210,9 +211,9 @@ def error_of_the_middle(scene: clips.Clip, results: list[ViewResult]) -> float:
     for step in range(SETTLING, len(results)):
         if len(results[step].measurements) != 1:
             continue
-        boxes = scene.boxes(step)
-        low, high = (boxes[:, :2] - boxes[:, 2:]).min(0), (boxes[:, :2] + boxes[:, 2:]).max(0)
-        off = np.linalg.norm(boxes[:, :2] - (low + high) / 2.0, axis=1)
+        boxes = Boxes(scene.boxes(step))
+        whole = Boxes.from_corners(boxes.low.min(0), boxes.high.max(0))
+        off = np.linalg.norm(boxes.centres - whole.centres, axis=1)
         largest = max(largest, float(off.max()))
     return largest
 
@@ -332,9 +333,8 @@ def _draw(first: dict[str, list[ViewResult]], measured: dict[str, dict[str, Any]
         plot.grid(visible=False)
         plot.set_title(f"k = {moment}", fontsize=8.5)
         for index, results in enumerate(first.values()):
-            for cx, cy, half_x, half_y in results[moment].estimates.tolist():
-                drawing.box(plot, (cx - half_x, cy - half_y, 2 * half_x, 2 * half_y),
-                            drawing.colour(index + 1))  # fmt: skip
+            for box in Boxes(results[moment].estimates).left_top.tolist():
+                drawing.box(plot, box, drawing.colour(index + 1))
     return figure
 
 

@@ -20,7 +20,7 @@ from tracker.experiments.laboratory.experiment import (
     Result,
     Unavailable,
 )
-from tracker.parameters import METHODS, RunParameters
+from tracker.parameters import METHODS, RunParameters, method_of
 from tracker.sequences.sequence import Sequence
 
 if TYPE_CHECKING:
@@ -29,7 +29,11 @@ if TYPE_CHECKING:
 ON_BOXES = "detection_phd"
 """The method that needs an outside detector's boxes, where the others need pictures."""
 
-ON_PICTURES = tuple(name for name in METHODS["single_view"] if name not in (ON_BOXES, "none"))
+ON_PICTURES = tuple(
+    name
+    for name in METHODS["single_view"]
+    if method_of("single_view", name).used(RunParameters()).pictures
+)
 
 BOXES_RECORDING = "cmc1"
 """A recording with such boxes, and without pictures."""

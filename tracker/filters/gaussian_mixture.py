@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -12,9 +13,21 @@ from numpy import ndarray
 from tracker.kernels import linear_algebra
 from tracker.kernels.intensity import merging
 from tracker.kernels.intensity import mixture as mixture_kernels
+from tracker.kernels.linear_algebra import Gaussians
 
 _NOBODY = np.zeros(0, dtype=np.int64)
 """Instead of owners, where no component has one."""
+
+
+class _Weighted(Protocol):
+    """What a compiled kernel gives of J components: (J,), (J, d) and (J, d, d)."""
+
+    @property
+    def weights(self) -> ndarray: ...
+    @property
+    def means(self) -> ndarray: ...
+    @property
+    def covariances(self) -> ndarray: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +67,11 @@ class GaussianMixture:
             labels=np.zeros(0, dtype=np.int64),
         )
 
+    @staticmethod
+    def of(gaussians: _Weighted, labels: Int[ndarray, " J"]) -> GaussianMixture:
+        """The components that a compiled kernel gave, with their labels."""
+        return GaussianMixture(gaussians.weights, gaussians.means, gaussians.covariances, labels)
+
     @property
     def size(self) -> int:
         """The number of components J."""
@@ -68,6 +86,11 @@ class GaussianMixture:
     def cardinality(self) -> float:
         """The expected number of targets: the sum of the weights."""
         return float(self.weights.sum())
+
+    @property
+    def gaussians(self) -> Gaussians:
+        """The components in the form that the compiled kernels know."""
+        return Gaussians(self.weights, self.means, self.covariances)
 
     def take(self, indices: ndarray | slice) -> GaussianMixture:
         """The components at ``indices`` (integers, a mask or a slice), in that order."""
@@ -88,9 +111,11 @@ class GaussianMixture:
             self.labels.take(indices),
         )
 
-    def renamed(self, names: dict[int, int]) -> GaussianMixture:
+    def relabelled(self, changed: dict[int, int]) -> GaussianMixture:
         """The same components; each label that is a key becomes what it stands for."""
-        labels = np.array([names.get(n, n) for n in self.labels.tolist()], dtype=np.int64)
+        labels = np.array(
+            [changed.get(label, label) for label in self.labels.tolist()], dtype=np.int64
+        )
         return GaussianMixture(self.weights, self.means, self.covariances, labels)
 
 
@@ -120,14 +145,14 @@ def predict(
         noise: Q, in squared state units per step, one for all or one a component.
         survival_probability: p_S, one for all or one a component.
     """
-    means, covariances = mixture_kernels.predict(
+    moved = mixture_kernels.predict(
         mixture.means,
         mixture.covariances,
         np.ascontiguousarray(transition, dtype=float),
         np.ascontiguousarray(noise, dtype=float).reshape(-1, *transition.shape),
     )
     return GaussianMixture(
-        mixture.weights * survival_probability, means, covariances, mixture.labels
+        mixture.weights * survival_probability, moved.means, moved.covariances, mixture.labels
     )
 
 
@@ -168,17 +193,18 @@ def merge(
     if mixture.size == 0:
         return mixture, np.zeros(0, dtype=np.int64)
     order = mixture_kernels.heaviest_first(mixture.weights)
-    group, leaders = merging.merge_groups(
+    groups = merging.merge_groups(
         mixture.means,
         mixture.covariances,
         order,
         _NOBODY if owners is None else owners,
         threshold,
     )
-    weights, means, covariances = linear_algebra.merge_moments(
-        mixture.weights, mixture.means, mixture.covariances, group, len(leaders)
+    leaders = groups.leaders
+    merged = linear_algebra.merge_moments(
+        mixture.weights, mixture.means, mixture.covariances, groups.places, len(leaders)
     )
-    return GaussianMixture(weights, means, covariances, mixture.labels.take(leaders)), leaders
+    return GaussianMixture.of(merged, mixture.labels.take(leaders)), leaders
 
 
 def reduce(
@@ -207,7 +233,7 @@ def reduce(
         the component that led each.
     """
     _check(merging_threshold)
-    weights, means, covariances, leaders = merging.reduce_mixture(
+    reduced = merging.reduce_mixture(
         mixture.weights,
         mixture.means,
         mixture.covariances,
@@ -216,7 +242,8 @@ def reduce(
         merging_threshold,
         max_components,
     )
-    return GaussianMixture(weights, means, covariances, mixture.labels.take(leaders)), leaders
+    leaders = reduced.leaders
+    return GaussianMixture.of(reduced, mixture.labels.take(leaders)), leaders
 
 
 def _check(threshold: float) -> None:

@@ -17,9 +17,10 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.kernels.gating import Measurements
 from tracker.kernels.intensity import extraction, phd
 from tracker.kernels.intensity import mixture as mixture_kernels
-from tracker.kernels.kalman import Alternative
+from tracker.kernels.kalman import Expected
 
 SPARE = 0.25
 """How much more than one target, or than its weight, a component may stand for: weights are
@@ -46,14 +47,11 @@ def update(
     predicted: GaussianMixture,
     measurements: Float[ndarray, "M m"],
     *,
-    expected: Float[ndarray, "J m"],
-    jacobians: Float[ndarray, "*J m d"],
+    expected: Expected,
     noise: Float[ndarray, "N m m"],
-    spread: Float[ndarray, "K m m"] | None = None,
     detection_probability: float | Float[ndarray, " J"],
     clutter_intensity: float | Float[ndarray, " M"],
     gate: float = np.inf,
-    other: Alternative | None = None,
 ) -> PhdUpdate:
     """Update an intensity by one set of measurements, eq. (28)–(33) of [VM06].
 
@@ -68,42 +66,40 @@ def update(
     Args:
         predicted: v', J components.
         measurements: z, one a row; none is allowed.
-        expected: h(m_j) for each component; for a linear model H m_j.
-        jacobians: H for each component, or one for all.
+        expected: h(m_j) for each component, for a linear model H m_j; H for each or one for
+            all; and what each adds to the noise where h bends.
         noise: R, one for all measurements (N = 1) or one each (N = M).
-        spread: What each component adds to the noise, where h bends (K = J); nothing, if none
-            (or K = 0).
         detection_probability: p_D, one for all or one a component. Where it is
             0 the component is left as it is.
         clutter_intensity: κ(z) per unit of the measurement space.
         gate: Squared Mahalanobis distance beyond which a pair is left out.
-        other: What else a measurement may be; nothing, if none.
 
     Raises:
         numpy.linalg.LinAlgError: If H P Hᵀ + R is not positive definite.
     """
     size, count = predicted.size, len(measurements)
-    weights, means, covariances, parents, sources, log_odds, sums = phd.phd_update(
-        predicted.weights,
-        predicted.means,
-        predicted.covariances,
-        np.ascontiguousarray(expected, dtype=float),
-        np.ascontiguousarray(jacobians, dtype=float),
-        np.ascontiguousarray(measurements, dtype=float),
-        np.ascontiguousarray(noise, dtype=float),
-        np.zeros((0, *noise.shape[1:])) if spread is None else spread,
+    updated = phd.phd_update(
+        predicted.gaussians,
+        expected,
+        Measurements(
+            np.ascontiguousarray(measurements, dtype=float),
+            np.ascontiguousarray(noise, dtype=float),
+        ),
         _filled(detection_probability, size),
         _filled(clutter_intensity, count),
         gate,
-        *(other or Alternative.none(noise.shape[1], predicted.dimension)),
     )
-    posterior = GaussianMixture(weights, means, covariances, predicted.labels.take(parents))
-    return PhdUpdate(posterior, parents, sources, log_odds, sums)
+    posterior = GaussianMixture.of(updated, predicted.labels.take(updated.parents))
+    return PhdUpdate(posterior, updated.parents, updated.measured, updated.log_odds, updated.sums)
 
 
 def _filled(value: float | Float[ndarray, " N"], count: int) -> Float[ndarray, " N"]:
     """One number for all as one each."""
-    return value if isinstance(value, np.ndarray) else np.full(count, float(value))
+    if isinstance(value, np.ndarray):
+        return value
+    filled = np.empty(count)  # a third of the time of np.full, which counts at every update
+    filled.fill(value)
+    return filled
 
 
 def extract(mixture: GaussianMixture, threshold: float) -> Int[ndarray, " K"]:
@@ -137,16 +133,18 @@ def extract_measured(
         The reported targets: first those of measurements, the surest first.
     """
     posterior = updated.posterior
-    weights, means, covariances, heaviest = extraction.report(
+    found = extraction.report(
         predicted.weights,
-        posterior.weights,
-        posterior.means,
-        posterior.covariances,
-        updated.parents,
-        updated.measurements,
-        updated.log_odds,
-        updated.measurement_weights,
+        phd.UpdatedIntensity(
+            posterior.weights,
+            posterior.means,
+            posterior.covariances,
+            updated.parents,
+            updated.measurements,
+            updated.log_odds,
+            updated.measurement_weights,
+        ),
         threshold,
         SPARE,
     )
-    return GaussianMixture(weights, means, covariances, posterior.labels.take(heaviest))
+    return GaussianMixture.of(found, posterior.labels.take(found.heaviest))

@@ -16,7 +16,8 @@ from numpy import ndarray
 from tracker import association
 from tracker.association import Marginals
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.kernels.kalman import Alternative
+from tracker.kernels.gating import Measurements
+from tracker.kernels.kalman import Expected
 from tracker.kernels.labelled import marginals as marginal_kernels
 
 
@@ -33,14 +34,11 @@ def update(
     tracks: GaussianMixture,
     measurements: Float[ndarray, "M m"],
     *,
-    expected: Float[ndarray, "n m"],
-    jacobians: Float[ndarray, "n m d"],
+    expected: Expected,
     noise: Float[ndarray, "N m m"],
-    spread: Float[ndarray, "K m m"] | None = None,
     detection_probability: Float[ndarray, " n"],
     unexplained_intensity: Float[ndarray, " M"],
     gate: float,
-    other: Alternative | None = None,
 ) -> PmbUpdate:
     """Update every track by the measurements that may be its own ([W15] TOMB/P).
 
@@ -54,33 +52,26 @@ def update(
     Args:
         tracks: n Bernoullis: existence as weight, Gaussian, label.
         measurements: z, one a row; none is allowed.
-        expected: h(m_i).
-        jacobians: H_i.
+        expected: h(m_i), H_i, and what each track adds to the noise where h bends.
         noise: R, one for all measurements (N = 1) or one each (N = M).
-        spread: What each track adds to the noise, where h bends (K = n); nothing, if none
-            (or K = 0).
         detection_probability: p_i of each track.
         unexplained_intensity: ρ_j = κ(z_j) + e_j, clutter and newborns at each measurement.
         gate: Squared Mahalanobis distance beyond which a pair is left out.
-        other: What else a measurement may be; nothing, if none.
     """
-    existences, means, covariances, rows, unexplained = marginal_kernels.bernoulli_update(
-        tracks.weights,
-        tracks.means,
-        tracks.covariances,
-        np.ascontiguousarray(expected, dtype=float),
-        np.ascontiguousarray(jacobians, dtype=float),
-        np.ascontiguousarray(measurements, dtype=float),
-        np.ascontiguousarray(noise, dtype=float),
-        np.zeros((0, *noise.shape[1:])) if spread is None else spread,
+    updated = marginal_kernels.bernoulli_update(
+        tracks.gaussians,
+        expected,
+        Measurements(
+            np.ascontiguousarray(measurements, dtype=float),
+            np.ascontiguousarray(noise, dtype=float),
+        ),
         detection_probability,
         unexplained_intensity,
         gate,
-        *(other or Alternative.none(noise.shape[1], tracks.dimension)),
-        association.TOLERANCE,
-        association.ITERATIONS,
+        association.SETTLING,
     )
+    rows = updated.rows
     return PmbUpdate(
-        GaussianMixture(existences, means, covariances, tracks.labels),
-        Marginals(rows[:, 1:], rows[:, 0], unexplained),
+        GaussianMixture(updated.existences, updated.means, updated.covariances, tracks.labels),
+        Marginals(rows[:, 1:], rows[:, 0], updated.unexplained),
     )

@@ -16,7 +16,7 @@ from tracker.foreground.exposure import BackgroundModel, LearntForeground, tone_
 from tracker.foreground.segmentation import ForegroundModel, Segmentation, pack, unpack
 from tracker.foreground.shares import box_shares, integral, shape_scores, shape_shares
 from tracker.parameters.foreground import ForegroundParams
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 
 __all__ = [
@@ -37,11 +37,12 @@ __all__ = [
 ]
 
 BACKGROUND_PICTURES = 32
-"""Pictures spread over the clip that a background is learnt from."""
+"""Pictures spread over the clip that a background is learnt from: a median needs the scene empty in
+half of them, and each takes time before the first step."""
 
 
 def learn(
-    sequence: Sequence, camera_index: int, reader: FrameReader, parameters: ForegroundParams
+    sequence: Sequence, camera_index: int, reader: Pictures, parameters: ForegroundParams
 ) -> ForegroundModel | None:
     """The chosen foreground model of one camera; None where it has not a single picture.
 
@@ -69,4 +70,4 @@ def learn(
     background = reader.once(
         ("background", camera_index), lambda: BackgroundModel.learn(pictures(), reader.check)
     )
-    return None if background is None else LearntForeground(background, parameters.threshold)
+    return None if background is None else LearntForeground(background, parameters)

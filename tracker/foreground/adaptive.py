@@ -14,29 +14,28 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
 from numpy import ndarray
 
-from tracker.foreground import kernels
 from tracker.foreground.exposure import (
-    DARKEST_SHADOW,
-    SHADOW_TINT,
     BackgroundModel,
     median,
     tone_curve,
 )
 from tracker.foreground.segmentation import Segmentation
+from tracker.kernels.pictures.foreground import (
+    above,
+    clear_shadows,
+    two_classes,
+    update_background,
+)
 from tracker.parameters.foreground import ForegroundParams
 
 ITERATIONS = 20
 """Of the c-means at most; most come to rest after five to eight."""
 
 CLOSING = np.ones((3, 3), dtype=np.uint8)
+"""Gaps that are closed, as published."""
+
 AROUND_FOREGROUND = np.ones((5, 5), dtype=np.uint8)
 """What is this near to the foreground does not change the background."""
-
-BLINDING = 0.6
-"""A picture of which more than this share differs shows another scene or another light."""
-
-BLANK = 4.0
-"""A picture whose grey levels deviate by less than this shows nothing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +82,7 @@ def cluster(difference: UInt8[ndarray, "h w 3"], parameters: ForegroundParams) -
         difference: |I - M|.
         parameters: Start centres, ratio r, least threshold, least number of pixels.
     """
-    thresholds, counts = kernels.two_classes(
+    found = two_classes(
         difference,
         parameters.background_centre,
         parameters.foreground_centre,
@@ -92,7 +91,7 @@ def cluster(difference: UInt8[ndarray, "h w 3"], parameters: ForegroundParams) -
         parameters.minimum_area,
         ITERATIONS,
     )
-    return Iterations(thresholds, counts, choose_iteration(counts))
+    return Iterations(found.thresholds, found.counts, choose_iteration(found.counts))
 
 
 def first_background(
@@ -162,16 +161,16 @@ class AdaptiveForeground:
             shown = cv2.LUT(shown, tone_curve(shown, picture))
         difference = cv2.absdiff(picture, shown)
         if p.drop_shadows:
-            kernels.clear_shadows(
-                difference, picture, shown, DARKEST_SHADOW, SHADOW_TINT, p.least_threshold
+            clear_shadows(
+                difference, picture, shown, p.darkest_shadow, p.shadow_tint, p.least_threshold
             )
         thresholds = self.thresholds(difference)
-        different = kernels.above(difference, thresholds)
+        different = above(difference, thresholds)
         share = cv2.countNonZero(different) / different.size
-        if share > BLINDING or cv2.meanStdDev(picture)[1].max() < BLANK:
+        if share > p.blinding_share or cv2.meanStdDev(picture)[1].max() < p.blank_deviation:
             return state, Segmentation(np.zeros_like(different), thresholds)
         mask = clean(different, p.minimum_area)
-        background, still = kernels.update_background(
+        after = update_background(
             state.background,
             state.still,
             picture,
@@ -181,7 +180,7 @@ class AdaptiveForeground:
             p.update_frames,
             p.update_rate,
         )
-        return AdaptiveState(background, still), Segmentation(mask, thresholds)
+        return AdaptiveState(after.levels, after.still), Segmentation(mask, thresholds)
 
 
 def clean(mask: UInt8[ndarray, "h w"], minimum_area: int) -> UInt8[ndarray, "h w"]:

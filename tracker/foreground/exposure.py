@@ -18,21 +18,19 @@ from jaxtyping import UInt8
 from numpy import ndarray
 from scipy.optimize import isotonic_regression
 
-from tracker.foreground import kernels
 from tracker.foreground.segmentation import Segmentation
-from tracker.kernels import images
+from tracker.kernels.pictures import images
+from tracker.kernels.pictures.foreground import level_medians, upper_medians
+from tracker.parameters.foreground import ForegroundParams
 
 LEVELS = 16
-"""Levels of the source at which a tone curve is measured."""
+"""Levels of the source at which a tone curve is measured; between them it is interpolated."""
 
 SAMPLED_PIXELS = 6000
-"""About so many pixels a tone curve is measured on."""
+"""About so many pixels a tone curve is measured on: some hundred for each level's median."""
 
 MEDIAN_VALUES = 50_000
 """Values of a picture of which medians are taken at a time: some ten milliseconds."""
-
-DARKEST_SHADOW, SHADOW_TINT = 0.65, 0.08
-"""A shadow leaves at least this share of the light, and nearly the same of each channel."""
 
 _ROOTS = np.rint(16.0 * np.sqrt(np.arange(256))).clip(0, 255).astype(np.uint8)
 
@@ -75,23 +73,24 @@ class BackgroundModel:
         return BackgroundModel(reference, median(deviations, check))
 
     def foreground(
-        self, picture: UInt8[ndarray, "h w 3"], threshold: float
+        self, picture: UInt8[ndarray, "h w 3"], parameters: ForegroundParams
     ) -> UInt8[ndarray, "h w"]:
         """1 where a pixel is neither background nor shadow, 0 elsewhere; single pixels cleaned off.
 
         Args:
             picture: BGR, of the background's size.
-            threshold: Difference in the channel that differs most, on the scale 16 √level
-                (0 … 255); what a pixel varies by itself comes on top.
+            parameters: The threshold, a difference in the channel that differs most on the scale
+                16 √level (0 … 255), on which comes what a pixel varies by itself; and what a
+                shadow may do.
         """
         mask = images.foreground_mask(
             picture,
             self.picture,
             tone_curve(self.picture, picture),
             self.spread,
-            threshold,
-            DARKEST_SHADOW,
-            SHADOW_TINT,
+            parameters.threshold,
+            parameters.darkest_shadow,
+            parameters.shadow_tint,
         )
         cleaned: ndarray = cv2.medianBlur(mask, 5)
         return cleaned
@@ -119,15 +118,15 @@ def tone_curve(
     levels = np.arange(256)
     curve = np.empty((1, 256, 3), dtype=np.uint8)
     enough = max(4, len(few) // 400)
-    totals, sums, medians = kernels.level_medians(few, other, LEVELS)
+    found = level_medians(few, other, LEVELS)
     for channel in range(3):
-        total = totals[channel]
+        total = found.totals[channel]
         used = (total >= enough).nonzero()[0]
         if not len(used):
             curve[0, :, channel] = levels
             continue
-        centres = sums[channel, used] / total[used]
-        rising = isotonic_regression(medians[channel, used], weights=total[used]).x
+        centres = found.sums[channel, used] / total[used]
+        rising = isotonic_regression(found.medians[channel, used], weights=total[used]).x
         mapped = levels + np.interp(levels, centres, rising - centres)
         curve[0, :, channel] = np.clip(np.rint(mapped), 0, 255)
     return curve
@@ -159,7 +158,7 @@ def median(
     for top in range(0, len(result), rows):
         check()
         stack = np.stack([picture[top : top + rows] for picture in pictures])
-        medians: ndarray = kernels.upper_medians(stack.reshape(len(stack), -1))
+        medians: ndarray = upper_medians(stack.reshape(len(stack), -1))
         result[top : top + rows] = medians.reshape(stack.shape[1:])
     return result
 
@@ -174,15 +173,15 @@ def _largest(picture: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w"]:
 class LearntForeground:
     """A :class:`BackgroundModel` that stays as it was learnt, and one threshold."""
 
-    def __init__(self, background: BackgroundModel, threshold: float) -> None:
+    def __init__(self, background: BackgroundModel, parameters: ForegroundParams) -> None:
         """Take the background.
 
         Args:
             background: As learnt.
-            threshold: As :meth:`BackgroundModel.foreground` takes it.
+            parameters: As :meth:`BackgroundModel.foreground` takes them.
         """
         self._background = background
-        self._threshold = threshold
+        self._parameters = parameters
 
     def start(self) -> None:
         """Nothing changes from picture to picture."""
@@ -190,5 +189,5 @@ class LearntForeground:
 
     def step(self, state: None, picture: UInt8[ndarray, "h w 3"]) -> tuple[None, Segmentation]:
         """The foreground of a picture."""
-        mask = self._background.foreground(picture, self._threshold)
-        return None, Segmentation(mask, np.full(3, self._threshold))
+        mask = self._background.foreground(picture, self._parameters)
+        return None, Segmentation(mask, np.full(3, self._parameters.threshold))

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
-from tracker.kernels import images
+from tracker.kernels.pictures import images
 
 # in half sizes from a box's centre, left, top, right, bottom: inside, above, left and right
 _PARTS = np.array(

@@ -5,16 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.special import expit
 
 from tracker.camera import Camera, stacked
 from tracker.fusion.target_model import TargetModel
 from tracker.kernels import births
+from tracker.kernels.births import Refinement
+from tracker.kernels.gating import Measurements
 from tracker.sequences.sequence import Room
 
-_REFINEMENTS = 3
+_REFINEMENTS = 3  # Gauss-Newton steps: from where two rays meet, the third moves hardly
 _MOST_SEEDS = 1000  # of a crowd of boxes that nobody explains, where the rays meet best
 _START_SIGMA = 1.0  # metres: how loosely the meeting point of two rays binds the refinement
 _UNEXPLAINED = 0.5  # a box that somebody made with more than this probability starts nobody
@@ -26,13 +28,14 @@ class Evidence:
 
     centres: Float[ndarray, "B 2"]
     """Of the boxes, pixels."""
-    values: Float[ndarray, "B m"]
-    """Measurements of the target model, pixels."""
-    noises: Float[ndarray, "B m m"]
+    measurements: Measurements
+    """Of the target model, each with its noise, pixels."""
     unexplained: Float[ndarray, " B"]
     """Probability that no target made the box."""
     starts: Int[ndarray, " C1"]
     """Where each camera's boxes begin, and the end."""
+    seeing: Bool[ndarray, " C"] | None = None
+    """Which cameras have a frame at this step: others miss nobody; None where all have."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,6 +58,24 @@ class Newborns:
         )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class BirthModel:
+    """What is known of newcomers and of what is taken for them."""
+
+    birth_rate: float
+    """λ_b, expected newcomers a step."""
+    detection_probability: float
+    """p_D of a target in the picture."""
+    clutter: Float[ndarray, " C"]
+    """κ of each camera, per unit of the measurement space."""
+    gate: float
+    """Squared Mahalanobis distance of a box that belongs to a newcomer."""
+    margin: float
+    """Metres outside the room's volume within which newcomers are taken, too."""
+    largest_gap: float
+    """Metres by which the rays of two boxes of one target may miss each other."""
+
+
 class MeasurementBirths:
     """Adaptive birth over several cameras.
 
@@ -71,46 +92,29 @@ class MeasurementBirths:
     """
 
     def __init__(
-        self,
-        cameras: tuple[Camera, ...],
-        room: Room,
-        model: TargetModel,
-        *,
-        birth_rate: float,
-        detection_probability: float,
-        clutter: Float[ndarray, " C"],
-        gate: float,
-        margin: float,
-        largest_gap: float,
+        self, cameras: tuple[Camera, ...], room: Room, target: TargetModel, model: BirthModel
     ) -> None:
         """Prepare for one room.
 
         Args:
             cameras: Their evidence will come in this order.
             room: Newcomers appear evenly in its volume.
-            model: Of a target's box.
-            birth_rate: λ_b, expected newcomers a step.
-            detection_probability: p_D of a target in the picture.
-            clutter: κ of each camera, per unit of the measurement space.
-            gate: Squared Mahalanobis distance of a box that belongs to a newcomer.
-            margin: Metres outside the volume within which newcomers are taken, too.
-            largest_gap: Metres by which the rays of two boxes of one target may miss each other.
+            target: Of a target's box.
+            model: Of births, detection and clutter.
         """
         self._cameras = cameras
         self._room = room
         self._model = model
-        self._log_density = np.log(birth_rate / np.prod(room.maximum - room.minimum))
-        self._log_hit = float(np.log(detection_probability))
+        p_d = model.detection_probability
+        self._log_density = np.log(model.birth_rate / np.prod(room.maximum - room.minimum))
+        self._log_hit = float(np.log(p_d))
         # at p_D = 1 no newcomer is ever missed
-        self._log_miss = (
-            float(np.log1p(-detection_probability)) if detection_probability < 1.0 else -np.inf
-        )
-        self._log_clutter = np.log(clutter)
-        self._gate = gate
-        self._margin = margin
-        self._largest_gap = largest_gap
+        self._log_miss = float(np.log1p(-p_d)) if p_d < 1.0 else -np.inf
+        self._log_clutter = np.log(model.clutter)
         self._centres = np.array([camera.centre for camera in cameras])
-        self._numbers = stacked(cameras)
+        self._calibrations = stacked(cameras)
+        self._target = target.target(3)
+        self._refinement = Refinement(_START_SIGMA, _REFINEMENTS, model.gate)
 
     def propose(self, evidence: Evidence) -> Newborns | None:
         """Newcomers that share no box, the surest first; None for nobody."""
@@ -130,21 +134,21 @@ class MeasurementBirths:
 
     def _meeting_points(self, evidence: Evidence) -> Float[ndarray, "N 3"]:
         """Where the rays of unexplained boxes of two cameras pass close by each other."""
-        free, starts, cameras = births.free_boxes(
-            evidence.unexplained, evidence.starts, _UNEXPLAINED
-        )
-        if cameras < 2:
+        free = births.free_boxes(evidence.unexplained, evidence.starts, _UNEXPLAINED)
+        if free.cameras < 2:
             return np.zeros((0, 3))
-        centres = evidence.centres.take(free, 0)
+        centres = evidence.centres.take(free.indices, 0)
         rays = np.concatenate(
             [
                 camera.back_project(centres[first:last])
-                for camera, first, last in zip(self._cameras, starts, starts[1:], strict=False)
+                for camera, first, last in zip(
+                    self._cameras, free.starts, free.starts[1:], strict=False
+                )
             ]
         )
-        points, gaps = births.meeting_points(rays, starts, self._centres, self._largest_gap)
-        inside = self._room.contains(points, self._margin)
-        points, gaps = points[inside], gaps[inside]
+        met = births.meeting_points(rays, free.starts, self._centres, self._model.largest_gap)
+        inside = self._room.contains(met.points, self._model.margin)
+        points, gaps = met.points[inside], met.gaps[inside]
         if len(points) > _MOST_SEEDS:
             points = points[np.argsort(gaps, kind="stable")[:_MOST_SEEDS]]
         return np.asarray(points)
@@ -154,32 +158,36 @@ class MeasurementBirths:
 
         A seed that ends outside the room or with fewer than two boxes is left out.
         """
-        positions, covariances, sources, fits = births.fit_places(
+        fitted = births.fit_places(
             seeds,
-            _START_SIGMA,
-            _REFINEMENTS,
-            evidence.values,
-            evidence.noises,
+            evidence.measurements,
             evidence.unexplained > _UNEXPLAINED,
             evidence.starts,
-            self._gate,
-            self._model.half_height,
-            self._model.half_width,
-            *self._numbers,
+            self._target,
+            self._calibrations,
+            self._refinement,
         )
-        inside = self._room.contains(positions, self._margin)
-        kept = np.flatnonzero(inside & ((sources >= 0).sum(axis=0) >= 2))
-        found = Newborns(positions[kept], covariances[kept], np.zeros(len(kept)), sources[:, kept])
-        existences = expit(self._log_odds(found, fits[:, kept]))
+        inside = self._room.contains(fitted.positions, self._model.margin)
+        kept = np.flatnonzero(inside & ((fitted.sources >= 0).sum(axis=0) >= 2))
+        found = Newborns(
+            fitted.positions[kept],
+            fitted.covariances[kept],
+            np.zeros(len(kept)),
+            fitted.sources[:, kept],
+        )
+        existences = expit(self._log_odds(found, fitted.fits[:, kept], evidence.seeing))
         return Newborns(found.positions, found.covariances, existences, found.sources)
 
-    def _log_odds(self, found: Newborns, fits: Float[ndarray, "C N"]) -> Float[ndarray, " N"]:
+    def _log_odds(
+        self, found: Newborns, fits: Float[ndarray, "C N"], seeing: Bool[ndarray, " C"] | None
+    ) -> Float[ndarray, " N"]:
         """log Λ of each newcomer, of whose boxes ``fits`` are the log likelihoods."""
         log_odds = self._log_density + 1.5 * np.log(2.0 * np.pi)
         log_odds = log_odds + 0.5 * np.linalg.slogdet(found.covariances)[1]
         for c, camera in enumerate(self._cameras):
             hit = found.sources[c] >= 0
             missed = ~hit & camera.sees(found.positions)
-            log_odds[missed] += self._log_miss
+            if seeing is None or seeing[c]:
+                log_odds[missed] += self._log_miss
             log_odds[hit] += self._log_hit - self._log_clutter[c] + fits[c][hit]
         return np.asarray(log_odds)

@@ -8,14 +8,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.optimize import linear_sum_assignment
-from scipy.stats import chi2
 
 from tracker.filters import gaussian_mixture
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.model import CONFIRMED, FusionModel
-
-_REACH = float(chi2.ppf(0.9, df=3))
-"""Squared Mahalanobis distance within which a newcomer may be somebody lately lost."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,11 +40,11 @@ class Memory:
         nobody = GaussianMixture.empty(dimension)
         return Memory(nobody, nobody, np.zeros(0), np.zeros(0, dtype=np.int64))
 
-    def renamed(self, names: dict[int, int]) -> Memory:
+    def relabelled(self, changed: dict[int, int]) -> Memory:
         """The known under other labels; who is lost under one of them is found."""
-        back = np.isin(self.lost.labels, list(names.values()))
+        back = np.isin(self.lost.labels, list(changed.values()))
         kept = self.take(~back)
-        return Memory(self.known.renamed(names), kept.lost, kept.ages, kept.newer)
+        return Memory(self.known.relabelled(changed), kept.lost, kept.ages, kept.newer)
 
     def take(self, indices: ndarray) -> Memory:
         """Some of the lost."""
@@ -75,7 +71,7 @@ def recall(
     bearers = _first_of_each(labels, (mixture.weights > CONFIRMED).nonzero()[0])
     missing = _missing(memory, labels[bearers], model, first_label)
     if missing.lost.size and len(bearers):
-        labels, back = _returned(missing, mixture.take(bearers), labels)
+        labels, back = _returned(missing, mixture.take(bearers), labels, model.memory_reach)
         missing = missing.take(~back)
     known = GaussianMixture(
         mixture.weights.take(bearers),
@@ -122,7 +118,7 @@ def _missing(
 
 
 def _returned(
-    memory: Memory, people: GaussianMixture, labels: Int[ndarray, " J"]
+    memory: Memory, people: GaussianMixture, labels: Int[ndarray, " J"], reach: float
 ) -> tuple[Int[ndarray, " J"], Bool[ndarray, " L"]]:
     """The labels with the old names of those who are back, and which of the lost these are."""
     lost, back = memory.lost, np.zeros(memory.lost.size, dtype=bool)
@@ -130,7 +126,7 @@ def _returned(
     spread = lost.covariances[:, None, :3, :3] + people.covariances[None, :, :3, :3]
     solved = np.linalg.solve(spread, offsets[..., None])[..., 0]
     distances = (offsets * solved).sum(axis=2)
-    may = (distances <= _REACH) & (people.labels[None, :] >= memory.newer[:, None])
+    may = (distances <= reach) & (people.labels[None, :] >= memory.newer[:, None])
     if not may.any():
         return labels, back
     labels = labels.copy()

@@ -11,17 +11,20 @@ from scipy.stats import chi2
 
 from tracker.filters import models
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion import visibility
-from tracker.fusion.measurement_births import Evidence, MeasurementBirths, Newborns
+from tracker.fusion import sight, visibility
+from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths, Newborns
+from tracker.fusion.sight import Glimpse, Recent
 from tracker.fusion.target_model import ExpectedBoxes, TargetModel
 from tracker.fusion.visibility import Visibility
 from tracker.kernels import linear_algebra
+from tracker.kernels.labelled.step import CameraBoxes
 from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 
 CONFIRMED = 0.5
-"""A component surer than this stands for a person: it may hide others."""
+"""A component surer than this stands for a person, who may hide others: he is there more likely
+than not."""
 
 
 class FusionModel:
@@ -33,7 +36,7 @@ class FusionModel:
         self.cameras = sequence.cameras
         self.step_time = sequence.step_time
         self.target = TargetModel(
-            sequence.target_half_extents, p.measurement, p.update, p.low_share
+            sequence.target_half_extents, p.measurement, p.update, p.posture_share, p
         )
         self.motion = models.Motion.of(p, sequence.step_time)
         self.births = self.motion.at_rest(
@@ -49,6 +52,8 @@ class FusionModel:
         """κ of each camera, per unit of the measurement space."""
         self.gate = float(chi2.ppf(p.gate_probability, df=self.target.size))
         """Squared Mahalanobis distance of the innovation."""
+        self.memory_reach = float(chi2.ppf(p.memory_gate_probability, df=3))
+        """Squared Mahalanobis distance within which a newcomer may be somebody lately lost."""
         self.near = p.duplicate_distance * 2.0 * float(np.mean(sequence.target_half_extents[:2]))
         """Metres within which two components may be one person."""
         margin = p.followed_margin
@@ -58,19 +63,21 @@ class FusionModel:
             self.cameras,
             sequence.room,
             self.target,
-            birth_rate=p.birth_rate * sequence.step_time,
-            detection_probability=p.detection_probability,
-            clutter=self.clutter,
-            gate=self.gate,
-            margin=p.followed_margin,
-            largest_gap=2.0 * float(np.max(sequence.target_half_extents)),
+            BirthModel(
+                birth_rate=p.birth_rate * sequence.step_time,
+                detection_probability=p.detection_probability,
+                clutter=self.clutter,
+                gate=self.gate,
+                margin=p.followed_margin,
+                largest_gap=2.0 * float(np.max(sequence.target_half_extents)),
+            ),
         )
 
     def expected(self, index: int, mixture: GaussianMixture) -> ExpectedBoxes:
         """The box that a camera should give of every component."""
         return self.target.expected(self.cameras[index], mixture.means, mixture.covariances)
 
-    def chances(
+    def detection_probabilities(
         self, index: int, expected: ExpectedBoxes, mixture: GaussianMixture
     ) -> Float[ndarray, " J"]:
         """p_D of every component in one camera where nobody hides anybody."""
@@ -98,7 +105,7 @@ class FusionModel:
         """
         hiding = np.flatnonzero(occluders > CONFIRMED)
         return visibility.visibility(
-            self.chances(index, expected, mixture),
+            self.detection_probabilities(index, expected, mixture),
             expected,
             mixture,
             occluders=hiding,
@@ -111,8 +118,36 @@ class FusionModel:
         """Newcomers where unexplained boxes of several cameras agree: components without labels,
         and what says so; None for nobody."""
         found = self._newborns.propose(evidence)
-        if found is None:
-            return None
+        return None if found is None else self._at_rest(found)
+
+    def newborns_and_recent(
+        self,
+        evidence: Evidence,
+        boxes: Float[ndarray, "B 4"],
+        views: Many[ViewResult],
+        recent: Recent,
+    ) -> tuple[tuple[GaussianMixture, Newborns] | None, Recent]:
+        """As :meth:`newborns`, and what is to be remembered of this step's frames.
+
+        Args:
+            evidence: What the cameras leave unexplained.
+            boxes: Camera after camera, centre and half sizes, pixels.
+            views: Which cameras have a frame.
+            recent: What was remembered at the end of the step before; empty at the start.
+        """
+        blind = np.array([view.blind for view in views])
+        now = Glimpse(evidence, boxes, blind)
+        later = sight.remember(recent, now, self.step_time)
+        if not blind.any():
+            return self.newborns(evidence), later
+        joined = sight.with_recent(now, recent, self.step_time, self.target.half_height)
+        proposed = self._newborns.propose(joined)
+        if proposed is None:
+            return None, later
+        found = sight.of_this_step(proposed, blind)
+        return (self._at_rest(found) if len(found.existences) else None), later
+
+    def _at_rest(self, found: Newborns) -> tuple[GaussianMixture, Newborns]:
         nameless = np.zeros(len(found.existences), dtype=np.int64)
         born = GaussianMixture(found.existences, found.positions, found.covariances, nameless)
         return self.motion.at_rest(born), found
@@ -122,7 +157,7 @@ class FusionModel:
         inside: ndarray = linear_algebra.inside_bounds(mixture.means, *self.followed)
         return inside
 
-    def doubles(
+    def duplicates(
         self,
         means: Float[ndarray, "n d"],
         weights: Float[ndarray, " n"],
@@ -136,21 +171,18 @@ class FusionModel:
         around one person, and two people cannot stand in one place. Among sure ones
         the older label stays; an unsure one never displaces a sure one.
         """
-        found: ndarray = linear_algebra.doubles(
+        found: ndarray = linear_algebra.duplicates(
             means, weights, labels, np.ascontiguousarray(sources), self.near, CONFIRMED
         )
         return found
 
 
-def all_boxes(
-    views: Many[ViewResult],
-) -> tuple[Float[ndarray, "B 4"], Float[ndarray, "B 4"], Int[ndarray, " C1"]]:
-    """The boxes of all cameras, one after another, their standard deviations, pixels, and where
-    each camera's begin, with the end."""
+def all_boxes(views: Many[ViewResult]) -> CameraBoxes:
+    """The boxes of all cameras, one after another."""
     starts = [0]
     for view in views:
         starts.append(starts[-1] + len(view.boxes))
-    return (
+    return CameraBoxes(
         np.concatenate([view.boxes for view in views], dtype=float),
         np.concatenate([view.sigmas for view in views], dtype=float),
         np.array(starts),

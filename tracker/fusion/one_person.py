@@ -18,6 +18,7 @@ from tracker.filters.phd import PhdUpdate
 from tracker.fusion.model import CONFIRMED
 from tracker.kernels import linear_algebra
 from tracker.kernels.labelled import marginals
+from tracker.kernels.labelled.marginals import LabelledWeights, PairOdds
 
 _LARGEST_ODDS = 600.0  # the logarithm of what still fits a float with room to spare
 
@@ -56,38 +57,32 @@ def share_boxes(
     """
     size, boxes = predicted.size, len(updated.measurement_weights)
     owner, box = updated.parents[size:], updated.measurements[size:]
-    factors, shares, known = marginals.share_boxes(
-        predicted.weights,
-        predicted.labels,
-        detection_probability,
+    shared = marginals.share_boxes(
+        LabelledWeights(predicted.weights, predicted.labels, detection_probability),
         births.start,
         births.stop,
-        owner,
-        box,
-        updated.log_odds,
-        boxes,
+        PairOdds(owner, box, updated.log_odds, boxes),
         _LARGEST_ODDS,
-        association.TOLERANCE,
-        association.ITERATIONS,
+        association.SETTLING,
     )
-    names = np.where(known, predicted.labels[owner], next_label + box)
+    labels = np.where(shared.of_people, predicted.labels[owner], next_label + box)
     posterior = GaussianMixture(
-        np.concatenate([updated.posterior.weights[:size] * factors, shares]),
+        np.concatenate([updated.posterior.weights[:size] * shared.factors, shared.shares]),
         updated.posterior.means,
         updated.posterior.covariances,
-        np.concatenate([predicted.labels, names]),
+        np.concatenate([predicted.labels, labels]),
     )
     return PhdUpdate(
         posterior,
         updated.parents,
         updated.measurements,
         updated.log_odds,
-        np.bincount(box, shares, boxes),
+        np.bincount(box, shared.shares, boxes),
     )
 
 
 def owners(mixture: GaussianMixture) -> Int[ndarray, " J"]:
     """Who may be merged with whom: a sure person's components with nobody else's, -1 for others."""
-    _, label = linear_algebra.group_labels(mixture.labels)
+    label = linear_algebra.group_labels(mixture.labels).places
     sure = np.bincount(label, mixture.weights) > CONFIRMED
     return np.asarray(np.where(sure[label], mixture.labels, -1))

@@ -10,10 +10,10 @@ from numpy import ndarray
 
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.protocol import Associations, FusionResult
-from tracker.kernels import linear_algebra
+from tracker.kernels.linear_algebra import sum_pairs
 
 WORTH_TELLING = 0.01
-"""Association probability below which a pair is not kept."""
+"""Association probability below which a pair is not told: a hundredth is no news to anybody."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,4 +122,5 @@ def summed(
     """
     if not len(labels) or not len(cameras):
         return Associations.none()
-    return Associations(*linear_algebra.sum_pairs(labels, cameras, of_pairs, boxes, probabilities))
+    found = sum_pairs(labels, cameras, of_pairs, boxes, probabilities)
+    return Associations(found.cameras, found.components, found.boxes, found.probabilities)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -15,17 +16,21 @@ from numpy import ndarray
 
 from tracker.filters import gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion import memory, one_person
+from tracker.fusion import memory, one_person, sight
 from tracker.fusion.measurement_births import Evidence
 from tracker.fusion.memory import Memory
 from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import Ledger, Record
+from tracker.fusion.sight import Recent
 from tracker.kernels import linear_algebra
+from tracker.kernels.gating import Measurements
 from tracker.kernels.intensity import mixture as mixture_kernels
-from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
+
+if TYPE_CHECKING:
+    from tracker.parameters import RunParameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,6 +40,8 @@ class SequentialPhdState:
     mixture: GaussianMixture
     next_label: int
     memory: Memory
+    recent: Recent = ()
+    """What each camera left unexplained in the last frames."""
 
 
 @dataclass(slots=True, eq=False)
@@ -48,8 +55,10 @@ class _Work:
     """Labels of this step's births."""
     sure: dict[int, float]
     """Predicted weight of each label, where it is enough to hide others."""
-    measured: list[tuple[ndarray, ndarray, ndarray]]
-    """Of each camera: the boxes as measurements, their noises, what nobody explains of each."""
+    measured: list[Measurements]
+    """The boxes of each camera as measurements."""
+    unexplained: list[ndarray]
+    """What nobody explains of each camera's boxes."""
     ledger: Ledger
 
 
@@ -63,9 +72,9 @@ class SequentialPhd:
     one value of a parameter, and the ``published`` preset sets them all.
     """
 
-    def __init__(self, sequence: Sequence, parameters: FusionParams) -> None:
-        self._parameters = parameters
-        self._model = FusionModel(sequence, parameters)
+    def __init__(self, sequence: Sequence, parameters: RunParameters) -> None:
+        self._parameters = parameters.fusion
+        self._model = FusionModel(sequence, parameters.fusion)
 
     def start(self) -> SequentialPhdState:
         """Nobody is in the room."""
@@ -93,41 +102,45 @@ class SequentialPhd:
             range(state.next_label, next_label),
             sure,
             measured=[],
+            unexplained=[],
             ledger=Ledger(),
         )
         for index, view in enumerate(views):
             self._update(work, index, view)
+        recent = state.recent
         if p.birth != "entrances":
-            self._add_newborns(work, views)
+            recent = self._add_newborns(work, views, recent)
         inside = self._model.stays(work.mixture)
         mixture, record = work.mixture.take(inside), work.record.take(inside)
         if p.misses == "per_person":
-            single = self._without_doubles(mixture, record)
+            single = self._without_duplicates(mixture, record)
             mixture, record = mixture.take(single), record.take(single)
         associations = work.ledger.associations(mixture.labels)
         labels, next_label = _one_person_a_label(mixture, previous, work.next_label)
         mixture = _relabelled(mixture, labels)
         labels, lost = memory.recall(state.memory, mixture, self._model, state.next_label)
         mixture = _relabelled(mixture, labels)
-        return SequentialPhdState(mixture, next_label, lost), record.result(mixture, associations)
+        after = SequentialPhdState(mixture, next_label, lost, recent)
+        return after, record.result(mixture, associations)
 
     def _update(self, work: _Work, index: int, view: ViewResult) -> None:
         """The update by the boxes of one camera, and its reduction."""
         p, model, mixture = self._parameters, self._model, work.mixture
-        values, noises = model.target.measured(view, p.measurement_sigma)
+        measurements = model.target.measured(view, p.measurement_sigma)
+        if view.blind:
+            work.measured.append(measurements)
+            work.unexplained.append(np.zeros(0))
+            return
         expected = model.expected(index, mixture)
         seen = model.visible(index, expected, mixture, _occluders(mixture, work.sure))
         updated = phd.update(
             mixture,
-            values,
-            expected=expected.values,
-            jacobians=expected.jacobians,
-            noise=noises,
-            spread=expected.spreads,
+            measurements.values,
+            expected=expected.expected,
+            noise=measurements.noises,
             detection_probability=seen.detection_probabilities,
             clutter_intensity=model.clutter[index],
             gate=model.gate,
-            other=expected.other,
         )
         owners = None
         if p.misses == "per_person":
@@ -138,7 +151,7 @@ class SequentialPhd:
                 births=work.births,
                 next_label=work.next_label,
             )
-            work.next_label += len(values)
+            work.next_label += len(measurements.values)
             owners = one_person.owners(updated.posterior)
         posterior, parents, sources = updated.posterior, updated.parents, updated.measurements
         record = work.record.take(parents)
@@ -156,17 +169,22 @@ class SequentialPhd:
             owners=owners,
         )
         work.record = record.take(leaders)
-        work.measured.append((values, noises, 1.0 - updated.measurement_weights))
+        work.measured.append(measurements)
+        work.unexplained.append(1.0 - updated.measurement_weights)
 
-    def _add_newborns(self, work: _Work, views: Many[ViewResult]) -> None:
-        """Components where unexplained boxes of several cameras agree on a place."""
-        values, noises, unexplained = (
-            np.concatenate(part) for part in zip(*work.measured, strict=True)
+    def _add_newborns(self, work: _Work, views: Many[ViewResult], recent: Recent) -> Recent:
+        """Components where unexplained boxes of several cameras agree on a place; what is to be
+        remembered of this step's frames."""
+        measured = Measurements(
+            np.concatenate([each.values for each in work.measured]),
+            np.concatenate([each.noises for each in work.measured]),
         )
-        boxes, _, starts = all_boxes(views)
-        found = self._model.newborns(Evidence(boxes[:, :2], values, noises, unexplained, starts))
+        seen = all_boxes(views)
+        unexplained = np.concatenate(work.unexplained)
+        evidence = Evidence(seen.boxes[:, :2], measured, unexplained, seen.starts)
+        found, later = self._model.newborns_and_recent(evidence, seen.boxes, views, recent)
         if found is None:
-            return
+            return later
         born, newborns = found
         born = models.label_births(born, work.next_label)
         work.next_label += born.size
@@ -175,18 +193,22 @@ class SequentialPhd:
         work.record = work.record.extended(born.size)
         work.record.sources[:, first:] = newborns.sources
         work.record.source_weights[:, first:] = newborns.sources >= 0
-        work.record.detection_probabilities[:, first:] = self._parameters.detection_probability
+        cameras = sight.seeing(views)
+        seeing = slice(None) if cameras is None else cameras
+        work.record.detection_probabilities[seeing, first:] = self._parameters.detection_probability
+        return later
 
-    def _without_doubles(self, mixture: GaussianMixture, record: Record) -> Int[ndarray, " K"]:
+    def _without_duplicates(self, mixture: GaussianMixture, record: Record) -> Int[ndarray, " K"]:
         """Indices of the components of those labels that do not only repeat another."""
-        labels, label = linear_algebra.group_labels(mixture.labels)
+        grouped = linear_algebra.group_labels(mixture.labels)
+        labels, label = grouped.labels, grouped.places
         held = np.bincount(label, mixture.weights, len(labels))
         # the heaviest component of a label has the last word on where its person is
         heaviest = mixture_kernels.heaviest_of_groups(mixture.weights, label, len(labels))
-        double = self._model.doubles(
+        duplicate = self._model.duplicates(
             mixture.means[heaviest], held, labels, record.sources[:, heaviest]
         )
-        return np.flatnonzero(~double[label])
+        return np.flatnonzero(~duplicate[label])
 
 
 def _relabelled(mixture: GaussianMixture, labels: Int[ndarray, " J"]) -> GaussianMixture:

@@ -9,9 +9,12 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from tracker.camera import NEAREST_DEPTH, Camera
+from tracker.camera import Camera
 from tracker.kernels import measurement
-from tracker.kernels.kalman import Alternative
+from tracker.kernels.gating import Measurements
+from tracker.kernels.kalman import Expected
+from tracker.kernels.measurement import Target
+from tracker.parameters import FusionParams
 from tracker.single_view.protocol import ViewResult
 
 MeasurementKind = Literal["centre", "box", "box_and_width"]
@@ -29,12 +32,7 @@ _FROM_BOX: dict[MeasurementKind, Float[ndarray, "m 4"]] = {
     ),
 }
 
-# a person who lies or bends, seen in perspective and from any side, against one who stands: in
-# half heights of the standing one, what his box should be and how far it may be off
-_LOW_HALF_HEIGHT, _LOW_HALF_WIDTH = 0.5, 0.6
-_LOW_SIGMAS = np.array([0.15, 0.15, 0.5, 0.25])  # centre across and down, half width, half height
-_DROP = 0.3  # how far his middle moves from one camera's box to the next
-
+_DEFAULTS = FusionParams()
 _NO_COVARIANCES = np.zeros((0, 3, 3))
 
 
@@ -42,21 +40,32 @@ _NO_COVARIANCES = np.zeros((0, 3, 3))
 class ExpectedBoxes:
     """What one camera should measure of J states."""
 
-    values: Float[ndarray, "J m"]
-    """Centre (x, y), or horizontal centre, top, bottom (and width), in pixels."""
-    jacobians: Float[ndarray, "J m d"]
-    """Derivative by the state, pixels a metre; zero for velocities."""
-    spreads: Float[ndarray, "K m m"]
-    """What the bend of the projection adds to the noise, squared pixels: one each (K = J),
-    or nothing (K = 0)."""
+    expected: Expected
+    """Values: centre (x, y), or horizontal centre, top, bottom (and width), in pixels. Their
+    derivatives by the state, pixels a metre; zero for velocities. What the bend of the
+    projection adds to the noise, squared pixels: one each, or nothing. The same of a person
+    who lies or is bent, where that is asked for."""
     boxes: Float[ndarray, "J 4"]
     """left, top, right, bottom in pixels, not clipped."""
     depths: Float[ndarray, " J"]
     """Distance from the lens, metres."""
     valid: Bool[ndarray, " J"]
     """Whether middle, head and foot lie in front of the lens."""
-    other: Alternative | None = None
-    """The box of the same person lying or bent, where that is asked for."""
+
+    @property
+    def values(self) -> Float[ndarray, "J m"]:
+        """Of the upright."""
+        return self.expected.values
+
+    @property
+    def jacobians(self) -> Float[ndarray, "J m d"]:
+        """Of the upright."""
+        return self.expected.jacobians
+
+    @property
+    def spreads(self) -> Float[ndarray, "K m m"]:
+        """Of the upright."""
+        return self.expected.spreads
 
 
 class TargetModel:
@@ -82,8 +91,8 @@ class TargetModel:
     extended update is the default.
 
     A person may also lie, crouch or bend, or half of him is behind a table. Then the
-    box is of another shape: with ``low_share`` a box is one of two kinds, and
-    ``other`` holds the second, low and broad and known loosely.
+    box is of another shape: with ``posture_share`` a box is one of two kinds, and
+    ``expected`` holds the second, too, low and broad and known loosely.
     """
 
     def __init__(
@@ -91,7 +100,8 @@ class TargetModel:
         half_extents: Float[ndarray, " 3"],
         kind: MeasurementKind,
         update: UpdateKind = "extended",
-        low_share: float = 0.0,
+        posture_share: float = 0.0,
+        parameters: FusionParams = _DEFAULTS,
     ) -> None:
         """Prepare for targets of one size.
 
@@ -99,13 +109,15 @@ class TargetModel:
             half_extents: Half width, depth and height, metres.
             kind: What is used of a box.
             update: How the bend of the projection is met.
-            low_share: Share of the boxes that show a person low: lying, crouching, bent.
+            posture_share: Share of the boxes that show a person in another posture than upright:
+                lying, crouching, bent.
+            parameters: What the box of such a person should be, and how far it may be off.
         """
         self.kind: MeasurementKind = kind
         self.size = SIZES[kind]
         self.unscented = update == "unscented"
         # a centre alone looks the same in any posture
-        self.low_share = low_share if kind != "centre" else 0.0
+        self.posture_share = posture_share if kind != "centre" else 0.0
         self.half_height = float(half_extents[2])
         self.half_width = float(np.mean(half_extents[:2]))
         transform = _FROM_BOX[kind]
@@ -113,16 +125,38 @@ class TargetModel:
         products = np.einsum("pa,qa->apq", transform, transform).reshape(4, self.size**2).copy()
         self.transforms = transform, products
         """T (m, 4) and (4, m²), as :func:`tracker.kernels.measurement.measured_boxes` has them."""
-        low_noise = (_LOW_SIGMAS**2 @ products).reshape(self.size, self.size)
-        self.numbers = (
-            self.half_height,
-            self.half_width,
-            _LOW_HALF_HEIGHT * self.half_height,
-            _LOW_HALF_WIDTH * self.half_height,
-            low_noise if self.low_share else np.zeros((0, 0)),
-            self.size,
+        p = parameters
+        sigmas = np.array(
+            [
+                p.posture_centre_sigma,
+                p.posture_centre_sigma,
+                p.posture_width_sigma,
+                p.posture_height_sigma,
+            ]
         )
-        """The target as :func:`tracker.kernels.measurement.expected_measurements` knows it."""
+        noise = (sigmas**2 @ products).reshape(self.size, self.size)
+        self._posture_noise = noise if self.posture_share else np.zeros((0, 0))
+        self._parameters = p
+        self._targets: dict[int, Target] = {}
+
+    def target(self, dimension: int) -> Target:
+        """The target as kernels know it, for states of ``dimension``."""
+        if dimension not in self._targets:
+            p = self._parameters
+            drift = np.zeros((dimension, dimension))
+            drift[2, 2] = (p.posture_drop * self.half_height) ** 2
+            self._targets[dimension] = Target(
+                self.half_height,
+                self.half_width,
+                self.size,
+                self.unscented,
+                p.posture_height * self.half_height,
+                p.posture_width * self.half_height,
+                self._posture_noise,
+                drift,
+                self.posture_share,
+            )
+        return self._targets[dimension]
 
     def expected(
         self,
@@ -137,50 +171,32 @@ class TargetModel:
             states: Position first, metres, world frame.
             covariances: Their uncertainty, for the unscented kind; none is taken as 0.
         """
-        bends = self.unscented and covariances is not None
-        (
-            values, jacobians, spreads, boxes, depths, valid,
-            low_values, low_jacobians, low_spreads,
-        ) = measurement.expected_measurements(
+        target = self.target(states.shape[1])
+        if covariances is None:
+            target, covariances = target._replace(unscented=False), _NO_COVARIANCES
+        found = measurement.expected_measurements(
             np.ascontiguousarray(states, dtype=float),
-            np.ascontiguousarray(covariances) if bends else _NO_COVARIANCES,
-            bends,
-            *self.numbers,
-            camera.image_size,
-            *camera.numbers,
-            NEAREST_DEPTH,
-            camera.largest_radius,
-        )  # fmt: skip
-        low = None
-        if self.low_share:
-            drift = self.drift(states.shape[1])
-            low = Alternative(low_values, low_jacobians, low_spreads, drift, self.low_share)
-        return ExpectedBoxes(values, jacobians, spreads, boxes, depths, valid, low)
+            np.ascontiguousarray(covariances),
+            target,
+            camera.calibration,
+        )
+        return ExpectedBoxes(found.expected, found.boxes, found.depths, found.valid)
 
-    def drift(self, dimension: int) -> Float[ndarray, "d d"]:
-        """How far a state may have moved with a change of posture from one box to the next: P."""
-        drift = np.zeros((dimension, dimension))
-        drift[2, 2] = (_DROP * self.half_height) ** 2
-        return drift
-
-    def measured(
-        self, view: ViewResult, factor: float
-    ) -> tuple[Float[ndarray, "M m"], Float[ndarray, "M m m"]]:
+    def measured(self, view: ViewResult, factor: float) -> Measurements:
         """The boxes of a camera as measurements z, and their noise R in squared pixels.
 
         Args:
             view: Boxes and how far each is to be trusted.
             factor: On the standard deviations.
         """
-        return self.measured_all(view.boxes, view.sigmas, factor)
+        return self.measured_boxes(view.boxes, view.sigmas, factor)
 
-    def measured_all(
+    def measured_boxes(
         self, boxes: Float[ndarray, "M 4"], sigmas: Float[ndarray, "M 4"], factor: float
-    ) -> tuple[Float[ndarray, "M m"], Float[ndarray, "M m m"]]:
+    ) -> Measurements:
         """As :meth:`measured`, of boxes and their standard deviations, pixels."""
-        measured: tuple[ndarray, ndarray] = measurement.measured_boxes(
+        return measurement.measured_boxes(
             np.ascontiguousarray(boxes, dtype=float),
             np.ascontiguousarray((factor * sigmas) ** 2, dtype=float),
             *self.transforms,
         )
-        return measured

@@ -12,9 +12,11 @@ from tracker.camera import Camera
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.target_model import ExpectedBoxes
 from tracker.kernels import boxes as box_kernels
+from tracker.kernels.boxes import Occlusion
 
 WORTH_TELLING = 0.2
-"""Share of a target's box that must be covered for its occluder to be named."""
+"""Share of a target's box that must be covered for its occluder to be named. It changes what is
+told, not what is tracked."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,14 +52,14 @@ def inside_probability(
         expected.jacobians,
         np.ascontiguousarray(covariances),
         expected.valid,
-        camera.image_size,
+        camera.calibration.image_size,
         soft,
     )
     return inside
 
 
 def visibility(
-    chances: Float[ndarray, " J"],
+    detection_probabilities: Float[ndarray, " J"],
     expected: ExpectedBoxes,
     mixture: GaussianMixture,
     *,
@@ -75,28 +77,26 @@ def visibility(
     independent occluders that exist with probability w_l.
 
     Args:
-        chances: p_j without occlusion.
+        detection_probabilities: p_j without occlusion.
         expected: The boxes that the components should give in this camera.
         mixture: The components, with their labels.
         occluders: Indices of the components that may hide others: sure ones, one a person.
         weights: Their existence; at most 1 counts.
         strength: ρ, 0 for no occlusion at all, 1 where a covered person is never seen.
-        near: Metres within which an occluder may be the target's double; a target must
+        near: Metres within which an occluder may be the target's duplicate; a target must
             not hide behind itself.
     """
     if strength == 0.0 or not len(occluders):
-        return Visibility(chances, np.full(len(chances), -1, dtype=np.int64))
-    return Visibility(
-        *box_kernels.hide(
-            chances,
-            expected.boxes,
-            expected.depths,
-            mixture.means,
-            mixture.labels,
-            occluders,
-            weights,
-            near,
-            strength,
-            WORTH_TELLING,
-        )
+        nobody = np.full(len(detection_probabilities), -1, dtype=np.int64)
+        return Visibility(detection_probabilities, nobody)
+    found = box_kernels.hide(
+        detection_probabilities,
+        expected.boxes,
+        expected.depths,
+        mixture.means,
+        mixture.labels,
+        occluders,
+        weights,
+        Occlusion(near, strength, WORTH_TELLING),
     )
+    return Visibility(found.detection_probabilities, found.hidden_by)

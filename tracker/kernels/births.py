@@ -3,40 +3,83 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy import ndarray
 
 from tracker.kernels.boxes import expected_boxes
 from tracker.kernels.compilation import kernel
+from tracker.kernels.gating import Measurements
+from tracker.kernels.lens import Calibrations, one_camera
 from tracker.kernels.linear_algebra import factorise, solve, squared_length
+from tracker.kernels.measurement import Target
+
+
+class FreeBoxes(NamedTuple):
+    """F boxes that nobody explains."""
+
+    indices: ndarray
+    """(F,), among all boxes."""
+    starts: ndarray
+    """(C + 1,), where each camera's begin among them."""
+    cameras: int
+    """How many cameras have any."""
+
+
+class MeetingPoints(NamedTuple):
+    """N places where rays of two cameras pass close by each other."""
+
+    points: ndarray
+    """(N, 3), world metres."""
+    gaps: ndarray
+    """(N,), metres between the rays."""
+
+
+class FittedPlaces(NamedTuple):
+    """N places that explain boxes of several cameras."""
+
+    positions: ndarray
+    """(N, 3), world metres."""
+    covariances: ndarray
+    """(N, 3, 3)."""
+    sources: ndarray
+    """(C, N) the box in each camera, counted within it, -1 for none."""
+    fits: ndarray
+    """(C, N) log N(z; h(x), R) of that box."""
+
+
+class Refinement(NamedTuple):
+    """How places are fitted."""
+
+    start_sigma: float
+    """Metres; how loosely a seed binds."""
+    passes: int
+    gate: float
+    """Squared Mahalanobis distance of a box that belongs to the place."""
 
 
 @kernel
-def free_boxes(unexplained: ndarray, starts: ndarray, least: float) -> tuple[ndarray, ndarray, int]:
+def free_boxes(unexplained: ndarray, starts: ndarray, least: float) -> FreeBoxes:
     """The boxes that nobody explains.
 
     Args:
         unexplained: (B,), probability that nobody made each box.
         starts: (C + 1,), where each camera's boxes begin.
         least: A box is free above this probability.
-
-    Returns:
-        (F,) indices of the free boxes, (C + 1,) where each camera's begin among them, and how
-        many cameras have any.
     """
     free = np.flatnonzero(unexplained > least)
     begins = np.searchsorted(free, starts)
     cameras = 0
     for c in range(len(starts) - 1):
         cameras += begins[c + 1] > begins[c]
-    return free, begins, cameras
+    return FreeBoxes(free, begins, cameras)
 
 
 @kernel
 def meeting_points(
     rays: ndarray, starts: ndarray, centres: ndarray, largest_gap: float
-) -> tuple[ndarray, ndarray]:
+) -> MeetingPoints:
     """The middles between rays of two cameras that pass close by each other, ahead of both.
 
     Args:
@@ -44,9 +87,6 @@ def meeting_points(
         starts: (C + 1,), where each camera's begin.
         centres: (C, 3) of the cameras' lenses, world metres.
         largest_gap: Metres between two rays that count as meeting.
-
-    Returns:
-        (N, 3) points, world metres, and (N,) the gaps there.
     """
     cameras = len(centres)
     room = 0
@@ -79,29 +119,19 @@ def meeting_points(
                     if gap < largest_gap:
                         gaps[count] = gap
                         count += 1
-    return points[:count].copy(), gaps[:count].copy()
+    return MeetingPoints(points[:count].copy(), gaps[:count].copy())
 
 
 @kernel
 def fit_places(
     seeds: ndarray,
-    start_sigma: float,
-    refinements: int,
-    values: ndarray,
-    noises: ndarray,
+    measurements: Measurements,
     free: ndarray,
     starts: ndarray,
-    gate: float,
-    half_height: float,
-    half_width: float,
-    image_sizes: ndarray,
-    rotations: ndarray,
-    translations: ndarray,
-    intrinsics: ndarray,
-    distortions: ndarray,
-    nearest_depth: float,
-    largest_radii: ndarray,
-) -> tuple[ndarray, ndarray, ndarray, ndarray]:
+    target: Target,
+    cameras: Calibrations,
+    refinement: Refinement,
+) -> FittedPlaces:
     """Move each seed to the place that explains the nearest free box of every camera best.
 
     Gauss-Newton over the boxes' residuals, bound loosely to the seed; each pass chooses
@@ -109,45 +139,39 @@ def fit_places(
 
     Args:
         seeds: (N, 3), world metres.
-        start_sigma: Metres; how loosely a seed binds.
-        refinements: Passes.
-        values: (B, m) measurements, camera after camera, pixels.
-        noises: (B, m, m).
+        measurements: Of B boxes, camera after camera, each with its noise.
         free: (B,), whether a box may be a newcomer's.
         starts: (C + 1,), where each camera's boxes begin.
-        gate: Squared Mahalanobis distance of a box that belongs to the place.
-        half_height: As the further ones, of :func:`tracker.kernels.boxes.expected_boxes`,
-            one row a camera.
-
-    Returns:
-        (N, 3) places, (N, 3, 3) covariances, (C, N) the box in each camera, counted within
-        it, -1 for none; and (C, N) log N(z; h(x), R) of that box at the final place.
+        target: Upright.
+        cameras: C of them.
+        refinement: How far and how often.
     """
-    count, size, cameras = len(seeds), values.shape[1], len(rotations)
+    values, noises = measurements.values, measurements.noises
+    start_sigma, gate = refinement.start_sigma, refinement.gate
+    count, size, views = len(seeds), values.shape[1], len(cameras.rotations)
     positions = seeds.copy()
     covariances = np.zeros((count, 3, 3))
     for n in range(count):
         for axis in range(3):
             covariances[n, axis, axis] = start_sigma**2
     information, pull = np.empty((count, 3, 3)), np.empty((count, 3))
-    sources = np.full((cameras, count), -1, dtype=np.int64)
+    sources = np.full((views, count), -1, dtype=np.int64)
     lower, spread, own = np.zeros((size, size)), np.empty((size, size)), np.empty((size, size))
     residual, solved = np.empty(size), np.empty(size)
     lower3, unit, column = np.zeros((3, 3)), np.zeros(3), np.empty(3)
-    for _ in range(refinements):
+    for _ in range(refinement.passes):
         for n in range(count):
             for a in range(3):
                 for b in range(3):
                     information[n, a, b] = 1.0 / start_sigma**2 if a == b else 0.0
                 pull[n, a] = seeds[n, a] / start_sigma**2
-        for c in range(cameras):
+        for c in range(views):
             if starts[c] == starts[c + 1]:
                 continue
-            expected, slopes, _, _, valid = expected_boxes(
-                positions, half_height, half_width, size,
-                (image_sizes[c, 0], image_sizes[c, 1]), rotations[c], translations[c],
-                intrinsics[c], distortions[c], nearest_depth, largest_radii[c],
-            )  # fmt: skip
+            seen = expected_boxes(
+                positions, target.half_height, target.half_width, size, one_camera(cameras, c)
+            )
+            expected, slopes, valid = seen.values, seen.jacobians, seen.valid
             for n in range(count):
                 sources[c, n] = -1
                 if not valid[n]:
@@ -203,15 +227,13 @@ def fit_places(
                 solve(lower3, unit, column)
                 for b in range(3):
                     covariances[n, b, a] = column[b]
-    fits = np.zeros((cameras, count))
-    for c in range(cameras):
+    fits = np.zeros((views, count))
+    for c in range(views):
         if starts[c] == starts[c + 1]:
             continue
-        expected, _, _, _, _ = expected_boxes(
-            positions, half_height, half_width, size,
-            (image_sizes[c, 0], image_sizes[c, 1]), rotations[c], translations[c],
-            intrinsics[c], distortions[c], nearest_depth, largest_radii[c],
-        )  # fmt: skip
+        expected = expected_boxes(
+            positions, target.half_height, target.half_width, size, one_camera(cameras, c)
+        ).values
         for n in range(count):
             if sources[c, n] < 0:
                 continue
@@ -222,4 +244,4 @@ def fit_places(
             fits[c, n] = -0.5 * (
                 squared_length(residual, lower) + log_determinant + size * math.log(2.0 * math.pi)
             )
-    return positions, covariances, sources, fits
+    return FittedPlaces(positions, covariances, sources, fits)

@@ -3,12 +3,48 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy import ndarray
 
 from tracker.kernels.compilation import kernel
-from tracker.kernels.lens import project_points
+from tracker.kernels.lens import Calibration, project_points
+
+
+class UprightBoxes(NamedTuple):
+    """The boxes that a camera should give of J upright targets."""
+
+    values: ndarray
+    """(J, m), what is measured of each, pixels."""
+    jacobians: ndarray
+    """(J, m, d), the derivatives, pixels a metre."""
+    boxes: ndarray
+    """(J, 4) left, top, right and bottom, not clipped, pixels."""
+    depths: ndarray
+    """(J,), distance from the lens, metres."""
+    valid: ndarray
+    """(J,), whether middle, head and foot lie in front of it."""
+
+
+class Occlusion(NamedTuple):
+    """How far targets hide those behind them."""
+
+    near: float
+    """Metres within which an occluder may be the target's duplicate: it hides nothing."""
+    strength: float
+    """ρ."""
+    worth_telling: float
+    """Share of a box from which its occluder is named."""
+
+
+class Hidden(NamedTuple):
+    """How likely J targets are detected, and who hides them."""
+
+    detection_probabilities: ndarray
+    """(J,)."""
+    hidden_by: ndarray
+    """(J,), the label of the strongest occluder, -1 for none."""
 
 
 @kernel
@@ -17,14 +53,8 @@ def expected_boxes(
     half_height: float,
     half_width: float,
     size: int,
-    image_size: tuple[int, int],
-    rotation: ndarray,
-    translation: ndarray,
-    intrinsics: ndarray,
-    distortion: ndarray,
-    nearest_depth: float,
-    largest_radius: float,
-) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
+    camera: Calibration,
+) -> UprightBoxes:
     """The box that a camera should give of each upright target, and its derivative.
 
     Args:
@@ -33,14 +63,9 @@ def expected_boxes(
         half_width: Of the target, metres.
         size: How much of a box is measured: 2 for its centre, 3 for horizontal centre,
             top and bottom, 4 for the width as well.
-        image_size: Width and height, pixels.
-        rotation: As the further ones, of :func:`tracker.kernels.lens.project_points`.
-
-    Returns:
-        (J, m) values and (J, m, d) derivatives, pixels and pixels a metre; (J, 4) left,
-        top, right and bottom, not clipped; (J,) distance from the lens; (J,) whether
-        middle, head and foot lie in front of it.
+        camera: Its picture, lens and pose.
     """
+    rotation, translation = camera.rotation, camera.translation
     count, dimension = states.shape
     points = np.empty((3 * count, 3))
     for j in range(count):
@@ -49,23 +74,15 @@ def expected_boxes(
                 points[3 * j + part, axis] = states[j, axis]
         points[3 * j + 1, 2] -= half_height
         points[3 * j + 2, 2] += half_height
-    pixels, slopes, ahead = project_points(
-        points,
-        rotation,
-        translation,
-        intrinsics,
-        distortion,
-        nearest_depth,
-        largest_radius,
-        True,
-    )
+    drawn = project_points(points, camera, True)
+    pixels, slopes, ahead = drawn.pixels, drawn.jacobians, drawn.valid
     values = np.zeros((count, size))
     jacobians = np.zeros((count, size, dimension))
     boxes = np.zeros((count, 4))
     depths = np.empty(count)
     valid = np.zeros(count, dtype=np.bool_)
     share = half_width / half_height
-    last = image_size[1] - 1.0
+    last = camera.image_size[1] - 1.0
     for j in range(count):
         total = 0.0
         for a in range(3):
@@ -104,7 +121,7 @@ def expected_boxes(
             values[j, 3] = width
             for a in range(3):
                 jacobians[j, 3, a] = sign * (slopes[foot, 1, a] - slopes[head, 1, a])
-    return values, jacobians, boxes, depths, valid
+    return UprightBoxes(values, jacobians, boxes, depths, valid)
 
 
 @kernel
@@ -113,7 +130,7 @@ def inside_probability(
     jacobians: ndarray,
     covariances: ndarray,
     valid: ndarray,
-    image_size: tuple[int, int],
+    image_size: ndarray,
     soft: bool,
 ) -> ndarray:
     """Probability that the middle of each target falls inside the picture.
@@ -123,7 +140,7 @@ def inside_probability(
         jacobians: (J, m, d), of which the first row belongs to x and the second to y.
         covariances: (J, d, d).
         valid: (J,), False where there is nothing to see.
-        image_size: Width and height, pixels.
+        image_size: (2,) width and height, pixels.
         soft: Whether the target's uncertainty counts, and a pixel more; else it is 0 or 1.
     """
     count = len(boxes)
@@ -151,43 +168,37 @@ def inside_probability(
 
 @kernel
 def hide(
-    chances: ndarray,
+    detection_probabilities: ndarray,
     boxes: ndarray,
     depths: ndarray,
     means: ndarray,
     labels: ndarray,
     occluders: ndarray,
     weights: ndarray,
-    near: float,
-    strength: float,
-    worth_telling: float,
-) -> tuple[ndarray, ndarray]:
+    occlusion: Occlusion,
+) -> Hidden:
     """Lower each detection probability where other targets stand in front.
 
         p_j ← p_j Π_l (1 − ρ w_l a(j, l))
         a(j, l) = [l is nearer to the lens than j] · area(box_j ∩ box_l) / area(box_j)
 
     Args:
-        chances: (J,), p_j without occlusion.
+        detection_probabilities: (J,), p_j without occlusion.
         boxes: (J, 4) left, top, right, bottom, pixels.
         depths: (J,) metres.
         means: (J, d), position first.
         labels: (J,).
         occluders: (L,), indices of those that may hide others.
         weights: (L,), their existence; at most 1 counts.
-        near: Metres within which an occluder may be the target's double: it hides nothing.
-        strength: ρ.
-        worth_telling: Share from which an occluder is named.
-
-    Returns:
-        (J,) probabilities and (J,) the label of the strongest occluder, -1 for none.
+        occlusion: How far they do.
     """
-    count = len(chances)
-    result = chances.copy()
+    near, strength = occlusion.near, occlusion.strength
+    count = len(detection_probabilities)
+    result = detection_probabilities.copy()
     hidden_by = np.full(count, -1, dtype=np.int64)
     for j in range(count):
         area = max((boxes[j, 2] - boxes[j, 0]) * (boxes[j, 3] - boxes[j, 1]), 1e-9)
-        strongest = worth_telling
+        strongest = occlusion.worth_telling
         for k in range(len(occluders)):
             other = occluders[k]
             if labels[other] == labels[j] or not depths[other] < depths[j]:
@@ -206,7 +217,7 @@ def hide(
             if effect > strongest:
                 strongest = effect
                 hidden_by[j] = labels[other]
-    return result, hidden_by
+    return Hidden(result, hidden_by)
 
 
 @kernel

@@ -3,8 +3,13 @@
 numba keeps machine code beside the source, where an installed package may be read-only,
 and looks at the file of a kernel only, not at those of the kernels that it calls. So the
 code goes to the cache folder, under the hash of the kernel's file and of those that it
-takes kernels from: a change leaves nothing stale behind, and what does not depend on it
-stays. ``NUMBA_CACHE_DIR`` names another place.
+takes kernels, tuples and constants from: a change leaves nothing stale behind, and what
+does not depend on it stays. ``NUMBA_CACHE_DIR`` names another place.
+
+While another process compiles (:func:`while_compiling`), a kernel whose machine code is
+not there yet runs as plain Python: the same source, and so the same numbers, some eighty
+times slower, which a room with a few people bears. Those that loop over pixels or samples
+would take seconds a picture; they are :func:`pixel_kernel`, and are always compiled.
 """
 
 from __future__ import annotations
@@ -17,13 +22,15 @@ import re
 import shutil
 import sys
 import time
+import types
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
 from numba.core import event
 
 from tracker.folders import cache_folder
@@ -39,11 +46,19 @@ _KEPT_SECONDS = 30 * 86400.0
 _config: Any = numba.config
 
 _ROOT = Path(__file__).resolve().parents[1]
-_HAS_KERNELS = re.compile(rb"^@kernel$", re.MULTILINE)
+_HAS_KERNELS = re.compile(rb"^@(?:pixel_)?kernel$", re.MULTILINE)
 
 
 def kernel(function: _F) -> _F:
     """Compile on the first call, keep the machine code on disk, release the interpreter."""
+    compiled: Any = pixel_kernel(function)
+    if not _config.DISABLE_JIT:  # numba's own variable: then it is the function itself
+        compiled._compile_for_args = _Chooser(compiled)
+    return cast(_F, compiled)
+
+
+def pixel_kernel(function: _F) -> _F:
+    """As :func:`kernel`, for loops over pixels or samples: never run as plain Python."""
     compiled = compiled_later(function)
     _KERNELS.append(compiled)
     return compiled
@@ -60,6 +75,90 @@ def compiled_later(function: _F, **options: Any) -> _F:
     finally:
         _config.CACHE_DIR = before
     return cast(_F, compiled)
+
+
+class _Chooser:
+    """What a kernel asks when it is called with arguments that it was not compiled for.
+
+    numba calls whatever function it is given back: the machine code, or plain Python.
+    """
+
+    def __init__(self, dispatcher: Any) -> None:
+        self._dispatcher = dispatcher
+        self._compile = dispatcher._compile_for_args
+        self._looked_at = -1
+
+    def __call__(self, *arguments: Any) -> Callable[..., Any]:
+        news = _Elsewhere.news
+        if not _Elsewhere.compiles or (self._looked_at != news and self._is_kept(arguments)):
+            return cast(Callable[..., Any], self._compile(*arguments))
+        self._looked_at = news
+        return by_hand(self._dispatcher)
+
+    def _is_kept(self, arguments: tuple[Any, ...]) -> bool:
+        """Whether the other process has put the machine code on disk by now."""
+        dispatcher = self._dispatcher
+        signature = tuple(dispatcher.typeof_pyval(each) for each in arguments)
+        return dispatcher._cache.load_overload(signature, dispatcher.targetctx) is not None
+
+
+class _Elsewhere:
+    """Whether another process compiles, and how often it has told of something new."""
+
+    compiles = False
+    news = 0
+
+
+def while_compiling() -> None:
+    """From now on another process compiles: what is not ready runs as plain Python."""
+    _Elsewhere.compiles = True
+
+
+@contextmanager
+def only_of_pixels() -> Iterator[None]:
+    """Within it none but :func:`pixel_kernel` is compiled."""
+    while_compiling()
+    try:
+        yield
+    finally:
+        no_longer_compiling()
+
+
+def news_of_compiling() -> None:
+    """The other process has more machine code on disk: look again."""
+    _Elsewhere.news += 1
+
+
+def no_longer_compiling() -> None:
+    """No other process compiles: what is still missing is compiled here, when it is called."""
+    _Elsewhere.compiles = False
+
+
+@cache
+def by_hand(dispatcher: Any) -> Callable[..., Any]:
+    """A kernel as plain Python, and so are all kernels that it calls."""
+    plain = _plain(dispatcher)
+
+    @wraps(plain)
+    def silently(*arguments: Any) -> Any:
+        # machine code divides and overflows without a word
+        with np.errstate(all="ignore"):
+            return plain(*arguments)
+
+    return silently
+
+
+def _plain(dispatcher: Any) -> Callable[..., Any]:
+    function = dispatcher.py_func
+    names = dict(function.__globals__)
+    for name in function.__code__.co_names:
+        called = names.get(name)
+        if called is not dispatcher and getattr(called, "_compile_for_args", None) is not None:
+            names[name] = _plain(called)
+    plain = types.FunctionType(function.__code__, names, closure=function.__closure__)
+    plain.__defaults__ = function.__defaults__
+    names[function.__name__] = plain  # for those that call themselves
+    return plain
 
 
 def kernel_folder() -> Path:
@@ -79,16 +178,22 @@ def _folder_of(file: Path) -> Path:
 
 
 def _with_used(file: Path, known: set[Path]) -> set[Path]:
-    """A file and those with kernels that it imports from, however far."""
+    """A file and those that make part of its machine code, which it imports, however far."""
     if file not in known and file.is_file():
         text = file.read_bytes()
-        if not known or _HAS_KERNELS.search(text):
+        if not known or _is_compiled_in(file, text):
             known.add(file)
             for name in _imported(text):
                 path = _ROOT.parent.joinpath(*name.split("."))
                 _with_used(path.with_suffix(".py"), known)
                 _with_used(path / "__init__.py", known)
     return known
+
+
+def _is_compiled_in(file: Path, text: bytes) -> bool:
+    """Whether a file has kernels, or the tuples and constants of the kernels' room."""
+    in_room = _ROOT / "kernels" in file.parents and file.name != Path(__file__).name
+    return in_room or _HAS_KERNELS.search(text) is not None
 
 
 def _imported(source: bytes) -> Iterator[str]:
@@ -113,7 +218,7 @@ def _digest(files: Iterable[Path]) -> str:
 @cache
 def _mark() -> Path:
     """A file that says that all kernels were compiled."""
-    with_kernels = [p for p in _ROOT.rglob("*.py") if _HAS_KERNELS.search(p.read_bytes())]
+    with_kernels = [p for p in _ROOT.rglob("*.py") if _is_compiled_in(p, p.read_bytes())]
     return kernel_folder() / f"{_digest(with_kernels)}.complete"
 
 

@@ -4,11 +4,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy import ndarray
 
 from tracker.kernels.compilation import kernel
+
+
+class Measurements(NamedTuple):
+    """M measurements of m numbers each."""
+
+    values: ndarray
+    """(M, m)."""
+    noises: ndarray
+    """(1, m, m), one covariance for all, or (M, m, m)."""
+
+
+class GatedPairs(NamedTuple):
+    """P pairs of a component and a measurement inside its gate."""
+
+    components: ndarray
+    """(P,)."""
+    measured: ndarray
+    """(P,), the measurement."""
+    log_likelihoods: ndarray
+    """(P,), log N(z; h, S)."""
 
 
 @kernel
@@ -63,14 +84,9 @@ def factor_innovation(
 
 @kernel
 def gated_pairs(
-    expected: ndarray,
-    measurements: ndarray,
-    noises: ndarray,
-    own: ndarray,
-    gate: float,
-    lower: ndarray,
-) -> tuple[ndarray, ndarray, ndarray]:
-    """Component, measurement and log-likelihood of each pair inside its gate.
+    expected: ndarray, measurements: Measurements, own: ndarray, gate: float, lower: ndarray
+) -> GatedPairs:
+    """The pairs inside their gates, measurement by measurement.
 
     What lies within the gate of S lies within √(gate S_pp) along every axis p: only such
     measurements are looked at, found by bisection along one axis. The result is that of
@@ -78,41 +94,37 @@ def gated_pairs(
 
     Args:
         expected: (J, m).
-        measurements: (M, m).
-        noises: (1, m, m) for all, or (M, m, m).
+        measurements: With their noise.
         own: (J, m, m), what each component adds to the noise.
         gate: Squared Mahalanobis distance.
         lower: (J, m, m) with one noise for all, else (1, m, m): takes what
             :func:`factor_innovation` gives for each component, or at last.
-
-    Returns:
-        (P,) each, measurement by measurement.
     """
     size, order = expected.shape
-    count = len(measurements)
+    count = len(measurements.values)
     if size == 0 or count == 0:
         nothing = np.empty(0, dtype=np.int64)
-        return nothing, nothing, np.empty(0)
+        return GatedPairs(nothing, nothing, np.empty(0))
     if order == 2:
-        found = _gated(expected, measurements, noises, own, gate, lower, (0, 1))
+        found = _gated(expected, measurements, own, gate, lower, (0, 1))
     else:
-        found = _gated(expected, measurements, noises, own, gate, lower, range(order))
-    return _by_measurement(found[0], found[1], found[2], count)
+        found = _gated(expected, measurements, own, gate, lower, range(order))
+    return _by_measurement(found, count)
 
 
 @kernel
 def _gated(
     expected: ndarray,
-    measurements: ndarray,
-    noises: ndarray,
+    measurements: Measurements,
     own: ndarray,
     gate: float,
     lower: ndarray,
     rows: Sequence[int],
-) -> tuple[ndarray, ndarray, ndarray]:
+) -> GatedPairs:
     """:func:`gated_pairs`, component by component; rows as of :func:`factor_innovation`."""
     size, order = expected.shape
-    count = len(measurements)
+    values, noises = measurements.values, measurements.noises
+    count = len(values)
     shared = noises.shape[0] == 1
     reach = np.empty((size, order))
     for p in range(len(rows)):
@@ -122,14 +134,14 @@ def _gated(
                 raise np.linalg.LinAlgError("H P H' + R is not positive definite")
             # a little more than the bound, so that rounding excludes nothing
             reach[j, p] = math.sqrt(gate * (own[j, p, p] + noise)) * (1.0 + 1e-9)
-    axis = _widest_axis(measurements, reach)
-    by_axis = np.argsort(measurements[:, axis])
-    ordered = np.empty(measurements.shape)
+    axis = _widest_axis(values, reach)
+    by_axis = np.argsort(values[:, axis])
+    ordered = np.empty(values.shape)
     coordinates = np.empty(count)
     for k in range(count):
-        coordinates[k] = measurements[by_axis[k], axis]
+        coordinates[k] = values[by_axis[k], axis]
         for p in range(len(rows)):
-            ordered[k, p] = measurements[by_axis[k], p]
+            ordered[k, p] = values[by_axis[k], p]
 
     capacity = 4 * (size + count)
     component = np.empty(capacity, dtype=np.int64)
@@ -177,14 +189,13 @@ def _gated(
             measured[pairs] = z
             likelihood[pairs] = constant - 0.5 * distance
             pairs += 1
-    return component[:pairs], measured[:pairs], likelihood[:pairs]
+    return GatedPairs(component[:pairs], measured[:pairs], likelihood[:pairs])
 
 
 @kernel
-def _by_measurement(
-    component: ndarray, measured: ndarray, likelihood: ndarray, count: int
-) -> tuple[ndarray, ndarray, ndarray]:
+def _by_measurement(pairs: GatedPairs, count: int) -> GatedPairs:
     """The same pairs, measurement by measurement; in the order they had where it is one."""
+    component, measured, likelihood = pairs.components, pairs.measured, pairs.log_likelihoods
     place_of = np.zeros(count + 1, dtype=np.int64)
     for z in measured:
         place_of[z + 1] += 1
@@ -198,4 +209,4 @@ def _by_measurement(
         components[place] = component[pair]
         measurements[place] = measured[pair]
         likelihoods[place] = likelihood[pair]
-    return components, measurements, likelihoods
+    return GatedPairs(components, measurements, likelihoods)

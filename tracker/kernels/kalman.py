@@ -10,49 +10,114 @@ import numpy as np
 from numpy import ndarray
 
 from tracker.kernels.compilation import kernel
-from tracker.kernels.gating import factor_innovation, gated_pairs
+from tracker.kernels.gating import GatedPairs, Measurements, factor_innovation, gated_pairs
 
 
-class Alternative(NamedTuple):
-    """What else a measurement of J components may be: that of a target in another posture."""
+class Expected(NamedTuple):
+    """What J components predict of a measurement, linearised: of a target in one of two postures.
 
-    expected: ndarray
-    """(J, m), or (0, m) where there is no other posture; as the next two."""
+        g(z|x) = (1 − ε) N(z; h(x), R + Ω) + ε N(z; h'(x'), R + Ω'),  x' = x + N(0, D)
+
+    What belongs to the other posture has no rows where there is none.
+    """
+
+    values: ndarray
+    """h (J, m) of each mean."""
     jacobians: ndarray
-    """(J, m, d)."""
+    """H (J, m, d), or (1, m, d), one for all."""
     spreads: ndarray
-    """(J, m, m), what the posture adds to the noise."""
-    drift: ndarray
-    """(d, d), how far a state may have moved with the change of posture: a covariance."""
-    share: float
-    """Of the measurements, above 0 and below 1."""
+    """Ω (J, m, m), what a component adds to the noise, or (0, m, m) for nothing."""
+    posture_values: ndarray
+    """h' (J, m), or (0, m)."""
+    posture_jacobians: ndarray
+    """H' (J, m, d), or (0, m, d)."""
+    posture_spreads: ndarray
+    """Ω' (J, m, m), or (0, m, m)."""
+    posture_drift: ndarray
+    """D (d, d), how far a state may have moved with the change of posture."""
+    posture_share: float
+    """ε, of the measurements, above 0 and below 1."""
 
     @staticmethod
-    def none(size: int, dimension: int) -> Alternative:
-        """There is no other posture."""
-        return Alternative(
-            np.zeros((0, size)),
-            np.zeros((0, size, dimension)),
-            np.zeros((0, size, size)),
+    def of(values: ndarray, jacobians: ndarray, spreads: ndarray | None = None) -> Expected:
+        """Of one posture: arrays of any kind, as kernels take them; no spread is none."""
+        size, dimension = jacobians.shape[1:]
+        return Expected(
+            np.ascontiguousarray(values, dtype=float),
+            np.ascontiguousarray(jacobians, dtype=float),
+            np.empty((0, size, size)) if spreads is None else spreads,
+            np.empty((0, size)),
+            np.empty((0, size, dimension)),
+            np.empty((0, size, size)),
             np.zeros((dimension, dimension)),
             0.0,
         )
 
 
+class Pairs(NamedTuple):
+    """P components, each updated by a measurement inside its gate."""
+
+    components: ndarray
+    """(P,), which component."""
+    measured: ndarray
+    """(P,), by which measurement."""
+    log_likelihoods: ndarray
+    """(P,), log N(z; h, S)."""
+    means: ndarray
+    """(P, d)."""
+    covariances: ndarray
+    """(P, d, d), in Joseph form, which stays symmetric and positive."""
+
+
+class _Innovations(NamedTuple):
+    """What J components make of the innovations' covariances S."""
+
+    cross: ndarray
+    """P Hᵀ (J, d, m)."""
+    own: ndarray
+    """H P Hᵀ + Ω (J, m, m), what a component adds to the noise."""
+
+
+class _Spot(NamedTuple):
+    """One filtered covariance: of whom, and where it is written."""
+
+    component: int
+    noise: int
+    factored: int
+    """Where the Cholesky factor of its S is."""
+    place: int
+
+
+class _Filtered(NamedTuple):
+    """Gains and covariances of all spots, and room to write in while one is worked out."""
+
+    gains: ndarray
+    """K (N, d, m)."""
+    covariances: ndarray
+    """(I − K H) P (I − K H)ᵀ + K R Kᵀ (N, d, d)."""
+    noise: ndarray
+    """(m, m)."""
+    factor: ndarray
+    """(d, d)."""
+    half: ndarray
+    """(d, d)."""
+    noisy: ndarray
+    """(d, m)."""
+
+
 @kernel
 def _innovations(
-    covariances: ndarray,
-    jacobians: ndarray,
-    spreads: ndarray,
-    axes: Sequence[int],
-    rows: Sequence[int],
-) -> tuple[ndarray, ndarray]:
-    """P Hᵀ (J, d, m) and H P Hᵀ + Ω (J, m, m), what a component adds to the noise.
+    covariances: ndarray, expected: Expected, axes: Sequence[int], rows: Sequence[int]
+) -> _Innovations:
+    """P Hᵀ and H P Hᵀ + Ω of every component.
 
     Args:
+        covariances: P (J, d, d).
+        expected: With H and Ω.
         axes: Of the state: a range, or, so that loops are unrolled, a tuple of as many.
         rows: Of the measurement, likewise.
     """
+    jacobians, spreads = expected.jacobians, expected.spreads
     size = len(covariances)
     ph = np.empty((size, len(axes), len(rows)))
     own = np.empty((size, len(rows), len(rows)))
@@ -70,37 +135,37 @@ def _innovations(
                 for a in range(len(axes)):
                     total += jacobians[h, p, a] * ph[j, a, q]
                 own[j, p, q] = total
-    return ph, own
+    return _Innovations(ph, own)
 
 
 @kernel
-def _gain(
-    j: int,
-    n: int,
-    ph: ndarray,
+def _filter(
+    spot: _Spot,
+    cross: ndarray,
     lower: ndarray,
-    factored: int,
     covariances: ndarray,
-    jacobians: ndarray,
+    expected: Expected,
     noises: ndarray,
-    spreads: ndarray,
-    gains: ndarray,
-    updated: ndarray,
-    place: int,
-    work: tuple[ndarray, ndarray, ndarray, ndarray],
-    axes: Sequence[int],
-    rows: Sequence[int],
+    filtered: _Filtered,
+    axes_and_rows: tuple[Sequence[int], Sequence[int]],
 ) -> None:
-    """K into ``gains[place]`` and (I − K H) P (I − K H)ᵀ + K R Kᵀ into ``updated[place]``.
+    """Gain and covariance of one spot, in place.
 
     Args:
-        j: The component.
-        n: The noise.
-        factored: Where the factor of S is in ``lower``.
-        work: (m, m), twice (d, d), and (d, m), to write in.
-        axes: As ``rows``, of :func:`_innovations`.
+        spot: Of whom, and where.
+        cross: Of :class:`_Innovations`.
+        lower: Cholesky factors of S, of :func:`tracker.kernels.gating.factor_innovation`.
+        covariances: P (J, d, d).
+        expected: With H and Ω.
+        noises: R (N, m, m).
+        filtered: Takes the result.
+        axes_and_rows: Of :func:`_innovations`.
     """
-    noise, factor, half, noisy = work
+    axes, rows = axes_and_rows
+    j, n, factored, place = spot.component, spot.noise, spot.factored, spot.place
+    jacobians, spreads = expected.jacobians, expected.spreads
+    gains, updated = filtered.gains, filtered.covariances
+    noise, factor, half, noisy = filtered.noise, filtered.factor, filtered.half, filtered.noisy
     h = 0 if len(jacobians) == 1 else j
     for p in range(len(rows)):
         for q in range(len(rows)):
@@ -110,7 +175,7 @@ def _gain(
     # K = P Hᵀ S⁻¹, row by row through the factor
     for a in range(len(axes)):
         for p in range(len(rows)):
-            total = ph[j, a, p]
+            total = cross[j, a, p]
             for r in range(p):
                 total -= lower[factored, p, r] * gains[place, a, r]
             gains[place, a, p] = total * lower[factored, p, p]
@@ -149,161 +214,145 @@ def _gain(
 
 @kernel
 def _updated(
-    component: ndarray,
-    measured: ndarray,
-    ph: ndarray,
-    own: ndarray,
-    lower: ndarray,
+    pairs: GatedPairs,
     means: ndarray,
     covariances: ndarray,
-    expected: ndarray,
-    jacobians: ndarray,
-    measurements: ndarray,
-    noises: ndarray,
-    spreads: ndarray,
-    axes: Sequence[int],
-    rows: Sequence[int],
-) -> tuple[ndarray, ndarray]:
-    """Means (P, d) and covariances (P, d, d) of pairs."""
-    pairs = len(component)
-    dimension = len(axes)
-    new_means = np.empty((pairs, dimension))
-    new_covariances = np.empty((pairs, dimension, dimension))
+    expected: Expected,
+    measurements: Measurements,
+    innovations: _Innovations,
+    lower: ndarray,
+    axes_and_rows: tuple[Sequence[int], Sequence[int]],
+) -> Pairs:
+    """The pairs with their means and covariances."""
+    axes, rows = axes_and_rows
+    component, measured = pairs.components, pairs.measured
+    noises = measurements.noises
+    count = len(component)
+    dimension, order = len(axes), len(rows)
+    new_means = np.empty((count, dimension))
+    new_covariances = np.empty((count, dimension, dimension))
     # with one noise for all, the pairs of a component share gain and covariance
     shared = len(noises) == 1
     known = np.zeros(len(means), dtype=np.bool_)
     known[component] = True
     filtered = np.flatnonzero(known) if shared else component
-    places = len(means) if shared else pairs
-    gains = np.empty((places, dimension, len(rows)))
-    updated = np.empty((places, dimension, dimension))
-    work = (
-        np.empty((len(rows), len(rows))),
+    places = len(means) if shared else count
+    result = _Filtered(
+        np.empty((places, dimension, order)),
+        np.empty((places, dimension, dimension)),
+        np.empty((order, order)),
         np.empty((dimension, dimension)),
         np.empty((dimension, dimension)),
-        np.empty((dimension, len(rows))),
+        np.empty((dimension, order)),
     )
     for k in range(len(filtered)):
         j = filtered[k]
-        n, place, factored = (0, j, j) if shared else (measured[k], k, 0)
+        spot = _Spot(j, 0, j, j) if shared else _Spot(j, measured[k], 0, k)
         if not shared:
-            factor_innovation(own, j, noises, n, lower, factored, rows)
-        _gain(
-            j, n, ph, lower, factored, covariances, jacobians, noises, spreads,
-            gains, updated, place, work, axes, rows,
-        )  # fmt: skip
-    for pair in range(pairs):
+            factor_innovation(innovations.own, j, noises, spot.noise, lower, 0, rows)
+        _filter(
+            spot, innovations.cross, lower, covariances, expected, noises, result, axes_and_rows
+        )
+    gains, updated = result.gains, result.covariances
+    for pair in range(count):
         j, z = component[pair], measured[pair]
         place = j if shared else pair
         for a in range(len(axes)):
             total = means[j, a]
             for p in range(len(rows)):
-                total += gains[place, a, p] * (measurements[z, p] - expected[j, p])
+                total += gains[place, a, p] * (measurements.values[z, p] - expected.values[j, p])
             new_means[pair, a] = total
             for b in range(len(axes)):
                 new_covariances[pair, a, b] = updated[place, a, b]
-    return new_means, new_covariances
+    return Pairs(component, measured, pairs.log_likelihoods, new_means, new_covariances)
 
 
 @kernel
 def kalman_pairs(
     means: ndarray,
     covariances: ndarray,
-    expected: ndarray,
-    jacobians: ndarray,
-    measurements: ndarray,
-    noises: ndarray,
-    spreads: ndarray,
+    expected: Expected,
+    measurements: Measurements,
     gate: float,
-) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
+) -> Pairs:
     """The Kalman update of every component by every measurement inside its gate.
 
     Args:
         means: (J, d).
         covariances: (J, d, d).
-        expected: (J, m), the measurement each component predicts.
-        jacobians: (J, m, d), its derivative H, or (1, m, d), one for all.
-        measurements: (M, m).
-        noises: (1, m, m) for all, or (M, m, m).
-        spreads: (J, m, m), what a component adds to the noise, or (0, m, m) for nothing.
+        expected: The measurement that each component predicts.
+        measurements: M of them.
         gate: Squared Mahalanobis distance of the innovation; infinity for none.
 
     Returns:
-        For each of the P pairs, measurement by measurement: component (P,),
-        measurement (P,), log N(z; h, S) (P,), mean (P, d), covariance (P, d, d)
-        in Joseph form, which stays symmetric and positive.
+        The pairs, measurement by measurement.
 
     Raises:
         numpy.linalg.LinAlgError: If the covariance of an innovation is not positive definite.
     """
-    dimension, order = means.shape[1], measurements.shape[1]
+    dimension, order = means.shape[1], measurements.values.shape[1]
+    lower = np.empty((len(means) if len(measurements.noises) == 1 else 1, order, order))
     # places in the plane and velocities are so frequent that their loops are unrolled
-    plane = dimension == 4 and order == 2
-    if plane:
-        ph, own = _innovations(covariances, jacobians, spreads, (0, 1, 2, 3), (0, 1))
-    else:
-        ph, own = _innovations(covariances, jacobians, spreads, range(dimension), range(order))
-    lower = np.empty((len(means) if len(noises) == 1 else 1, order, order))
-    component, measured, likelihood = gated_pairs(expected, measurements, noises, own, gate, lower)
-    if plane:
-        new_means, new_covariances = _updated(
-            component, measured, ph, own, lower, means, covariances, expected, jacobians,
-            measurements, noises, spreads, (0, 1, 2, 3), (0, 1),
-        )  # fmt: skip
-    else:
-        new_means, new_covariances = _updated(
-            component, measured, ph, own, lower, means, covariances, expected, jacobians,
-            measurements, noises, spreads, range(dimension), range(order),
-        )  # fmt: skip
-    return component, measured, likelihood, new_means, new_covariances
+    if dimension == 4 and order == 2:
+        axes, rows = (0, 1, 2, 3), (0, 1)
+        innovations = _innovations(covariances, expected, axes, rows)
+        pairs = gated_pairs(expected.values, measurements, innovations.own, gate, lower)
+        return _updated(
+            pairs, means, covariances, expected, measurements, innovations, lower, (axes, rows)
+        )
+    whole = (range(dimension), range(order))
+    innovations = _innovations(covariances, expected, whole[0], whole[1])
+    pairs = gated_pairs(expected.values, measurements, innovations.own, gate, lower)
+    return _updated(pairs, means, covariances, expected, measurements, innovations, lower, whole)
+
+
+@kernel
+def _in_posture(expected: Expected) -> Expected:
+    """What is predicted of those in the other posture, as of the only one."""
+    return Expected(
+        expected.posture_values,
+        expected.posture_jacobians,
+        expected.posture_spreads,
+        expected.posture_values[:0],
+        expected.posture_jacobians[:0],
+        expected.posture_spreads[:0],
+        expected.posture_drift,
+        expected.posture_share,
+    )
 
 
 @kernel
 def all_pairs(
     means: ndarray,
     covariances: ndarray,
-    expected: ndarray,
-    jacobians: ndarray,
-    measurements: ndarray,
-    noises: ndarray,
-    spreads: ndarray,
+    expected: Expected,
+    measurements: Measurements,
     gate: float,
-    other_expected: ndarray,
-    other_jacobians: ndarray,
-    other_spreads: ndarray,
-    other_drift: ndarray,
-    other_share: float,
-) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
-    """:func:`kalman_pairs` of a measurement that is of one of two kinds.
-
-        g(z|x) = (1 − ε) N(z; h(x), R + Ω) + ε N(z; h'(x'), R + Ω'),  x' = x + N(0, D)
+) -> Pairs:
+    """:func:`kalman_pairs` of a measurement of a target in one of two postures.
 
     Args:
         means: As the further ones, of :func:`kalman_pairs`.
-        other_expected: h' and, in the further ones, H', Ω', D and ε: :class:`Alternative`.
 
     Returns:
-        The pairs of the first kind and then those of the other.
+        The pairs of the first posture and then those of the other.
     """
-    component, measured, likelihood, new_means, new_covariances = kalman_pairs(
-        means, covariances, expected, jacobians, measurements, noises, spreads, gate
-    )
-    if len(other_expected) == 0:
-        return component, measured, likelihood, new_means, new_covariances
+    first = kalman_pairs(means, covariances, expected, measurements, gate)
+    if len(expected.posture_values) == 0:
+        return first
     more = kalman_pairs(
-        means,
-        covariances + other_drift,
-        other_expected,
-        other_jacobians,
-        measurements,
-        noises,
-        other_spreads,
-        gate,
+        means, covariances + expected.posture_drift, _in_posture(expected), measurements, gate
     )
-    return (
-        np.concatenate((component, more[0])),
-        np.concatenate((measured, more[1])),
-        np.concatenate((likelihood + math.log(1.0 - other_share), more[2] + math.log(other_share))),
-        np.concatenate((new_means, more[3])),
-        np.concatenate((new_covariances, more[4])),
+    share = expected.posture_share
+    return Pairs(
+        np.concatenate((first.components, more.components)),
+        np.concatenate((first.measured, more.measured)),
+        np.concatenate(
+            (
+                first.log_likelihoods + math.log(1.0 - share),
+                more.log_likelihoods + math.log(share),
+            )
+        ),
+        np.concatenate((first.means, more.means)),
+        np.concatenate((first.covariances, more.covariances)),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy import ndarray
@@ -10,39 +11,86 @@ from numpy import ndarray
 from tracker.kernels.compilation import kernel
 
 
+class Calibration(NamedTuple):
+    """A calibrated camera."""
+
+    image_size: ndarray
+    """(2,) width and height, pixels."""
+    rotation: ndarray
+    """(3, 3), world to camera axes."""
+    translation: ndarray
+    """(3,), metres, camera axes."""
+    intrinsics: ndarray
+    """(3, 3), pixels."""
+    distortion: ndarray
+    """(5,), k1 k2 p1 p2 k3."""
+    nearest_depth: float
+    """Metres; what is nearer than this does not count."""
+    largest_radius: float
+    """What is further aside, in units of the depth, does not count."""
+
+
+class Calibrations(NamedTuple):
+    """C calibrated cameras: the fields of :class:`Calibration`, stacked."""
+
+    image_sizes: ndarray
+    """(C, 2)."""
+    rotations: ndarray
+    """(C, 3, 3)."""
+    translations: ndarray
+    """(C, 3)."""
+    intrinsics: ndarray
+    """(C, 3, 3)."""
+    distortions: ndarray
+    """(C, 5)."""
+    nearest_depth: float
+    """Of all."""
+    largest_radii: ndarray
+    """(C,)."""
+
+
+class Projection(NamedTuple):
+    """N world points in a picture."""
+
+    pixels: ndarray
+    """(N, 2), NaN where the point does not count."""
+    jacobians: ndarray
+    """(N, 2, 3) pixels a metre, 0 where the point does not count; or (0, 2, 3)."""
+    valid: ndarray
+    """(N,), whether it counts."""
+
+
 @kernel
-def project_points(
-    points: ndarray,
-    rotation: ndarray,
-    translation: ndarray,
-    intrinsics: ndarray,
-    distortion: ndarray,
-    nearest_depth: float,
-    largest_radius: float,
-    with_jacobian: bool,
-) -> tuple[ndarray, ndarray, ndarray]:
+def one_camera(cameras: Calibrations, index: int) -> Calibration:
+    """One of several cameras."""
+    return Calibration(
+        cameras.image_sizes[index],
+        cameras.rotations[index],
+        cameras.translations[index],
+        cameras.intrinsics[index],
+        cameras.distortions[index],
+        cameras.nearest_depth,
+        cameras.largest_radii[index],
+    )
+
+
+@kernel
+def project_points(points: ndarray, camera: Calibration, with_jacobian: bool) -> Projection:
     """Draw world points through a radial-tangential lens.
 
     Args:
         points: (N, 3), world metres.
-        rotation: (3, 3), world to camera axes.
-        translation: (3,), metres.
-        intrinsics: (3, 3), pixels.
-        distortion: (5,), k1 k2 p1 p2 k3.
-        nearest_depth: Metres; what is nearer than this does not count.
-        largest_radius: What is further aside, in units of the depth, does not count.
+        camera: With its lens.
         with_jacobian: Whether the derivative is wanted.
-
-    Returns:
-        (N, 2) pixels, NaN where the point does not count; (N, 2, 3) pixels a metre,
-        0 there, or (0, 2, 3); and (N,), whether it counts.
     """
+    translation, intrinsics = camera.translation, camera.intrinsics
+    nearest_depth, largest_radius = camera.nearest_depth, camera.largest_radius
     count = len(points)
     pixels = np.full((count, 2), np.nan)
     jacobians = np.zeros((count if with_jacobian else 0, 2, 3))
     valid = np.zeros(count, dtype=np.bool_)
-    k1, k2, p1, p2, k3 = distortion
-    r = rotation
+    k1, k2, p1, p2, k3 = camera.distortion
+    r = camera.rotation
     for n in range(count):
         x, y, z = points[n, 0], points[n, 1], points[n, 2]
         depth = r[2, 0] * x + r[2, 1] * y + r[2, 2] * z + translation[2]
@@ -74,7 +122,7 @@ def project_points(
                 jacobians[n, i, a] = (
                     by_u * (r[0, a] - u * r[2, a]) + by_v * (r[1, a] - v * r[2, a])
                 ) / depth
-    return pixels, jacobians, valid
+    return Projection(pixels, jacobians, valid)
 
 
 @kernel
@@ -117,25 +165,18 @@ def undistort(distorted: ndarray, distortion: ndarray, iterations: int) -> ndarr
 
 
 @kernel
-def directions(
-    pixels: ndarray,
-    rotation: ndarray,
-    intrinsics: ndarray,
-    distortion: ndarray,
-    iterations: int,
-) -> ndarray:
+def directions(pixels: ndarray, camera: Calibration, iterations: int) -> ndarray:
     """Unit directions of the rays that a lens draws at some pixels: the way back.
 
     Args:
         pixels: (N, 2).
-        rotation: (3, 3), world to camera axes.
-        intrinsics: (3, 3), pixels.
-        distortion: (5,), k1 k2 p1 p2 k3.
+        camera: With its lens.
         iterations: Of :func:`undistort`; 0 for a pinhole.
 
     Returns:
         (N, 3), world axes.
     """
+    rotation, intrinsics = camera.rotation, camera.intrinsics
     count = len(pixels)
     drawn = np.empty((count, 2))
     determinant = intrinsics[0, 0] * intrinsics[1, 1] - intrinsics[0, 1] * intrinsics[1, 0]
@@ -143,7 +184,7 @@ def directions(
         across, down = pixels[n, 0] - intrinsics[0, 2], pixels[n, 1] - intrinsics[1, 2]
         drawn[n, 0] = (intrinsics[1, 1] * across - intrinsics[0, 1] * down) / determinant
         drawn[n, 1] = (intrinsics[0, 0] * down - intrinsics[1, 0] * across) / determinant
-    straight = undistort(drawn, distortion, iterations)
+    straight = undistort(drawn, camera.distortion, iterations)
     rays = np.empty((count, 3))
     for n in range(count):
         u, v = straight[n]

@@ -6,11 +6,43 @@ Every kernel has a NumPy or SciPy counterpart in the tests that it must agree wi
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy import ndarray
 
 from tracker.kernels.compilation import kernel
+
+
+class Gaussians(NamedTuple):
+    """J weighted Gaussians over a d-dimensional state."""
+
+    weights: ndarray
+    """(J,)."""
+    means: ndarray
+    """(J, d)."""
+    covariances: ndarray
+    """(J, d, d)."""
+
+
+class LabelGroups(NamedTuple):
+    """Which of J components share a label."""
+
+    labels: ndarray
+    """The distinct labels, ascending."""
+    places: ndarray
+    """(J,), the place of each component's label among them."""
+
+
+class SummedPairs(NamedTuple):
+    """K pairs of a component and a box, in the order of camera, component and box."""
+
+    cameras: ndarray
+    """(K,) int32, as the next two."""
+    components: ndarray
+    boxes: ndarray
+    probabilities: ndarray
+    """(K,) float32, at most 1."""
 
 
 @kernel
@@ -68,7 +100,7 @@ def squared_length(residual: ndarray, lower: ndarray) -> float:
 @kernel
 def merge_moments(
     weights: ndarray, means: ndarray, covariances: ndarray, group: ndarray, count: int
-) -> tuple[ndarray, ndarray, ndarray]:
+) -> Gaussians:
     """Weight, mean and covariance (spread of the means included) of each group.
 
     In a group without any weight all count the same. Who is in the group -1 is left out.
@@ -100,11 +132,11 @@ def merge_moments(
                 merged_covariances[g, a, b] += share * (
                     covariances[i, a, b] + difference_a * (means[i, b] - merged_means[g, b])
                 )
-    return merged_weights, merged_means, merged_covariances
+    return Gaussians(merged_weights, merged_means, merged_covariances)
 
 
 @kernel
-def group_labels(labels: ndarray) -> tuple[ndarray, ndarray]:
+def group_labels(labels: ndarray) -> LabelGroups:
     """The distinct labels, ascending, and for each of (J,) labels its place among them."""
     order = np.argsort(labels, kind="mergesort")
     distinct = np.empty(len(labels), dtype=np.int64)
@@ -115,7 +147,7 @@ def group_labels(labels: ndarray) -> tuple[ndarray, ndarray]:
             distinct[count] = labels[j]
             count += 1
         place[j] = count - 1
-    return distinct[:count].copy(), place
+    return LabelGroups(distinct[:count].copy(), place)
 
 
 @kernel
@@ -134,7 +166,7 @@ def inside_bounds(points: ndarray, low: ndarray, high: ndarray) -> ndarray:
 
 
 @kernel
-def doubles(
+def duplicates(
     means: ndarray,
     weights: ndarray,
     labels: ndarray,
@@ -154,7 +186,7 @@ def doubles(
         confirmed: Whoever has more weight is sure, and is never displaced by an unsure one.
     """
     size, cameras = len(means), len(sources)
-    double = np.zeros(size, dtype=np.bool_)
+    duplicate = np.zeros(size, dtype=np.bool_)
     for i in range(size):
         for j in range(size):
             if i == j:
@@ -173,27 +205,23 @@ def doubles(
                 if sources[c, i] >= 0 and sources[c, j] >= 0 and sources[c, i] != sources[c, j]:
                     parted = True
             if not parted or distance < (near / 2.0) * (near / 2.0):
-                double[i] = True
+                duplicate[i] = True
                 break
-    return double
+    return duplicate
 
 
 @kernel
 def sum_pairs(
     labels: ndarray, cameras: ndarray, of_pairs: ndarray, boxes: ndarray, weights: ndarray
-) -> tuple[ndarray, ndarray, ndarray, ndarray]:
+) -> SummedPairs:
     """Sum the pairs of one camera, component and box; pairs of absent labels are left out.
 
     Args:
         labels: (J,) of the components; of several with one label the first stands for it.
         cameras: (A,) of the pairs, as the further ones.
-        of_pairs: (A,) labels.
-        boxes: (A,).
+        of_pairs: (A,) labels, known or not.
+        boxes: (A,), counted within the camera.
         weights: (A,).
-
-    Returns:
-        (K,) camera, component, box and sum, at most 1, of each pair, in the order of the first
-        three: as int32 and float32.
     """
     count = len(of_pairs)
     width = 1
@@ -222,7 +250,7 @@ def sum_pairs(
     found = found[:distinct]
     rest = found // width
     size = max(len(labels), 1)
-    return (
+    return SummedPairs(
         (rest // size).astype(np.int32),
         (rest % size).astype(np.int32),
         (found % width).astype(np.int32),

@@ -2,21 +2,71 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy import ndarray
 
 from tracker.kernels.boxes import expected_boxes
 from tracker.kernels.compilation import kernel
+from tracker.kernels.gating import Measurements
+from tracker.kernels.kalman import Expected
+from tracker.kernels.lens import Calibration
 from tracker.kernels.linear_algebra import factorise, solve
 
 _SIGMA_POINTS = 6
 """Of a 3D position: its axes at ±√3 standard deviations, each with 1/6 of the weight."""
 
 
+class Target(NamedTuple):
+    """A target of known size, upright or in another posture: lying, crouching, bent."""
+
+    half_height: float
+    """Of the upright target, metres."""
+    half_width: float
+    """Likewise."""
+    size: int
+    """m, how much of a box is measured: see :func:`tracker.kernels.boxes.expected_boxes`."""
+    unscented: bool
+    """Whether the projection's bend over a state's uncertainty counts."""
+    posture_half_height: float
+    """In the other posture, metres."""
+    posture_half_width: float
+    """Likewise."""
+    posture_noise: ndarray
+    """(m, m), how far the box may then be off, for one pixel of the upright box's half height;
+    (0, 0) where there is no other posture."""
+    posture_drift: ndarray
+    """(d, d), as ``posture_share``, of :class:`tracker.kernels.kalman.Expected`."""
+    posture_share: float
+
+
+class ExpectedBoxes(NamedTuple):
+    """What a camera should measure of J targets."""
+
+    expected: Expected
+    """Of those who stand, and, infinite where there is nothing to see, in the other posture."""
+    boxes: ndarray
+    """(J, 4) left, top, right, bottom of those who stand, not clipped, pixels."""
+    depths: ndarray
+    """(J,), distance from the lens, metres."""
+    valid: ndarray
+    """(J,), whether there is anything to see."""
+
+
+class _SigmaPoints(NamedTuple):
+    """The unscented points of J positions."""
+
+    points: ndarray
+    """χ (6 J, 3)."""
+    offsets: ndarray
+    """χ − m (6 J, 3)."""
+
+
 @kernel
 def measured_boxes(
     boxes: ndarray, variances: ndarray, transform: ndarray, products: ndarray
-) -> tuple[ndarray, ndarray]:
+) -> Measurements:
     """Boxes as measurements z = T b, and their noise T diag(σ²) Tᵀ.
 
     Args:
@@ -24,9 +74,6 @@ def measured_boxes(
         variances: σ² (M, 4).
         transform: T (m, 4).
         products: (4, m²), what each variance adds to each entry of the noise.
-
-    Returns:
-        (M, m) and (M, m, m).
     """
     count, size = len(boxes), len(transform)
     values = np.zeros((count, size))
@@ -37,81 +84,64 @@ def measured_boxes(
                 values[i, a] += transform[a, part] * boxes[i, part]
                 for b in range(size):
                     noises[i, a, b] += variances[i, part] * products[part, a * size + b]
-    return values, noises
+    return Measurements(values, noises)
 
 
 @kernel
 def expected_measurements(
-    states: ndarray,
-    covariances: ndarray,
-    unscented: bool,
-    half_height: float,
-    half_width: float,
-    low_half_height: float,
-    low_half_width: float,
-    low_noise: ndarray,
-    size: int,
-    image_size: tuple[int, int],
-    rotation: ndarray,
-    translation: ndarray,
-    intrinsics: ndarray,
-    distortion: ndarray,
-    nearest_depth: float,
-    largest_radius: float,
-) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray, ndarray, ndarray, ndarray, ndarray]:
-    """What a camera should measure of each target: upright, and lying or bent.
+    states: ndarray, covariances: ndarray, target: Target, camera: Calibration
+) -> ExpectedBoxes:
+    """What a camera should measure of each target: upright, and in the other posture.
 
     Args:
         states: (J, d), position first, world metres.
-        covariances: (J, d, d); they count where ``unscented`` says so.
-        unscented: Whether the projection's bend over a state's uncertainty counts.
-        half_height: Of the upright target, metres, as ``half_width``.
-        low_half_height: Of one who lies or bends, as ``low_half_width``.
-        low_noise: (m, m), how far his box may be off, for one pixel of the upright box's half
-            height; (0, 0) where nobody lies.
-        size: As the further ones, of :func:`tracker.kernels.boxes.expected_boxes`.
-
-    Returns:
-        Upright: (J, m) values, (J, m, d) derivatives, (J, m, m) what the bend adds to the noise
-        or (0, m, m) for nothing, (J, 4) boxes, (J,) depths, (J,) whether there is anything to
-        see. Low: (J, m) values, infinite where there is nothing to see, (J, m, d) derivatives
-        and (J, m, m) noise; or none of each.
+        covariances: (J, d, d); they count for an unscented target.
+        target: Its sizes and postures.
+        camera: Its picture, lens and pose.
     """
-    values, jacobians, boxes, depths, valid = expected_boxes(
-        states, half_height, half_width, size, image_size, rotation, translation, intrinsics,
-        distortion, nearest_depth, largest_radius,
-    )  # fmt: skip
-    low = len(states) if len(low_noise) > 0 else 0
-    low_values, low_jacobians, _, _, low_valid = expected_boxes(
-        states[:low], low_half_height, low_half_width, size, image_size, rotation, translation,
-        intrinsics, distortion, nearest_depth, largest_radius,
-    )  # fmt: skip
-    low_spreads = np.empty((low, size, size))
-    for j in range(low):
-        if not low_valid[j]:
-            low_values[j] = np.inf  # beyond every gate
-        scale = max((boxes[j, 3] - boxes[j, 1]) / 2.0, 1.0)
-        low_spreads[j] = scale * scale * low_noise
-    spreads = np.zeros((len(states) if unscented else 0, size, size))
-    if unscented:
-        points, offsets = _sigma_points(states, covariances)
-        drawn, _, _, _, ahead = expected_boxes(
-            points, half_height, half_width, size, image_size, rotation, translation, intrinsics,
-            distortion, nearest_depth, largest_radius,
-        )  # fmt: skip
+    size = target.size
+    seen = expected_boxes(states, target.half_height, target.half_width, size, camera)
+    others = len(states) if len(target.posture_noise) > 0 else 0
+    posture = expected_boxes(
+        states[:others], target.posture_half_height, target.posture_half_width, size, camera
+    )
+    posture_spreads = np.empty((others, size, size))
+    for j in range(others):
+        if not posture.valid[j]:
+            posture.values[j] = np.inf  # beyond every gate
+        scale = max((seen.boxes[j, 3] - seen.boxes[j, 1]) / 2.0, 1.0)
+        posture_spreads[j] = scale * scale * target.posture_noise
+    spreads = np.zeros((len(states) if target.unscented else 0, size, size))
+    if target.unscented:
+        sigma = _sigma_points(states, covariances)
+        drawn = expected_boxes(sigma.points, target.half_height, target.half_width, size, camera)
         for j in range(len(states)):
             own = slice(_SIGMA_POINTS * j, _SIGMA_POINTS * (j + 1))
-            if valid[j] and ahead[own].all():
-                _regress(drawn[own], offsets[own], covariances[j], values[j], jacobians[j],
-                         spreads[j])  # fmt: skip
-    return (
-        values, jacobians, spreads, boxes, depths, valid, low_values, low_jacobians, low_spreads,
-    )  # fmt: skip
+            if seen.valid[j] and drawn.valid[own].all():
+                _regress(
+                    drawn.values[own], sigma.offsets[own], covariances[j],
+                    seen.values[j], seen.jacobians[j], spreads[j],
+                )  # fmt: skip
+    return ExpectedBoxes(
+        Expected(
+            seen.values,
+            seen.jacobians,
+            spreads,
+            posture.values,
+            posture.jacobians,
+            posture_spreads,
+            target.posture_drift,
+            target.posture_share,
+        ),
+        seen.boxes,
+        seen.depths,
+        seen.valid,
+    )
 
 
 @kernel
-def _sigma_points(states: ndarray, covariances: ndarray) -> tuple[ndarray, ndarray]:
-    """The unscented points χ of each position, (6 J, 3), and their offsets χ − m."""
+def _sigma_points(states: ndarray, covariances: ndarray) -> _SigmaPoints:
+    """The unscented points of each position."""
     count = len(states)
     offsets = np.empty((_SIGMA_POINTS * count, 3))
     points = np.empty((_SIGMA_POINTS * count, 3))
@@ -124,7 +154,7 @@ def _sigma_points(states: ndarray, covariances: ndarray) -> tuple[ndarray, ndarr
                 offset = sign * lower[a, k % 3]
                 offsets[_SIGMA_POINTS * j + k, a] = offset
                 points[_SIGMA_POINTS * j + k, a] = states[j, a] + offset
-    return points, offsets
+    return _SigmaPoints(points, offsets)
 
 
 @kernel

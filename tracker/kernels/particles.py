@@ -5,13 +5,33 @@ Every kernel has a NumPy counterpart in the tests that it must agree with.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy import ndarray
 
-from tracker.kernels.compilation import kernel
+from tracker.kernels.compilation import pixel_kernel
 
 
-@kernel
+class FixedPoints(NamedTuple):
+    """Where S climbs ended."""
+
+    points: ndarray
+    """(S, 4), centre x, centre y, half width, half height."""
+    densities: ndarray
+    """(S,), there."""
+
+
+class Modes(NamedTuple):
+    """M modes of S fixed points."""
+
+    owners: ndarray
+    """(S,), the mode of each point, -1 for none."""
+    leaders: ndarray
+    """(M,), the point of each mode."""
+
+
+@pixel_kernel
 def epanechnikov_climb(
     boxes: ndarray,
     counts: ndarray,
@@ -19,7 +39,7 @@ def epanechnikov_climb(
     bandwidth: float,
     iterations: int,
     tolerance: float,
-) -> tuple[ndarray, ndarray]:
+) -> FixedPoints:
     """Climb from every box to a fixed point of the mean shift with the Epanechnikov kernel.
 
     The density is Σ_i c_i max(0, 1 - r_i²), r_i the distance between the centres in units of
@@ -33,9 +53,6 @@ def epanechnikov_climb(
         bandwidth: In half sizes.
         iterations: At most so many steps.
         tolerance: Stop when a step is shorter than this many half sizes.
-
-    Returns:
-        (S, 4) fixed points, and (S,) densities there.
     """
     size = len(boxes)
     points = boxes.copy()
@@ -71,13 +88,11 @@ def epanechnikov_climb(
             points[k] = shifted
             if u * u + v * v < tolerance * tolerance:
                 break
-    return points, densities
+    return FixedPoints(points, densities)
 
 
-@kernel
-def join_modes(
-    points: ndarray, counts: ndarray, order: ndarray, distance: float
-) -> tuple[ndarray, ndarray]:
+@pixel_kernel
+def join_modes(points: ndarray, counts: ndarray, order: ndarray, distance: float) -> Modes:
     """Fixed points that lie close to a denser one belong to its mode.
 
     Args:
@@ -85,9 +100,6 @@ def join_modes(
         counts: (S,), how many particles climbed to each; those of 0 have no mode.
         order: (S,) indices, densest first.
         distance: In half sizes of the denser one, between the centres.
-
-    Returns:
-        The mode of each point (S,), -1 for none, and the point of each mode (M,).
     """
     size = len(points)
     owners = np.full(size, -1, dtype=np.int64)
@@ -108,4 +120,4 @@ def join_modes(
             owners[i] = modes
             leaders[modes] = i
             modes += 1
-    return owners, leaders[:modes].copy()
+    return Modes(owners, leaders[:modes].copy())

@@ -10,26 +10,41 @@ where ours differs.
 
 from __future__ import annotations
 
+import importlib
+from typing import TYPE_CHECKING, Any
+
 from tracker.parameters.association_matrix import AssociationMatrixParams
-from tracker.parameters.changing import (
-    ParameterError,
-    changed,
-    stage_values,
-    value,
-    with_values,
-)
 from tracker.parameters.colour_phd import ColourPeakParams, ColourPhdParams
-from tracker.parameters.definition import Params, Stage
+from tracker.parameters.definition import Params, Stage, ui
 from tracker.parameters.detections import DetectionBoxParams, DetectionPhdParams
 from tracker.parameters.foreground import ForegroundParams
 from tracker.parameters.fusion import FusionParams
 from tracker.parameters.jpda import JpdaParams
+from tracker.parameters.methods import Method, MethodKey, Reads, Uses
 from tracker.parameters.pseudo_particle import PseudoParticleParams
-from tracker.parameters.run import FusionName, RunParameters, SingleViewName, SmoothingName
 from tracker.parameters.smoothing import SmoothingParams
-from tracker.parameters.table import GROUPS, METHODS, PARAMETERS, PRESETS, Parameter
+
+if TYPE_CHECKING:
+    from tracker.parameters.changing import (
+        ParameterError,
+        changed,
+        value,
+        with_values,
+    )
+    from tracker.parameters.reading import shown_keys, stage_values
+    from tracker.parameters.registry import FOLLOWS, PluginWarning
+    from tracker.parameters.run import RunParameters
+    from tracker.parameters.table import (
+        GROUPS,
+        METHODS,
+        PARAMETERS,
+        PRESETS,
+        Parameter,
+        method_of,
+    )
 
 __all__ = [
+    "FOLLOWS",
     "GROUPS",
     "METHODS",
     "PARAMETERS",
@@ -40,20 +55,53 @@ __all__ = [
     "DetectionBoxParams",
     "DetectionPhdParams",
     "ForegroundParams",
-    "FusionName",
     "FusionParams",
     "JpdaParams",
+    "Method",
+    "MethodKey",
     "Parameter",
     "ParameterError",
     "Params",
+    "PluginWarning",
     "PseudoParticleParams",
+    "Reads",
     "RunParameters",
-    "SingleViewName",
-    "SmoothingName",
     "SmoothingParams",
     "Stage",
+    "Uses",
     "changed",
+    "method_of",
+    "shown_keys",
     "stage_values",
+    "ui",
     "value",
     "with_values",
 ]
+
+_MADE_OF_ALL_METHODS = {
+    "FOLLOWS": "registry",
+    "PluginWarning": "registry",
+    "RunParameters": "run",
+    "GROUPS": "table",
+    "METHODS": "table",
+    "PARAMETERS": "table",
+    "PRESETS": "table",
+    "Parameter": "table",
+    "method_of": "table",
+    "ParameterError": "changing",
+    "changed": "changing",
+    "value": "changing",
+    "with_values": "changing",
+    "shown_keys": "reading",
+    "stage_values": "reading",
+}
+"""What is made when it is first asked for: it needs the methods of other packages, which
+themselves import from here what a group of parameters is made of."""
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MADE_OF_ALL_METHODS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module = importlib.import_module(f"{__name__}.{_MADE_OF_ALL_METHODS[name]}")
+    found = globals()[name] = getattr(module, name)
+    return found

@@ -11,6 +11,10 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
+from tracker.parameters.methods import Method, Reads, Uses
+
+_APART = {"follow_mild": (True,)}
+_TARGETS = {"output": ("targets",)}
 
 
 class AssociationMatrixParams(Params):
@@ -44,11 +48,13 @@ class AssociationMatrixParams(Params):
     follow_mild: Annotated[bool, ui("MS")] = True
     """Whether two who merge under mild occlusion are followed apart by mean shift."""
 
-    mild_share: Annotated[float, Field(ge=0.1, le=1.5), ui("S_k/(S_a+S_b)", step=0.01)] = 0.8
+    mild_share: Annotated[
+        float, Field(ge=0.1, le=1.5), ui("S_k/(S_a+S_b)", step=0.01, when=_APART)
+    ] = 0.8
     """Two who merge into an object larger than this share of both are mildly occluded."""
 
     occlusion_distance: Annotated[
-        float, Field(ge=0.0, le=3.0), ui("ε", unit="half widths", step=0.05)
+        float, Field(ge=0.0, le=3.0), ui("ε", unit="half widths", step=0.05, when=_APART)
     ] = 0.5
     """Two who are followed apart are one object once their centres are this near."""
 
@@ -58,13 +64,21 @@ class AssociationMatrixParams(Params):
     output: Annotated[Literal["targets", "objects"], ui("Y", published="objects")] = "targets"
     """What goes to the fusion: target boxes fitted to the objects' outlines, or the objects."""
 
-    acceptance: Annotated[float, Field(ge=-10.0, le=0.0), ui("s_min", step=0.1)] = -2.0
+    acceptance: Annotated[
+        float,
+        Field(ge=-10.0, le=0.0),
+        ui("s_min", step=0.1, when=_TARGETS, essential=True),
+    ] = -2.0
     """Targets: an object's best box is not taken if the outline fits it worse than this."""
 
-    further_acceptance: Annotated[float, Field(ge=-10.0, le=0.0), ui("s_2", step=0.1)] = -1.7
+    further_acceptance: Annotated[
+        float, Field(ge=-10.0, le=0.0), ui("s_2", step=0.1, when=_TARGETS)
+    ] = -1.7
     """Targets: nor are the other boxes of a merged object if they fit worse than this."""
 
-    spare_acceptance: Annotated[float, Field(ge=-10.0, le=0.0), ui("s_+", step=0.1)] = -0.7
+    spare_acceptance: Annotated[
+        float, Field(ge=-10.0, le=0.0), ui("s_+", step=0.1, when=_TARGETS)
+    ] = -0.7
     """Targets: a box that fits better than this is taken beyond the object's number of tracks."""
 
     centre_sigma: Annotated[
@@ -76,3 +90,46 @@ class AssociationMatrixParams(Params):
         float, Field(ge=0.02, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
     ] = 0.2
     """Standard deviation of a box's half sizes."""
+
+    straying: Annotated[
+        float, Field(ge=0.0, le=2.0), ui("v_s", unit="1/step", step=0.01, advanced=True)
+    ] = 0.1
+    """How much further a lost object may be found with every step, as a share of its reach."""
+
+    inside_weight: Annotated[
+        float, Field(ge=0.0, le=20.0), ui("a", step=0.5, advanced=True, when=_TARGETS)
+    ] = 3.0
+    """Targets: how much the foreground inside a box counts for it."""
+
+    around_weight: Annotated[
+        float, Field(ge=0.0, le=20.0), ui("b", step=0.5, advanced=True, when=_TARGETS)
+    ] = 3.0
+    """Targets: how much the foreground above and beside it counts against it."""
+
+    least_inside: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("f_min", step=0.05, advanced=True, when=_TARGETS)
+    ] = 0.4
+    """Targets: a box with a smaller share of foreground is nobody."""
+
+    averaging_width: Annotated[
+        float,
+        Field(ge=0.05, le=5.0),
+        ui("h", unit="half sizes", step=0.05, advanced=True, when=_TARGETS),
+    ] = 0.5
+    """Targets: width over which boxes that fit nearly as well are averaged."""
+
+    apart: Annotated[
+        float,
+        Field(ge=0.0, le=5.0),
+        ui("d", unit="half sizes", step=0.1, advanced=True, when=_TARGETS),
+    ] = 1.0
+    """Targets: the distance that two boxes keep."""
+
+
+METHOD = Method(
+    name="association_matrix",
+    help="Tracks of foreground objects by decision matrices.",
+    made_by="tracker.single_view.association_matrix.method:AssociationMatrix",
+    uses=Uses(pictures=True, reads=(Reads("association_matrix"), Reads("foreground"))),
+    parameters=AssociationMatrixParams,
+)

@@ -1,4 +1,4 @@
-"""Values by key: read, changed with all checks, compared, and split by stage."""
+"""Values by key: read, changed with all checks, and compared."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from collections.abc import Mapping
 from operator import attrgetter
 from typing import Any
 
-from tracker.parameters.colour_phd import ColourPeakParams
-from tracker.parameters.definition import Stage
-from tracker.parameters.run import FOREGROUND_METHODS, RunParameters
+from tracker.parameters.run import RunParameters
 from tracker.parameters.table import METHODS, PARAMETERS, Parameter
 
 _READ = {key: attrgetter(key) for key in (*METHODS, *PARAMETERS)}
@@ -17,11 +15,18 @@ _READ = {key: attrgetter(key) for key in (*METHODS, *PARAMETERS)}
 
 
 class ParameterError(ValueError):
-    """A parameter does not exist or its value is out of range; the message says what to do."""
+    """A parameter does not exist or its value is out of range; the message says what to do.
 
-    def __init__(self, key: str, message: str) -> None:
+    Args:
+        key: Of the parameter, or the name of what else was asked for.
+        message: What was expected and what was found.
+        hint: Where to find what there is, if that is not the table of parameters.
+    """
+
+    def __init__(self, key: str, message: str, hint: str | None = None) -> None:
         super().__init__(f"{key}: {message}")
         self.key = key
+        self.hint = hint
 
 
 def value(parameters: RunParameters, key: str) -> Any:
@@ -97,39 +102,3 @@ def changed(parameters: RunParameters, reference: RunParameters | None = None) -
     reference = reference or RunParameters()
     values = ((key, read(parameters), read(reference)) for key, read in _READ.items())
     return {key: own for key, own, other in values if own != other}
-
-
-def stage_values(parameters: RunParameters, stage: Stage) -> dict[str, Any]:
-    """What the result of one stage depends on by itself: its method and its parameters."""
-    values: dict[str, Any] = {}
-    if stage == "single_view":
-        values["single_view"] = parameters.single_view
-    if stage == "fusion":
-        values["fusion_method"] = parameters.fusion_method
-    if stage == "smoothing":
-        values["smoothing_method"] = parameters.smoothing_method
-        if parameters.smoothing_method == "none":
-            return values
-    for key, parameter in PARAMETERS.items():
-        if parameter.stage == stage and (stage != "single_view" or _reads(parameters, parameter)):
-            values[key] = value(parameters, key)
-    return values
-
-
-def _reads(parameters: RunParameters, parameter: Parameter) -> bool:
-    """Whether the chosen single-view method reads a number."""
-    method, group = parameters.single_view, parameter.group
-    if group == ("detection_boxes" if method == "none" else method):
-        return True
-    if method == "jpda":
-        source = parameters.jpda.measurements
-        return (
-            (group == "foreground" and source != "detections")
-            or (group == "detection_boxes" and source == "detections")
-            or (
-                group == "colour_phd"
-                and source == "colour"
-                and parameter.name in ColourPeakParams.model_fields
-            )
-        )
-    return group == "foreground" and method in FOREGROUND_METHODS

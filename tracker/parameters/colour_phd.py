@@ -6,11 +6,15 @@ density filtering", 2021.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
+from tracker.parameters.methods import Method, Reads, Uses
+
+if TYPE_CHECKING:
+    from tracker.parameters.run import RunParameters
 
 
 class ColourPeakParams(Params):
@@ -30,7 +34,7 @@ class ColourPeakParams(Params):
     """Spread of the distance D to the nearest template in the colour likelihood N(D; 0, σ²)."""
 
     acceptance_distance: Annotated[
-        float, Field(ge=0.05, le=1.0), ui("D_max", step=0.01, published=1.0)
+        float, Field(ge=0.05, le=1.0), ui("D_max", step=0.01, published=1.0, essential=True)
     ] = 0.52
     """A peak less likely, with its foreground, than a box at this distance is not taken."""
 
@@ -80,6 +84,30 @@ class ColourPeakParams(Params):
         float, Field(ge=0.02, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
     ] = 0.5
     """Standard deviation of a peak's half sizes: colour alone hardly tells them."""
+
+    size_jitter: Annotated[float, Field(ge=0.0, le=1.0), ui("σ_s", step=0.01, advanced=True)] = 0.1
+    """Spread of the samples' sizes around what a target has at a place: people differ."""
+
+    merge_distance: Annotated[
+        float, Field(ge=0.1, le=5.0), ui("d_m", unit="half sizes", step=0.1, advanced=True)
+    ] = 0.8
+    """Climbs that end nearer to each other than this are one peak."""
+
+    same_person_distance: Annotated[
+        float, Field(ge=0.1, le=5.0), ui("d_g", unit="half sizes", step=0.1, advanced=True)
+    ] = 1.5
+    """Peaks of one person's colours keep this far apart."""
+
+    @property
+    def asks_foreground(self) -> bool:
+        """Whether anything is made of the foreground."""
+        asked = (
+            self.acceptance_foreground,
+            self.foreground_weight,
+            self.surroundings_weight,
+            self.foreground_samples,
+        )
+        return max(asked) > 0.0
 
 
 class ColourPhdParams(ColourPeakParams):
@@ -132,3 +160,24 @@ class ColourPhdParams(ColourPeakParams):
 
     output: Annotated[Literal["peaks", "estimates"], ui("Y", published="estimates")] = "peaks"
     """What goes to the fusion: this step's peaks, which lag less, or the filter's estimates."""
+
+    gate_probability: Annotated[float, Field(ge=0.5, le=0.999999), ui("P_G", advanced=True)] = (
+        0.9999
+    )
+    """Probability that a person's own peak lies in the gate."""
+
+
+def _uses(parameters: RunParameters) -> Uses:
+    asked = parameters.of(ColourPhdParams).asks_foreground
+    foreground = parameters.foreground.read_by_colours if asked else ()
+    reads = (Reads("colour_phd"), *foreground)
+    return Uses(pictures=True, templates="needed", reads=reads)
+
+
+METHOD = Method(
+    name="colour_phd",
+    help="GM-PHD filter on peaks of the colour likelihood.",
+    made_by="tracker.single_view.colour_phd:ColourPhd",
+    uses=_uses,
+    parameters=ColourPhdParams,
+)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 Stage = Literal["single_view", "fusion", "smoothing", "tracks"]
+
+NO_CONDITION: Mapping[str, tuple[Any, ...]] = MappingProxyType({})
 
 
 def ui(
@@ -18,6 +22,8 @@ def ui(
     stage: Stage | None = None,
     published: Any = None,
     advanced: bool = False,
+    when: Mapping[str, tuple[Any, ...]] = NO_CONDITION,
+    essential: bool = False,
 ) -> Any:
     """What a parameter's face needs beyond its range and help.
 
@@ -29,6 +35,9 @@ def ui(
         stage: The first stage that a change re-runs, where it is not the group's.
         published: The value of the ``published`` preset, where it differs from the default.
         advanced: Whether the page folds it away at first.
+        when: Other parameters of the same group and the values of each with which this one has
+            an effect; with any other value it is not shown.
+        essential: Whether it is among the few that the page shows first.
     """
     extra = {
         "symbol": symbol,
@@ -38,6 +47,8 @@ def ui(
         "stage": stage,
         "published": published,
         "advanced": advanced,
+        "when": {name: list(values) for name, values in when.items()},
+        "essential": essential,
     }
     return Field(json_schema_extra={"x-ui": extra})
 

@@ -7,12 +7,15 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
+from tracker.parameters.methods import Method, Reads, Uses
 
 
 class DetectionBoxParams(Params):
     """An outside detector's boxes, as they are."""
 
-    score_threshold: Annotated[float, Field(ge=0.0, le=1.0), ui("s_min", step=0.01)] = 0.0
+    score_threshold: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("s_min", step=0.01, essential=True)
+    ] = 0.0
     """Boxes with a lower score are left out."""
 
     room_tolerance: Annotated[float, Field(ge=0.0, le=100.0), ui("d_r", unit="m", step=0.1)] = 1.0
@@ -35,6 +38,9 @@ class DetectionBoxParams(Params):
 
     pixel_sigma: Annotated[float, Field(ge=0.0, le=50.0), ui("σ_px", unit="px", step=0.1)] = 1.5
     """Noise of a box's centre and half sizes however small it is; it adds to the shares."""
+
+    depth_sigmas: Annotated[float, Field(ge=0.0, le=10.0), ui("k_σ", step=0.5, advanced=True)] = 3.0
+    """Standard deviations by which the size of a box may be off when it is set against the room."""
 
 
 class DetectionPhdParams(DetectionBoxParams):
@@ -81,3 +87,26 @@ class DetectionPhdParams(DetectionBoxParams):
 
     output: Annotated[Literal["boxes", "estimates"], ui("Y", published="estimates")] = "boxes"
     """What goes to the fusion: the boxes that the filter believes in, or its estimates."""
+
+    gate_probability: Annotated[float, Field(ge=0.5, le=0.999999), ui("P_G", advanced=True)] = (
+        0.9999
+    )
+    """Probability that a person's own box lies in the gate."""
+
+
+AS_THEY_ARE = Method(
+    name="none",
+    help="An outside detector's boxes, without a filter in the picture.",
+    made_by="tracker.single_view.none:DetectionBoxes",
+    uses=Uses(detections=True, reads=(Reads("detection_boxes"),)),
+    parameters=DetectionBoxParams,
+    group="detection_boxes",
+)
+
+FILTERED = Method(
+    name="detection_phd",
+    help="GM-PHD filter on an outside detector's boxes.",
+    made_by="tracker.single_view.detection_phd:DetectionPhd",
+    uses=Uses(detections=True, reads=(Reads("detection_phd"),)),
+    parameters=DetectionPhdParams,
+)

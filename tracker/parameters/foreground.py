@@ -11,6 +11,9 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
+from tracker.parameters.methods import Reads
+
+_LEARNT, _ADAPTIVE = {"model": ("learnt",)}, {"model": ("adaptive",)}
 
 
 class ForegroundParams(Params):
@@ -19,47 +22,82 @@ class ForegroundParams(Params):
     model: Annotated[Literal["learnt", "adaptive"], ui("M", published="adaptive")] = "learnt"
     """A background learnt once from the clip and one threshold, or the c-means of [CMQ07]."""
 
-    threshold: Annotated[float, Field(ge=2.0, le=128.0), ui("θ", unit="16 √level", step=1.0)] = 24.0
+    threshold: Annotated[
+        float, Field(ge=2.0, le=128.0), ui("θ", unit="16 √level", step=1.0, when=_LEARNT)
+    ] = 24.0
     """Learnt: a pixel that differs more than this from the background is foreground."""
 
     background_centre: Annotated[
-        float, Field(ge=0.0, le=50.0), ui("m_b", unit="grey levels", step=1.0, advanced=True)
+        float,
+        Field(ge=0.0, le=50.0),
+        ui("m_b", unit="grey levels", step=1.0, advanced=True, when=_ADAPTIVE),
     ] = 5.0
     """Adaptive: where the background's class of differences starts."""
 
     foreground_centre: Annotated[
-        float, Field(ge=10.0, le=200.0), ui("m_f", unit="grey levels", step=1.0, advanced=True)
+        float,
+        Field(ge=10.0, le=200.0),
+        ui("m_f", unit="grey levels", step=1.0, advanced=True, when=_ADAPTIVE),
     ] = 50.0
     """Adaptive: where the foreground's class of differences starts."""
 
-    deviation_ratio: Annotated[float, Field(ge=0.1, le=10.0), ui("σ_b/σ_f", step=0.1, log=True)] = (
-        3.0
-    )
+    deviation_ratio: Annotated[
+        float, Field(ge=0.1, le=10.0), ui("σ_b/σ_f", step=0.1, log=True, when=_ADAPTIVE)
+    ] = 3.0
     """Adaptive: the background's deviation over the foreground's; more makes less foreground."""
 
     least_threshold: Annotated[
-        float, Field(ge=0.0, le=100.0), ui("t_min", unit="grey levels", step=1.0, published=0.0)
+        float,
+        Field(ge=0.0, le=100.0),
+        ui("t_min", unit="grey levels", step=1.0, published=0.0, when=_ADAPTIVE),
     ] = 20.0
     """Adaptive: a difference below this is noise, whatever the classes say."""
 
-    follow_exposure: Annotated[bool, ui("I/M", published=False)] = True
+    follow_exposure: Annotated[bool, ui("I/M", published=False, when=_ADAPTIVE)] = True
     """Adaptive: whether the background is brought to each picture's exposure."""
 
-    drop_shadows: Annotated[bool, ui("S", published=False)] = True
+    drop_shadows: Annotated[bool, ui("S", published=False, when=_ADAPTIVE)] = True
     """Adaptive: whether an even loss of light is no difference."""
 
     update_limit: Annotated[
-        int, Field(ge=1, le=60), ui("Th", unit="grey levels", step=1, advanced=True)
+        int, Field(ge=1, le=60), ui("Th", unit="grey levels", step=1, advanced=True, when=_ADAPTIVE)
     ] = 6
     """Adaptive: only a pixel that differs by less than this changes the background."""
 
     update_frames: Annotated[
-        int, Field(ge=1, le=250), ui("w", unit="steps", step=1, advanced=True)
+        int, Field(ge=1, le=250), ui("w", unit="steps", step=1, advanced=True, when=_ADAPTIVE)
     ] = 10
     """Adaptive: a pixel must have been background for so long to change it."""
 
-    update_rate: Annotated[float, Field(ge=0.0, le=1.0), ui("α", step=0.01)] = 0.1
+    update_rate: Annotated[float, Field(ge=0.0, le=1.0), ui("α", step=0.01, when=_ADAPTIVE)] = 0.1
     """Adaptive: how far the background goes towards each picture."""
 
     minimum_area: Annotated[int, Field(ge=1, le=5000), ui("A_min", unit="px", log=True)] = 40
     """Smaller pieces of foreground are nobody."""
+
+    darkest_shadow: Annotated[float, Field(ge=0.0, le=1.0), ui("s_l", step=0.01, advanced=True)] = (
+        0.65
+    )
+    """A shadow leaves at least this share of the light."""
+
+    shadow_tint: Annotated[float, Field(ge=0.0, le=1.0), ui("s_t", step=0.01, advanced=True)] = 0.08
+    """And the same of each channel, up to this."""
+
+    blinding_share: Annotated[
+        float, Field(ge=0.05, le=1.0), ui("n_b", step=0.05, advanced=True, when=_ADAPTIVE)
+    ] = 0.6
+    """Adaptive: a picture of which a larger share differs shows another scene or light."""
+
+    blank_deviation: Annotated[
+        float,
+        Field(ge=0.0, le=50.0),
+        ui("σ_0", unit="grey levels", step=0.5, advanced=True, when=_ADAPTIVE),
+    ] = 4.0
+    """Adaptive: a picture whose grey levels deviate by less than this shows nothing."""
+
+    @property
+    def read_by_colours(self) -> tuple[Reads, ...]:
+        """What a method on colour reads of the group: it asks for no pieces of the foreground,
+        which a learnt background has no least size of."""
+        without = frozenset({"minimum_area"}) if self.model == "learnt" else frozenset()
+        return (Reads("foreground", without=without),)

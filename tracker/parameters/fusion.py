@@ -6,33 +6,45 @@ density filtering", 2021.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
+from tracker.parameters.methods import Method, Reads, Uses
+
+if TYPE_CHECKING:
+    from tracker.parameters.run import RunParameters
+
+_BOXES = {"measurement": ("box", "box_and_width")}
+_RECOGNITION = {"recognition": (True,)}
+_WALK, _VELOCITY = {"motion": ("random_walk",)}, {"motion": ("constant_velocity",)}
 
 
 class FusionParams(Params):
     """Fusion of the cameras in 3D ([ZW21] §2.4)."""
 
-    survival_probability: Annotated[float, Field(ge=0.5, le=1.0), ui("p_S", step=0.001)] = 0.99
+    survival_probability: Annotated[
+        float, Field(ge=0.5, le=1.0), ui("p_S", step=0.001, essential=True)
+    ] = 0.99
     """Probability that a person in the room is still there a step later."""
 
     detection_probability: Annotated[
-        float, Field(ge=0.05, le=1.0), ui("p_D", step=0.01, published=0.98)
+        float, Field(ge=0.05, le=1.0), ui("p_D", step=0.01, published=0.98, essential=True)
     ] = 0.95
     """Probability that a camera's boxes include a person that its picture holds."""
 
     clutter_rate: Annotated[
         float,
         Field(ge=0.001, le=50.0),
-        ui("λ_c", unit="1/(camera·step)", step=0.1, log=True, published=0.5),
+        ui("λ_c", unit="1/(camera·step)", step=0.1, log=True, published=0.5, essential=True),
     ] = 3.0
     """Expected number of false boxes that a camera gives at each step."""
 
     birth_rate: Annotated[
-        float, Field(ge=1e-4, le=10.0), ui("γ", unit="1/(entrance·s)", log=True, published=0.5)
+        float,
+        Field(ge=1e-4, le=10.0),
+        ui("γ", unit="1/(entrance·s)", log=True, published=0.5, essential=True),
     ] = 0.05
     """Expected number of people who come in at each entrance in one second."""
 
@@ -41,7 +53,11 @@ class FusionParams(Params):
     ] = "box"
     """What is used of a box: its centre; its horizontal centre, top and bottom; and its width."""
 
-    low_share: Annotated[float, Field(ge=0.0, le=0.5), ui("ε", step=0.01, published=0.0)] = 0.1
+    posture_share: Annotated[
+        float,
+        Field(ge=0.0, le=0.5),
+        ui("ε", step=0.01, published=0.0, when=_BOXES),
+    ] = 0.1
     """Share of the boxes that show a person lying, crouching or bent; 0: everybody stands."""
 
     update: Annotated[Literal["extended", "unscented"], ui("h(x)")] = "extended"
@@ -53,24 +69,30 @@ class FusionParams(Params):
     """How people move between two steps."""
 
     motion_sigma: Annotated[
-        float, Field(ge=0.01, le=3.0), ui("σ_w", unit="m/√s", step=0.01, log=True)
+        float, Field(ge=0.01, le=3.0), ui("σ_w", unit="m/√s", step=0.01, log=True, when=_WALK)
     ] = 0.4
     """Random walk: how far a person strays in one second, along each axis."""
 
     acceleration_sigma: Annotated[
-        float, Field(ge=0.05, le=10.0), ui("σ_a", unit="m/s per √s", step=0.05, log=True)
+        float,
+        Field(ge=0.05, le=10.0),
+        ui("σ_a", unit="m/s per √s", step=0.05, log=True, when=_VELOCITY, essential=True),
     ] = 0.8
     """Constant velocity: how much a person's speed changes in one second, along each axis."""
 
-    vertical_share: Annotated[float, Field(ge=0.01, le=1.0), ui("σ_z/σ_x", step=0.01)] = 0.2
+    vertical_share: Annotated[
+        float, Field(ge=0.01, le=1.0), ui("σ_z/σ_x", step=0.01, when=_VELOCITY)
+    ] = 0.2
     """Constant velocity: how lively the height is, relative to the ground plane."""
 
     velocity_memory: Annotated[
-        float, Field(ge=0.1, le=100.0), ui("τ", unit="s", step=0.1, log=True)
+        float, Field(ge=0.1, le=100.0), ui("τ", unit="s", step=0.1, log=True, when=_VELOCITY)
     ] = 2.0
     """Constant velocity: time after which a person who is not seen has slowed to a third."""
 
-    start_velocity: Annotated[float, Field(ge=0.0, le=5.0), ui("σ_v0", unit="m/s", step=0.1)] = 0.7
+    start_velocity: Annotated[
+        float, Field(ge=0.0, le=5.0), ui("σ_v0", unit="m/s", step=0.1, when=_VELOCITY)
+    ] = 0.7
     """Constant velocity: spread of a newcomer's speed along each axis."""
 
     birth: Annotated[
@@ -105,7 +127,7 @@ class FusionParams(Params):
     """How far outside the room people are followed, unreported, so that their boxes are theirs."""
 
     memory: Annotated[
-        float, Field(ge=0.0, le=30.0), ui("t_m", unit="s", step=0.1, published=0.0)
+        float, Field(ge=0.0, le=30.0), ui("t_m", unit="s", step=0.1, published=0.0, essential=True)
     ] = 3.0
     """How long a person whom no camera sees may be gone and still come back under the same id."""
 
@@ -133,6 +155,108 @@ class FusionParams(Params):
     """Sequential PHD: whether the components that one box made are reported singly or as one."""
 
     extraction_threshold: Annotated[
-        float, Field(ge=0.01, le=0.99), ui("T_e", step=0.01, stage="tracks")
+        float, Field(ge=0.01, le=0.99), ui("T_e", step=0.01, stage="tracks", essential=True)
     ] = 0.5
     """A component whose weight is above this is reported as a person."""
+
+    posture_height: Annotated[
+        float,
+        Field(ge=0.1, le=1.0),
+        ui("h_p", unit="half heights", step=0.05, advanced=True, when=_BOXES),
+    ] = 0.5
+    """Other posture: half height of the box, seen in perspective and from any side."""
+
+    posture_width: Annotated[
+        float,
+        Field(ge=0.1, le=2.0),
+        ui("w_p", unit="half heights", step=0.05, advanced=True, when=_BOXES),
+    ] = 0.6
+    """Other posture: half width of the box."""
+
+    posture_centre_sigma: Annotated[
+        float,
+        Field(ge=0.01, le=2.0),
+        ui("σ_pc", unit="half heights", step=0.01, advanced=True, when=_BOXES),
+    ] = 0.15
+    """Other posture: deviation of the box's centre, across and down."""
+
+    posture_width_sigma: Annotated[
+        float,
+        Field(ge=0.01, le=2.0),
+        ui("σ_pw", unit="half heights", step=0.01, advanced=True, when=_BOXES),
+    ] = 0.5
+    """Other posture: deviation of its half width."""
+
+    posture_height_sigma: Annotated[
+        float,
+        Field(ge=0.01, le=2.0),
+        ui("σ_ph", unit="half heights", step=0.01, advanced=True, when=_BOXES),
+    ] = 0.25
+    """Other posture: deviation of its half height."""
+
+    posture_drop: Annotated[
+        float,
+        Field(ge=0.0, le=1.0),
+        ui("σ_pd", unit="half heights", step=0.05, advanced=True, when=_BOXES),
+    ] = 0.3
+    """Other posture: how far the middle moves from one box to the next."""
+
+    memory_gate_probability: Annotated[
+        float, Field(ge=0.1, le=0.9999), ui("P_m", step=0.01, advanced=True)
+    ] = 0.9
+    """Probability that somebody who comes back lies within reach of where he should be."""
+
+    recognition_doubt: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("ε_r", step=0.01, advanced=True, when=_RECOGNITION)
+    ] = 0.1
+    """Recognition: probability that a box's colours tell nothing of who it is."""
+
+    recognition_interval: Annotated[
+        float,
+        Field(ge=0.01, le=60.0),
+        ui("τ_r", unit="s", log=True, advanced=True, when=_RECOGNITION),
+    ] = 1.0
+    """Recognition: after so long a look is a new one; pictures of one moment agree."""
+
+    recognition_swap: Annotated[
+        float,
+        Field(ge=0.1, le=1000.0),
+        ui("T_r", unit="s", log=True, advanced=True, when=_RECOGNITION),
+    ] = 30.0
+    """Recognition: time in which a track may come to be of somebody else."""
+
+    recognition_odds: Annotated[
+        float, Field(ge=1.0, le=10000.0), ui("o_s", log=True, advanced=True, when=_RECOGNITION)
+    ] = 20.0
+    """Recognition: odds of the best naming against any without it, from which a pair holds."""
+
+    recognition_own_odds: Annotated[
+        float, Field(ge=1.0, le=1000.0), ui("o_o", log=True, advanced=True, when=_RECOGNITION)
+    ] = 3.0
+    """Recognition: odds of a track's own looks, from which it may be named."""
+
+
+def _multi_bernoulli_uses(parameters: RunParameters) -> Uses:
+    without = {"misses", "extraction"}
+    if parameters.fusion.birth == "measurements":
+        without.add("merging_threshold")  # of the people not yet detected, of whom there are none
+    return Uses(reads=(Reads("fusion", without=frozenset(without)),))
+
+
+_RECOGNITION_ONLY = frozenset(
+    name for name in FusionParams.model_fields if name.startswith("recognition")
+)
+
+SEQUENTIAL_PHD = Method(
+    name="sequential_phd",
+    help="GM-PHD filter updated by one camera after another.",
+    made_by="tracker.fusion.sequential_phd:SequentialPhd",
+    uses=Uses(reads=(Reads("fusion", without=_RECOGNITION_ONLY),)),
+)
+
+MULTI_BERNOULLI = Method(
+    name="multi_bernoulli",
+    help="Poisson multi-Bernoulli filter with belief propagation.",
+    made_by="tracker.fusion.multi_bernoulli:MultiBernoulli",
+    uses=_multi_bernoulli_uses,
+)

@@ -6,11 +6,20 @@ data association", patent CN101783020A, 2010.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
+from tracker.parameters.colour_phd import ColourPeakParams
 from tracker.parameters.definition import Params, ui
+from tracker.parameters.methods import Method, Reads, Uses
+
+if TYPE_CHECKING:
+    from tracker.parameters.run import RunParameters
+
+_FOREGROUND = {"measurements": ("foreground",)}
+_CROWNS = {**_FOREGROUND, "foreground_box": ("target",)}
+_FIVE = {"five_cases": (True,)}
 
 
 class JpdaParams(Params):
@@ -20,7 +29,9 @@ class JpdaParams(Params):
     """What is associated: boxes of the foreground, peaks of the colour likelihood, or an outside
     detector's boxes."""
 
-    foreground_box: Annotated[Literal["target", "piece"], ui("z", published="piece")] = "target"
+    foreground_box: Annotated[
+        Literal["target", "piece"], ui("z", published="piece", when=_FOREGROUND)
+    ] = "target"
     """Box of a foreground measurement: a target under each top of a piece, or the whole piece."""
 
     association: Annotated[
@@ -28,13 +39,17 @@ class JpdaParams(Params):
     ] = "exact"
     """Over which joint events: all of them, the K best, or n + M that share no pair."""
 
-    events: Annotated[int, Field(ge=1, le=500), ui("K", log=True, advanced=True)] = 30
+    events: Annotated[
+        int, Field(ge=1, le=500), ui("K", log=True, advanced=True, when={"association": ("murty",)})
+    ] = 30
     """For murty: how many of the best joint events count."""
 
     five_cases: Annotated[bool, ui("Ω")] = True
     """Whether occlusions, splits and returns are treated apart; off is the classical filter."""
 
-    gate_probability: Annotated[float, Field(ge=0.5, le=0.99999), ui("P_G", step=0.001)] = 0.99
+    gate_probability: Annotated[
+        float, Field(ge=0.5, le=0.99999), ui("P_G", step=0.001, essential=True)
+    ] = 0.99
     """Probability that a target's own measurement lies in its gate."""
 
     detection_probability: Annotated[float, Field(ge=0.05, le=0.999), ui("P_D", step=0.01)] = 0.9
@@ -44,12 +59,16 @@ class JpdaParams(Params):
     """What is known of the number of false measurements: its mean, or nothing at all."""
 
     clutter_rate: Annotated[
-        float, Field(ge=0.001, le=50.0), ui("λ_c", unit="1/step", step=0.1, log=True)
+        float,
+        Field(ge=0.001, le=50.0),
+        ui("λ_c", unit="1/step", step=0.1, log=True, when={"clutter": ("poisson",)}),
     ] = 0.5
     """For poisson: expected number of measurements that are nobody, uniform over the picture."""
 
     gate_volume: Annotated[
-        float, Field(ge=1.0, le=1000.0), ui("V", unit="√|S|", log=True, advanced=True)
+        float,
+        Field(ge=1.0, le=1000.0),
+        ui("V", unit="√|S|", log=True, advanced=True, when={"clutter": ("diffuse",)}),
     ] = 9.5
     """For diffuse: volume of a gate, in which a false measurement is uniform, in standard
     deviations of the innovation."""
@@ -65,36 +84,44 @@ class JpdaParams(Params):
     """How fast a newcomer may move, who is taken to stand still."""
 
     centre_sigma: Annotated[
-        float, Field(ge=0.01, le=3.0), ui("σ_x", unit="half sizes", step=0.01, log=True)
+        float,
+        Field(ge=0.01, le=3.0),
+        ui("σ_x", unit="half sizes", step=0.01, log=True, when=_FOREGROUND),
     ] = 0.15
     """Standard deviation of the centre of a foreground box."""
 
     size_sigma: Annotated[
-        float, Field(ge=0.01, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
+        float,
+        Field(ge=0.01, le=3.0),
+        ui("σ_h", unit="half sizes", step=0.01, log=True, when=_FOREGROUND),
     ] = 0.2
     """Standard deviation of the half sizes of a foreground box: how far they tell depth."""
 
-    pixel_sigma: Annotated[float, Field(ge=0.0, le=50.0), ui("σ_px", unit="px", step=0.1)] = 2.5
+    pixel_sigma: Annotated[
+        float, Field(ge=0.0, le=50.0), ui("σ_px", unit="px", step=0.1, when=_FOREGROUND)
+    ] = 2.5
     """Noise of a foreground box's centre however small it is; it adds to the share."""
 
     size_rate: Annotated[float, Field(ge=0.01, le=1.0), ui("α", step=0.01)] = 0.2
     """How far a target's box takes the size of its measurement in one step."""
 
     least_probability: Annotated[
-        float, Field(ge=0.0, le=0.9), ui("β_min", step=0.01, published=0.0)
+        float, Field(ge=0.0, le=0.9), ui("β_min", step=0.01, published=0.0, when=_FIVE)
     ] = 0.1
     """Entries of the association matrix up to this count as 0 when the cases are told apart."""
 
-    occlusion: Annotated[Literal["inside", "measurement"], ui("x|z", published="measurement")] = (
-        "inside"
-    )
+    occlusion: Annotated[
+        Literal["inside", "measurement"], ui("x|z", published="measurement", when=_FIVE)
+    ] = "inside"
     """Who is hidden by another goes on inside the piece; or all whose gates meet in one
     measurement take its place and stand still."""
 
     vanish_steps: Annotated[int, Field(ge=1, le=100), ui("k_v", unit="steps", step=1)] = 3
     """A target without measurement at so many steps in a row has vanished."""
 
-    return_steps: Annotated[int, Field(ge=0, le=250), ui("k_s", unit="steps", step=1)] = 5
+    return_steps: Annotated[
+        int, Field(ge=0, le=250), ui("k_s", unit="steps", step=1, when=_FIVE)
+    ] = 5
     """A newcomer where somebody vanished at most so many steps ago is the same person."""
 
     confirmation_steps: Annotated[
@@ -106,3 +133,107 @@ class JpdaParams(Params):
         "estimates"
     )
     """What goes to the fusion: the targets' boxes, or the measurements that are somebody's."""
+
+    longest_hidden: Annotated[
+        float, Field(ge=0.0, le=60.0), ui("t_h", unit="s", step=0.5, advanced=True, when=_FIVE)
+    ] = 4.0
+    """Somebody who does not come out from behind another for so long is given up."""
+
+    same_size: Annotated[
+        float, Field(ge=1.0, le=5.0), ui("k_s", step=0.1, advanced=True, when=_FIVE)
+    ] = 1.5
+    """A measurement larger or smaller than its target by this factor shows others too."""
+
+    leap: Annotated[
+        float,
+        Field(ge=0.0, le=10.0),
+        ui("k_l", unit="half sizes", step=0.1, advanced=True, when=_FIVE),
+    ] = 2.0
+    """A measurement this near may be that of a target whose gate it missed."""
+
+    one_side: Annotated[
+        float, Field(ge=1.0, le=10.0), ui("k_e", step=0.1, advanced=True, when=_FIVE)
+    ] = 2.0
+    """An edge of a piece is left over if more is by this factor than of the opposite one."""
+
+    cover: Annotated[
+        float,
+        Field(ge=1.0, le=10.0),
+        ui(
+            "k_c",
+            unit="half sizes",
+            step=0.1,
+            advanced=True,
+            when={"measurements": ("colour", "detections")},
+        ),
+    ] = 2.0
+    """Without a piece of foreground, who is hidden lies within so many half sizes of the box."""
+
+    height_sigmas: Annotated[
+        float, Field(ge=0.0, le=10.0), ui("k_z", step=0.5, advanced=True, when=_CROWNS)
+    ] = 2.0
+    """Targets keep within so many deviations of the heights that they come in at."""
+
+    crack: Annotated[
+        float,
+        Field(ge=0.0, le=2.0),
+        ui("h_c", unit="half heights", step=0.05, advanced=True, when=_CROWNS),
+    ] = 0.5
+    """Cracks across a piece up to this height, between head and shirt say, are closed."""
+
+    top_reach: Annotated[
+        float,
+        Field(ge=0.1, le=5.0),
+        ui("w_t", unit="half widths", step=0.1, advanced=True, when=_CROWNS),
+    ] = 1.2
+    """The pixels under a top within so many half widths are its target."""
+
+    least_inside: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("f_i", step=0.05, advanced=True, when=_CROWNS)
+    ] = 0.4
+    """A box with a smaller share of foreground is no target's."""
+
+    most_above: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("f_a", step=0.05, advanced=True, when=_CROWNS)
+    ] = 0.5
+    """Nor is one with a larger share of foreground above it."""
+
+    most_beside: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("f_b", step=0.05, advanced=True, when=_CROWNS)
+    ] = 0.8
+    """Nor is one with a larger share beside its upper part."""
+
+    shoulder_across: Annotated[
+        float,
+        Field(ge=0.0, le=5.0),
+        ui("w_s", unit="half widths", step=0.1, advanced=True, when=_CROWNS),
+    ] = 1.0
+    """A top no further beside another may be that target's shoulder."""
+
+    shoulder_down: Annotated[
+        float,
+        Field(ge=0.0, le=5.0),
+        ui("h_s", unit="half heights", step=0.1, advanced=True, when=_CROWNS),
+    ] = 1.5
+    """And no further below it."""
+
+
+def _uses(parameters: RunParameters) -> Uses:
+    source = parameters.of(JpdaParams).measurements
+    own = Reads("jpda")
+    if source == "detections":
+        return Uses(detections=True, reads=(own, Reads("detection_boxes")))
+    if source == "foreground":
+        return Uses(pictures=True, reads=(own, Reads("foreground")))
+    # without a single template the foreground's boxes are taken instead
+    reads = (own, Reads("foreground"), Reads("colour_phd", only=ColourPeakParams))
+    return Uses(pictures=True, templates="if there", reads=reads)
+
+
+METHOD = Method(
+    name="jpda",
+    help="Joint probabilistic data association with five cases.",
+    made_by="tracker.single_view.jpda:Jpda",
+    uses=_uses,
+    parameters=JpdaParams,
+)

@@ -7,11 +7,17 @@ radius; λ and d_0, for flat RGB histograms, and h near that radius are chosen o
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
+from tracker.parameters.methods import Method, Reads, Uses
+
+if TYPE_CHECKING:
+    from tracker.parameters.run import RunParameters
+
+_PSEUDO = {"filter": ("pseudo",)}
 
 
 class PseudoParticleParams(Params):
@@ -53,10 +59,12 @@ class PseudoParticleParams(Params):
     )
     """Where particles look for new targets: on the foreground, or anywhere in the picture."""
 
-    newcomer_share: Annotated[float, Field(ge=0.0, le=1.0), ui("s", step=0.05)] = 0.4
+    newcomer_share: Annotated[float, Field(ge=0.0, le=1.0), ui("s", step=0.05, when=_PSEUDO)] = 0.4
     """Share of the particles that look for new targets; all do while there is no target."""
 
-    resampling: Annotated[Literal["each", "together"], ui("w_i", published="together")] = "each"
+    resampling: Annotated[
+        Literal["each", "together"], ui("w_i", published="together", when=_PSEUDO)
+    ] = "each"
     """Whether each target's particles, and the newcomers', keep their number, or all compete."""
 
     motion_sigma: Annotated[
@@ -69,55 +77,77 @@ class PseudoParticleParams(Params):
     ] = 0.4
     """How much a person's box grows or shrinks in one second."""
 
-    velocity_share: Annotated[float, Field(ge=0.0, le=1.0), ui("v", step=0.05, published=0.0)] = 0.8
+    velocity_share: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("v", step=0.05, published=0.0, when=_PSEUDO)
+    ] = 0.8
     """How much of its mean displacement a target repeats: 0 is a random walk."""
 
-    clusters: Annotated[Literal["each", "together"], ui("m", published="together")] = "each"
+    clusters: Annotated[
+        Literal["each", "together"], ui("m", published="together", when=_PSEUDO)
+    ] = "each"
     """Whether particles cluster with those of the same person's colours only, or with all."""
 
     bandwidth: Annotated[
-        float, Field(ge=0.2, le=3.0), ui("h", unit="half sizes", step=0.05, log=True, published=0.7)
+        float,
+        Field(ge=0.2, le=3.0),
+        ui("h", unit="half sizes", step=0.05, log=True, published=0.7, when=_PSEUDO),
     ] = 1.0
     """Radius of the mean shift's kernel; it follows the size of the target."""
 
-    smallest_cluster: Annotated[float, Field(ge=0.0, le=0.5), ui("c_min", step=0.005)] = 0.01
+    smallest_cluster: Annotated[
+        float, Field(ge=0.0, le=0.5), ui("c_min", step=0.005, when=_PSEUDO)
+    ] = 0.01
     """A cluster with a smaller share of the particles is dropped."""
 
     redistribution: Annotated[
-        float, Field(ge=0.0, le=3.0), ui("σ_r", unit="half sizes", step=0.05, published=1.0)
+        float,
+        Field(ge=0.0, le=3.0),
+        ui("σ_r", unit="half sizes", step=0.05, published=1.0, when=_PSEUDO),
     ] = 0.7
     """Spread of the particles that are drawn anew around each target; 0 keeps the resampled."""
 
     acceptance_distance: Annotated[
-        float, Field(ge=0.05, le=1.0), ui("d_0", step=0.01, published=0.6)
+        float, Field(ge=0.05, le=1.0), ui("d_0", step=0.01, published=0.6, essential=True)
     ] = 0.5
     """Column of the background: a mode less likely than one at this distance is nobody."""
 
     acceptance_foreground: Annotated[
-        float, Field(ge=0.0, le=1.0), ui("f_min", step=0.01, published=0.0)
+        float, Field(ge=0.0, le=1.0), ui("f_min", step=0.01, published=0.0, when=_PSEUDO)
     ] = 0.35
     """A mode with a smaller share of foreground in its box is nobody."""
 
     position_sigma: Annotated[
-        float, Field(ge=0.1, le=10.0), ui("σ_a", unit="half sizes", step=0.1, log=True)
+        float,
+        Field(ge=0.1, le=10.0),
+        ui("σ_a", unit="half sizes", step=0.1, log=True, when=_PSEUDO),
     ] = 1.0
     """How far from where a target is expected its mode lies, when they are assigned."""
 
     separation: Annotated[
-        float, Field(ge=0.0, le=5.0), ui("r_n", unit="half sizes", step=0.1, published=0.0)
+        float,
+        Field(ge=0.0, le=5.0),
+        ui("r_n", unit="half sizes", step=0.1, published=0.0, when=_PSEUDO),
     ] = 2.0
     """A mode nearer than this to a target's mode is no newcomer."""
 
-    targets_per_person: Annotated[int, Field(ge=1, le=10), ui("n_g", step=1, published=1)] = 2
+    targets_per_person: Annotated[
+        int, Field(ge=1, le=10), ui("n_g", step=1, published=1, when=_PSEUDO)
+    ] = 2
     """How many targets may look like one person's templates at a time."""
 
-    confirmation: Annotated[int, Field(ge=1, le=50), ui("n_c", unit="steps", step=1)] = 3
+    confirmation: Annotated[
+        int, Field(ge=1, le=50), ui("n_c", unit="steps", step=1, when=_PSEUDO)
+    ] = 3
     """Steps in which a new target must be found before it counts."""
 
-    patience: Annotated[float, Field(ge=0.0, le=10.0), ui("t_p", unit="s", step=0.05)] = 0.8
+    patience: Annotated[
+        float, Field(ge=0.0, le=10.0), ui("t_p", unit="s", step=0.05, when=_PSEUDO)
+    ] = 0.8
     """How long a target that is not found is still waited for."""
 
-    memory: Annotated[float, Field(ge=0.0, le=100.0), ui("t_m", unit="s", step=0.5)] = 10.0
+    memory: Annotated[
+        float, Field(ge=0.0, le=100.0), ui("t_m", unit="s", step=0.5, when=_PSEUDO)
+    ] = 10.0
     """How long after it vanished a target of the same colours returns under its id."""
 
     centre_sigma: Annotated[
@@ -130,5 +160,54 @@ class PseudoParticleParams(Params):
     ] = 0.5
     """Standard deviation of a mode's half sizes: colour alone hardly tells them."""
 
-    output: Annotated[Literal["modes", "targets"], ui("Y", published="targets")] = "modes"
+    output: Annotated[Literal["modes", "targets"], ui("Y", published="targets", when=_PSEUDO)] = (
+        "modes"
+    )
     """What goes to the fusion: every mode that is not background, or the confirmed targets."""
+
+    size_jitter: Annotated[float, Field(ge=0.0, le=1.0), ui("σ_s", step=0.01, advanced=True)] = 0.1
+    """Spread of the newcomers' sizes around what a target has at a place: people differ."""
+
+    merge_distance: Annotated[
+        float,
+        Field(ge=0.1, le=5.0),
+        ui("d_m", unit="half sizes", step=0.1, advanced=True, when=_PSEUDO),
+    ] = 1.0
+    """Modes nearer to each other than this are one."""
+
+    newcomer_misses: Annotated[
+        int, Field(ge=1, le=50), ui("n_m", unit="steps", step=1, advanced=True, when=_PSEUDO)
+    ] = 2
+    """An unconfirmed target that is not found at so many steps in a row is given up."""
+
+    velocity_memory: Annotated[
+        float, Field(ge=0.0, le=0.99), ui("μ", step=0.05, advanced=True, when=_PSEUDO)
+    ] = 0.8
+    """Share of the mean displacement that a new one leaves as it is."""
+
+    position_gate: Annotated[
+        float, Field(ge=0.5, le=10.0), ui("k_a", step=0.5, advanced=True, when=_PSEUDO)
+    ] = 3.0
+    """A target at an unknown place is as likely as one so many deviations σ_a off."""
+
+    @property
+    def asks_foreground(self) -> bool:
+        """Whether anything is made of the foreground."""
+        asked = (self.foreground_weight, self.surroundings_weight, self.acceptance_foreground)
+        return self.birth == "foreground" or max(asked) > 0.0
+
+
+def _uses(parameters: RunParameters) -> Uses:
+    asked = parameters.of(PseudoParticleParams).asks_foreground
+    foreground = parameters.foreground.read_by_colours if asked else ()
+    reads = (Reads("pseudo_particle"), *foreground)
+    return Uses(pictures=True, templates="needed", reads=reads)
+
+
+METHOD = Method(
+    name="pseudo_particle",
+    help="Particle filter on colour whose clusters are the targets.",
+    made_by="tracker.single_view.pseudo_particle.method:PseudoParticle",
+    uses=_uses,
+    parameters=PseudoParticleParams,
+)

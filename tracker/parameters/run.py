@@ -1,50 +1,76 @@
-"""The methods that can be chosen, and all groups of parameters of a run."""
+"""All parameters of a run: the methods, what they share, and a group for each method."""
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
 
-from tracker.parameters.association_matrix import AssociationMatrixParams
-from tracker.parameters.colour_phd import ColourPhdParams
+from pydantic import create_model
+from pydantic.fields import FieldInfo
+
 from tracker.parameters.definition import Params
-from tracker.parameters.detections import DetectionBoxParams, DetectionPhdParams
 from tracker.parameters.foreground import ForegroundParams
 from tracker.parameters.fusion import FusionParams
-from tracker.parameters.jpda import JpdaParams
-from tracker.parameters.pseudo_particle import PseudoParticleParams
+from tracker.parameters.methods import Method, MethodKey
+from tracker.parameters.registry import REGISTERED
 from tracker.parameters.smoothing import SmoothingParams
 
-SingleViewName = Literal[
-    "colour_phd", "jpda", "pseudo_particle", "association_matrix", "detection_phd", "none"
-]
-FusionName = Literal["sequential_phd", "multi_bernoulli"]
-SmoothingName = Literal["none", "positions", "identities"]
+_Group = TypeVar("_Group", bound=Params)
 
 
-FOREGROUND_METHODS: frozenset[SingleViewName] = frozenset(
-    {"colour_phd", "pseudo_particle", "association_matrix"}
-)
-"""The single-view methods that ask what in a picture is foreground."""
-
-
-class RunParameters(Params):
+class SharedParameters(Params):
     """Everything that a run depends on, besides the sequence and the seed."""
 
-    single_view: SingleViewName = "colour_phd"
+    single_view: str = "colour_phd"
     """Method of stage 1: boxes from each camera's pictures, or a detector's, filtered or not."""
 
-    fusion_method: FusionName = "sequential_phd"
+    fusion_method: str = "multi_bernoulli"
     """Method of stage 2: how the cameras' boxes become 3D positions."""
 
-    smoothing_method: SmoothingName = "identities"
-    """Method of stage 3: the filter's tracks as they are; each smoothed; or who is who as well."""
+    smoothing_method: str = "identities"
+    """Method of stage 3: the filter's tracks as they are, smoothed, or who is who as well."""
 
-    colour_phd: ColourPhdParams = ColourPhdParams()
-    jpda: JpdaParams = JpdaParams()
-    pseudo_particle: PseudoParticleParams = PseudoParticleParams()
-    association_matrix: AssociationMatrixParams = AssociationMatrixParams()
-    detection_boxes: DetectionBoxParams = DetectionBoxParams()
-    detection_phd: DetectionPhdParams = DetectionPhdParams()
     foreground: ForegroundParams = ForegroundParams()
     fusion: FusionParams = FusionParams()
     smoothing: SmoothingParams = SmoothingParams()
+
+    def of(self, kind: type[_Group]) -> _Group:
+        """The numbers of one group, by their class.
+
+        Raises:
+            KeyError: If no registered method brings them.
+        """
+        for name, field in type(self).model_fields.items():
+            if field.annotation is kind:
+                return cast(_Group, getattr(self, name))
+        raise KeyError(f"no registered method has {kind.__name__} for its parameters")
+
+    def method(self, key: MethodKey) -> Method:
+        """The chosen method."""
+        return REGISTERED[key][getattr(self, key)]
+
+
+def _with_methods() -> type[SharedParameters]:
+    """The parameters with a group for every method that brings one, and the methods' names."""
+    fields: dict[str, Any] = {}
+    for key, methods in REGISTERED.items():
+        shared: FieldInfo = SharedParameters.model_fields[key]
+        fields[key] = (Literal[tuple(methods)], shared)
+        for method in methods.values():
+            if method.parameters is not None:
+                fields[method.own_group] = (method.parameters, method.parameters())
+    return create_model(
+        "RunParameters",
+        __base__=SharedParameters,
+        __module__=__name__,
+        __doc__=SharedParameters.__doc__,
+        **fields,
+    )
+
+
+if TYPE_CHECKING:
+
+    class RunParameters(SharedParameters):
+        """Everything that a run depends on, besides the sequence and the seed."""
+
+else:
+    RunParameters = _with_methods()

@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
+from tracker.parameters.methods import Method, Reads, Uses
 
 
 class SmoothingParams(Params):
@@ -46,3 +47,26 @@ class SmoothingParams(Params):
 
     appearance: Annotated[float, Field(ge=0.0, le=5.0), ui("α", step=0.1)] = 1.0
     """Identities: weight of what people look like; 0 leaves it out."""
+
+
+_IDENTITIES_ONLY = frozenset({"doubt", "jump", "gap", "longest", "keeping", "appearance"})
+
+NONE = Method(
+    name="none",
+    help="The filter's tracks as they are: what a live system would see.",
+    made_by="tracker.smoothing.protocol:NoSmoothing",
+)
+
+POSITIONS = Method(
+    name="positions",
+    help="Each track of the filter, smoothed over its whole life.",
+    made_by="tracker.smoothing.stage:Positions",
+    uses=Uses(reads=(Reads("smoothing", without=_IDENTITIES_ONLY),)),
+)
+
+IDENTITIES = Method(
+    name="identities",
+    help="Smoothed, and who is who settled over the whole recording.",
+    made_by="tracker.smoothing.stage:Identities",
+    uses=Uses(reads=(Reads("smoothing"),)),
+)

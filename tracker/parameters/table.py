@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from pydantic.fields import FieldInfo
 
 from tracker.parameters.definition import Params, Stage
-from tracker.parameters.run import FusionName, RunParameters, SingleViewName, SmoothingName
+from tracker.parameters.methods import Method, MethodKey
+from tracker.parameters.registry import REGISTERED, SHARED_GROUPS
+from tracker.parameters.run import RunParameters
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,11 +37,17 @@ class Parameter:
     choices: tuple[str, ...]
     published: Any
     advanced: bool
+    when: Mapping[str, tuple[Any, ...]]
+    """Keys of others, and the values of each with which this one has an effect."""
+    essential: bool
 
 
 def _group_stage(group: str) -> Stage:
-    later: dict[str, Stage] = {"fusion": "fusion", "smoothing": "smoothing"}
-    return later.get(group, "single_view")
+    fused = (method.own_group for method in REGISTERED["fusion_method"].values())
+    smoothed = (method.own_group for method in REGISTERED["smoothing_method"].values())
+    if group == "smoothing" or group in smoothed:
+        return "smoothing"
+    return "fusion" if group == "fusion" or group in fused else "single_view"
 
 
 def _describe(group: str, name: str, field: FieldInfo) -> Parameter:
@@ -74,31 +82,35 @@ def _describe(group: str, name: str, field: FieldInfo) -> Parameter:
         choices=tuple(get_args(annotation)) if kind == "choice" else (),
         published=extra["published"],
         advanced=extra["advanced"],
+        when={f"{group}.{other}": tuple(values) for other, values in extra["when"].items()},
+        essential=extra["essential"],
     )
 
 
+def _groups() -> dict[str, type[Params]]:
+    """Those of the methods in the order of their list, then what they share."""
+    found = {
+        name: field.annotation
+        for name, field in RunParameters.model_fields.items()
+        if isinstance(field.annotation, type) and issubclass(field.annotation, Params)
+    }
+    return {name: found[name] for name in sorted(found, key=lambda name: name in SHARED_GROUPS)}
+
+
 def _collect() -> Iterator[Parameter]:
-    for group, group_field in RunParameters.model_fields.items():
-        model = group_field.annotation
-        if isinstance(model, type) and issubclass(model, Params):
-            for name, field in model.model_fields.items():
-                yield _describe(group, name, field)
+    for group, model in _groups().items():
+        for name, field in model.model_fields.items():
+            yield _describe(group, name, field)
 
 
 PARAMETERS: dict[str, Parameter] = {p.key: p for p in _collect()}
 """Every parameter by its key, in the order of definition."""
 
-GROUPS: dict[str, str] = {
-    name: (field.annotation.__doc__ or "").strip()
-    for name, field in RunParameters.model_fields.items()
-    if isinstance(field.annotation, type) and issubclass(field.annotation, Params)
-}
+GROUPS: dict[str, str] = {name: (model.__doc__ or "").strip() for name, model in _groups().items()}
 """Every group of parameters and what it is for."""
 
-METHODS: dict[str, tuple[str, ...]] = {
-    "single_view": get_args(SingleViewName),
-    "fusion_method": get_args(FusionName),
-    "smoothing_method": get_args(SmoothingName),
+METHODS: dict[MethodKey, tuple[str, ...]] = {
+    key: tuple(methods) for key, methods in REGISTERED.items()
 }
 """The methods that can be chosen for stages 1, 2 and 3."""
 
@@ -111,3 +123,14 @@ PRESETS: dict[str, dict[str, Any]] = {
     },
 }
 """Named sets of values, each against the defaults: ``robust`` is the defaults themselves."""
+
+
+def method_of(key: MethodKey, name: str) -> Method:
+    """What a method uses and how it is made.
+
+    Raises:
+        ValueError: If there is no such method.
+    """
+    if name not in REGISTERED[key]:
+        raise ValueError(f"{key}: expected one of {', '.join(REGISTERED[key])}, got {name!r}")
+    return REGISTERED[key][name]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 from functools import cache
 from pathlib import Path
 
@@ -12,7 +13,8 @@ import numpy as np
 import scipy
 
 from tracker import __version__
-from tracker.parameters import Stage
+from tracker.parameters import Method, Stage
+from tracker.parameters.registry import ORIGINS
 
 _ROOT = Path(__file__).resolve().parents[1]
 
@@ -44,3 +46,16 @@ def numbers_version(stage: Stage) -> str:
             digest.update(path.read_bytes() + b"\0")
     libraries = [np.__version__, scipy.__version__, cv2.__version__, numba.__version__]
     return " ".join([__version__, *libraries, digest.hexdigest()])
+
+
+def method_version(method: Method) -> str:
+    """Of a method of another package its version and source; of this project's own nothing, for
+    :func:`numbers_version` has them."""
+    origin = ORIGINS.get(method.name)
+    if origin is None:
+        return ""
+    try:
+        source = Path(inspect.getfile(method.load())).read_bytes()
+    except (OSError, TypeError):
+        source = b""
+    return f"{origin} {hashlib.sha256(source).hexdigest()}"

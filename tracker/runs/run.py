@@ -7,10 +7,10 @@ import json
 from dataclasses import dataclass, field
 from typing import Any
 
-from tracker import parameters as parameter_table
 from tracker.fusion.protocol import FusionResult
-from tracker.parameters import RunParameters, Stage
-from tracker.runs.numbers_version import numbers_version
+from tracker.parameters import RunParameters, Stage, stage_values
+from tracker.parameters.reading import CHOSEN_BY
+from tracker.runs.numbers_version import method_version, numbers_version
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 from tracker.smoothing import Smoothed
@@ -104,6 +104,7 @@ def stage_keys(sequence: Sequence, parameters: RunParameters, seed: int) -> dict
     values: list[Any] = [sequence.digest, seed]
     stages: tuple[Stage, ...] = ("single_view", "fusion", "smoothing", "tracks")
     for stage in stages:
-        values += [numbers_version(stage), parameter_table.stage_values(parameters, stage)]
+        method = parameters.method(CHOSEN_BY[stage])
+        values += [numbers_version(stage), method_version(method), stage_values(parameters, stage)]
         keys[stage] = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
     return keys

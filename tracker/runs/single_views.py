@@ -12,8 +12,8 @@ import numpy as np
 
 from tracker import single_view
 from tracker.runs.run import Cancelled, Run
-from tracker.sequences.frames import FrameReader, Picture
-from tracker.single_view.colour.likeness import Likeness, looks
+from tracker.sequences.frames import Picture, Pictures
+from tracker.single_view.colour.likeness import Likeness, looks_of
 from tracker.single_view.protocol import SingleViewMethod, ViewResult
 
 BLOCK = 5
@@ -30,7 +30,7 @@ class SingleViews:
     def __init__(
         self,
         run: Run,
-        reader: FrameReader,
+        reader: Pictures,
         cancelled: Cancel,
         thread_begins: Callable[[], None] = lambda: None,
     ) -> None:
@@ -87,7 +87,7 @@ class SingleViews:
         method = single_view.create(
             run.parameters.single_view, run.sequence, camera, run.parameters, self._reader
         )
-        run.costly = run.costly or method.needs_pictures
+        run.costly = run.costly or _looks_at_pictures(run)
         state = run.view_states[camera] if run.view_states is not None else method.start()
         return _CameraWorker(method, state, camera, run, self._reader, self._is_stopped)
 
@@ -101,44 +101,69 @@ class _CameraWorker:
         state: Any,
         camera: int,
         run: Run,
-        reader: FrameReader,
+        reader: Pictures,
         stopped: Cancel,
     ) -> None:
         self._method = method
         self._state = state
         self._camera = camera
+        self._view = run.sequence.views[camera]
         self._frame = len(run.views)
         self._frames = run.sequence.frames
         self._seed = run.seed
         self._stopped = stopped
-        self._pictures = reader.iterate(camera, self._frame) if method.needs_pictures else None
-        self._likeness = Likeness.of(run.sequence, reader) if method.needs_pictures else None
+        looks = _looks_at_pictures(run)
+        self._pictures = reader.iterate(camera, self._frame) if looks else None
+        self._likeness = Likeness.of(run.sequence, reader) if looks else None
 
     def block(self, steps: int) -> list[tuple[ViewResult, Any]]:
         """The next few steps: result and state of each; none at the end."""
         done: list[tuple[ViewResult, Any]] = []
         while len(done) < steps and self._frame < self._frames and not self._stopped():
             picture = next(self._pictures, None) if self._pictures is not None else None
+            if self._pictures is None and not self._view.was_looked_at(self._frame):
+                done.append((ViewResult.of_no_frame(), self._state))
+                self._frame += 1
+                continue
             rng = np.random.default_rng((self._seed, self._camera, self._frame))
             self._state, result = self._method.step(self._state, self._frame, picture, rng)
+            if self._pictures is not None and picture is None:
+                result = without_boxes(result)
             if picture is not None and self._likeness is not None:
                 likenesses = self._likeness.of_boxes(picture, result.boxes)
                 result = replace(result, likenesses=likenesses)
             if picture is not None:
-                result = replace(result, looks=looks(picture, result.boxes))
+                result = replace(result, looks=looks_of(picture, result.boxes))
             done.append((result, self._state))
             self._frame += 1
         return done
 
 
-class _StoppingReader(FrameReader):
+def _looks_at_pictures(run: Run) -> bool:
+    return run.parameters.method("single_view").used(run.parameters).pictures
+
+
+def without_boxes(result: ViewResult) -> ViewResult:
+    """What a method makes of a missing picture: its own estimates, and nothing to the fusion."""
+    nothing = ViewResult.of_no_frame()
+    return replace(
+        result,
+        boxes=nothing.boxes,
+        weights=nothing.weights,
+        labels=nothing.labels,
+        sigmas=nothing.sigmas,
+        blind=True,
+    )
+
+
+class _StoppingReader:
     """The pictures of another reader, until the run is to stop: then :class:`Cancelled` is raised.
 
     A background or the templates take many pictures before the first step: nobody waits for
     the rest of them.
     """
 
-    def __init__(self, reader: FrameReader, stopped: Cancel) -> None:
+    def __init__(self, reader: Pictures, stopped: Cancel) -> None:
         self._reader = reader
         self._stopped = stopped
 
@@ -156,6 +181,3 @@ class _StoppingReader(FrameReader):
     def check(self) -> None:
         if self._stopped():
             raise Cancelled
-
-    def close(self) -> None:
-        """Whoever opened the other one closes it."""

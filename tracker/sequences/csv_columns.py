@@ -117,7 +117,8 @@ def read_columns(
     header = (lines[0] if lines else "").strip()
     names = tuple(cell.strip() for cell in next(csv.reader([header]), []))
     _check_header(names, where, numbers[0] if numbers else 1, needed, optional)
-    wanted = [name for name in (*needed, *optional, *blank) if name in names]
+    # a column may be needed although its cells may be empty
+    wanted = [name for name in dict.fromkeys((*needed, *optional, *blank)) if name in names]
     places = [names.index(name) for name in wanted]
     table = _parse(lines[1:], len(names), places)
     if table is None:

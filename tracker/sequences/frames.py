@@ -11,7 +11,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from jaxtyping import UInt8
 from numpy import ndarray
@@ -34,6 +34,26 @@ BEHIND = 12
 
 NEAR = 4
 """Steps: two requests no further apart than this are part of one walk, at up to this speed."""
+
+
+class Pictures(Protocol):
+    """The pictures of a sequence as a method of stage 1 asks for them: a :class:`FrameReader`."""
+
+    def picture(self, camera: int, step: int) -> Picture | None:
+        """The picture of one camera at one step, BGR."""
+        ...
+
+    def iterate(self, camera: int, first: int = 0) -> Iterator[Picture | None]:
+        """The pictures of one camera from one step to the last."""
+        ...
+
+    def once(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
+        """What follows from the pictures alone, made when it is first asked for."""
+        ...
+
+    def check(self) -> None:
+        """Asked between parts of a long work: whoever may be told to stop raises here."""
+        ...
 
 
 class FrameReader:
@@ -230,8 +250,10 @@ class _Source:
 
     def read(self, step: int) -> Picture | None:
         """Decode one step; None where there is no picture of the camera's size."""
-        frame = self.view.first_frame + step
+        frame = self.view.frame_at(step)
         picture = None
+        if frame < 0:
+            return None
         if self.view.video is not None:
             picture = self._read_video(frame)
         elif frame < len(self.view.images):

@@ -30,6 +30,7 @@ class SequenceEntry:
     kind: Literal["rendered", "folder"]
     cameras: int
     frames: int
+    """0 where the file leaves it to its videos."""
     ready: bool
     """Whether it opens at once; a room that was never rendered does not."""
     folder: Path
@@ -66,7 +67,8 @@ def _entry(folder: Path) -> SequenceEntry:
     description, cameras, frames, error = "", 0, 0, None
     try:
         summary = read_summary(folder)
-        description, cameras, frames = summary.description, summary.cameras, summary.frames
+        description, cameras = summary.description, summary.cameras
+        frames = summary.frames or 0
     except SequenceError as problem:
         error = str(problem)
     return SequenceEntry(

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from tracker.sequences.fields import Fields, did_you_mean
 from tracker.sequences.sequence import SequenceError, View
@@ -67,44 +70,66 @@ def _inside(folder: Path, given: str, fields: Fields, name: str) -> Path:
     return path
 
 
-def check_pictures(view: View, fields: Fields, frames: int) -> Iterable[str]:
-    """Open the video or the first image once: its size must fit the calibration.
+@dataclass(frozen=True, slots=True, eq=False)
+class Pictures:
+    """The pictures of one camera, as far as opening them once tells."""
+
+    size: tuple[int, int]
+    """Width and height, pixels."""
+    frames: int
+    fps: float | None
+    """None for images, and where a video does not say."""
+
+
+def probe(video: Path | None, images: tuple[Path, ...], fields: Fields) -> Pictures | None:
+    """Open a video or the first image once; None where there is neither.
+
+    Raises:
+        SequenceError: If it cannot be read.
+    """
+    if video is not None:
+        try:
+            index = index_video(video)
+        except (VideoError, OSError) as error:
+            size = video.stat().st_size
+            raise fields.error(
+                "video",
+                f'"{video.name}" ({size:,} bytes) cannot be read as a video ({error}); '
+                "expected MP4, AVI or another format that FFmpeg decodes",
+            ) from None
+        return Pictures(index.size, index.frames, index.fps)
+    if images:
+        picture = read_image(images[0])
+        if picture is None:
+            raise fields.error("images", f'"{images[0].name}" cannot be read as a picture')
+        return Pictures((picture.shape[1], picture.shape[0]), len(images), None)
+    return None
+
+
+def check_pictures(view: View, found: Pictures, fields: Fields, frames: int) -> Iterable[str]:
+    """Whether the pictures' size fits the calibration, and whether there are enough.
 
     Returns:
         Warnings: pictures that end early, images whose names sort oddly.
 
     Raises:
-        SequenceError: If it cannot be read, or has another size.
+        SequenceError: If they have another size.
     """
     if view.video is not None:
-        try:
-            index = index_video(view.video)
-        except (VideoError, OSError) as error:
-            size = view.video.stat().st_size
-            raise fields.error(
-                "video",
-                f'"{view.video.name}" ({size:,} bytes) cannot be read as a video ({error}); '
-                "expected MP4, AVI or another format that FFmpeg decodes",
-            ) from None
-        _check_size(view, fields, index.size, "frame size")
-        return list(_short(view, index.frames, frames, "video has"))
-    if view.images:
-        picture = read_image(view.images[0])
-        if picture is None:
-            raise fields.error("images", f'"{view.images[0].name}" cannot be read as a picture')
-        _check_size(view, fields, (picture.shape[1], picture.shape[0]), "image size")
-        warnings = list(_short(view, len(view.images), frames, "images are"))
-        by_number = sorted(view.images, key=_by_number)
-        for first, other in zip(by_number, view.images, strict=True):
-            if first != other:
-                warnings.append(
-                    f'camera "{view.camera.name}": images are taken in the order of their names, '
-                    f'so "{other.name}" comes before "{first.name}"; write the numbers with '
-                    "leading zeros"
-                )
-                break
-        return warnings
-    return []
+        _check_size(view, fields, found.size, "frame size")
+        return list(_short(view, found.frames, frames, "video has"))
+    _check_size(view, fields, found.size, "image size")
+    warnings = list(_short(view, found.frames, frames, "images are"))
+    by_number = sorted(view.images, key=_by_number)
+    for first, other in zip(by_number, view.images, strict=True):
+        if first != other:
+            warnings.append(
+                f'camera "{view.camera.name}": images are taken in the order of their names, '
+                f'so "{other.name}" comes before "{first.name}"; write the numbers with '
+                "leading zeros"
+            )
+            break
+    return warnings
 
 
 def _check_size(view: View, fields: Fields, found: tuple[int, int], what: str) -> None:
@@ -117,6 +142,15 @@ def _check_size(view: View, fields: Fields, found: tuple[int, int], what: str) -
 
 
 def _short(view: View, there: int, frames: int, what: str) -> Iterable[str]:
+    if view.clock is not None:
+        last = np.flatnonzero(view.clock.frame_of_step >= there)
+        if len(last):
+            yield (
+                f'camera "{view.camera.name}": the {what} too few: expected at least '
+                f"{int(view.clock.frame_of_step.max()) + 1} frames, found {there}; from step "
+                f"{int(last[0])} on it has no picture"
+            )
+        return
     steps = max(0, there - view.first_frame)
     if steps < frames:
         offset = f" from frame {view.first_frame} on" if view.first_frame else ""

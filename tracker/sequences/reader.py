@@ -9,23 +9,18 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 
-from tracker.sequences.calibration import POSE, check_sight, read_camera
-from tracker.sequences.csv_columns import Columns, read_columns
+from tracker.sequences.calibration import check_sight
 from tracker.sequences.fields import Fields, did_you_mean, shown
-from tracker.sequences.media import check_pictures, find_images, locate
-from tracker.sequences.sequence import (
-    Detections,
-    GroundTruth,
-    Sequence,
-    SequenceError,
-    View,
-)
+from tracker.sequences.filling import check_missing, find_room, find_time
+from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.tables import Reading, read_ground_truth
+from tracker.sequences.views import CAMERA, read_sources, read_views
 from tracker.sequences.writing.taught_fields import read_room, read_templates
 
 FILE = "sequence.toml"
@@ -34,7 +29,6 @@ MOST_FRAMES = 10_000_000
 
 TOP = ("format", "name", "description", "fps", "frames", "room", "target", "camera", "template",
        "ground_truth")  # fmt: skip
-CAMERA = ("name", "image_size", "video", "images", "first_frame", "detections", *POSE, "projection")
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,24 +37,18 @@ class SequenceSummary:
 
     name: str
     description: str
-    fps: float
-    frames: int
+    fps: float | None
+    """None where it is left to the videos."""
+    frames: int | None
+    """None where it is left to the videos and boxes."""
     cameras: int
-
-
-@dataclass(slots=True)
-class _Reading:
-    """What is collected on the way through the file."""
-
-    folder: Path
-    frames: int
-    files: list[Path] = field(default_factory=list)
-    """Every file that sequence.toml names, in its order."""
-    warnings: list[str] = field(default_factory=list)
 
 
 def read_sequence(folder: Path | str) -> Sequence:
     """Read and check a sequence folder.
+
+    What the file does not state is found out: rate, steps and picture sizes from the videos, room
+    and target from where boxes of two cameras meet; the warnings say what was found.
 
     Args:
         folder: The folder, or the ``sequence.toml`` in it.
@@ -70,24 +58,30 @@ def read_sequence(folder: Path | str) -> Sequence:
     """
     folder, text = _find(Path(folder))
     fields = _parse(folder, text)
-    reading = _Reading(folder, fields.integer("frames", minimum=1, maximum=MOST_FRAMES))
-    fps = fields.number("fps", above=0.0, at_most=1000.0)
-    room = read_room(fields)
-    target = fields.table("target", ("half_extents",))
-    assert target is not None
-    half_extents = target.vector(
-        "half_extents", 3, "half width, depth and height in metres", positive=True
+    reading = Reading(folder)
+    stated_frames = (
+        fields.integer("frames", minimum=1, maximum=MOST_FRAMES) if "frames" in fields else None
     )
-    views = _views(fields, reading)
+    stated_fps = fields.number("fps", above=0.0, at_most=1000.0) if "fps" in fields else None
+    room = read_room(fields) if "room" in fields else None
+    half_extents = _half_extents(fields)
+    check_missing(fields, _tables(fields))
+    sources = read_sources(_tables(fields), reading)
+    time = find_time(sources, stated_fps, stated_frames, fields)
+    views = read_views(sources, time, reading)
+    if room is None or half_extents is None:
+        room, half_extents, told = find_room(views, room, half_extents, fields)
+        reading.warnings += told
+    reading.warnings += time.told
     for view in views:
         reading.warnings += check_sight(view.camera, room)
-    templates = read_templates(fields, views, reading.frames)
-    ground_truth = _ground_truth(fields, reading)
+    templates = read_templates(fields, views, time.steps)
+    ground_truth = read_ground_truth(fields, reading, time.steps)
     return Sequence(
         name=fields.text("name"),
         folder=folder,
-        fps=fps,
-        frames=reading.frames,
+        fps=time.fps,
+        frames=time.steps,
         room=room,
         target_half_extents=half_extents,
         views=views,
@@ -97,6 +91,20 @@ def read_sequence(folder: Path | str) -> Sequence:
         digest=_digest(text, reading),
         warnings=tuple(reading.warnings),
     )
+
+
+def _half_extents(fields: Fields) -> Float[ndarray, " 3"] | None:
+    target = fields.table("target", ("half_extents",), needed=False)
+    if target is None:
+        return None
+    return target.vector("half_extents", 3, "half width, depth and height in metres", positive=True)
+
+
+def _tables(fields: Fields) -> list[Fields]:
+    tables = fields.tables("camera", CAMERA, "[[camera]]")
+    if not tables:
+        raise fields.error("camera", "expected at least one table [[camera]], found none")
+    return tables
 
 
 def read_summary(folder: Path | str) -> SequenceSummary:
@@ -110,8 +118,10 @@ def read_summary(folder: Path | str) -> SequenceSummary:
     return SequenceSummary(
         name=fields.text("name"),
         description=fields.text("description", ""),
-        fps=fields.number("fps", above=0.0, at_most=1000.0),
-        frames=fields.integer("frames", minimum=1, maximum=MOST_FRAMES),
+        fps=fields.number("fps", above=0.0, at_most=1000.0) if "fps" in fields else None,
+        frames=fields.integer("frames", minimum=1, maximum=MOST_FRAMES)
+        if "frames" in fields
+        else None,
         cameras=len(fields.tables("camera", CAMERA, "[[camera]]")),
     )
 
@@ -167,98 +177,7 @@ def _parse(folder: Path, text: str) -> Fields:
     return fields
 
 
-def _views(fields: Fields, reading: _Reading) -> tuple[View, ...]:
-    tables = fields.tables("camera", CAMERA, "[[camera]]")
-    if not tables:
-        raise fields.error("camera", "expected at least one table [[camera]], found none")
-    views: list[View] = []
-    for camera in tables:
-        name = camera.text("name")
-        if any(character in name for character in ',"#'):
-            raise camera.error(
-                "name", f"expected no comma, quote or # (it heads CSV columns), found {shown(name)}"
-            )
-        if name in [view.camera.name for view in views]:
-            raise camera.error("name", "two cameras have this name; rename one of them")
-        views.append(_view(name, camera, reading))
-    return tuple(views)
-
-
-def _view(name: str, fields: Fields, reading: _Reading) -> View:
-    size = fields.vector("image_size", 2, "width and height in pixels", positive=True)
-    if (size != np.floor(size)).any() or (size > 65535).any():
-        found = f"{size[0]:g} and {size[1]:g}"
-        raise fields.error(
-            "image_size", f"expected two whole numbers of pixels up to 65535, found {found}"
-        )
-    image_size = (int(size[0]), int(size[1]))
-    if "video" in fields and "images" in fields:
-        raise fields.error("images", "expected a video or images, found both; remove one")
-    video = None
-    if "video" in fields:
-        video = locate(reading.folder, fields, "video")
-    images = find_images(reading.folder, fields) if "images" in fields else ()
-    detections = None
-    if "detections" in fields:
-        path = locate(reading.folder, fields, "detections")
-        detections = _detections(path, reading)
-    view = View(
-        camera=read_camera(name, image_size, fields),
-        video=video,
-        images=images,
-        first_frame=fields.integer("first_frame", 0),
-        detections=detections,
-    )
-    reading.warnings += check_pictures(view, fields, reading.frames)
-    reading.files += images if video is None else (video,)
-    return view
-
-
-def _detections(path: Path, reading: _Reading) -> Detections:
-    columns = _columns(
-        path,
-        reading,
-        needed=("frame", "left", "top", "width", "height"),
-        optional={"score": 1.0},
-    )
-    frames = columns.whole("frame", 0, reading.frames - 1, "the step")
-    for name in ("width", "height"):
-        columns.require(name, columns.values[name] > 0.0, "a size above 0 pixels")
-    scores = columns.values["score"]
-    columns.require("score", (scores >= 0.0) & (scores <= 1.0), "a score from 0 to 1")
-    order = np.argsort(frames, kind="stable")
-    boxes = columns.stacked("left", "top", "width", "height")
-    return Detections(frames[order], boxes[order], scores[order])
-
-
-def _columns(
-    path: Path, reading: _Reading, *, needed: tuple[str, ...], optional: Mapping[str, float]
-) -> Columns:
-    reading.files.append(path)
-    where = f"{reading.folder.name}/{path.relative_to(reading.folder).as_posix()}"
-    return read_columns(path, where, needed=needed, optional=optional)
-
-
-def _ground_truth(fields: Fields, reading: _Reading) -> GroundTruth | None:
-    table = fields.table("ground_truth", ("file",), needed=False)
-    if table is None:
-        return None
-    path = locate(reading.folder, table, "file")
-    columns = _columns(
-        path,
-        reading,
-        needed=("frame", "id", "x", "y", "z"),
-        optional={"valid": 1.0},
-    )
-    frames = columns.whole("frame", 0, reading.frames - 1, "the step")
-    ids = columns.whole("id", 0, None, "the person")
-    valid = columns.whole("valid", 0, 1, "1 certain, 0 not")
-    order = columns.one_row_each(frames, ids, "person")
-    positions = columns.stacked("x", "y", "z")
-    return GroundTruth(frames[order], ids[order], positions[order], valid[order] == 1)
-
-
-def _digest(text: str, reading: _Reading) -> str:
+def _digest(text: str, reading: Reading) -> str:
     digest = hashlib.sha256(text.encode())
     for path in reading.files:
         status = path.stat()

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.camera import Camera
+
+if TYPE_CHECKING:
+    from tracker.sequences.clock import Clock
 
 
 class SequenceError(ValueError):
@@ -98,13 +102,27 @@ class View:
     video: Path | None = None
     images: tuple[Path, ...] = ()
     first_frame: int = 0
-    """The frame of the video or image list that is step 0."""
+    """The frame of the video or image list that is step 0, where it has no clock of its own."""
     detections: Detections | None = None
+    clock: Clock | None = None
+    """Which frame each step shows; None where it is ``first_frame`` + k at step k."""
+    looked_at: Bool[ndarray, " F"] | None = None
+    """At which steps the detector had a picture; None where it had one at every step."""
 
     @property
     def has_pictures(self) -> bool:
         """Whether there is a video or a list of images."""
         return self.video is not None or bool(self.images)
+
+    def frame_at(self, step: int) -> int:
+        """The frame of the video or image list that a step shows, -1 for none."""
+        if self.clock is None:
+            return self.first_frame + step
+        return int(self.clock.frame_of_step[step])
+
+    def was_looked_at(self, step: int) -> bool:
+        """Whether the outside detector had a picture of this step: else it says nothing there."""
+        return self.looked_at is None or bool(self.looked_at[step])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -51,6 +51,8 @@ class VideoIndex:
     """Time stamps, microseconds, ascending; None where they do not identify the frames."""
     keys: Int[ndarray, " K"]
     """The frames that decode by themselves: where a jump can land."""
+    fps: float | None = None
+    """Frames a second: by the time stamps, else as the header says; None where neither does."""
 
 
 def index_video(path: Path) -> VideoIndex:
@@ -75,6 +77,7 @@ def _index_video(path: Path, bytes_: int, changed: int) -> VideoIndex:
             int(capture.get(cv2.CAP_PROP_FRAME_WIDTH)),
             int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT)),
         )
+        claimed = float(capture.get(cv2.CAP_PROP_FPS))
         frames = len(stamps)
         if frames < len(decoded):  # no packets to count: count pictures
             frames = len(decoded)
@@ -95,7 +98,18 @@ def _index_video(path: Path, bytes_: int, changed: int) -> VideoIndex:
         frames=frames,
         times=times if exact else None,
         keys=np.flatnonzero(is_key[order]) if exact else np.zeros(1, dtype=np.int64),
+        fps=_rate(times if exact else times[:0], claimed),
     )
+
+
+def _rate(times: Int[ndarray, " F"], claimed: float) -> float | None:
+    """Frames a second by the time stamps, microseconds; where they are few, as claimed."""
+    if len(times) > 1:
+        measured = 1e6 * (len(times) - 1) / float(times[-1] - times[0])
+        # stamps are rounded: what the header says is exact where both agree
+        agree = 0.0 < claimed < 1000.0 and abs(measured / claimed - 1.0) < 2e-3
+        return claimed if agree else round(measured, 3)
+    return claimed if 0.0 < claimed < 1000.0 else None
 
 
 def _scan(path: Path) -> tuple[Int[ndarray, " F"], ndarray]:

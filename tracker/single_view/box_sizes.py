@@ -15,16 +15,18 @@ from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.sequences.sequence import Room
 
 CELLS = 24
-"""The picture is cut into about so many cells a side."""
+"""The picture is cut into about so many cells a side: sizes hardly change within one, and each
+still holds some hundred of the positions."""
 
 POSITIONS = 60_000
-"""Positions in the room that are projected."""
+"""Positions in the room that are projected, once a camera: enough for every cell."""
 
 AT_ENTRANCE_HEIGHT, HEIGHT_FACTOR = 0.9, 2.0
-"""Share of the positions at the entrances' heights, and the factor on those heights' spread."""
+"""Share of the positions at the entrances' heights, and the factor on those heights'
+spread: some people sit or bend, and entrances are drawn by eye."""
 
 BELOW_FLOOR = 0.1
-"""Metres that a target may reach below the room's volume."""
+"""Metres that a target may reach below the room's volume, whose floor is drawn by eye."""
 
 
 def upright_boxes(

@@ -9,7 +9,7 @@ filters", IEEE TAES 48(2), 2012.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -19,15 +19,20 @@ from scipy.stats import chi2
 from tracker.filters import gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.foreground import pack
-from tracker.parameters import ColourPhdParams, ForegroundParams
-from tracker.sequences.frames import FrameReader
+from tracker.kernels.kalman import Expected
+from tracker.parameters import ColourPhdParams
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import entrance_boxes
 from tracker.single_view.colour.peaks import PeakFinder, Peaks
 from tracker.single_view.protocol import ViewResult
 
-GATE = float(chi2.ppf(0.9999, df=4))
-"""Squared Mahalanobis distance: a person's own peak lies inside with this probability."""
+if TYPE_CHECKING:
+    from tracker.parameters import RunParameters
+
+EXPLAINED = 0.5
+"""A peak that people explain with less than this weight may be somebody new: it is more likely
+nobody's than somebody's."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,29 +63,27 @@ class ColourPhd:
     peaks themselves go to the fusion.
     """
 
-    needs_pictures = True
-
     def __init__(
         self,
         sequence: Sequence,
         camera_index: int,
-        parameters: ColourPhdParams,
-        foreground: ForegroundParams,
-        reader: FrameReader,
+        parameters: RunParameters,
+        reader: Pictures,
     ) -> None:
         """Read the templates and learn the background.
 
         Raises:
             ValueError: If there are no pictures or templates, or a template cannot be read.
         """
-        self._parameters = parameters
-        self._finder = PeakFinder(sequence, camera_index, parameters, foreground, reader)
+        self._parameters = p = parameters.of(ColourPhdParams)
+        self._finder = PeakFinder(sequence, camera_index, p, parameters.foreground, reader)
+        self._gate = float(chi2.ppf(p.gate_probability, df=4))
         self._step_time = sequence.step_time
         camera = sequence.cameras[camera_index]
         births = GaussianMixture.empty(4)
-        if parameters.birth != "peaks":
+        if p.birth != "peaks":
             births = entrance_boxes(
-                camera, sequence.room, sequence.target_half_extents, parameters.birth_rate
+                camera, sequence.room, sequence.target_half_extents, p.birth_rate
             )
         self._entrances = GaussianMixture(
             births.weights * self._step_time, births.means, births.covariances, births.labels
@@ -90,7 +93,7 @@ class ColourPhd:
         possible = self._finder.sizes
         sizes = np.maximum(possible.largest - possible.smallest, 1.0)
         volume = width * height * float(np.prod(sizes))
-        self._clutter = parameters.clutter_rate / volume
+        self._clutter = p.clutter_rate / volume
 
     def start(self) -> ColourPhdState:
         """Nobody is in the picture."""
@@ -118,15 +121,14 @@ class ColourPhd:
         updated = phd.update(
             predicted,
             peaks.boxes,
-            expected=predicted.means,
-            jacobians=np.eye(4)[None],
+            expected=Expected.of(predicted.means, np.eye(4)[None]),
             noise=noise,
             detection_probability=p.detection_probability,
             clutter_intensity=self._clutter,
-            gate=GATE,
+            gate=self._gate,
         )
         mixture = self._reduce(updated.posterior)
-        unexplained = peaks.boxes[updated.measurement_weights < 0.5]
+        unexplained = peaks.boxes[updated.measurement_weights < EXPLAINED]
         after = ColourPhdState(mixture, unexplained, next_label, background)
         return after, self._result(mixture, peaks)
 

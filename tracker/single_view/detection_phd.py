@@ -9,6 +9,7 @@ filters", IEEE TAES 48(2), 2012.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
@@ -18,16 +19,19 @@ from scipy.stats import chi2
 from tracker.filters import gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.filters.phd import PhdUpdate
+from tracker.kernels.kalman import Expected
 from tracker.parameters import DetectionPhdParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.detector_boxes import Detected, DetectorBoxes, trust
 from tracker.single_view.protocol import ViewResult
 
-GATE = float(chi2.ppf(0.9999, df=4))
-"""Squared Mahalanobis distance: a person's own box lies inside with this probability."""
+if TYPE_CHECKING:
+    from tracker.parameters import RunParameters
+    from tracker.sequences.frames import Pictures
 
 BELIEVED = 0.5
-"""A box that people explain with more than this weight goes to the fusion."""
+"""A box that people explain with more than this weight goes to the fusion: it is more likely
+somebody's than nobody's."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,22 +57,25 @@ class DetectionPhd:
     box on. Boxes that contradict the room are shown and not used.
     """
 
-    needs_pictures = False
-
     def __init__(
-        self, sequence: Sequence, camera_index: int, parameters: DetectionPhdParams
+        self,
+        sequence: Sequence,
+        camera_index: int,
+        parameters: RunParameters,
+        reader: Pictures | None = None,
     ) -> None:
         """Prepare for one camera.
 
         Raises:
             ValueError: If the camera has no detections.
         """
-        self._parameters = parameters
-        self._boxes = DetectorBoxes(sequence, camera_index, parameters)
+        self._parameters = p = parameters.of(DetectionPhdParams)
+        self._boxes = DetectorBoxes(sequence, camera_index, p)
+        self._gate = float(chi2.ppf(p.gate_probability, df=4))
         self._step_time = sequence.step_time
         width, height = sequence.cameras[camera_index].image_size
         # half sizes up to half of the picture's, as the fusion's clutter has them
-        self._clutter = parameters.clutter_rate / (width * height * width / 2.0 * height / 2.0)
+        self._clutter = p.clutter_rate / (width * height * width / 2.0 * height / 2.0)
 
     def start(self) -> DetectionPhdState:
         """Nobody is in the picture."""
@@ -89,13 +96,12 @@ class DetectionPhd:
         updated = phd.update(
             predicted,
             found.boxes[good],
-            expected=predicted.means,
-            jacobians=np.eye(4)[None],
+            expected=Expected.of(predicted.means, np.eye(4)[None]),
             noise=found.sigmas[good][:, :, None] ** 2 * np.eye(4),
             detection_probability=p.detection_probability,
             clutter_intensity=self._clutter
             * np.exp(2.0 * p.score_clutter * (0.5 - found.scores[good])),
-            gate=GATE,
+            gate=self._gate,
         )
         mixture, _ = gaussian_mixture.reduce(
             updated.posterior,

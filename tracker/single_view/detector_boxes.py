@@ -8,11 +8,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
+from tracker.boxes import Boxes
 from tracker.camera import Camera
 from tracker.parameters import DetectionBoxParams
 from tracker.sequences.sequence import Room, Sequence
-
-_DEPTH_SIGMAS = 3.0  # a box's size may be off by so many standard deviations
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,14 +47,13 @@ class DetectorBoxes:
         p, all_boxes = parameters, view.detections
         above = all_boxes.scores >= p.score_threshold
         self._frames, scores = all_boxes.frames[above], all_boxes.scores[above]
-        half_sizes = all_boxes.boxes[above, 2:] / 2.0
-        boxes = np.concatenate([all_boxes.boxes[above, :2] + half_sizes, half_sizes], axis=1)
+        boxes = Boxes.from_left_top(all_boxes.boxes[above]).centred
         sigmas = trust(boxes, p)
         nearest, farthest = standing_between(
             view.camera,
             boxes,
             float(sequence.target_half_extents[2]),
-            _DEPTH_SIGMAS * sigmas[:, 3] / boxes[:, 3],
+            p.depth_sigmas * sigmas[:, 3] / boxes[:, 3],
         )
         plausible = meets(sequence.room, nearest, farthest, p.room_tolerance)
         self._found = Detected(_within(boxes, view.camera), scores, sigmas, plausible)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy import ndarray
@@ -12,6 +13,10 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.detector_boxes import DetectorBoxes
 from tracker.single_view.protocol import ViewResult
 
+if TYPE_CHECKING:
+    from tracker.parameters import RunParameters
+    from tracker.sequences.frames import Pictures
+
 
 class DetectionBoxes:
     """The boxes of the sequence's ``detections``, with the trust that the parameters state.
@@ -19,17 +24,19 @@ class DetectionBoxes:
     Boxes that contradict the room stay among the measurements and go no further.
     """
 
-    needs_pictures = False
-
     def __init__(
-        self, sequence: Sequence, camera_index: int, parameters: DetectionBoxParams
+        self,
+        sequence: Sequence,
+        camera_index: int,
+        parameters: RunParameters,
+        reader: Pictures | None = None,
     ) -> None:
         """Prepare for one camera.
 
         Raises:
             ValueError: If the camera has no detections.
         """
-        self._boxes = DetectorBoxes(sequence, camera_index, parameters)
+        self._boxes = DetectorBoxes(sequence, camera_index, parameters.of(DetectionBoxParams))
 
     def start(self) -> None:
         """There is no state."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -63,8 +63,10 @@ class ViewResult:
     if they are one's; (0, 0) where there was no picture, or fewer than two have templates. A
     method leaves it: :mod:`tracker.single_view.colour.likeness` tells it of all."""
     looks: Float16[ndarray, "N A"] = field(default_factory=lambda: np.zeros((0, 0), np.float16))
-    """What each box looks like, as a unit vector: the root of its colour histogram where there
-    are pictures, or what the detector gave; (0, 0) where there is neither."""
+    """What each box looks like, as a unit vector: the root of its colour histogram where the
+    method is given pictures; (0, 0) where there is nothing to see of it."""
+    blind: bool = False
+    """Whether the camera had no frame at this step, and so says nothing of who is there."""
 
     @staticmethod
     def of_boxes(
@@ -89,6 +91,12 @@ class ViewResult:
             information={},
         )
 
+    @staticmethod
+    def of_no_frame() -> ViewResult:
+        """The camera had no frame at this step."""
+        nothing = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
+        return replace(nothing, blind=True)
+
 
 class SingleViewMethod(Protocol):
     """One method, prepared for one camera of one sequence.
@@ -96,8 +104,6 @@ class SingleViewMethod(Protocol):
     A method is made once per camera and run (that is where templates are read and
     the background is learnt); its steps are pure: state in, state out.
     """
-
-    needs_pictures: bool
 
     def start(self) -> Any:
         """The state before the first step."""

@@ -9,6 +9,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.fusion.target_model import ExpectedBoxes
+from tracker.kernels.gating import Measurements
 
 _BOX_SIGMA = 0.1
 """Of one box's edge about a person's, in half heights."""
@@ -62,6 +63,10 @@ class Calibration:
     def of_people(self, people: ndarray) -> Calibration:
         """Of some of the people, in that order."""
         return Calibration(self.sizes[people], self.offsets, self.noises)
+
+    def measured(self, camera: int, measurements: Measurements) -> Measurements:
+        """A camera's measurements with the noise that was learnt."""
+        return measurements._replace(noises=self.noises[camera] ** 2 * measurements.noises)
 
     def shift(self, camera: int, people: ndarray, expected: ExpectedBoxes) -> Float[ndarray, "L m"]:
         """What is added to the expected measurements of some boxes, pixels.

@@ -241,6 +241,7 @@ def _seen_empty(
         chances = p.detection_probability * visibility.inside_probability(
             model.cameras[c], expected, spread, soft=p.edge == "soft"
         )
+        chances = np.where(camera.blind[steps], 0.0, chances)
         against = evidence.seen_empty(
             expected.boxes, expected.valid, chances, steps, camera.starts, camera.boxes
         )

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.kernels.smoothing.presence import presence
+from tracker.kernels.smoothing.presence import Habits, presence
 from tracker.parameters import SmoothingParams
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Shared, Smoother
@@ -45,16 +45,15 @@ def lifetimes(
     hit = -np.log1p(-min(p.detection_probability, 1.0 - 1e-6))
     votes = hit * np.bincount(shared.links.rows, shared.links.shares, len(paths.states))
     weight = independence(smoother.model.step_time, parameters.memory)
-    chances, odds = presence(
+    survival = min(p.survival_probability, 1.0 - 1e-9)
+    found = presence(
         paths.starts,
         paths.lasts,
         weight * (votes + misses(shared)),
-        float(np.log(p.survival_probability)) if p.survival_probability < 1.0 else -1e-9,
-        -_ENTER,
-        -parameters.change,
+        Habits(float(np.log(survival)), -_ENTER, -parameters.change),
         smoother.frames - 1,
     )
-    return chances, odds
+    return found.probabilities, found.odds
 
 
 def extended(smoother: Smoother, paths: Paths, steps: int) -> tuple[Paths, Float[ndarray, " N"]]:

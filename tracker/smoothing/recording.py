@@ -6,10 +6,11 @@ from collections.abc import Sequence as Many
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.fusion.target_model import TargetModel
+from tracker.kernels.gating import Measurements
 from tracker.single_view.protocol import ViewResult
 
 
@@ -19,10 +20,10 @@ class CameraBoxes:
 
     starts: Int[ndarray, " T1"]
     """Where each step's boxes begin, and the end."""
-    values: Float[ndarray, "B m"]
-    """Measurements of the target model, pixels."""
-    noises: Float[ndarray, "B m m"]
-    """Squared pixels."""
+    blind: Bool[ndarray, " T"]
+    """Whether the camera had no frame."""
+    measurements: Measurements
+    """Of the target model, pixels and squared pixels."""
     boxes: Float[ndarray, "B 4"]
     """Centre and half sizes, pixels."""
 
@@ -32,6 +33,7 @@ class CameraBoxes:
         counts = [len(view.boxes) for view in views]
         boxes = np.concatenate([np.zeros((0, 4)), *(view.boxes for view in views)])
         sigmas = np.concatenate([np.zeros((0, 4)), *(view.sigmas for view in views)])
-        values, noises = model.measured_all(boxes, sigmas, factor)
+        measurements = model.measured_boxes(boxes, sigmas, factor)
+        blind = np.array([view.blind for view in views], dtype=bool)
         starts = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
-        return CameraBoxes(starts, values, noises, boxes)
+        return CameraBoxes(starts, blind, measurements, boxes)

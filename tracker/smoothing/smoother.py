@@ -12,8 +12,8 @@ from numpy import ndarray
 from tracker import association
 from tracker.fusion import visibility
 from tracker.fusion.model import CONFIRMED, FusionModel
-from tracker.fusion.target_model import ExpectedBoxes
-from tracker.kernels.kalman import Alternative
+from tracker.kernels.labelled.camera_update import CameraRule
+from tracker.kernels.measurement import ExpectedBoxes as SeenBoxes
 from tracker.kernels.smoothing import evidence, passes
 from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
@@ -82,7 +82,19 @@ class Smoother:
             CameraBoxes.of([step[c] for step in views], model.target, parameters.measurement_sigma)
             for c in range(len(model.cameras))
         ]
-        motion = model.motion
+        motion, p = model.motion, parameters
+        self._rule = CameraRule(
+            gate=model.gate,
+            soft=p.edge == "soft",
+            detection_probability=p.detection_probability,
+            confirmed=CONFIRMED,
+            near=model.near,
+            strength=p.occlusion,
+            worth_telling=visibility.WORTH_TELLING,
+            tolerance=association.TOLERANCE,
+            iterations=association.ITERATIONS,
+            least_told=_LEAST,
+        )
         self.prior = np.zeros((motion.dimension, motion.dimension))
         self.prior[:3, :3] = START_SIGMA**2 * np.eye(3)
         self.prior[3:, 3:] = max(motion.start_velocity, 1e-6) ** 2 * np.eye(motion.dimension - 3)
@@ -110,35 +122,36 @@ class Smoother:
         """
         motion, model, owners = self.model.motion, self.model, paths.owners
         learnt = learnt or self.stated(paths)
+        rule = passes.PathMotion(motion.transition, motion.noise, self.prior)
         for _ in range(iterations):
             rows = len(paths.states)
-            information, vectors = np.zeros((rows, 3, 3)), np.zeros((rows, 3))
-            constants = np.zeros(rows)
+            information = evidence.BoxInformation(
+                np.zeros((rows, 3, 3)), np.zeros((rows, 3)), np.zeros(rows)
+            )
             for c, camera in enumerate(self.cameras):
                 own = links.take(links.cameras == c)
-                expected = model.target.expected(
-                    model.cameras[c], paths.states[own.rows], paths.covariances[own.rows]
+                seen = self._seen(
+                    c, paths.states[own.rows], paths.covariances[own.rows], owners[own.rows], learnt
                 )
                 # who stands behind the lens cannot have made the box
-                own_valid = expected.valid
+                shares = np.where(seen.valid, own.shares, 0.0)
                 evidence.add_information(
-                    own.rows, own.boxes, np.where(own_valid, own.shares, 0.0), paths.states,
+                    evidence.BoxLinks(own.rows, own.boxes, shares),
+                    paths.states,
                     paths.covariances,
-                    expected.values + learnt.shift(c, owners[own.rows], expected),
-                    expected.jacobians, expected.spreads, camera.values,
-                    learnt.noises[c] ** 2 * camera.noises, *self._other(expected), information,
-                    vectors, constants,
-                )  # fmt: skip
+                    seen.expected,
+                    learnt.measured(c, camera.measurements),
+                    information,
+                )
                 log_hit = np.log(self.parameters.detection_probability / model.clutter[c])
-                np.add.at(constants, own.rows, own.shares * log_hit)
+                np.add.at(information.constants, own.rows, own.shares * log_hit)
             begins = paths.states[paths.starts[:-1]].copy()
             begins[:, 3:] = 0.0
-            means, covariances, fits, traces, jumps = passes.smooth_paths(
-                paths.starts, begins, information, vectors, motion.transition, motion.noise,
-                self.prior,
-            )  # fmt: skip
-            paths = paths.with_states(means, covariances)
-        return Fitted(paths, fits + constants, jumps, traces)
+            found = passes.smooth_paths(
+                paths.starts, begins, information.matrices, information.vectors, rule
+            )
+            paths = paths.with_states(found.means, found.covariances)
+        return Fitted(paths, found.fits + information.constants, found.jumps, found.traces)
 
     def stated(self, paths: Paths) -> Calibration:
         """The boxes as stage 1 states them, for some paths."""
@@ -155,32 +168,55 @@ class Smoother:
         Association marginals by belief propagation, with the fusion's detection probabilities:
         people behind people, the picture's edge.
         """
-        p, model = self.parameters, self.model
-        steps = paths.steps
+        steps, owners = paths.steps, paths.owners
         order = np.argsort(steps, kind="stable")
-        step_starts = np.searchsorted(steps[order], np.arange(self.frames + 1))
-        existences = np.ones(len(steps)) if existences is None else existences
-        owners = paths.owners
-        labels = paths.labels[owners]
         learnt = learnt or self.stated(paths)
-        parts, chances, missed, hidden = [], [], [], []
+        rows = evidence.Rows(
+            paths.states,
+            paths.covariances,
+            np.ones(len(steps)) if existences is None else existences,
+            paths.labels[owners],
+            order,
+            np.searchsorted(steps[order], np.arange(self.frames + 1)),
+        )
+        links, shared = [], []
         for c, camera in enumerate(self.cameras):
-            expected = model.target.expected(model.cameras[c], paths.states, paths.covariances)
-            rows, boxes, shares, chance, miss, hidden_by = evidence.share_camera(
-                order, step_starts, camera.starts, existences, paths.states, paths.covariances,
-                labels, expected.values + learnt.shift(c, owners, expected), expected.jacobians,
-                expected.spreads, expected.boxes, expected.depths, expected.valid,
-                *self._other(expected), camera.values, learnt.noises[c] ** 2 * camera.noises,
-                model.clutter[c], model.gate,
-                np.array(model.cameras[c].image_size), p.edge == "soft",
-                p.detection_probability, CONFIRMED, p.occlusion, model.near,
-                visibility.WORTH_TELLING, association.TOLERANCE, association.ITERATIONS, _LEAST,
-            )  # fmt: skip
-            parts.append(Links(np.full(len(rows), c, dtype=np.int64), rows, boxes, shares))
-            chances.append(chance)
-            missed.append(miss)
-            hidden.append(hidden_by)
-        return Shared(Links.joined(parts), np.array(chances), np.array(missed), np.array(hidden))
+            found = evidence.share_camera(
+                rows,
+                evidence.CameraSteps(
+                    camera.starts,
+                    camera.blind,
+                    learnt.measured(c, camera.measurements),
+                    self.model.clutter[c],
+                ),
+                self._seen(c, paths.states, paths.covariances, owners, learnt),
+                self.model.cameras[c].calibration.image_size,
+                self._rule,
+            )
+            which = np.full(len(found.links.rows), c, dtype=np.int64)
+            links.append(Links(which, *found.links))
+            shared.append(found)
+        return Shared(
+            Links.joined(links),
+            np.array([one.detection_probabilities for one in shared]),
+            np.array([one.missed for one in shared]),
+            np.array([one.hidden_by for one in shared]),
+        )
+
+    def _seen(
+        self,
+        camera: int,
+        states: ndarray,
+        covariances: ndarray,
+        people: ndarray,
+        learnt: Calibration,
+    ) -> SeenBoxes:
+        """What a camera should give of states that are those of ``people``."""
+        found = self.model.target.expected(self.model.cameras[camera], states, covariances)
+        values = found.expected.values + learnt.shift(camera, people, found)
+        return SeenBoxes(
+            found.expected._replace(values=values), found.boxes, found.depths, found.valid
+        )
 
     def learn(self, paths: Paths, links: Links, learnt: Calibration) -> Calibration:
         """What the boxes say of themselves, given where the paths lie: a step of EM.
@@ -199,7 +235,7 @@ class Smoother:
                 self.model.cameras[c], paths.states[own.rows], paths.covariances[own.rows]
             )
             half = np.maximum((expected.boxes[:, 3] - expected.boxes[:, 1]) / 2.0, 1.0)
-            plain = camera.values[own.boxes] - expected.values
+            plain = camera.measurements.values[own.boxes] - expected.expected.values
             whole = expected.valid & (np.abs(expected.jacobians[:, :, :3]).max(axis=2) > 0.0).all(
                 axis=1
             )
@@ -220,7 +256,9 @@ class Smoother:
                 h = expected.jacobians[whole][:, :, :3]
                 p = paths.covariances[own.rows[whole]][:, :3, :3]
                 spread = np.einsum("lpa,lab,lpb->lp", h, p, h)
-                own_noise = np.diagonal(camera.noises[own.boxes[whole]], axis1=1, axis2=2)
+                own_noise = np.diagonal(
+                    camera.measurements.noises[own.boxes[whole]], axis1=1, axis2=2
+                )
                 square = (half[:, None] * left[whole]) ** 2
                 ratio = np.median(square / own_noise) / _MEDIAN + np.median(spread / own_noise)
                 alike = _alike(own.rows[whole], owners, left[whole])
@@ -228,11 +266,6 @@ class Smoother:
                     np.sqrt(ratio * (1.0 + alike) / (1.0 - alike)), NARROWEST, WIDEST
                 )
         return Calibration(told / (count + SIZE_RIDGE), offsets, noises)
-
-    def _other(self, expected: ExpectedBoxes) -> Alternative:
-        return expected.other or Alternative.none(
-            self.model.target.size, self.model.motion.dimension
-        )
 
 
 def _alike(

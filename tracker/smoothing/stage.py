@@ -25,49 +25,74 @@ _SEEN = 0.5
 """Association probability from which a camera counts as seeing a person."""
 
 
-def smooth(
-    sequence: Sequence,
-    parameters: RunParameters,
-    views: Many[tuple[ViewResult, ...]],
-    fused: Many[FusionResult],
-    *,
-    check: Callable[[], None] = lambda: None,
-) -> Smoothed:
-    """The tracks of some steps from step 0 on, each by the boxes of all of them.
+class Positions:
+    """Each track of the filter, smoothed over its whole life.
 
-    ``positions``: each track of the filter is fitted to its boxes over its whole life, and the
-    boxes are shared out anew by where the tracks lie; gaps are filled from both sides, ends cut
-    where the evidence ends and beginnings drawn back to the first box. ``identities``: before
-    that, tracks are cut where it was a draw who was who, and joined again all at once.
-
-    Args:
-        sequence: Cameras and room.
-        parameters: Of the fusion, whose models are used, and of the smoothing.
-        views: Stage 1 of each step.
-        fused: Stage 2 of each step.
-        check: Called now and then; raises to stop.
+    It is fitted to its boxes, and the boxes are shared out anew by where the tracks lie; gaps
+    are filled from both sides, ends cut where the evidence ends, and beginnings drawn back to
+    the first box.
     """
-    p = parameters.smoothing
-    smoother = Smoother(sequence, parameters.fusion, views)
-    dimension, cameras = smoother.model.motion.dimension, len(smoother.cameras)
-    tracks = trajectories.extract(fused, cameras=cameras, extraction_threshold=CONFIRMED)
-    if not len(tracks):
-        return Smoothed.empty(dimension, cameras)
-    paths = reading.read_paths(fused, tracks, dimension)
-    links = reading.read_links(fused, paths, smoother.cameras)
-    check()
-    decisions: list[Decision] = []
-    learnt: Calibration | None = None
-    if parameters.smoothing_method == "identities":
+
+    def __init__(self, sequence: Sequence, parameters: RunParameters) -> None:
+        """Prepare for one sequence.
+
+        Args:
+            sequence: Cameras and room.
+            parameters: Of the fusion, whose models are used, and of the smoothing.
+        """
+        self._sequence = sequence
+        self._parameters = parameters
+
+    def smooth(
+        self,
+        views: Many[tuple[ViewResult, ...]],
+        fused: Many[FusionResult],
+        check: Callable[[], None] = lambda: None,
+    ) -> Smoothed:
+        """The tracks of some steps from step 0 on, each by the boxes of all of them."""
+        p = self._parameters.smoothing
+        smoother = Smoother(self._sequence, self._parameters.fusion, views)
+        dimension, cameras = smoother.model.motion.dimension, len(smoother.cameras)
+        tracks = trajectories.extract(fused, cameras=cameras, extraction_threshold=CONFIRMED)
+        if not len(tracks):
+            return Smoothed.empty(dimension, cameras)
+        paths = reading.read_paths(fused, tracks, dimension)
+        links = reading.read_links(fused, paths, smoother.cameras)
+        check()
+        paths, links, learnt, decisions = self._named(smoother, paths, links, views, check)
+        fitted, shared, learnt = _settled(smoother, paths, links, p, learnt, check)
+        return _finished(smoother, fitted, shared, learnt, p, decisions)
+
+    def _named(
+        self,
+        smoother: Smoother,
+        paths: Paths,
+        links: Links,
+        views: Many[tuple[ViewResult, ...]],
+        check: Callable[[], None],
+    ) -> tuple[Paths, Links, Calibration | None, list[Decision]]:
+        """The tracks of people, and what was learnt on the way: here the filter's own."""
+        return paths, links, None, []
+
+
+class Identities(Positions):
+    """Smoothed, and who is who settled: tracks cut where it was a draw, and joined at once."""
+
+    def _named(
+        self,
+        smoother: Smoother,
+        paths: Paths,
+        links: Links,
+        views: Many[tuple[ViewResult, ...]],
+        check: Callable[[], None],
+    ) -> tuple[Paths, Links, Calibration | None, list[Decision]]:
+        p = self._parameters.smoothing
         contested = pieces.contested(paths, links)
         fitted, shared, learnt = _settled(smoother, paths, links, p, None, check)
         looks = _looks(views) if p.appearance > 0.0 else None
         found = identities.settle(smoother, fitted, shared, contested, p, looks)
         check()
-        paths, links, decisions = found.paths, found.links, found.decisions
-        learnt = learnt.of_people(found.origins)
-    fitted, shared, learnt = _settled(smoother, paths, links, p, learnt, check)
-    return _finished(smoother, fitted, shared, learnt, p, decisions)
+        return found.paths, found.links, learnt.of_people(found.origins), found.decisions
 
 
 def _settled(

@@ -9,9 +9,8 @@ from jaxtyping import Int
 from numpy import ndarray
 
 from tracker.fusion.protocol import FusionResult
-from tracker.sequences.sequence import Room
 from tracker.smoothing.result import Smoothed
-from tracker.trajectories import Trajectories
+from tracker.trajectories import Bounds, Trajectories
 
 
 def tracks_of(
@@ -20,9 +19,7 @@ def tracks_of(
     ids: dict[int, int],
     *,
     extraction_threshold: float,
-    room: Room,
-    margin: float,
-    below: float,
+    bounds: Bounds,
     near: float,
 ) -> Trajectories:
     """The people of each step whose existence is above the threshold, inside the room.
@@ -32,12 +29,11 @@ def tracks_of(
         fused: Stage 2 of each step, for the component that stands for each person.
         ids: Label → id as the filter reported them; labels that it never reported get the
             next numbers.
-        extraction_threshold: As ``room``, ``margin`` and ``below``, of
-            :func:`tracker.trajectories.extract`.
+        extraction_threshold: As ``bounds``, of :func:`tracker.trajectories.extract`.
         near: Metres within which a component of the filter's posterior is the person's.
     """
     chosen = smoothed.existences > extraction_threshold
-    chosen &= room.contains(smoothed.means[:, :3], margin, below)
+    chosen &= bounds.contain(smoothed.means[:, :3])
     rows = np.flatnonzero(chosen)
     known = dict(ids)
     for label in smoothed.labels[rows].tolist():

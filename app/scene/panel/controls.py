@@ -8,8 +8,9 @@ just moving it.
 
 from __future__ import annotations
 
+import html
 import threading
-from collections.abc import Set
+from collections.abc import Mapping, Set
 from functools import partial
 from typing import Any
 
@@ -17,12 +18,13 @@ import viser
 
 from app.scene import style
 from app.scene.keys import hotkeys
-from app.scene.panel.sliders import Scale, hint_text, label_text, number_text
+from app.scene.panel import finding
+from app.scene.panel.sliders import Scale, hint_text, label_text, number_text, symbol_parts
 from app.scene.worker import LatestWorker
 from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
 from tracker import parameters as table
-from tracker.parameters import Parameter, ParameterError, RunParameters, Stage
+from tracker.parameters import MethodKey, Parameter, ParameterError, RunParameters, Stage
 
 ORIGIN = "viser"
 PANEL_WIDTH = 276
@@ -37,11 +39,14 @@ STAGES: dict[Stage, str] = {
     "smoothing": "Smoothing",
     "tracks": "Tracks",
 }
-METHOD_STAGE: dict[str, Stage] = {
+METHOD_STAGE: dict[MethodKey, Stage] = {
     "single_view": "single_view",
     "fusion_method": "fusion",
     "smoothing_method": "smoothing",
 }
+
+UNFIT = " · not here"
+"""Behind the name of a method that cannot work on the open sequence, as on the page."""
 
 Input = (
     viser.GuiInputHandle[float]
@@ -68,8 +73,10 @@ class Controls:
         self._groups: dict[str, list[viser.GuiFolderHandle]] = {}
         self._resets: dict[Stage, viser.GuiButtonHandle] = {}
         self._lock = threading.Lock()
-        self._moved: set[str] = set()
-        """Edits of browsers that are not yet in the workbench."""
+        self._moved: dict[str, Any] = {}
+        """Edits of browsers that are not yet in the workbench: the input that was moved, by key."""
+        self._copies: dict[str, list[Any]] = {}
+        """The same parameters among the essentials and among what is found."""
         self._worker = LatestWorker("controls", self._work)
         server.gui.main_panel.dock_right()
         server.gui.main_panel.set_width(PANEL_WIDTH)
@@ -81,8 +88,42 @@ class Controls:
             hint="Takes a named set of values; Changes on the page saves one of your own.",
         )
         self._presets.on_update(self._take_preset)
+        self._sought: Any = server.gui.add_text(
+            "Find", "", hint="Words of a parameter's name, symbol, unit or help."
+        )
+        self._only_changed: Any = server.gui.add_checkbox(
+            "Changed only", False, hint="Leaves out what stands at its default."
+        )
+        for asked in (self._sought, self._only_changed):
+            asked.on_update(lambda _: self._worker.ask("refresh"))
+        self._essentials = server.gui.add_folder("Essentials")
+        self._found = server.gui.add_folder("Found", visible=False)
+        self._nothing_found = server.gui.add_html("", visible=False)
+        for folder, wanted in ((self._essentials, False), (self._found, True)):
+            with folder:
+                # what all methods share comes first
+                for parameter in sorted(table.PARAMETERS.values(), key=_is_of_one_method):
+                    if wanted or parameter.essential:
+                        handle = self._input_of(parameter)
+                        handle.visible = False
+                        self._copies.setdefault(parameter.key, []).append(handle)
+                        self._hear(parameter.key, handle)
+        self._stages: dict[Stage, viser.GuiFolderHandle] = {}
         for stage, title in STAGES.items():
             self._make_stage(stage, title)
+        every = [*self._inputs.items(), *((k, h) for k, hs in self._copies.items() for h in hs)]
+        server.gui.add_html(
+            style.symbols(
+                {
+                    handle._impl.uuid: (
+                        symbol_parts(table.PARAMETERS[key].symbol)[1],
+                        table.PARAMETERS[key].unit,
+                    )
+                    for key, handle in every
+                    if key in table.PARAMETERS
+                }
+            )
+        )
         self._reset_all = server.gui.add_button(
             "Reset all", hint="Every value and method to its default."
         )
@@ -117,7 +158,8 @@ class Controls:
 
     def _make_stage(self, stage: Stage, title: str) -> None:
         parameters = [p for p in table.PARAMETERS.values() if p.stage == stage]
-        with self._server.gui.add_folder(title):
+        folder = self._stages[stage] = self._server.gui.add_folder(title, expand_by_default=False)
+        with folder:
             for method, owner in METHOD_STAGE.items():
                 if owner == stage:
                     self._make_method(method)
@@ -127,7 +169,7 @@ class Controls:
             reset.on_click(lambda _: self._reset(stage))
             self._resets[stage] = reset
 
-    def _make_method(self, method: str) -> None:
+    def _make_method(self, method: MethodKey) -> None:
         field = RunParameters.model_fields[method]
         chooser = self._server.gui.add_dropdown(
             "Method",
@@ -152,6 +194,9 @@ class Controls:
                         self._make_input(parameter)
 
     def _make_input(self, parameter: Parameter) -> None:
+        self._follow(parameter.key, self._input_of(parameter))
+
+    def _input_of(self, parameter: Parameter) -> Input:
         gui = self._server.gui
         label, hint = label_text(parameter, changed=False), hint_text(parameter)
         handle: Input
@@ -171,16 +216,18 @@ class Controls:
                 initial_value=scale.place(parameter.default),
                 hint=hint,
             )
-        self._follow(parameter.key, handle)
+        return handle
 
     def _follow(self, key: str, handle: Any) -> None:
         self._inputs[key] = handle
+        self._hear(key, handle)
 
+    def _hear(self, key: str, handle: Any) -> None:
         @handle.on_update  # type: ignore[untyped-decorator]
         def _(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is not None:  # else it is our own writing
                 with self._lock:
-                    self._moved.add(key)
+                    self._moved[key] = handle
                 self._worker.ask("edit")
 
     # what happens: these return at once
@@ -214,15 +261,17 @@ class Controls:
 
     def _take_edits(self) -> None:
         with self._lock:
-            moved, self._moved = self._moved, set()
-        edits = {key: self._value_of(key) for key in moved}
+            moved, self._moved = self._moved, {}
+        edits = {key: self._value_of(key, handle) for key, handle in moved.items()}
         try:
             self._workbench.set_parameters(edits, ORIGIN)
         except ParameterError as error:
             self._workbench.notify("error", str(error))
 
-    def _value_of(self, key: str) -> Any:
-        place = self._inputs[key].value
+    def _value_of(self, key: str, handle: Any) -> Any:
+        place = handle.value
+        if key in METHOD_STAGE:
+            return place.removesuffix(UNFIT)
         return self._scales[key].value(place) if key in self._scales else place
 
     def _refresh(self, snapshot: Snapshot) -> None:
@@ -231,17 +280,23 @@ class Controls:
         shown = self._inputs.keys() & self._shown_keys(parameters)
         with self._server.atomic():
             for key, handle in self._inputs.items():
-                self._write(key, handle, table.value(parameters, key))
+                if key not in METHOD_STAGE:
+                    for input_ in (handle, *self._copies.get(key, ())):
+                        self._write(key, input_, table.value(parameters, key))
+            for method, unfit in snapshot.unfit.items():
+                self._write_method(method, getattr(parameters, method), unfit)
             # only what differs is written: the interpreter is wanted by the run
             for key in changed ^ self._changed:
                 if key in table.PARAMETERS:
                     label = label_text(table.PARAMETERS[key], changed=key in changed)
                 else:
                     label = "• Method" if key in changed else "Method"
-                self._inputs[key].label = label
+                for input_ in (self._inputs[key], *self._copies.get(key, ())):
+                    input_.label = label
             for key in shown ^ self._shown:
                 self._inputs[key].visible = key in shown
             self._changed, self._shown = changed, shown
+            self._show_found(parameters, shown, changed)
             groups = {table.PARAMETERS[key].group for key in shown if key in table.PARAMETERS}
             for group, folders in self._groups.items():
                 for folder in folders:
@@ -252,6 +307,32 @@ class Controls:
             self._show_presets(snapshot)
             self._values.content = self._value_style(parameters, changed)
         self._server.flush()
+
+    def _show_found(self, parameters: RunParameters, shown: set[str], changed: set[str]) -> None:
+        """Essentials and groups, or in their place what somebody looks for."""
+        text, only_changed = self._sought.value.strip(), self._only_changed.value
+        looks = bool(text or only_changed)
+        keys = finding.found(shown, changed, text, only_changed=only_changed)
+        for key, copies in self._copies.items():
+            copies[-1].visible = looks and key in keys
+            if len(copies) > 1:
+                copies[0].visible = not looks and key in shown
+        self._essentials.visible = not looks
+        self._found.visible = looks and bool(keys)
+        self._nothing_found.visible = looks and not keys
+        what = f"No parameter has “{html.escape(text)}”" if text else "Nothing is changed"
+        self._nothing_found.content = f'<div class="mvp-status">{what}.</div>'
+        essential = {key for key in shown if key in self._copies and len(self._copies[key]) > 1}
+        self._essentials.label = finding.title(
+            "Essentials", "", len(essential), len(essential & changed)
+        )
+        self._found.label = finding.title("Found", "", len(keys), len(keys & changed))
+        for stage, folder in self._stages.items():
+            own = {key for key in shown & table.PARAMETERS.keys() if self._stage_of(key) == stage}
+            method = next((m for m, owner in METHOD_STAGE.items() if owner == stage), "")
+            name = str(getattr(parameters, method)) if method else ""
+            folder.visible = not looks
+            folder.label = finding.title(STAGES[stage], name, len(own), len(own & changed))
 
     def _show_presets(self, snapshot: Snapshot) -> None:
         """Those that the page lists, in the same order, and which of them the values are."""
@@ -272,20 +353,46 @@ class Controls:
             elif not scale.stands_at(handle.value, value):
                 handle.value = scale.place(value)
 
+    def _write_method(self, key: MethodKey, name: str, unfit: Mapping[str, str]) -> None:
+        """The methods, marked where one cannot work here; of the chosen one the hint says why."""
+        handle = self._inputs[key]
+        marked = {name: f"{name}{UNFIT}" if name in unfit else name for name in table.METHODS[key]}
+        with self._lock:
+            if key in self._moved:
+                return
+            if handle.options != tuple(marked.values()):
+                handle.options = tuple(marked.values())
+            if handle.value != marked[name]:
+                handle.value = marked[name]
+            hint = unfit.get(name, RunParameters.model_fields[key].description)
+            if handle.hint != hint:
+                handle.hint = hint
+
     def _shown_keys(self, parameters: RunParameters) -> set[str]:
-        """The keys that the chosen methods read, the choices themselves included."""
-        stages = (table.stage_values(parameters, stage) for stage in STAGES)
-        return {*table.METHODS, *(key for values in stages for key in values)}
+        """The choices of the methods, and what has an effect with what is chosen."""
+        return set(table.shown_keys(parameters))
 
     def _stage_of(self, key: str) -> Stage:
-        return METHOD_STAGE[key] if key in METHOD_STAGE else table.PARAMETERS[key].stage
+        for method, stage in METHOD_STAGE.items():
+            if key == method:
+                return stage
+        return table.PARAMETERS[key].stage
 
     def _value_style(self, parameters: RunParameters, changed: set[str]) -> str:
         """The readable numbers of logarithmic sliders, and stronger ink for changed labels."""
         numbers = {
-            self._inputs[key]._impl.uuid: number_text(table.value(parameters, key))
+            handle._impl.uuid: number_text(table.value(parameters, key))
             for key, scale in self._scales.items()
             if scale.parameter.log
+            for handle in (self._inputs[key], *self._copies.get(key, ()))
         }
-        marked = [self._inputs[key]._impl.uuid for key in sorted(changed)]
+        marked = [
+            handle._impl.uuid
+            for key in sorted(changed)
+            for handle in (self._inputs[key], *self._copies.get(key, ()))
+        ]
         return style.values(numbers, marked)
+
+
+def _is_of_one_method(parameter: Parameter) -> bool:
+    return parameter.group in table.METHODS["single_view"] or parameter.group == "detection_boxes"

@@ -82,10 +82,23 @@ def number_text(value: float) -> str:
     return f"{float(mantissa):g}e{int(exponent)}"
 
 
+def symbol_parts(symbol: str) -> tuple[str, str]:
+    """A symbol's letter and what stands low behind it: ``D_max`` is D with max.
+
+    What is no plain letter with an index stays as the formulas write it.
+    """
+    letter, _, index = symbol.partition("_")
+    plain = len(letter) <= 2 and (index.isalnum() or index == "+")
+    return (letter, index) if plain else (symbol, "")
+
+
 def label_text(parameter: Parameter, *, changed: bool) -> str:
-    """Name, symbol and unit, with a dot in front where the value is not the default."""
-    unit = f", {parameter.unit}" if parameter.unit else ""
-    return f"{'• ' if changed else ''}{parameter.label} {parameter.symbol}{unit}"
+    """Name and symbol, with a dot in front where the value is not the default.
+
+    The symbol's index and the unit are written by the panel's style sheet.
+    """
+    letter = symbol_parts(parameter.symbol)[0]
+    return f"{'• ' if changed else ''}{parameter.label} {letter}"
 
 
 def hint_text(parameter: Parameter) -> str:

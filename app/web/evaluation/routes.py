@@ -11,7 +11,7 @@ from app.models import State
 from app.state.evaluator import Evaluator
 from app.state.scores import Scored
 from app.state.snapshot import Snapshot
-from app.web.api import ERRORS, Bench, Part, file_name, nothing_open
+from app.web.dependencies import ERRORS, Bench, Part, file_name, nothing_open
 from app.web.evaluation import messages, models
 from app.web.views import results
 from tracker.evaluation import Evaluation

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import cv2
 import numpy as np
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Response
 from jaxtyping import UInt8
 from numpy import ndarray
 
-from app.errors import ApiError
 from app.state.snapshot import Snapshot
-from app.web.api import ERRORS, FOR_EVER, Bench
+from app.web.dependencies import ERRORS, Bench
+from app.web.pictures.address import Kept, checked, missing, png
 from tracker.foreground import unpack
 
 TINT = (214, 100, 244)
@@ -20,6 +18,8 @@ TINT = (214, 100, 244)
 
 INSIDE, BORDER = 84, 235
 """Opacity of 255: the picture is seen through the foreground, its outline stands out."""
+
+_missing = missing("no_foreground")
 
 router = APIRouter(prefix="/api", responses=ERRORS)
 
@@ -34,15 +34,11 @@ def foreground(
     sequence_key: str,
     camera: int,
     step: int,
-    run: Annotated[
-        str | None,
-        Query(description="As the step tells it: with it the answer may be kept for ever."),
-    ] = None,
+    run: Kept = None,
 ) -> Response:
     """One camera's foreground at one step of the shown run, to be laid over its picture."""
     mask = _mask(bench.snapshot(), sequence_key, camera, step, run)
-    keep = "no-cache" if run is None else FOR_EVER
-    return Response(tinted(mask), media_type="image/png", headers={"cache-control": keep})
+    return png(tinted(mask), run)
 
 
 def tinted(mask: UInt8[ndarray, "h w"]) -> bytes:
@@ -59,15 +55,8 @@ def tinted(mask: UInt8[ndarray, "h w"]) -> bytes:
 def _mask(
     snapshot: Snapshot, sequence_key: str, camera: int, step: int, wanted: str | None
 ) -> UInt8[ndarray, "h w"]:
-    sequence, run = snapshot.sequence, snapshot.run
-    if sequence is None or snapshot.sequence_key != sequence_key:
-        raise _missing("That sequence is not open any more.", "Load the page again.")
-    if not 0 <= camera < len(sequence.views):
-        raise _missing(
-            f"There is no camera {camera}: {sequence.name} has 0 … {len(sequence.views) - 1}."
-        )
-    if not 0 <= step < sequence.frames:
-        raise _missing(f"There is no step {step}: {sequence.name} has 0 … {sequence.frames - 1}.")
+    sequence, _ = checked(snapshot, sequence_key, camera, step, _missing)
+    run = snapshot.run
     if run is None or step >= run.done:
         raise _missing(f"Step {step} is not computed yet.", "Ask again when the run is there.")
     if wanted is not None and wanted != run.keys["single_view"]:
@@ -81,7 +70,3 @@ def _mask(
             "Choose a single-view method that looks at pictures.",
         )
     return unpack(packed)
-
-
-def _missing(message: str, hint: str | None = None) -> ApiError:
-    return ApiError(404, "no_foreground", message, hint=hint)

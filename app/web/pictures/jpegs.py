@@ -8,14 +8,17 @@ from concurrent.futures import ThreadPoolExecutor
 
 import cv2
 
-from app.errors import ApiError
 from app.state.workbench import Workbench
+from app.web.pictures.address import checked, missing, no_picture
 from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
 
 KEPT_BYTES = 96 << 20
 QUALITY = 88
 THREADS = 4
 """One request mostly waits for one camera's decoder; four cameras are asked at once."""
+
+_missing = missing("no_picture")
 
 Key = tuple[str, int, int, int]
 
@@ -42,18 +45,7 @@ class Pictures:
         Raises:
             ApiError: 404 where there is none.
         """
-        snapshot = self._workbench.snapshot()
-        sequence, reader = snapshot.sequence, snapshot.reader
-        if sequence is None or reader is None or snapshot.sequence_key != sequence_key:
-            raise _missing("That sequence is not open any more.", "Load the page again.")
-        if not 0 <= camera < len(sequence.views):
-            raise _missing(
-                f"There is no camera {camera}: {sequence.name} has 0 … {len(sequence.views) - 1}."
-            )
-        if not 0 <= step < sequence.frames:
-            raise _missing(
-                f"There is no step {step}: {sequence.name} has 0 … {sequence.frames - 1}."
-            )
+        sequence, reader = self._checked(sequence_key, camera, step)
         key = (sequence_key, camera, step, width or 0)
         if key in self._kept:
             self._kept.move_to_end(key)
@@ -64,17 +56,14 @@ class Pictures:
             self._under_way[key] = job
             job.add_done_callback(lambda done: self._keep(key, done))
         # a page that gives up must not cancel what another one waits for
-        try:
-            jpeg = await asyncio.shield(self._under_way[key])
-        except ValueError:  # closed meanwhile: another sequence is open now
-            raise _missing("That sequence is not open any more.", "Load the page again.") from None
+        jpeg = await asyncio.shield(self._under_way[key])
         if jpeg is None:
-            name = sequence.views[camera].camera.name
-            raise _missing(
-                f'Camera "{name}" has no picture of step {step}.',
-                "The sequence has none for this camera, or its file ends before.",
-            )
+            self._checked(sequence_key, camera, step)  # another one may be open by now
+            raise no_picture(sequence, camera, step, _missing)
         return jpeg
+
+    def _checked(self, sequence_key: str, camera: int, step: int) -> tuple[Sequence, FrameReader]:
+        return checked(self._workbench.snapshot(), sequence_key, camera, step, _missing)
 
     def _keep(self, key: Key, job: asyncio.Future[bytes | None]) -> None:
         self._under_way.pop(key, None)
@@ -103,7 +92,3 @@ def _encode(reader: FrameReader, camera: int, step: int, width: int | None) -> b
         picture = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA)
     done, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
     return bytes(data) if done else None
-
-
-def _missing(message: str, hint: str | None = None) -> ApiError:
-    return ApiError(404, "no_picture", message, hint=hint)

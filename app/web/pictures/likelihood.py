@@ -7,11 +7,12 @@ import threading
 
 import cv2
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, UInt8
 from numpy import ndarray
 
-from app.errors import ApiError, sentence
+from app.errors import sentence
 from app.state.snapshot import Snapshot
+from app.web.pictures import address
 from tracker.colour import ColourModel
 from tracker.parameters import ColourPhdParams
 from tracker.sequences.frames import FrameReader
@@ -25,6 +26,9 @@ LOW, HIGH = (35, 119, 224), (190, 244, 255)
 
 OPAQUE = 225
 """Opacity of 255 where the colours are just a template's; what looks less like one is clearer."""
+
+missing = address.missing("no_likelihood")
+"""The answer where there is no map."""
 
 
 def key_of(sequence: Sequence, parameters: ColourPhdParams) -> str:
@@ -42,7 +46,7 @@ def key_of(sequence: Sequence, parameters: ColourPhdParams) -> str:
 def shown_colours(snapshot: Snapshot) -> ColourPhdParams:
     """The numbers of the run that is shown, else those that are chosen."""
     run = snapshot.run
-    return (run.parameters if run is not None else snapshot.parameters).colour_phd
+    return (run.parameters if run is not None else snapshot.parameters).of(ColourPhdParams)
 
 
 class Likelihoods:
@@ -54,20 +58,26 @@ class Likelihoods:
         self._model: ColourModel | None = None
         self._sizes: dict[int, BoxSizes] = {}
 
-    def png(self, snapshot: Snapshot, camera: int, step: int) -> bytes:
+    def png(
+        self,
+        sequence: Sequence,
+        reader: FrameReader,
+        parameters: ColourPhdParams,
+        camera: int,
+        picture: UInt8[ndarray, "h w 3"],
+    ) -> bytes:
         """One map as a transparent PNG of a pixel a cell.
 
+        Args:
+            sequence: Whose templates.
+            reader: Of the pictures that they are in.
+            parameters: Of the colours.
+            camera: Index.
+            picture: Of this camera, BGR.
+
         Raises:
-            ApiError: If there is no picture, or no template to compare it with.
+            ApiError: If there is no template to compare it with.
         """
-        sequence, reader = snapshot.sequence, snapshot.reader
-        assert sequence is not None
-        assert reader is not None
-        picture = reader.picture(camera, step)
-        if picture is None:
-            name = sequence.views[camera].camera.name
-            raise missing(f'Camera "{name}" has no picture of step {step}.')
-        parameters = shown_colours(snapshot)
         model, sizes = self._prepared(sequence, reader, parameters, camera)
         sigma = parameters.likelihood_sigma
         least = -0.5 * (parameters.acceptance_distance / sigma) ** 2
@@ -83,7 +93,7 @@ class Likelihoods:
                 try:
                     self._model = read_templates(sequence, space, kernel, reader)
                 except ValueError as error:
-                    raise missing(sentence(error)) from None
+                    raise missing(sentence(error), None) from None
                 self._key, self._sizes = key, {}
             if camera not in self._sizes:
                 self._sizes[camera] = BoxSizes.of(
@@ -102,12 +112,7 @@ def heat(values: Float[ndarray, "rows columns"], least: float) -> bytes:
     share = np.clip(1.0 - values / least, 0.0, 1.0)[:, :, None]
     picture = np.empty((*values.shape, 4), dtype=np.uint8)
     picture[:, :, :3] = np.rint(np.array(LOW) * (1.0 - share) + np.array(HIGH) * share)
-    picture[:, :, 3] = np.rint(OPAQUE * share[:, :, 0])
+    picture[:, :, 3] = np.rint(OPAQUE * np.sqrt(share[:, :, 0]))
     done, data = cv2.imencode(".png", picture)
     assert done, "a picture of four channels can be written as PNG"
     return bytes(data)
-
-
-def missing(message: str, hint: str | None = None) -> ApiError:
-    """The answer where there is no map."""
-    return ApiError(404, "no_likelihood", message, hint=hint)

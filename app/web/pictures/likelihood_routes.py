@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from fastapi import APIRouter, Request, Response
 
-from fastapi import APIRouter, Query, Request, Response
-
-from app.web.api import ERRORS, FOR_EVER, Bench
+from app.web.dependencies import ERRORS, Bench
+from app.web.pictures.address import Kept, checked, picture_of, png
 from app.web.pictures.likelihood import Likelihoods, key_of, missing, shown_colours
 
 router = APIRouter(prefix="/api", responses=ERRORS)
@@ -23,24 +22,13 @@ def likelihood(
     sequence_key: str,
     camera: int,
     step: int,
-    run: Annotated[
-        str | None,
-        Query(description="As the step tells it: with it the answer may be kept for ever."),
-    ] = None,
+    run: Kept = None,
 ) -> Response:
     """How much a person's box at each place of a picture looks like one of the templates."""
     snapshot = bench.snapshot()
-    sequence = snapshot.sequence
-    if sequence is None or snapshot.sequence_key != sequence_key:
-        raise missing("That sequence is not open any more.", "Load the page again.")
-    if not 0 <= camera < len(sequence.views) or not 0 <= step < sequence.frames:
-        raise missing(
-            f"There is no camera {camera} or no step {step}: {sequence.name} has "
-            f"{len(sequence.views)} cameras and {sequence.frames} steps, counted from 0."
-        )
+    sequence, reader = checked(snapshot, sequence_key, camera, step, missing)
+    picture = picture_of(sequence, reader, camera, step, missing)
     if run is not None and run != key_of(sequence, shown_colours(snapshot)):
         raise missing("The templates or colours are others by now.", "Ask for the step again.")
     maps: Likelihoods = request.app.state.likelihoods
-    keep = "no-cache" if run is None else FOR_EVER
-    png = maps.png(snapshot, camera, step)
-    return Response(png, media_type="image/png", headers={"cache-control": keep})
+    return png(maps.png(sequence, reader, shown_colours(snapshot), camera, picture), run)

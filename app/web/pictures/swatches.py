@@ -7,9 +7,10 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
-from app.errors import ApiError
 from app.state.snapshot import Snapshot
+from app.web.pictures.address import checked, missing, picture_of
 from tracker import colour
+from tracker.boxes import Boxes
 
 CROP_HEIGHT = 88
 """Pixels: twice what the page shows, for fine screens."""
@@ -17,6 +18,10 @@ CROP_HEIGHT = 88
 HUES, SHADES = 16, 16
 BAR, GAP, HEIGHT = 5, 1, 40
 """Of the bars, in units of the drawing."""
+
+RELOAD = "Load the page again."
+
+_missing = missing("no_swatch")
 
 
 class Swatches:
@@ -35,7 +40,7 @@ class Swatches:
         columns = slice(max(0, round(left)), max(0, round(left + width)))
         part = picture[rows, columns]
         if part.size == 0:
-            raise missing(f"The box {box} lies outside the picture.")
+            raise _missing(f"The box {box} lies outside the picture.", RELOAD)
         size = (max(1, round(part.shape[1] * CROP_HEIGHT / part.shape[0])), CROP_HEIGHT)
         shown = cv2.resize(part, size, interpolation=cv2.INTER_AREA)
         done, data = cv2.imencode(".png", shown)
@@ -50,8 +55,8 @@ class Swatches:
         Raises:
             ApiError: If there is no such picture.
         """
-        picture, (left, top, width, height) = _picture(snapshot, sequence_key, camera, step, box)
-        place = np.array([[left + width / 2, top + height / 2, width / 2, height / 2]])
+        picture, left_top = _picture(snapshot, sequence_key, camera, step, box)
+        place = Boxes.from_left_top(np.array([left_top], dtype=float)).centred
         bins = colour.bin_map(picture, "hue_saturation")
         found = colour.histograms(bins, place, "hue_saturation", "epanechnikov")[0]
         return bars(found)
@@ -93,27 +98,13 @@ def bars(histogram: Float[ndarray, " bins"]) -> str:
 def _picture(
     snapshot: Snapshot, sequence_key: str, camera: int, step: int, box: str
 ) -> tuple[UInt8[ndarray, "h w 3"], tuple[float, float, float, float]]:
-    sequence, reader = snapshot.sequence, snapshot.reader
-    if sequence is None or reader is None or snapshot.sequence_key != sequence_key:
-        raise missing("That sequence is not open any more.")
-    if not 0 <= camera < len(sequence.views) or not 0 <= step < sequence.frames:
-        raise missing(
-            f"There is no camera {camera} or no step {step}: {sequence.name} has "
-            f"{len(sequence.views)} cameras and {sequence.frames} steps, counted from 0."
-        )
+    sequence, reader = checked(snapshot, sequence_key, camera, step, _missing)
     try:
         left, top, width, height = (float(part) for part in box.split(","))
         if not all(abs(value) < 1e5 for value in (left, top, width, height)):
             raise ValueError
     except ValueError:
-        raise missing(f"A box is left,top,width,height in pixels, found {box[:60]!r}.") from None
-    picture = reader.picture(camera, step)
-    if picture is None:
-        name = sequence.views[camera].camera.name
-        raise missing(f'Camera "{name}" has no picture of step {step}.')
+        words = f"A box is left,top,width,height in pixels, found {box[:60]!r}."
+        raise _missing(words, RELOAD) from None
+    picture = picture_of(sequence, reader, camera, step, _missing)
     return picture, (left, top, width, height)
-
-
-def missing(message: str) -> ApiError:
-    """The answer where there is nothing to show."""
-    return ApiError(404, "no_swatch", message, hint="Load the page again.")

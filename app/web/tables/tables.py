@@ -15,7 +15,7 @@ from app.state.evaluator import Evaluator
 from app.state.history import History
 from app.state.scores import Scored
 from app.state.snapshot import RunPhase, RunState, Snapshot
-from app.web.api import ERRORS, Bench, nothing_open
+from app.web.dependencies import ERRORS, Bench, nothing_open
 from app.web.evaluation import messages
 from app.web.evaluation.models import Comparison
 from app.web.tables.markup import (

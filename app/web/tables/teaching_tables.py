@@ -10,8 +10,9 @@ from fastapi.responses import HTMLResponse
 
 from app.state.snapshot import Snapshot
 from app.state.teaching import Part, Side, Teaching
-from app.web.api import ERRORS, Bench, nothing_open
+from app.web.dependencies import ERRORS, Bench, nothing_open
 from app.web.tables.markup import Cell, Markup, escaped, line, quiet, table
+from tracker.parameters import METHODS, method_of
 from tracker.sequences.sequence import Sequence, Template
 from tracker.sequences.writing.teaching import AXES, changes, taught_values
 
@@ -65,15 +66,17 @@ def _templates(snapshot: Snapshot, sequence: Sequence) -> str:
 def _method(snapshot: Snapshot) -> str:
     """What to do where the run does not look at templates."""
     parameters = snapshot.parameters
-    method = parameters.single_view
-    if method in ("colour_phd", "pseudo_particle"):
+    method = parameters.method("single_view")
+    if method.used(parameters).templates != "no":
         return ""
-    if method == "jpda" and parameters.jpda.measurements == "colour":
-        return ""
-    use = {"changes": {"single_view": "colour_phd"}}
+    looking = next(
+        name
+        for name in METHODS["single_view"]
+        if method_of("single_view", name).used(parameters).templates != "no"
+    )
     return line(
-        f"The run's single-view method, {method}, looks at no templates. ",
-        _send("Use colour_phd", "PATCH parameters", use),
+        f"The run's single-view method, {method.name}, looks at no templates. ",
+        _send(f"Use {looking}", "PATCH parameters", {"changes": {"single_view": looking}}),
     )
 
 

@@ -10,7 +10,6 @@ from app import models
 from app.state.snapshot import Snapshot
 from app.web.command_line import command_line
 from tracker import parameters as table
-from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing.teaching import changes, taught_values
 
 
@@ -19,7 +18,7 @@ def state_of(snapshot: Snapshot) -> models.State:
     parameters = snapshot.parameters
     return models.State(
         version=snapshot.version,
-        sequence=_sequence_of(snapshot.sequence, snapshot.sequence_key),
+        sequence=_sequence_of(snapshot),
         opening=None
         if snapshot.opening is None
         else models.OpeningInfo(**asdict(snapshot.opening)),
@@ -31,6 +30,7 @@ def state_of(snapshot: Snapshot) -> models.State:
             fusion_method=parameters.fusion_method,
             smoothing_method=parameters.smoothing_method,
         ),
+        unfit={str(key): names for key, names in snapshot.unfit.items()},
         presets=list(snapshot.presets),
         preset=snapshot.preset,
         playhead=snapshot.playhead,
@@ -90,13 +90,15 @@ def schema() -> models.Schema:
     )
 
 
-def _sequence_of(sequence: Sequence | None, key: str) -> models.SequenceInfo | None:
+def _sequence_of(snapshot: Snapshot) -> models.SequenceInfo | None:
+    sequence = snapshot.sequence
     if sequence is None:
         return None
     room = sequence.room
     return models.SequenceInfo(
-        key=key,
+        key=snapshot.sequence_key,
         name=sequence.name,
+        opened_as=snapshot.opened_as,
         description=sequence.description,
         fps=sequence.fps,
         frames=sequence.frames,

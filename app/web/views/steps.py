@@ -9,7 +9,9 @@ from app import models
 from app.scene.geometry import FUTURE_SECONDS, TRAIL_SECONDS
 from app.state.pairs import pairs_at
 from app.web.pictures.likelihood import key_of
+from tracker.boxes import Boxes
 from tracker.fusion.protocol import FusionResult
+from tracker.parameters import ColourPhdParams
 from tracker.pipeline import Run
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
@@ -41,7 +43,7 @@ def step_of(
     computed = run is not None and step < run.done
     likelihood = None
     if run is not None and sequence.templates:
-        likelihood = key_of(sequence, run.parameters.colour_phd)
+        likelihood = key_of(sequence, run.parameters.of(ColourPhdParams))
     cameras = [
         models.CameraStep(
             name=view.camera.name,
@@ -233,5 +235,4 @@ def _box(values: ndarray) -> models.Box:
 
 def _corner_boxes(boxes: ndarray) -> list[models.Box]:
     """Centre and half sizes as left, top, width, height."""
-    corners = np.column_stack([boxes[:, :2] - boxes[:, 2:], 2.0 * boxes[:, 2:]])
-    return [_box(row) for row in corners]
+    return [_box(row) for row in Boxes(boxes).left_top]

@@ -1,6 +1,11 @@
 /** What all canvases share. */
 
-/** Fit a canvas to its element, in CSS pixels, and to the screen's pixels; clear it. @param {HTMLCanvasElement} canvas @param {number} width @param {number} height */
+/**
+ * Fit a canvas to its element, in CSS pixels, and to the screen's pixels; clear it.
+ * @param {HTMLCanvasElement} canvas
+ * @param {number} width
+ * @param {number} height
+ */
 export function prepare(canvas, width, height) {
 	const ratio = devicePixelRatio || 1;
 	const [w, hgt] = [width, height].map((side) => Math.max(1, Math.round(side * ratio)));
@@ -20,7 +25,11 @@ export function trace(g, points) {
 
 /**
  * Stroke the current path, with a dark halo under it where it lies on a picture.
- * @param {Brush} g @param {string} colour @param {number} width @param {number[]} [dash] @param {number} [halo]  its opacity
+ * @param {Brush} g
+ * @param {string} colour
+ * @param {number} width
+ * @param {number[]} [dash]
+ * @param {number} [halo] its opacity
  */
 export function stroke(g, colour, width, dash = [], halo = 0) {
 	g.setLineDash(dash);
@@ -35,7 +44,13 @@ export function stroke(g, colour, width, dash = [], halo = 0) {
 	g.setLineDash([]);
 }
 
-/** Slanted lines: not computed, or missed for long. @param {Brush} g @param {Cell[]} cells @param {string} colour @param {number} [gap] */
+/**
+ * Slanted lines: not computed, or missed for long.
+ * @param {Brush} g
+ * @param {Cell[]} cells
+ * @param {string} colour
+ * @param {number} [gap]
+ */
 export function hatch(g, cells, colour, gap = 4) {
 	if (!cells.length) return;
 	g.save();

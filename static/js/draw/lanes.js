@@ -1,12 +1,24 @@
 /** Range bar, ruler and track lanes of the timeline. */
-import { rangesOf, tickSteps, xOf } from "../clock.js";
-import { faded } from "../palette.js";
+import { rangesOf, tickSteps, xOf } from "../play/clock.js";
+import { faded } from "./colours.js";
 import { hatch, stroke, trace } from "./canvas.js";
 
-/** Loaded pictures thin and grey, the computed part in the accent's colour on top. @param {Pen} pen @param {Iterable<number>} loaded @param {number} done @param {number} frames */
+/**
+ * Loaded pictures thin and grey, the computed part in the accent's colour on top.
+ * @param {Pen} pen
+ * @param {Iterable<number>} loaded
+ * @param {number} done
+ * @param {number} frames
+ */
 export function drawRange({ g, row, view, ink }, loaded, done, frames) {
 	const y = row.y + Math.round(row.height / 2) - 2;
-	/** @param {string} colour @param {number} from @param {number} to @param {number} top @param {number} height */
+	/**
+	 * @param {string} colour
+	 * @param {number} from
+	 * @param {number} to
+	 * @param {number} top
+	 * @param {number} height
+	 */
 	const bar = (colour, from, to, top, height) => {
 		const [x0, x1] = [Math.max(0, xOf(from, view)), Math.min(view.width, xOf(to, view))];
 		g.fillStyle = ink.get(colour);
@@ -26,7 +38,14 @@ export function drawRuler({ g, row, view, ink }, range) {
 	for (let step = Math.ceil(view.first / minor) * minor; step <= view.last; step += minor) {
 		const x = Math.round(xOf(step, view)) + 0.5;
 		const labelled = Math.round(step % major) === 0;
-		stroke(trace(g, [[x, bottom - (labelled ? 5 : 3)], [x, bottom]]), ink.get(labelled ? "ink-3" : "bg-4"), 1);
+		stroke(
+			trace(g, [
+				[x, bottom - (labelled ? 5 : 3)],
+				[x, bottom],
+			]),
+			ink.get(labelled ? "ink-3" : "bg-4"),
+			1,
+		);
 		if (!labelled) continue;
 		const text = String(Math.round(step));
 		const half = g.measureText(text).width / 2;
@@ -38,13 +57,27 @@ export function drawRuler({ g, row, view, ink }, range) {
 	range.forEach((step, end) => {
 		if (step === null || step < view.first || step > view.last) return;
 		const x = Math.round(xOf(step, view));
-		trace(g, [[x, bottom], [x, bottom - 7], [x + (end ? -5 : 5), bottom - 7]]).fill();
+		trace(g, [
+			[x, bottom],
+			[x, bottom - 7],
+			[x + (end ? -5 : 5), bottom - 7],
+		]).fill();
 	});
-	stroke(trace(g, [[0, bottom - 0.5], [view.width + 20, bottom - 0.5]]), ink.get("line"), 1);
+	stroke(
+		trace(g, [
+			[0, bottom - 0.5],
+			[view.width + 20, bottom - 0.5],
+		]),
+		ink.get("line"),
+		1,
+	);
 }
 
 /** @param {Pen} pen @param {Lanes} lanes */
-export function drawLanes(pen, { tracks, pinned, scroll, laneHeight, done, selection, hover, switches }) {
+export function drawLanes(
+	pen,
+	{ tracks, pinned, scroll, laneHeight, done, selection, hover, switches },
+) {
 	const { g, row, view, ink } = pen;
 	g.save();
 	g.beginPath();
@@ -62,9 +95,19 @@ export function drawLanes(pen, { tracks, pinned, scroll, laneHeight, done, selec
 		const below = topOf(index) + laneHeight - 1.5;
 		for (const { like, spans } of pinned) {
 			if (like !== track.id) continue;
-			for (const [from, to] of spans) stroke(trace(g, [[Math.max(-4, xOf(from, view)), below], [Math.min(view.width + 4, xOf(to + 1, view)), below]]), ink.get("ink-2"), 1, [4, 2]);
+			for (const [from, to] of spans)
+				stroke(
+					trace(g, [
+						[Math.max(-4, xOf(from, view)), below],
+						[Math.min(view.width + 4, xOf(to + 1, view)), below],
+					]),
+					ink.get("ink-2"),
+					1,
+					[4, 2],
+				);
 		}
-		if (track.last >= view.first && track.first <= view.last) drawLane(pen, track, middle, done, Math.max(5, Math.round(laneHeight * 0.42)));
+		if (track.last >= view.first && track.first <= view.last)
+			drawLane(pen, track, middle, done, Math.max(5, Math.round(laneHeight * 0.42)));
 	}
 	const rows = new Map(tracks.map(({ id }, index) => [id, topOf(index + 0.5)]));
 	for (const { step, before, track } of switches) {
@@ -72,7 +115,14 @@ export function drawLanes(pen, { tracks, pinned, scroll, laneHeight, done, selec
 		const x = xOf(step, view);
 		const ends = [before, track].flatMap((id) => rows.get(id) ?? []);
 		// A cross in both lanes and a line that joins them: here the identity went over.
-		stroke(trace(g, ends.map((y) => [x, y])), ink.get("ink-3"), 1);
+		stroke(
+			trace(
+				g,
+				ends.map((y) => [x, y]),
+			),
+			ink.get("ink-3"),
+			1,
+		);
 		g.beginPath();
 		for (const y of ends) {
 			for (const sign of [1, -1]) {
@@ -86,7 +136,13 @@ export function drawLanes(pen, { tracks, pinned, scroll, laneHeight, done, selec
 	g.restore();
 }
 
-/** @param {Pen} pen @param {TrackLane} track @param {number} middle @param {number} done @param {number} thick */
+/**
+ * @param {Pen} pen
+ * @param {Server.TrackLife} track
+ * @param {number} middle
+ * @param {number} done
+ * @param {number} thick
+ */
 function drawLane({ g, view, ink }, track, middle, done, thick) {
 	const colour = ink.id(track.id);
 	const top = middle - Math.round(thick / 2);
@@ -99,7 +155,10 @@ function drawLane({ g, view, ink }, track, middle, done, thick) {
 	for (const [from, to, kind] of track.spans) {
 		if (to < view.first || from > view.last) continue;
 		const x = Math.max(-4, xOf(from, view));
-		const width = Math.max(1.5, Math.min(view.width + 4, xOf(Math.min(to + 1, view.last), view)) - x);
+		const width = Math.max(
+			1.5,
+			Math.min(view.width + 4, xOf(Math.min(to + 1, view.last), view)) - x,
+		);
 		if (kind === "seen") g.fillRect(x, top, width, thick);
 		else if (kind === "long miss" && width > 6) missed.push({ x, y: top, width, height: thick });
 		else {
@@ -114,6 +173,12 @@ function drawLane({ g, view, ink }, track, middle, done, thick) {
 	stroke(g, colour, 1);
 	g.fillStyle = ink.get("ink-1");
 	const x = xOf(track.first, view);
-	if (track.first > 0 && track.first >= view.first) trace(g, [[x - 5.5, centre - 4], [x - 0.5, centre], [x - 5.5, centre + 4]]).fill();
-	if (track.last < done - 1 && track.last < view.last) g.fillRect(xOf(track.last + 1, view) + 2, centre - 2.5, 5, 5);
+	if (track.first > 0 && track.first >= view.first)
+		trace(g, [
+			[x - 5.5, centre - 4],
+			[x - 0.5, centre],
+			[x - 5.5, centre + 4],
+		]).fill();
+	if (track.last < done - 1 && track.last < view.last)
+		g.fillRect(xOf(track.last + 1, view) + 2, centre - 2.5, 5, 5);
 }

@@ -2,13 +2,20 @@
  * What is drawn over a picture. Dashed means "not seen by the current run here": truth and
  * coasting. Colour is the id's; the number is always printed as well.
  */
-import { faded } from "../palette.js";
+import { faded } from "./colours.js";
 import { stroke, trace } from "./canvas.js";
 
 const WHITE = "#f4f4f4";
+/** Of samples: no track and no line has it. */
+const SAMPLE = "#ffd84d";
 
-/** @param {Box} box @param {number} scale  @returns {number[]} left, top, right, bottom on whole pixels, so that thin lines stay thin */
-const edges = ([left, top, width, height], scale) => [left, top, left + width, top + height].map((v) => Math.round(v * scale) + 0.5);
+/**
+ * @param {Box} box
+ * @param {number} scale
+ * @returns {number[]} left, top, right, bottom on whole pixels, so that thin lines stay thin
+ */
+const edges = ([left, top, width, height], scale) =>
+	[left, top, left + width, top + height].map((v) => Math.round(v * scale) + 0.5);
 
 /** @param {Brush} g @param {Box} box @param {number} scale */
 function outline(g, box, scale) {
@@ -23,7 +30,12 @@ function corners(g, box, scale) {
 	const [x0, y0, x1, y1] = edges(box, scale);
 	const arm = Math.max(3, Math.min(10, (x1 - x0) * 0.3, (y1 - y0) * 0.3));
 	g.beginPath();
-	for (const [x, y, sx, sy] of [[x0, y0, 1, 1], [x1, y0, -1, 1], [x1, y1, -1, -1], [x0, y1, 1, -1]]) {
+	for (const [x, y, sx, sy] of [
+		[x0, y0, 1, 1],
+		[x1, y0, -1, 1],
+		[x1, y1, -1, -1],
+		[x0, y1, 1, -1],
+	]) {
 		g.moveTo(x + sx * arm, y);
 		g.lineTo(x, y);
 		g.lineTo(x, y + sy * arm);
@@ -31,13 +43,19 @@ function corners(g, box, scale) {
 	return g;
 }
 
-/** Tracks whose box is in the picture, far to near. @param {CameraStep} view @param {number | null} [only]  their id */
+/**
+ * Tracks whose box is in the picture, far to near.
+ * @param {Server.CameraStep} view
+ * @param {number | null} [only]  their id
+ */
 export function visibleTracks({ tracks }, only = null) {
-	const shown = /** @type {(TrackInView & {box: Box})[]} */ (tracks.filter(({ id, visible, box }) => visible && box && (only === null || id === only)));
+	const shown = /** @type {(Server.CameraTrack & {box: Box})[]} */ (
+		tracks.filter(({ id, visible, box }) => visible && box && (only === null || id === only))
+	);
 	return shown.sort((a, b) => a.box[1] + a.box[3] - b.box[1] - b.box[3]);
 }
 
-/** @param {Brush} g @param {CameraStep} view @param {Scene} scene */
+/** @param {Brush} g @param {Server.CameraStep} view @param {Scene} scene */
 export function drawOverlay(g, view, scene) {
 	const { layers, width, scale, opacity, alone, selection } = scene;
 	const roomy = width > 260;
@@ -54,7 +72,8 @@ export function drawOverlay(g, view, scene) {
 		g.globalAlpha = opacity;
 		drawErrors(g, view, scene);
 	}
-	if (layers.measurements) for (const { box } of view.measurements) stroke(outline(g, box, scale), WHITE, 1, [], 0.4);
+	if (layers.measurements)
+		for (const { box } of view.measurements) stroke(outline(g, box, scale), WHITE, 1, [], 0.4);
 	if (layers.estimates) {
 		for (const { box } of view.estimates) stroke(corners(g, box, scale), WHITE, 1.75, [], 0.5);
 		if (view.gates.length && roomy) drawGates(g, view, scene);
@@ -63,17 +82,31 @@ export function drawOverlay(g, view, scene) {
 	g.globalAlpha = 1;
 }
 
-/** Gates, and the labels that the camera's events speak of. @param {Brush} g @param {CameraStep} view @param {Scene} scene */
+/**
+ * Gates, and the labels that the camera's events speak of.
+ * @param {Brush} g
+ * @param {Server.CameraStep} view
+ * @param {Scene} scene
+ */
 function drawGates(g, { gates, estimates }, { scale, ink }) {
 	for (const [x, y, xx, xy, yy] of gates) {
 		const reach = Math.hypot((xx - yy) / 2, xy);
 		// half axes: the roots of the matrix's eigenvalues
-		const [long, short] = [reach, -reach].map((r) => Math.sqrt(Math.max(0, (xx + yy) / 2 + r)) * scale);
+		const [long, short] = [reach, -reach].map(
+			(r) => Math.sqrt(Math.max(0, (xx + yy) / 2 + r)) * scale,
+		);
 		g.beginPath();
 		g.ellipse(x * scale, y * scale, long, short, Math.atan2(2 * xy, xx - yy) / 2, 0, 7);
 		stroke(g, WHITE, 1, [1, 3], 0.3);
 	}
-	Object.assign(g, { font: `600 10px ${ink.font}`, textAlign: "left", textBaseline: "alphabetic", fillStyle: WHITE, strokeStyle: "rgb(0 0 0 / .6)", lineWidth: 3 });
+	Object.assign(g, {
+		font: `600 10px ${ink.font}`,
+		textAlign: "left",
+		textBaseline: "alphabetic",
+		fillStyle: WHITE,
+		strokeStyle: "rgb(0 0 0 / .6)",
+		lineWidth: 3,
+	});
 	for (const { box, label } of estimates) {
 		const [x, y] = [box[0] * scale + 3, (box[1] + box[3]) * scale - 4];
 		g.strokeText(`${label}`, x, y);
@@ -81,23 +114,47 @@ function drawGates(g, { gates, estimates }, { scale, ink }) {
 	}
 }
 
-/** The way of the feet: what was is drawn, what comes is hinted at. @param {Brush} g @param {TrackInView[]} tracks @param {Scene} scene */
+/**
+ * The way of the feet: what was is drawn, what comes is hinted at.
+ * @param {Brush} g
+ * @param {Server.CameraTrack[]} tracks
+ * @param {Scene} scene
+ */
 function drawTrails(g, tracks, { scale, ink, selection }) {
 	for (const { id, trail } of tracks) {
 		const points = trail.map(([, x, y]) => [x * scale, y * scale]);
 		const now = trail.findIndex(([step]) => step >= 0);
 		stroke(trace(g, points.slice(Math.max(0, now))), ink.id(id), 1, [], 0.3);
-		stroke(trace(g, points.slice(0, now < 0 ? undefined : now + 1)), ink.id(id), id === selection ? 2.5 : 1.75, [], 0.4);
+		stroke(
+			trace(g, points.slice(0, now < 0 ? undefined : now + 1)),
+			ink.id(id),
+			id === selection ? 2.5 : 1.75,
+			[],
+			0.4,
+		);
 	}
 }
 
-/** From where somebody is to where he was put: the colour says how far. @param {Brush} g @param {CameraStep} view @param {Scene} scene */
+/**
+ * From where somebody is to where he was put: the colour says how far.
+ * @param {Brush} g
+ * @param {Server.CameraStep} view
+ * @param {Scene} scene
+ */
 function drawErrors(g, { truth, tracks }, { scale, ink, people }) {
 	for (const { id, track, error } of people) {
 		const ends = [truth.find((t) => t.id === id)?.box, tracks.find((t) => t.id === track)?.box];
 		if (!ends[0] || !ends[1] || error === null) continue;
-		const middles = ends.flatMap((box) => (box ? [[(box[0] + box[2] / 2) * scale, (box[1] + box[3] / 2) * scale]] : []));
-		stroke(trace(g, middles), `color-mix(in srgb, ${ink.get("worse")} ${Math.min(100, 100 * error)}%, ${ink.get("better")})`, 2.5, [], 0.5);
+		const middles = ends.flatMap((box) =>
+			box ? [[(box[0] + box[2] / 2) * scale, (box[1] + box[3] / 2) * scale]] : [],
+		);
+		stroke(
+			trace(g, middles),
+			`color-mix(in srgb, ${ink.get("worse")} ${Math.min(100, 100 * error)}%, ${ink.get("better")})`,
+			2.5,
+			[],
+			0.5,
+		);
 	}
 }
 
@@ -107,7 +164,10 @@ function drawSamples(g, samples, scale) {
 	const opacity = g.globalAlpha;
 	for (const [x, y, weight] of samples) {
 		g.globalAlpha = opacity * (0.25 + 0.75 * Math.sqrt(Math.max(0, weight) / heaviest));
-		for (const [colour, size] of /** @type {[string, number][]} */ ([["rgb(0 0 0 / .5)", 3], [WHITE, 1.5]])) {
+		for (const [colour, size] of /** @type {[string, number][]} */ ([
+			["rgb(0 0 0 / .7)", 4.5],
+			[SAMPLE, 3],
+		])) {
 			g.fillStyle = colour;
 			g.fillRect(Math.round(x * scale) - size / 2, Math.round(y * scale) - size / 2, size, size);
 		}
@@ -115,7 +175,12 @@ function drawSamples(g, samples, scale) {
 	g.globalAlpha = opacity;
 }
 
-/** @param {Brush} g @param {(TrackInView & {box: Box})[]} tracks @param {Scene} scene @param {boolean} roomy */
+/**
+ * @param {Brush} g
+ * @param {(Server.CameraTrack & {box: Box})[]} tracks
+ * @param {Scene} scene
+ * @param {boolean} roomy
+ */
 function drawTracks(g, tracks, { scale, selection, hover, ink, width }, roomy) {
 	const huge = width > 800 ? 1.4 : 1;
 	for (const { id, box, seen, fed_by: fed } of tracks) {
@@ -129,7 +194,11 @@ function drawTracks(g, tracks, { scale, selection, hover, ink, width }, roomy) {
 		stroke(g, ink.id(id), (roomy ? 2.5 : 2) * huge + (marked ? 0.5 : 0), seen ? [] : [7, 4], 0.55);
 	}
 	const size = Math.round((roomy ? 15 : 13) * huge);
-	Object.assign(g, { font: `600 ${Math.round((roomy ? 11 : 10) * huge)}px ${ink.font}`, textAlign: "center", textBaseline: "middle" });
+	Object.assign(g, {
+		font: `600 ${Math.round((roomy ? 11 : 10) * huge)}px ${ink.font}`,
+		textAlign: "center",
+		textBaseline: "middle",
+	});
 	/** @type {[number, number, number][]} */
 	const placed = [];
 	for (const { id, box } of [...tracks].reverse()) {
@@ -141,13 +210,21 @@ function drawTracks(g, tracks, { scale, selection, hover, ink, width }, roomy) {
 		// The nearest person's tag keeps its corner; the others step aside.
 		for (let k = 0; k < placed.length; k += 1) {
 			const [px, py, pw] = placed[k];
-			if (Math.abs(y - py) < size + 2 && x < px + pw + 2 && px < x + wide + 2 && px + pw + 2 + wide < width) {
+			if (
+				Math.abs(y - py) < size + 2 &&
+				x < px + pw + 2 &&
+				px < x + wide + 2 &&
+				px + pw + 2 + wide < width
+			) {
 				x = px + pw + 2;
 				k = -1;
 			}
 		}
 		placed.push([x, y, wide]);
-		for (const [colour, rim] of /** @type {[string, number][]} */ ([["rgb(0 0 0 / .55)", 1], [ink.id(id), 0]])) {
+		for (const [colour, rim] of /** @type {[string, number][]} */ ([
+			["rgb(0 0 0 / .55)", 1],
+			[ink.id(id), 0],
+		])) {
 			g.fillStyle = colour;
 			g.fillRect(x - rim, y - rim, wide + 2 * rim, size + 2 * rim);
 		}
@@ -156,7 +233,12 @@ function drawTracks(g, tracks, { scale, selection, hover, ink, width }, roomy) {
 	}
 }
 
-/** A camera without pictures: a border and a quiet grid. @param {Brush} g @param {number} width @param {number} height */
+/**
+ * A camera without pictures: a border and a quiet grid.
+ * @param {Brush} g
+ * @param {number} width
+ * @param {number} height
+ */
 export function drawEmptyPicture(g, width, height) {
 	g.fillStyle = "#1c1c1c";
 	g.fillRect(0, 0, width, height);

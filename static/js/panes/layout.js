@@ -1,5 +1,5 @@
 /** How much room each pane has: dragged or moved by key, one pane alone, remembered. */
-import { all, one } from "../dom.js";
+import { all, one } from "../elements/dom.js";
 
 /** What a splitter sets, which way it grows, and its least and largest share of the window. */
 const SPLITS = {
@@ -12,7 +12,8 @@ const SPLITS = {
 export function mountLayout({ store, actions }) {
 	const app = one(".app");
 	const splits = all("[data-split]");
-	const nameOf = (/** @type {Part} */ split) => /** @type {keyof typeof SPLITS} */ (split.dataset.split);
+	const nameOf = (/** @type {Part} */ split) =>
+		/** @type {keyof typeof SPLITS} */ (split.dataset.split);
 	const windowOf = (/** @type {string} */ along) => (along === "x" ? innerWidth : innerHeight);
 
 	/** What a splitter stands at now, pixels. @param {keyof typeof SPLITS} name */
@@ -31,7 +32,8 @@ export function mountLayout({ store, actions }) {
 	for (const split of splits) {
 		const name = nameOf(split);
 		const { along, sign } = SPLITS[name];
-		const place = (/** @type {PointerEvent} */ event) => (along === "x" ? event.clientX : event.clientY);
+		const place = (/** @type {PointerEvent} */ event) =>
+			along === "x" ? event.clientX : event.clientY;
 		/** @type {[number, number] | null} */
 		let begun = null;
 		split.addEventListener("pointerdown", (event) => {
@@ -40,14 +42,22 @@ export function mountLayout({ store, actions }) {
 			begun = [place(event), now(name)];
 			app.classList.add("dragging");
 		});
-		split.addEventListener("pointermove", (event) => begun && resize(name, begun[1] + sign * (place(event) - begun[0])));
+		split.addEventListener(
+			"pointermove",
+			(event) => begun && resize(name, begun[1] + sign * (place(event) - begun[0])),
+		);
 		split.addEventListener("lostpointercapture", () => {
 			begun = null;
 			app.classList.remove("dragging");
 		});
-		split.addEventListener("dblclick", () => store.set({ layout: { ...store.get().layout, [name]: undefined } }));
+		split.addEventListener("dblclick", () =>
+			store.set({ layout: { ...store.get().layout, [name]: undefined } }),
+		);
 		split.addEventListener("keydown", (event) => {
-			const turn = (along === "x" ? ["ArrowLeft", "", "ArrowRight"] : ["ArrowUp", "", "ArrowDown"]).indexOf(event.key) - 1;
+			const turn =
+				(along === "x" ? ["ArrowLeft", "", "ArrowRight"] : ["ArrowUp", "", "ArrowDown"]).indexOf(
+					event.key,
+				) - 1;
 			if (turn !== -1 && turn !== 1) return;
 			event.preventDefault();
 			event.stopPropagation();
@@ -55,9 +65,12 @@ export function mountLayout({ store, actions }) {
 		});
 	}
 	for (const pane of /** @type {const} */ (["view", "cams", "side", "time"])) {
-		document.querySelector(`.${pane} > :first-child`)?.addEventListener("dblclick", ({ target }) => {
-			if (target instanceof Element && !target.closest("button, input, select, .chooser, .read")) actions.maximise(pane);
-		});
+		document
+			.querySelector(`.${pane} > :first-child`)
+			?.addEventListener("dblclick", ({ target }) => {
+				if (target instanceof Element && !target.closest("button, input, select, .chooser, .read"))
+					actions.maximise(pane);
+			});
 	}
 
 	function arrange() {
@@ -69,8 +82,10 @@ export function mountLayout({ store, actions }) {
 		}
 		app.dataset.max = layout.max ?? "";
 		// A 3D view that had the keys and is now hidden would keep them.
-		if (!document.activeElement?.checkVisibility()) /** @type {HTMLElement | null} */ (document.activeElement)?.blur();
-		for (const button of all("[data-command^=maximise]")) button.ariaPressed = String(button.dataset.command === `maximise-${layout.max}`);
+		if (!document.activeElement?.checkVisibility())
+			/** @type {HTMLElement | null} */ (document.activeElement)?.blur();
+		for (const button of all("[data-command^=maximise]"))
+			button.ariaPressed = String(button.dataset.command === `maximise-${layout.max}`);
 		for (const split of splits) {
 			const name = nameOf(split);
 			split.ariaValueNow = String(Math.round((100 * now(name)) / windowOf(SPLITS[name].along)));

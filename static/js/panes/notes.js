@@ -1,5 +1,5 @@
 /** Notes under the top bar: what happened, what still works, what to do next. */
-import { fill, h, icon } from "../dom.js";
+import { fill, h, icon } from "../elements/dom.js";
 
 /** @type {Pane} */
 export function mountNotes(root, { store, actions, retry }) {
@@ -7,11 +7,29 @@ export function mountNotes(root, { store, actions, retry }) {
 	/** @type {Timer} */
 	let ticking;
 
-	/** @param {string} kind @param {string} title @param {string} text @param {(Node | null | false)[]} buttons */
+	/**
+	 * @param {string} kind
+	 * @param {string} title
+	 * @param {string} text
+	 * @param {(Node | null | false)[]} buttons
+	 */
 	const note = (kind, title, text, buttons) =>
-		h("div", { class: "note", role: kind === "bad" ? "alert" : null }, h("span", { class: `dot ${kind}` }), h("h2", {}, title), h("span", { class: "group" }, buttons), text && h("p", {}, text));
-	const button = (/** @type {string} */ word, /** @type {() => void} */ onclick) => h("button", { class: "btn box", onclick }, word);
-	const close = (/** @type {() => void} */ onclick) => h("button", { class: "btn icon end", "aria-label": "Dismiss", "data-tip": "Dismiss", onclick }, icon("i-close"));
+		h(
+			"div",
+			{ class: "note", role: kind === "bad" ? "alert" : null },
+			h("span", { class: `dot ${kind}` }),
+			h("h2", {}, title),
+			h("span", { class: "group" }, buttons),
+			text && h("p", {}, text),
+		);
+	const button = (/** @type {string} */ word, /** @type {() => void} */ onclick) =>
+		h("button", { class: "btn box", onclick }, word);
+	const close = (/** @type {() => void} */ onclick) =>
+		h(
+			"button",
+			{ class: "btn icon end", "aria-label": "Dismiss", "data-tip": "Dismiss", onclick },
+			icon("i-close"),
+		);
 
 	function render() {
 		const { link, lostAt, retryAt, run, basis, notes, server } = store.get();
@@ -21,28 +39,52 @@ export function mountNotes(root, { store, actions, retry }) {
 			const seconds = Math.max(0, Math.ceil((retryAt - Date.now()) / 1000));
 			const since = new Date(lostAt).toLocaleTimeString([], { hour12: false });
 			const wait = seconds > 0 ? `Next try in ${seconds} s.` : "Trying now.";
-			all.push(note("bad", `No connection since ${since}`, `What was loaded can still be looked at; parameters are locked until the server is back. ${wait}`, [button("Try now", retry)]));
-		}
-		if (run?.state === "failed" && dismissed !== run.key) {
-			const next = basis && basis !== run.key ? "The run before is still shown." : "Change a parameter, or choose another method.";
 			all.push(
-				note("bad", `The run stopped at step ${run.done}`, `${(run.error ?? "The terminal says more").replace(/\.$/, "")}. ${next}`, [
-					server?.changed.length ? button("Reset all parameters", () => actions.reset()) : null,
-					button("Try again", actions.runAgain),
-					close(() => {
-						dismissed = run.key;
-						render();
-					}),
-				]),
+				note(
+					"bad",
+					`No connection since ${since}`,
+					`What was loaded can still be looked at; parameters are locked until the server is back. ${wait}`,
+					[button("Try now", retry)],
+				),
 			);
 		}
-		for (const { id, level, title, text } of notes) {
+		if (run?.state === "failed" && dismissed !== run.key) {
+			const next =
+				basis && basis !== run.key
+					? "The run before is still shown."
+					: "Change a parameter, or choose another method.";
+			all.push(
+				note(
+					"bad",
+					`The run stopped at step ${run.done}`,
+					`${(run.error ?? "The terminal says more").replace(/\.$/, "")}. ${next}`,
+					[
+						server?.changed.length ? button("Reset all parameters", () => actions.reset()) : null,
+						button("Try again", actions.runAgain),
+						close(() => {
+							dismissed = run.key;
+							render();
+						}),
+					],
+				),
+			);
+		}
+		for (const { id, level, title, text, remedy, once } of notes) {
 			const kind = { error: "bad", warn: "warn", info: "busy" }[level];
-			all.push(note(kind, title, text, [close(() => store.set({ notes: store.get().notes.filter((other) => other.id !== id) }))]));
+			const gone = () => {
+				store.set({ notes: store.get().notes.filter((other) => other.id !== id) });
+				if (once) store.set({ dismissed: [...store.get().dismissed, once] });
+			};
+			const mend = () => {
+				gone();
+				remedy?.act();
+			};
+			all.push(note(kind, title, text, [remedy ? button(remedy.word, mend) : null, close(gone)]));
 		}
 		fill(root, all);
 		clearInterval(ticking);
-		if (link === "lost") ticking = setInterval(() => root.contains(document.activeElement) || render(), 1000);
+		if (link === "lost")
+			ticking = setInterval(() => root.contains(document.activeElement) || render(), 1000);
 	}
 
 	store.watch(["link", "retryAt", "run", "basis", "notes"], render);

@@ -1,6 +1,6 @@
 /** The two dialogs made from the registry of commands: help with its keys, and the palette. */
-import { COMMANDS, keyLabel, perform, search } from "../commands.js";
-import { all, fill, h, parts } from "../dom.js";
+import { COMMANDS, keyLabel, perform, search } from "../state/commands.js";
+import { all, fill, h, parts } from "../elements/dom.js";
 
 /** @param {string[]} keys */
 const signs = (keys) => keys.map((key) => h("kbd", {}, keyLabel(key)));
@@ -11,15 +11,29 @@ export function mountSheets({ store, actions }) {
 	const { sheet, single } = parts(help);
 	const { input, list } = parts(palette);
 	for (const dialog of [help, palette]) {
-		dialog.addEventListener("click", (/** @type {Event} */ event) => event.target === dialog && dialog.close());
+		dialog.addEventListener(
+			"click",
+			(/** @type {Event} */ event) => event.target === dialog && dialog.close(),
+		);
 	}
 
 	const row = (/** @type {Command} */ { name, title, keys }) => {
 		const cameras = name === "camera-1";
-		return h("div", { class: "key-row" }, cameras ? "Camera 1 to 9 large, again: all alike" : title, h("span", { class: "grow" }), cameras ? [...signs(["1"]), "–", ...signs(["9"])] : signs(keys));
+		return h(
+			"div",
+			{ class: "key-row" },
+			cameras ? "Camera 1 to 9 large, again: all alike" : title,
+			h("span", { class: "grow" }),
+			cameras ? [...signs(["1"]), "–", ...signs(["9"])] : signs(keys),
+		);
 	};
 	const listed = COMMANDS.filter(({ name, keys }) => keys.length && !/^camera-[2-9]$/.test(name));
-	fill(sheet, [...new Set(listed.map(({ group }) => group))].map((group) => h("section", {}, h("h3", {}, group), listed.filter((c) => c.group === group).map(row))));
+	fill(
+		sheet,
+		[...new Set(listed.map(({ group }) => group))].map((group) =>
+			h("section", {}, h("h3", {}, group), listed.filter((c) => c.group === group).map(row)),
+		),
+	);
 	single.addEventListener("change", () => store.set({ singleKeys: single.checked }));
 	actions.help = () => {
 		if (help.open) return help.close();
@@ -36,7 +50,14 @@ export function mountSheets({ store, actions }) {
 		const option = (/** @type {Command} */ command, /** @type {number} */ index) =>
 			h(
 				"div",
-				{ class: "key-row", role: "option", id: `option-${index}`, "aria-selected": String(index === at), onclick: () => run(command), onpointermove: () => index !== at && choose(index) },
+				{
+					class: "key-row",
+					role: "option",
+					id: `option-${index}`,
+					"aria-selected": String(index === at),
+					onclick: () => run(command),
+					onpointermove: () => index !== at && choose(index),
+				},
 				command.title,
 				h("span", { class: "grow" }),
 				signs(command.keys.slice(0, 1)),

@@ -1,28 +1,55 @@
 /** The timeline: one axis for range bar, ruler, lanes and strips, and one playhead over them. */
-import { bucketOf, panned, secondsOf, stepAt, xOf, zoomed } from "../clock.js";
-import { fill, h, idTag, parts, write } from "../dom.js";
+import { bucketOf, panned, secondsOf, stepAt, xOf, zoomed } from "../play/clock.js";
+import { fill, h, idTag, parts, write } from "../elements/dom.js";
 import { hatch, prepare } from "../draw/canvas.js";
 import { drawLanes, drawRange, drawRuler } from "../draw/lanes.js";
 import { drawCardinality, drawErrors, drawParts } from "../draw/strips.js";
-import { isAlone, ordered, resultOf, scoresOf, trueCount } from "../events.js";
-import { faded, palette } from "../palette.js";
-import { shownDone } from "../playback.js";
+import { isAlone, ordered, resultOf, scoresOf, trueCount } from "../state/events.js";
+import { faded, palette } from "../draw/colours.js";
+import { shownDone } from "../play/playback.js";
+import { hintLines, mountHint } from "./hint.js";
 import { mountTransport } from "./transport.js";
 
 /** @type {Pane} */
 export function mountTimeline(root, context) {
 	const { store, actions, playback } = context;
-	const { lanes, order, people, truthSign, scored, measure, value, countSign, referenceSign, axis, errors, error, whose, plot, fixed, empty, seek: seekBar, wanted, head, label: readout } = parts(root);
+	const {
+		lanes,
+		order,
+		people,
+		truthSign,
+		scored,
+		measure,
+		value,
+		countSign,
+		referenceSign,
+		axis,
+		errors,
+		error,
+		whose,
+		plot,
+		fixed,
+		empty,
+		seek: seekBar,
+		wanted,
+		head,
+		label: readout,
+	} = parts(root);
 	mountTransport(root, context);
-	order.addEventListener("click", () => store.set({ laneOrder: store.get().laneOrder === "longest" ? "born" : "longest" }));
-	measure.addEventListener("click", () => store.set({ measure: store.get().measure === "ospa" ? "gospa" : "ospa" }));
+	order.addEventListener("click", () =>
+		store.set({ laneOrder: store.get().laneOrder === "longest" ? "born" : "longest" }),
+	);
+	measure.addEventListener("click", () =>
+		store.set({ measure: store.get().measure === "ospa" ? "gospa" : "ospa" }),
+	);
 
 	/** @type {View} */
 	let view = { first: 0, last: 1, width: 1 };
 	let asked = false;
 	let spoken = 0;
 
-	const token = (/** @type {string} */ name) => parseFloat(getComputedStyle(document.documentElement).getPropertyValue(`--${name}`));
+	const token = (/** @type {string} */ name) =>
+		parseFloat(getComputedStyle(document.documentElement).getPropertyValue(`--${name}`));
 
 	/** Height of what stands over the lanes. */
 	const above = () => token("h-over") + token("h-ruler");
@@ -36,9 +63,8 @@ export function mountTimeline(root, context) {
 	/** Another part is shown: of a long recording its values are fetched. @param {View} next */
 	function look(next) {
 		view = next;
-		const { timeline, span, frames } = store.get();
-		const whole = view.last - view.first >= frames - 1;
-		if (timeline && (timeline.stride > 1 || span)) store.set({ span: whole ? null : [view.first, view.last] });
+		const whole = view.last - view.first >= store.get().frames - 1;
+		store.set({ span: whole ? null : [view.first, view.last] });
 		draw();
 		placeHead();
 	}
@@ -52,15 +78,17 @@ export function mountTimeline(root, context) {
 		});
 	}
 
-	/** @type {{of: any, by: string, tracks: TrackLane[]}} */
+	/** @type {{of: any, by: string, tracks: Server.TrackLife[]}} */
 	let sorted = { of: null, by: "", tracks: [] };
-	/** @returns {TrackLane[]} */
+	/** @returns {Server.TrackLife[]} */
 	function shownTracks() {
 		const { timeline, laneOrder, selection } = store.get();
 		if (timeline !== sorted.of || laneOrder !== sorted.by) {
 			sorted = { of: timeline, by: laneOrder, tracks: ordered(timeline?.tracks ?? [], laneOrder) };
 		}
-		return isAlone(store.get()) ? sorted.tracks.filter(({ id }) => id === selection) : sorted.tracks;
+		return isAlone(store.get())
+			? sorted.tracks.filter(({ id }) => id === selection)
+			: sorted.tracks;
 	}
 
 	/** The values at the playhead, beside their plots. */
@@ -68,7 +96,8 @@ export function mountTimeline(root, context) {
 		const { shown, selection, measure: name } = store.get();
 		const { series, reference } = scoresOf(store.get()) ?? {};
 		const text = (/** @type {number | null | undefined} */ number) => number?.toFixed(2) ?? "–";
-		const valueOf = (/** @type {ScoreSeries | null | undefined} */ of) => text(of?.[name][bucketOf(Math.max(0, shown), of)]);
+		const valueOf = (/** @type {Server.EvaluationSeries | null | undefined} */ of) =>
+			text(of?.[name][bucketOf(Math.max(0, shown), of)]);
 		const unit = series?.unit ?? "";
 		write(value, `${reference ? `A ${valueOf(reference)} · B ` : ""}${valueOf(series)} ${unit}`);
 		write(axis, `0–${Math.max(series?.axes[name] ?? 0, reference?.axes[name] ?? 0)}`);
@@ -76,9 +105,17 @@ export function mountTimeline(root, context) {
 		measure.dataset.tip = `${series?.cost ?? "not scored yet"}; press for ${name === "ospa" ? "GOSPA" : "OSPA"}`;
 		countSign.dataset.tip = name === "ospa" ? "number of people" : "missed and false people";
 		referenceSign.hidden = !reference;
-		const course = series?.track_errors.find(({ track }) => track === selection) ?? (series && { first: series.first, values: series.mean_error, track: null });
-		write(error, `${text(course && series && course.values[bucketOf(Math.max(0, shown), { ...course, stride: series.stride })])} ${unit}`);
-		write(whose, `${course?.track ? `track ${course.track}` : "mean"} in front · 0–${series?.axes.error ?? 0} ${unit}`);
+		const course =
+			series?.track_errors.find(({ track }) => track === selection) ??
+			(series && { first: series.first, values: series.mean_error, track: null });
+		write(
+			error,
+			`${text(course && series && course.values[bucketOf(Math.max(0, shown), { ...course, stride: series.stride })])} ${unit}`,
+		);
+		write(
+			whose,
+			`${course?.track ? `track ${course.track}` : "mean"} in front · 0–${series?.axes.error ?? 0} ${unit}`,
+		);
 	}
 
 	function paint() {
@@ -94,23 +131,42 @@ export function mountTimeline(root, context) {
 		const lanesRow = row(lanes.offsetHeight);
 		const top = lanesRow.row.y;
 		if (loop && (range[0] !== null || range[1] !== null)) {
-			const [x0, x1] = [xOf(Math.max(view.first, range[0] ?? 0), view), xOf(Math.min(view.last, range[1] ?? frames - 1), view)];
+			const [x0, x1] = [
+				xOf(Math.max(view.first, range[0] ?? 0), view),
+				xOf(Math.min(view.last, range[1] ?? frames - 1), view),
+			];
 			g.fillStyle = faded(ink.get("accent"), 0.07);
 			if (x1 > x0) g.fillRect(x0, ruler.row.y, x1 - x0, height - ruler.row.y);
 		}
 		const done = shownDone(store.get());
 		const { series, reference } = scoresOf(store.get()) ?? {};
-		drawLanes(lanesRow, { tracks: shownTracks(), pinned: timeline?.pinned?.tracks ?? [], scroll: lanes.scrollTop, laneHeight: token("h-lane"), done: timeline?.done ?? 0, selection, hover: hover?.id ?? null, switches: series?.switches ?? [] });
+		drawLanes(lanesRow, {
+			tracks: shownTracks(),
+			pinned: timeline?.pinned?.tracks ?? [],
+			scroll: lanes.scrollTop,
+			laneHeight: token("h-lane"),
+			done: timeline?.done ?? 0,
+			selection,
+			hover: hover?.id ?? null,
+			switches: series?.switches ?? [],
+		});
 		drawRange(over, playback.loadedSteps(), done, frames);
 		drawRuler(ruler, range);
-		if (timeline) drawCardinality(row(token("h-strip")), timeline);
+		// Each plot has its row, whether there is something to plot or not.
+		const [counts, costs, distances] = [0, 1, 2].map(() => row(token("h-strip")));
+		if (timeline) drawCardinality(counts, timeline);
 		if (series && !scored.hidden) {
-			drawParts(row(token("h-strip")), series, reference ?? null, name);
-			drawErrors(row(token("h-strip")), series, selection);
+			drawParts(costs, series, reference ?? null, name);
+			drawErrors(distances, series, selection);
 		}
 		if (done < frames) {
 			const x = Math.max(0, xOf(done, view));
-			hatch(g, [{ x, y: top, width: Math.max(0, view.width - x), height: Math.max(0, height - top - 2) }], ink.get("line"), 6);
+			hatch(
+				g,
+				[{ x, y: top, width: Math.max(0, view.width - x), height: Math.max(0, height - top - 2) }],
+				ink.get("line"),
+				6,
+			);
 		}
 	}
 
@@ -131,9 +187,16 @@ export function mountTimeline(root, context) {
 		if (!playing || now - spoken > 1000) {
 			spoken = now;
 			const count = result ? `, ${result.tracks.length} people` : "";
-			seekBar.setAttribute("aria-valuetext", `step ${at} of ${frames}, ${secondsOf(at, fps)} s${count}`);
+			seekBar.setAttribute(
+				"aria-valuetext",
+				`step ${at} of ${frames - 1}, ${secondsOf(at, fps)} s${count}`,
+			);
 		}
-		fill(people, result?.tracks.length ?? "–", result && sequence?.has_truth && h("span", { class: "sub" }, ` of ${trueCount(result)}`));
+		fill(
+			people,
+			result?.tracks.length ?? "–",
+			result && sequence?.has_truth && h("span", { class: "sub" }, ` of ${trueCount(result)}`),
+		);
 		if (!scored.hidden) writeScores();
 	}
 
@@ -142,14 +205,20 @@ export function mountTimeline(root, context) {
 	function listLanes() {
 		const tracks = shownTracks();
 		const ids = new Set(tracks.map((track) => track.id));
-		for (const [id, label] of labels) if (!ids.has(id)) label.remove(), labels.delete(id);
+		for (const [id, label] of labels) if (!ids.has(id)) (label.remove(), labels.delete(id));
 		const { selection } = store.get();
 		tracks.forEach(({ id, seen }, index) => {
 			const label =
 				labels.get(id) ??
 				h(
 					"button",
-					{ class: "gr lane", "aria-label": `Track ${id}`, onclick: () => actions.select(id), onpointerenter: () => store.set({ hover: { id, camera: -1 } }), onpointerleave: () => store.set({ hover: null }) },
+					{
+						class: "gr lane",
+						"aria-label": `Track ${id}`,
+						onclick: () => actions.select(id),
+						onpointerenter: () => store.set({ hover: { id, camera: -1 } }),
+						onpointerleave: () => store.set({ hover: null }),
+					},
 					idTag(id),
 					h("span", { class: "r" }),
 				);
@@ -159,9 +228,21 @@ export function mountTimeline(root, context) {
 			if (lanes.children[index] !== label) lanes.insertBefore(label, lanes.children[index] ?? null);
 		});
 		const { run, sequence, laneOrder } = store.get();
-		write(order, laneOrder === "longest" ? "tracks, longest first" : "tracks, first born first");
+		const fit = Math.floor(lanes.clientHeight / token("h-lane"));
+		const words = laneOrder === "longest" ? "longest first" : "first born first";
+		// Who does not see all of them is told how many there are.
+		write(order, fit < tracks.length ? `${fit} of ${tracks.length}, ${words}` : `tracks, ${words}`);
 		const idle = tracks.length === 0 && sequence && run?.state !== "computing";
-		write(empty, !idle ? "" : run?.state === "failed" ? "The run failed before a track was found." : !run?.done ? "" : "No track was found with these parameters.");
+		write(
+			empty,
+			!idle
+				? ""
+				: run?.state === "failed"
+					? "The run failed before a track was found."
+					: !run?.done
+						? ""
+						: "No track was found with these parameters.",
+		);
 		empty.style.top = `${above() + 8}px`;
 	}
 
@@ -170,11 +251,9 @@ export function mountTimeline(root, context) {
 		event.preventDefault();
 		plot.setPointerCapture(event.pointerId);
 		const box = plot.getBoundingClientRect();
-		const lane = Math.floor((event.clientY - box.top - above() + lanes.scrollTop) / token("h-lane"));
-		const inLanes = event.clientY - box.top > above() && event.clientY - box.top < above() + lanes.clientHeight;
-		const track = shownTracks()[lane];
+		const track = laneAt(event);
 		const at = stepAt(event.clientX - box.left, view);
-		if (inLanes && track && at >= track.first && at <= track.last) actions.select(track.id);
+		if (track && at >= track.first && at <= track.last) actions.select(track.id);
 		store.set({ playing: 0 });
 		playback.seek(at);
 	});
@@ -188,21 +267,53 @@ export function mountTimeline(root, context) {
 			event.preventDefault();
 			const box = plot.getBoundingClientRect();
 			const { frames } = store.get();
-			const overLanes = event.clientY - box.top > above() && lanes.scrollHeight > lanes.clientHeight;
-			if (overLanes && !event.ctrlKey && !event.shiftKey) lanes.scrollTop += event.deltaY;
-			else if (event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY)) look(panned(view, ((event.deltaX || event.deltaY) / view.width) * (view.last - view.first), frames));
+			// The wheel zooms wherever the plot is; beside it, over the names, it scrolls the lanes.
+			if (event.altKey) lanes.scrollTop += event.deltaY;
+			else if (event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY))
+				look(
+					panned(
+						view,
+						((event.deltaX || event.deltaY) / view.width) * (view.last - view.first),
+						frames,
+					),
+				);
 			else look(zoomed(view, Math.exp(event.deltaY * 0.0015), event.clientX - box.left, frames));
 		},
 		{ passive: false },
 	);
-	actions.zoom = (factor) => look(zoomed(view, factor, Math.max(0, Math.min(view.width, xOf(Math.max(0, store.get().shown), view))), store.get().frames));
+	/** The track whose lane is under the pointer. @param {PointerEvent} event */
+	function laneAt({ clientY }) {
+		const y = clientY - plot.getBoundingClientRect().top - above();
+		if (y < 0 || y >= lanes.clientHeight) return undefined;
+		return shownTracks()[Math.floor((y + lanes.scrollTop) / token("h-lane"))];
+	}
+	mountHint(plot, (event) => {
+		const { sequence } = store.get();
+		if (!sequence) return [];
+		const at = stepAt(event.clientX - plot.getBoundingClientRect().left, view);
+		return hintLines(store.get(), at, laneAt(event));
+	});
+	actions.zoom = (factor) =>
+		look(
+			zoomed(
+				view,
+				factor,
+				Math.max(0, Math.min(view.width, xOf(Math.max(0, store.get().shown), view))),
+				store.get().frames,
+			),
+		);
 	plot.addEventListener("dblclick", () => actions.zoom(1e9));
 	seekBar.addEventListener("input", () => playback.seek(seekBar.valueAsNumber));
 	lanes.addEventListener("scroll", draw);
 
-	store.on(["sequence"], ({ sequence, frames }) => {
+	store.on(["span"], ({ span }) => {
+		if (!span || (span[0] === view.first && span[1] === view.last)) return;
+		look({ ...view, first: span[0], last: Math.min(span[1], store.get().frames - 1) });
+	});
+	store.on(["sequence"], ({ sequence, frames, span }) => {
 		truthSign.hidden = scored.hidden = errors.hidden = !sequence?.has_truth;
-		view = { ...view, first: 0, last: Math.max(1, frames - 1) };
+		const [first, last] = span ?? [0, Math.max(1, frames - 1)];
+		view = { ...view, first, last };
 		seekBar.max = String(Math.max(0, frames - 1));
 		resize();
 	});

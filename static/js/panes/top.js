@@ -1,30 +1,73 @@
 /** The top bar: what is open, which methods run, how far they are. */
-import { fill, h, parts, write } from "../dom.js";
+import { fill, h, parts, write } from "../elements/dom.js";
 
 /** @type {Pane} */
 export function mountTop(root, { store, actions }) {
-	const { sequence, facts, single_view, fusion_method, dot, word, bar, number, rate, cancel, again, spoken, csv } = parts(root);
+	const {
+		sequence,
+		facts,
+		single_view,
+		fusion_method,
+		dot,
+		word,
+		bar,
+		number,
+		rate,
+		cancel,
+		again,
+		spoken,
+		csv,
+	} = parts(root);
 	sequence.addEventListener("change", () => actions.open(sequence.value));
-	for (const [key, select] of Object.entries({ single_view, fusion_method })) select.addEventListener("change", () => actions.change({ [key]: select.value }));
+	for (const [key, select] of Object.entries({ single_view, fusion_method }))
+		select.addEventListener("change", () => actions.change({ [key]: select.value }));
 	// A chosen word leaves the focus to the page, so that Space goes on meaning play.
-	for (const select of [sequence, single_view, fusion_method]) select.addEventListener("change", () => select.blur());
+	for (const select of [sequence, single_view, fusion_method])
+		select.addEventListener("change", () => select.blur());
 
 	function lists() {
 		const { server, sequences, schema, link } = store.get();
 		const open = server?.opening?.name ?? server?.sequence?.name ?? "";
-		const option = (/** @type {SequenceEntry} */ { name, description, cameras, frames, kind, ready, error }) => {
-			const size = error ? "cannot be read" : cameras && frames ? `${cameras} cameras, ${frames} steps` : kind;
+		const option = (
+			/** @type {Server.SequenceEntryInfo} */ {
+				name,
+				description,
+				cameras,
+				frames,
+				kind,
+				ready,
+				error,
+			},
+		) => {
+			const size = error
+				? "cannot be read"
+				: cameras && frames
+					? `${cameras} cameras, ${frames} steps`
+					: kind;
 			const wait = kind === "rendered" && !ready ? ", rendered on first use" : "";
 			// The chosen one stands in the bar, where its name is enough.
-			return h("option", { value: name, title: error ?? description }, name === open ? name : `${name}  ·  ${size}${wait}`);
+			return h(
+				"option",
+				{ value: name, title: error ?? description },
+				name === open ? name : `${name}  ·  ${size}${wait}`,
+			);
 		};
-		const group = (/** @type {string} */ label, /** @type {SequenceEntry[]} */ entries) => entries.length > 0 && h("optgroup", { label }, entries.map(option));
+		const group = (
+			/** @type {string} */ label,
+			/** @type {Server.SequenceEntryInfo[]} */ entries,
+		) => entries.length > 0 && h("optgroup", { label }, entries.map(option));
 		fill(
 			sequence,
 			!open && h("option", { value: "", disabled: true }, "choose a sequence"),
 			open && !sequences.some(({ name }) => name === open) && h("option", { value: open }, open),
-			group("Rendered rooms", sequences.filter(({ kind }) => kind === "rendered")),
-			group("Folders", sequences.filter(({ kind }) => kind !== "rendered")),
+			group(
+				"Rendered rooms",
+				sequences.filter(({ kind }) => kind === "rendered"),
+			),
+			group(
+				"Folders",
+				sequences.filter(({ kind }) => kind !== "rendered"),
+			),
 		);
 		sequence.value = open;
 		sequence.disabled = link !== "open" || sequences.length === 0;
@@ -33,7 +76,18 @@ export function mountTop(root, { store, actions }) {
 		for (const [key, select] of Object.entries({ single_view, fusion_method })) {
 			const now = server?.parameters[key] ?? "";
 			const names = schema?.methods[key] ?? [];
-			fill(select, (names.includes(now) ? names : [now, ...names]).map((name) => h("option", { value: name }, name)));
+			const unfit = server?.unfit[key] ?? {};
+			fill(
+				select,
+				(names.includes(now) ? names : [now, ...names]).map((name) =>
+					h(
+						"option",
+						{ value: name, title: unfit[name] },
+						unfit[name] ? `${name} · not here` : name,
+					),
+				),
+			);
+			select.title = unfit[now] ?? "";
 			select.value = now;
 			select.disabled = link !== "open" || !size;
 		}
@@ -53,7 +107,15 @@ export function mountTop(root, { store, actions }) {
 		again.hidden = link !== "open" || run?.state !== "cancelled" || Boolean(opening);
 		number.hidden = rate.hidden = link === "lost" || !(opening || run?.total);
 		const [kind, text] =
-			link === "lost" ? ["bad", "not connected"] : !server ? ["", "connecting"] : opening ? ["busy", "opening"] : server.sequence && run ? runWords(run) : ["", "nothing open"];
+			link === "lost"
+				? ["bad", "not connected"]
+				: !server
+					? ["", "connecting"]
+					: opening
+						? ["busy", "opening"]
+						: server.sequence && run
+							? runWords(run)
+							: ["", "nothing open"];
 		say(kind, text);
 		const { done, total } = opening ?? run ?? { done: 0, total: 0 };
 		bar.style.setProperty("--part", String(total > 0 ? done / total : 0));
@@ -67,17 +129,26 @@ export function mountTop(root, { store, actions }) {
 	store.watch(["server", "run", "link"], status);
 }
 
-/** @type {Record<RunState["state"], [string, string]>} */
-const WORDS = { computing: ["busy", "computing"], done: ["good", "computed"], failed: ["bad", "failed"], cancelled: ["warn", "partial"], idle: ["", "ready"] };
+/** @type {Record<Server.RunInfo["state"], [string, string]>} */
+const WORDS = {
+	computing: ["busy", "computing"],
+	done: ["good", "computed"],
+	failed: ["bad", "failed"],
+	cancelled: ["warn", "partial"],
+	idle: ["", "ready"],
+};
 
-/** @param {RunState} run  @returns {[string, string]} sign and word */
+/** @param {Server.RunInfo} run  @returns {[string, string]} sign and word */
 export const runWords = (run) => WORDS[run.state];
 
-/** @param {RunState} run  @returns {string} speed and time left, or why it does not begin */
+/** @param {Server.RunInfo} run  @returns {string} speed and time left, or why it does not begin */
 export function rateText({ state, message, steps_per_second: speed, seconds_left: left }) {
 	if (!speed) return message;
 	const rate = `${speed < 10 ? speed.toFixed(1) : Math.round(speed)} steps/s`;
 	if (state !== "computing" || left === null) return rate;
-	const time = left < 60 ? `${left.toFixed(left < 10 ? 1 : 0)} s` : `${Math.floor(left / 60)} min ${Math.round(left % 60)} s`;
+	const time =
+		left < 60
+			? `${left.toFixed(left < 10 ? 1 : 0)} s`
+			: `${Math.floor(left / 60)} min ${Math.round(left % 60)} s`;
 	return `${rate} · ${time} left`;
 }

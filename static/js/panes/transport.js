@@ -1,6 +1,6 @@
 /** Play, step, speed, loop and the readout. */
-import { SPEEDS, parseStep, secondsOf } from "../clock.js";
-import { all, choices, parts, write } from "../dom.js";
+import { SPEEDS, parseStep, secondsOf } from "../play/clock.js";
+import { all, choices, parts, write } from "../elements/dom.js";
 
 /** @type {Pane} */
 export function mountTransport(root, { store, playback }) {
@@ -23,7 +23,11 @@ export function mountTransport(root, { store, playback }) {
 		if (wanted !== null) playback.seek(wanted);
 		if (event.key === "Enter" || event.key === "Escape") close();
 	});
-	choices(speed, SPEEDS.map((value) => [value, `${value}×`]), 1);
+	choices(
+		speed,
+		SPEEDS.map((value) => [value, `${value}×`]),
+		1,
+	);
 	speed.addEventListener("change", () => {
 		store.set({ speed: Number(speed.value) });
 		speed.blur();
@@ -31,7 +35,7 @@ export function mountTransport(root, { store, playback }) {
 
 	store.on(["shown", "sequence"], ({ shown, frames, fps }) => {
 		write(step, String(Math.max(0, shown)));
-		write(of, `/ ${frames}`);
+		write(of, `/ ${Math.max(0, frames - 1)}`);
 		write(seconds, secondsOf(Math.max(0, shown), fps));
 		// Room for the largest number, so that nothing moves sideways.
 		step.style.minWidth = `${String(frames).length}ch`;
@@ -42,7 +46,12 @@ export function mountTransport(root, { store, playback }) {
 		play.ariaLabel = playing ? "Pause" : "Play";
 	});
 	const marks = () => {
-		const { loop: on, range: [from, to], frames, speed: now } = store.get();
+		const {
+			loop: on,
+			range: [from, to],
+			frames,
+			speed: now,
+		} = store.get();
 		for (const control of all("button:not(.end), select", root)) control.disabled = !frames;
 		loop.ariaPressed = String(on);
 		write(range, from === null && to === null ? "all" : `${from ?? 0} – ${to ?? frames - 1}`);

@@ -1,5 +1,14 @@
 /** The 3D pane: viser's page inside ours, with its layers and view points. */
-import { all, fill, h, icon, parts } from "../dom.js";
+import { all, fill, h, icon, parts } from "../elements/dom.js";
+
+/** What draws WebGL here where it is no graphics card; empty where it is one, or not told. */
+function softwareRenderer() {
+	const gl = document.createElement("canvas").getContext("webgl2");
+	const info = gl?.getExtension("WEBGL_debug_renderer_info");
+	const name = String((info && gl?.getParameter(info.UNMASKED_RENDERER_WEBGL)) ?? "");
+	gl?.getExtension("WEBGL_lose_context")?.loseContext();
+	return /swiftshader|llvmpipe|softpipe|software/i.test(name) ? name : "";
+}
 
 /** @type {Pane} */
 export function mountView3d(root, { store, actions, retry, press }) {
@@ -10,11 +19,25 @@ export function mountView3d(root, { store, actions, retry, press }) {
 	/** @type {Timer} */
 	let timer;
 
-	/** Load viser's page, but only once it answers: a browser's error page inside ours says nothing. */
+	if (softwareRenderer())
+		actions.note(
+			"info",
+			"The 3D view is drawn without a graphics card",
+			"It follows a few times a second; pictures, timeline and tables keep their speed.",
+			undefined,
+			"software",
+		);
+
+	/**
+	 * Load viser's page, but only once it answers: a browser's error page inside ours says nothing.
+	 */
 	async function load() {
 		clearTimeout(timer);
 		if (!path) return;
-		reachable = await fetch(path, { cache: "no-store" }).then(({ ok }) => ok, () => false);
+		reachable = await fetch(path, { cache: "no-store" }).then(
+			({ ok }) => ok,
+			() => false,
+		);
 		if (reachable) {
 			tries = 0;
 			frame.src = path;
@@ -24,29 +47,78 @@ export function mountView3d(root, { store, actions, retry, press }) {
 		}
 		cover();
 	}
-	// After a click into 3D its document has the keys; ours come first, but for those that move its camera.
-	frame.addEventListener("load", () => frame.contentWindow?.addEventListener("keydown", (event) => {
-		if (/^(Arrow.*|[wasdqe])$/i.test(event.key) && !event.ctrlKey && !event.metaKey) return;
-		if (press(event)) event.stopImmediatePropagation();
-	}, true));
+	// After a click into 3D its document has the keys; ours come first, but for those that move its
+	// camera.
+	frame.addEventListener("load", () =>
+		frame.contentWindow?.addEventListener(
+			"keydown",
+			(event) => {
+				if (/^(Arrow.*|[wasdqe])$/i.test(event.key) && !event.ctrlKey && !event.metaKey) return;
+				if (press(event)) event.stopImmediatePropagation();
+			},
+			true,
+		),
+	);
 
 	function cover() {
 		const { link, server } = store.get();
 		blank.hidden = reachable && link !== "lost";
 		if (blank.hidden) return;
-		const say = (/** @type {string} */ title, /** @type {string} */ text, /** @type {() => void} */ onclick) =>
-			fill(blank, icon("i-plug", "l"), h("h3", {}, title), h("p", {}, text), h("button", { class: "btn box", onclick }, "Try now"));
-		if (link === "lost") say("3D view lost", "Pictures and results that were loaded can still be looked at.", retry);
-		else if (tries > 0) say("The 3D view does not answer", "Pictures, timeline and tables still work. It is tried again by itself.", load);
+		const say = (
+			/** @type {string} */ title,
+			/** @type {string} */ text,
+			/** @type {() => void} */ onclick,
+		) =>
+			fill(
+				blank,
+				icon("i-plug", "l"),
+				h("h3", {}, title),
+				h("p", {}, text),
+				h("button", { class: "btn box", onclick }, "Try now"),
+			);
+		if (link === "lost")
+			say("3D view lost", "Pictures and results that were loaded can still be looked at.", retry);
+		else if (tries > 0)
+			say(
+				"The 3D view does not answer",
+				"Pictures, timeline and tables still work. It is tried again by itself.",
+				load,
+			);
 		else fill(blank, h("p", {}, server ? "Loading the 3D view" : "Connecting"));
 	}
 
 	function header() {
 		const { server, cameras, link } = store.get();
 		/** @type {[string, number | "top" | null, string, string][]} */
-		const points = [["free", null, "Free view", "0"], ["top", "top", "From above", "U"], ...cameras.map(({ name }, index) => /** @type {[string, number, string, string]} */ ([`C${index + 1}`, index, `Look through ${name}`, ""]))];
+		const points = [
+			["free", null, "Free view", "0"],
+			["top", "top", "From above", "U"],
+			...cameras.map(
+				({ name }, index) =>
+					/** @type {[string, number, string, string]} */ ([
+						`C${index + 1}`,
+						index,
+						`Look through ${name}`,
+						"",
+					]),
+			),
+		];
 		if (views.childElementCount !== points.length) {
-			fill(views, points.map(([name, view, tip, key]) => h("button", { class: "start", "data-tip": tip, "data-key": key, onclick: () => actions.lookThrough(view) }, name)));
+			fill(
+				views,
+				points.map(([name, view, tip, key]) =>
+					h(
+						"button",
+						{
+							class: "start",
+							"data-tip": tip,
+							"data-key": key,
+							onclick: () => actions.lookThrough(view),
+						},
+						name,
+					),
+				),
+			);
 		}
 		all("button", views).forEach((button, index) => {
 			button.ariaPressed = String(points[index][1] === (server?.view ?? null));

@@ -79,10 +79,10 @@ def test_stage_1_is_kept_for_the_next_run_unless_told_otherwise(
     line = ("track", data / "numbers", "-o", out, "--colour-phd.samples", "60")
     status, _, stderr = run(*line, "--no-cache")
     assert status == 0
-    assert not (tmp_path / "cache").exists()
+    assert not (tmp_path / "cache" / "stages").exists()
     first = out.read_text(encoding="utf-8")
     assert "was kept" not in run(*line)[2]
-    assert len(list((tmp_path / "cache").rglob("*.npz"))) == 1
+    assert len(list((tmp_path / "cache" / "stages").rglob("*.npz"))) == 1
     out.unlink()
     status, _, stderr = run(*line)
     assert (status, "stage 1 was kept from an earlier run" in stderr) == (0, True)
@@ -101,12 +101,15 @@ def test_benchmarks_run_from_a_checkout(
 
     monkeypatch.setattr(cli.subprocess, "run", note)
     wanted = tmp_path / "figures.json"
-    assert run("benchmark", "kernels", "targets", "--short", "--json", wanted)[0] == 1
-    ((line, where),) = lines
+    assert run("benchmark", "kernels", "targets", "--short", "--json", wanted, "--record")[0] == 1
+    chart = tmp_path / "chart.html"
+    run("benchmark", "--chart", chart)
+    (line, where), (drawn, _) = lines
     assert line == [
         *("-m", "tests.benchmarks", "kernels", "targets", "--short"),
-        *("--json", str(wanted)),
+        *("--json", str(wanted), "--record"),
     ]
+    assert drawn == ["-m", "tests.benchmarks", "--chart", str(chart)]
     assert (where / "tests" / "benchmarks" / "__main__.py").is_file()
 
 
@@ -231,6 +234,7 @@ def test_a_failure_leaves_an_older_file_as_it_was(
     assert list(tmp_path.iterdir()) == [out]
 
 
+@pytest.mark.full
 def test_ctrl_c_in_the_middle_leaves_nothing(tmp_path: Path) -> None:
     folder = write_crossing(tmp_path / "long", 6000)
     out = tmp_path / "out"
@@ -328,6 +332,7 @@ def test_render_refuses_what_it_cannot_do(run: Runs, tmp_path: Path) -> None:
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.full
 def test_render_writes_what_track_reads(
     run: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -10,10 +10,12 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from concurrent.futures import Future
+from collections.abc import Callable, Coroutine, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 import httpx
 import pytest
@@ -29,7 +31,14 @@ from tests.app.conftest import wait_until
 from tests.app.folders import write_crossing
 from tracker.pipeline import Cancelled
 
+T = TypeVar("T")
 VISER = Subprotocol(f"viser-v{viser.__version__}")
+
+
+def said(talk: Callable[[], Coroutine[None, None, T]]) -> T:
+    """What a talk gives, in a thread of its own: in this one Playwright's loop may run."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(lambda: asyncio.run(talk())).result()
 
 
 @dataclass
@@ -68,6 +77,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     assert server.process.returncode == 0
 
 
+@pytest.mark.full
 def test_the_page_is_there_and_the_run_is_done_soon(server: Server) -> None:
     page = httpx.get(server.address)
     assert page.status_code == 200
@@ -75,6 +85,7 @@ def test_the_page_is_there_and_the_run_is_done_soon(server: Server) -> None:
     wait_until(lambda: httpx.get(f"{server.address}/api/state").json()["run"]["state"] == "done")
 
 
+@pytest.mark.full
 def test_visers_page_is_served_with_a_focus_that_stays(server: Server) -> None:
     answer = httpx.get(f"{server.address}/viser", follow_redirects=True)
     assert answer.url.path == "/viser/"
@@ -83,6 +94,7 @@ def test_visers_page_is_served_with_a_focus_that_stays(server: Server) -> None:
     assert again.status_code == 304
 
 
+@pytest.mark.full
 def test_visers_socket_passes_through_with_its_subprotocol(server: Server) -> None:
     async def talk() -> tuple[str | None, int]:
         async with connect(
@@ -96,11 +108,12 @@ def test_visers_socket_passes_through_with_its_subprotocol(server: Server) -> No
             assert isinstance(first, bytes)
             return ws.subprotocol, len(first)
 
-    subprotocol, size = asyncio.run(talk())
+    subprotocol, size = said(talk)
     assert subprotocol == VISER
     assert size > 0
 
 
+@pytest.mark.full
 def test_viser_says_itself_why_it_closes(server: Server) -> None:
     async def talk() -> None:
         async with connect(
@@ -111,12 +124,13 @@ def test_viser_says_itself_why_it_closes(server: Server) -> None:
                     await ws.recv()
 
     with pytest.raises(ConnectionClosed) as closed:
-        asyncio.run(talk())
+        said(talk)
     assert closed.value.rcvd is not None
     assert closed.value.rcvd.code == 1002
     assert "Version mismatch" in closed.value.rcvd.reason
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("path", ["/viser", "/viser/", "/api/stream"])
 def test_foreign_pages_get_no_socket(server: Server, path: str) -> None:
     async def talk(origin: str, host: str | None) -> None:
@@ -131,7 +145,7 @@ def test_foreign_pages_get_no_socket(server: Server, path: str) -> None:
 
     for origin in ("http://evil.example", "null", "http://localhost:1"):
         with pytest.raises(InvalidStatus) as refused:
-            asyncio.run(talk(origin, None))
+            said(partial(talk, origin, None))
         assert refused.value.response.status_code == 403
 
 
@@ -149,6 +163,7 @@ def test_visers_public_tunnel_cannot_be_asked_for() -> None:
         running.stop()
 
 
+@pytest.mark.full
 def test_ctrl_c_ends_it_soon_also_with_a_page_open(tmp_path: Path) -> None:
     server = start(str(write_crossing(tmp_path / "crossing")))
 
@@ -164,7 +179,7 @@ def test_ctrl_c_ends_it_soon_also_with_a_page_open(tmp_path: Path) -> None:
             await asyncio.to_thread(server.process.wait, 20)
             return time.monotonic() - begin
 
-    seconds = asyncio.run(talk())
+    seconds = said(talk)
     assert server.process.returncode == 0
     assert server.process.communicate() == ("", "")
     assert seconds < 5.0  # two on a quiet machine

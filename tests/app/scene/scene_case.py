@@ -99,8 +99,9 @@ def run(of: Sequence, done: int | None = None, clutter: int = 4, walkers: int = 
 
 
 def opened(of: Sequence, shown: Run | None = None) -> Workbench:
-    """A workbench with the sequence and, where given, a finished run."""
+    """A workbench with the sequence and, where given, a finished run; every layer is on."""
     workbench = Workbench()
+    workbench.set_layers({"truth": True})
     show(workbench, of, shown)
     return workbench
 

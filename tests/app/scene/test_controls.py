@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from app.paths import static_folder
 from app.scene.keys import hotkeys
 from app.scene.panel.controls import ORIGIN, Controls
-from app.scene.panel.sliders import Scale, hint_text, label_text, number_text
+from app.scene.panel.sliders import Scale, hint_text, label_text, number_text, symbol_parts
 from app.state.workbench import Workbench
 from app.web import gateway
 from tests.app.scene import scene_case
@@ -130,14 +130,68 @@ def test_numbers_are_written_short(number: float, text: str) -> None:
 def test_label_and_hint_say_what_it_is(parameter: table.Parameter) -> None:
     label = label_text(parameter, changed=False)
     assert parameter.label in label
-    assert parameter.symbol in label
-    assert parameter.unit in label
+    letter, index = symbol_parts(parameter.symbol)
+    assert label.endswith(f" {letter}")
+    assert parameter.symbol in (letter, f"{letter}_{index}")
     assert label_text(parameter, changed=True) == f"• {label}"
     assert hint_text(parameter).startswith(parameter.help)
     assert "efault" in hint_text(parameter)
 
 
 # the panel
+
+
+def visible_copies(panel: Controls) -> set[str]:
+    return {key for key, copies in panel._copies.items() if any(h.visible for h in copies)}
+
+
+def test_the_essentials_come_first_and_move_the_same_parameter(
+    panel: Controls, workbench: Workbench
+) -> None:
+    essential = {key for key, p in PARAMETERS.items() if p.essential}
+    shown = visible_copies(panel)
+    assert shown == essential & set(panel._shown)
+    assert {P_D, "fusion.survival_probability", "fusion.extraction_threshold"} <= shown
+    assert panel._essentials.label == f"Essentials · {len(shown)}"
+    handle = panel._copies[P_D][0]
+    handle._impl.value = 0.6
+    for callback in handle._impl.update_cb:
+        callback(viser.GuiEvent(None, 1, handle))  # type: ignore[arg-type]
+    assert panel.wait(SECONDS)
+    assert value(workbench, P_D) == 0.6
+    assert panel._inputs[P_D].value == 0.6
+    assert panel._essentials.label.endswith(", 1 changed")
+    assert panel._stages["fusion"].label.endswith(", 1 changed")
+
+
+def test_the_filter_lists_what_has_its_words_and_says_where_nothing_has(
+    panel: Controls, workbench: Workbench
+) -> None:
+    workbench.set_parameters({P_D: 0.6}, "page")
+    for text, only, expected in (
+        ("detection prob", False, P_D),
+        ("p_d", False, P_D),
+        ("", True, P_D),
+        ("survival", False, "fusion.survival_probability"),
+    ):
+        panel._sought._impl.value, panel._only_changed._impl.value = text, only
+        panel._worker.ask("refresh")
+        assert panel.wait(SECONDS)
+        assert expected in visible_copies(panel)
+        assert panel._found.visible
+        assert not panel._essentials.visible
+        assert not any(folder.visible for folder in panel._stages.values())
+    assert visible_copies(panel) == {"fusion.survival_probability"}
+    panel._sought._impl.value = "<xyz>"
+    panel._worker.ask("refresh")
+    assert panel.wait(SECONDS)
+    assert "No parameter has “&lt;xyz&gt;”" in panel._nothing_found.content
+    assert panel._nothing_found.visible
+    panel._sought._impl.value = ""
+    panel._worker.ask("refresh")
+    assert panel.wait(SECONDS)
+    assert panel._essentials.visible
+    assert panel._stages["fusion"].visible
 
 
 def test_every_parameter_and_method_has_one_input(panel: Controls) -> None:
@@ -191,7 +245,7 @@ def test_a_slider_that_is_being_moved_is_not_written(panel: Controls, workbench:
     handle = panel._inputs[key]
     handle._impl.value = -2.505  # further on than what the store knows
     with panel._lock:
-        panel._moved.add(key)
+        panel._moved[key] = handle
     workbench.set_parameters({key: 1e-6}, "page")
     assert panel.wait(SECONDS)
     assert handle.value == -2.505

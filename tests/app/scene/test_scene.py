@@ -11,8 +11,10 @@ import pytest
 import viser
 import viser.transforms as tf
 
-from app.scene import scene
+from app.colours import PALETTES
+from app.scene import geometry, scene
 from app.scene.geometry import mass_radius
+from app.scene.nodes import linear
 from app.scene.scene import Scene
 from app.scene.worker import LatestWorker
 from app.web import gateway
@@ -221,6 +223,54 @@ def test_lines_from_truth_to_estimate_say_how_far(server: viser.ViserServer) -> 
     workbench.set_layers({"truth": False})
     assert view.wait(SECONDS)
     assert not nodes(server)["/people/errors"].visible
+    view.close()
+
+
+def test_a_person_stands_on_the_floor_in_the_colour_of_the_label(
+    server: viser.ViserServer,
+) -> None:
+    of = scene_case.sequence()
+    shown = scene_case.run(of)
+    workbench = scene_case.opened(of, shown)
+    view = Scene(server, workbench)
+    workbench.seek(30)
+    assert view.wait(SECONDS)
+    now = shown.tracks.at(30)
+    body = nodes(server)["/people/figures"]
+    top = shown.tracks.positions[now][:, 2] + scene_case.HALF[2]
+    np.testing.assert_allclose(body.batched_positions[:, 2], scene_case.ROOM.minimum[2])
+    np.testing.assert_allclose(body.batched_scales[:, 2], top, rtol=1e-6)
+    discs = nodes(server)["/labels/people_discs"]
+    expected = linear(PALETTES["dark"].of(shown.tracks.ids[now]))
+    np.testing.assert_array_equal(discs.colors[:, 0], expected)
+    assert "/labels/entrances_discs" not in visible(server, "/labels")
+    workbench.set_layers({"bodies": False})
+    assert view.wait(SECONDS)
+    assert not nodes(server)["/people/figures"].visible
+    assert not nodes(server)["/people/feet"].visible
+    view.close()
+
+
+@pytest.mark.parametrize("aspect", [0.6, 1.0, 2.4])
+def test_the_overview_crops_neither_the_room_nor_a_camera(
+    server: viser.ViserServer, aspect: float
+) -> None:
+    of = scene_case.sequence(3)
+    view = Scene(server, scene_case.opened(of))
+    assert view.wait(SECONDS)
+    pose = view._overview(aspect)
+    assert pose is not None
+    ahead = pose.look_at - pose.position
+    ahead /= np.linalg.norm(ahead)
+    right = np.cross(ahead, pose.up)
+    right /= np.linalg.norm(right)
+    corners = geometry.box_corners(of.room.minimum, of.room.maximum)
+    points = np.concatenate([corners, [camera.centre for camera in of.cameras]]) - pose.position
+    depth = points @ ahead
+    tall = np.abs(points @ np.cross(right, ahead)) / depth / np.tan(pose.fov / 2.0)
+    wide = np.abs(points @ right) / depth / np.tan(pose.fov / 2.0) / aspect
+    assert max(tall.max(), wide.max()) < 0.97
+    assert max(tall.max(), wide.max()) > 0.6  # nor is it farther away than it must be
     view.close()
 
 

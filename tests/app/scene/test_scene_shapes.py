@@ -21,7 +21,7 @@ from app.scene.room import pose_through
 from app.scene.views import between
 from tests.app.scene import scene_case
 
-TOKENS = Path(__file__).resolve().parents[2] / "static" / "css" / "tokens.css"
+TOKENS = Path(__file__).resolve().parents[3] / "static" / "css" / "tokens.css"
 
 # shapes
 

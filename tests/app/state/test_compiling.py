@@ -1,4 +1,4 @@
-"""The process that compiles the kernels: seen from the workbench, waited for, and ended."""
+"""The processes that compile the kernels: seen from the workbench, waited for, and ended."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from typing import Any
 
 import pytest
 
-from app.state import compiling
 from app.state.compiling import WORDS, Compiling
 from app.state.jobs import Jobs
 from app.state.workbench import Workbench
 from tests.app.conftest import wait_until
+from tracker import warm_up
 from tracker.kernels import compilation
 
 
@@ -29,34 +29,34 @@ def instead(monkeypatch: pytest.MonkeyPatch, code: str) -> None:
     """Another program in place of the one that compiles."""
     real = subprocess.Popen
 
-    def start(_: list[str], **how: Any) -> Any:
-        return real([sys.executable, "-c", code], **how)
+    def start(line: list[str], **how: Any) -> Any:
+        return real([sys.executable, "-c", code, line[-1]], **how)
 
-    monkeypatch.setattr(compiling.subprocess, "Popen", start)
+    monkeypatch.setattr(warm_up.subprocess, "Popen", start)
 
 
 SLOW = """
 import sys, time
 def say(words):
     print(words, flush=True)
-say("3 50"); time.sleep(0.4); say("shown")
-time.sleep(0.4); say("20 50"); time.sleep(0.4); say("ready"); time.sleep(30)
+say("3 50"); time.sleep(0.4)
+say("20 50"); time.sleep(0.4)
+if sys.argv[-1] == "first":
+    say("ready")
+time.sleep(30)
 """
 
 
-def test_a_sequence_is_shown_and_run_when_its_kernels_are_there(
+def test_a_sequence_is_shown_at_once_and_run_when_its_loops_over_pixels_are_there(
     uncompiled: None, monkeypatch: pytest.MonkeyPatch, data: Path
 ) -> None:
     instead(monkeypatch, SLOW)
     said: list[str] = []
     bench = Workbench()
-    told: list[tuple[str, int, int]] = []
     waits: list[str] = []
 
     def note(change: str) -> None:
         now = bench.snapshot()
-        if now.opening is not None:
-            told.append((now.opening.message, now.opening.done, now.opening.total))
         if now.sequence is not None and now.run is None:
             waits.append(now.run_state.message)
 
@@ -65,16 +65,15 @@ def test_a_sequence_is_shown_and_run_when_its_kernels_are_there(
     jobs = Jobs(bench, data=data, compiling=worker)
     jobs.open("crossing").result(30.0)
     assert said == [WORDS]
-    assert (WORDS, 3, 50) in told
     assert bench.snapshot().run_state.done == 0, "it is seen before it can be run"
     wait_until(lambda: bench.snapshot().run_state.state == "done")
     assert f"{WORDS}, 20 of 50" in waits
     begin = time.monotonic()
     jobs.close()
     assert time.monotonic() - begin < 5.0
-    process = worker._process
-    assert process is not None
-    assert process.wait(10.0) != 0, "what goes on for the other methods ends with the workbench"
+    assert len(worker._processes) == 2
+    for process in worker._processes.values():
+        assert process.wait(10.0) != 0, "what goes on for the other methods ends with the workbench"
 
 
 def test_where_everything_is_compiled_nothing_starts(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -82,10 +81,10 @@ def test_where_everything_is_compiled_nothing_starts(monkeypatch: pytest.MonkeyP
         raise AssertionError
 
     monkeypatch.setattr(compilation, "is_compiled", lambda: True)
-    monkeypatch.setattr(compiling.subprocess, "Popen", never)
+    monkeypatch.setattr(warm_up.subprocess, "Popen", never)
     said: list[str] = []
     worker = Compiling(said.append)
-    worker.wait("ready", never, lambda: False)
+    worker.wait(never, lambda: False)
     worker.close()
     assert said == []
 
@@ -99,7 +98,7 @@ def test_nobody_waits_for_a_process_that_failed(
 ) -> None:
     instead(monkeypatch, code)
     worker = Compiling()
-    worker.wait("ready", lambda done, total: None, lambda: False)
+    worker.wait(lambda done, total: None, lambda: False)
     assert "compiling ended with status" in caplog.text
 
 
@@ -109,8 +108,8 @@ def test_nobody_waits_where_no_process_can_be_started(
     def refuse(*_: object, **__: object) -> None:
         raise OSError("no more processes")
 
-    monkeypatch.setattr(compiling.subprocess, "Popen", refuse)
-    Compiling().wait("shown", lambda done, total: None, lambda: False)
+    monkeypatch.setattr(warm_up.subprocess, "Popen", refuse)
+    Compiling().wait(lambda done, total: None, lambda: False)
 
 
 def test_who_does_not_want_the_sequence_any_more_does_not_wait(
@@ -120,5 +119,5 @@ def test_who_does_not_want_the_sequence_any_more_does_not_wait(
     worker = Compiling()
     wanted = threading.Event()
     threading.Timer(0.2, wanted.set).start()
-    worker.wait("ready", lambda done, total: None, wanted.is_set)
+    worker.wait(lambda done, total: None, wanted.is_set)
     worker.close()

@@ -229,6 +229,19 @@ def test_a_failed_run_is_told_in_a_sentence_and_the_last_good_one_stays(
     desk.wait("done")
 
 
+def test_a_failure_before_any_run_was_finished_leaves_what_was_computed_shown(
+    desk: Desk,
+) -> None:
+    desk.open()
+    unfinished = desk.now.run
+    assert unfinished is not None
+    desk.bench._last_good = None  # as if the failure had come while the first run computed
+    desk.bench.run_begins("another")
+    desk.bench.run_ends("another", "failed", "the numbers do not add up")
+    assert desk.now.run is unfinished
+    assert desk.now.run_state.state == "failed"
+
+
 def test_what_cannot_be_opened_leaves_what_was_open(desk: Desk, tmp_path: Path) -> None:
     desk.open()
     before = desk.now

@@ -13,6 +13,8 @@ from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, is_evaluated, run_is, wait_until
 from tests.long_recording import write_long
 
+pytestmark = pytest.mark.full
+
 OPENS = """
 import resource, sys, time
 import numpy as np

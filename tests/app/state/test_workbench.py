@@ -109,7 +109,7 @@ def test_an_empty_workbench_takes_everything_but_goes_nowhere() -> None:
 
 
 def test_layers(bench: Workbench) -> None:
-    assert bench.layers == dict.fromkeys(LAYERS, True)
+    assert bench.layers == {name: name != "truth" for name in LAYERS}
     bench.set_layers({"truth": False})
     assert not bench.layers["truth"]
     with pytest.raises(ParameterError, match="expected one of boxes"):

@@ -61,8 +61,8 @@ def test_selection_and_layers_reach_the_page_in_the_state(client: TestClient) ->
         read_until(socket, is_type("timeline"))
         socket.send_json({"type": "select", "id": 3})
         assert socket.receive_json()["state"]["selection"] == 3
-        client.patch("/api/layers", json={"changes": {"truth": False}})
-        assert not socket.receive_json()["state"]["layers"]["truth"]
+        client.patch("/api/layers", json={"changes": {"trails": False}})
+        assert not socket.receive_json()["state"]["layers"]["trails"]
 
 
 def test_ping(client: TestClient) -> None:

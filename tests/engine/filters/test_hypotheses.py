@@ -13,7 +13,7 @@ from numpy import ndarray
 from tracker.single_view.protocol import ViewEvent
 from tracker.single_view.pseudo_particle import hypotheses
 from tracker.single_view.pseudo_particle.hypotheses import best_hypothesis, somebody
-from tracker.single_view.pseudo_particle.register import Register, Targets, follow
+from tracker.single_view.pseudo_particle.track_management import Targets, Tracks, manage
 
 LIKELY, UNLIKELY = 0.2, 0.9
 
@@ -44,6 +44,7 @@ def matrix(
         sharpness=20.0,
         background_distance=0.5,
         position_sigma=1.0,
+        position_gate=3.0,
     )
 
 
@@ -137,20 +138,27 @@ class Story:
     """Steps of one camera, told as the modes and persons that were found at each."""
 
     def __init__(self, **changes: int) -> None:
-        self.register = Register.empty()
-        self.numbers = {"confirmation": 2, "patience": 3, "memory": 10, **changes}
+        self.tracks = Tracks.empty()
+        self.numbers = {
+            "confirmation": 2,
+            "patience": 3,
+            "memory": 10,
+            "newcomer_misses": 2,
+            "velocity_memory": 0.8,
+            **changes,
+        }
 
     def step(self, *modes: tuple[float, int]) -> list[ViewEvent]:
         """Modes at these places along a line, of these persons."""
-        expected = self.register.targets.moved(0.0)
+        expected = self.tracks.targets.moved(0.0)
         vacant = hypotheses.vacancies(expected, 2, 2)
         boxes = np.array([[x, 60.0, 10.0, 14.0] for x, _ in modes]).reshape(-1, 4)
         distances = np.full((len(modes), 2), UNLIKELY)
         for row, (_, person) in enumerate(modes):
             distances[row, person] = LIKELY
         logs = matrix(boxes, distances, expected, vacant)
-        self.register, events = follow(
-            self.register,
+        self.tracks, events = manage(
+            self.tracks,
             expected,
             boxes,
             somebody(logs),
@@ -170,16 +178,16 @@ def test_somebody_comes_goes_and_returns() -> None:
     assert story.step((50.0, 0)) == []  # seen once: not sure yet
     assert story.step((51.0, 0)) == [event("new", 1)]
     assert [story.step((52.0, 0)), story.step()] == [[], []]
-    kept = story.register.targets
+    kept = story.tracks.targets
     np.testing.assert_allclose(kept.boxes[0, :2], [52.0, 60.0])
     assert 0.0 < kept.existences[0] < 0.99
     assert story.step((52.0, 0)) == []  # waited for, found again: nothing to tell
     assert [story.step() for _ in range(3)] == [[]] * 3
     assert story.step() == [event("vanished", 1)]
-    assert len(story.register.targets) == 0
+    assert len(story.tracks.targets) == 0
     assert story.step((200.0, 1), (90.0, 0)) == []
     assert story.step((201.0, 1), (91.0, 0)) == [event("new", 2), event("returned", 1)]
-    assert len(story.register.departed.labels) == 0
+    assert len(story.tracks.departed.labels) == 0
 
 
 def test_nobody_is_remembered_for_ever() -> None:
@@ -204,8 +212,8 @@ def test_what_is_seen_once_is_forgotten_without_an_event() -> None:
     story = Story(confirmation=3)
     assert story.step((50.0, 0)) == []
     assert [story.step(), story.step()] == [[], []]
-    assert len(story.register.targets) == 0
-    assert story.register.next_label == 1
+    assert len(story.tracks.targets) == 0
+    assert story.tracks.next_label == 1
 
 
 def test_a_label_is_given_once() -> None:
@@ -214,10 +222,10 @@ def test_a_label_is_given_once() -> None:
     for _ in range(200):
         modes = [(float(x), int(rng.integers(2))) for x in rng.choice(12, 3, replace=False) * 40]
         given += [e.labels[0] for e in story.step(*modes) if e.kind == "new"]
-        labels = story.register.targets.labels
-        sure = labels[story.register.targets.confirmed]
+        labels = story.tracks.targets.labels
+        sure = labels[story.tracks.targets.confirmed]
         assert len(set(sure)) == len(sure)
-        assert np.all(np.bincount(story.register.targets.persons, minlength=2) <= 2)
+        assert np.all(np.bincount(story.tracks.targets.persons, minlength=2) <= 2)
     assert len(given) > 5
     assert given == list(range(1, len(given) + 1))
 
@@ -226,7 +234,7 @@ def test_a_target_that_walks_is_expected_further_on() -> None:
     story = Story()
     for x in range(50, 90, 2):
         story.step((float(x), 0))
-    walker = story.register.targets
+    walker = story.tracks.targets
     assert walker.velocities[0, 0] == pytest.approx(2.0, abs=0.1)
     ahead = walker.moved(0.5)
     assert ahead.boxes[0, 0] - walker.boxes[0, 0] == pytest.approx(1.0, abs=0.05)

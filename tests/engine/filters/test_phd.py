@@ -24,6 +24,8 @@ from tests.engine.synthetic import CAMERAS, walk
 from tracker.filters import gaussian_mixture, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.kernels import kalman as update_kernels
+from tracker.kernels.gating import Measurements
+from tracker.kernels.kalman import Expected
 
 seeds = st.integers(0, 2**32 - 1)
 DIMENSIONS = (1, 2, 4, 6)
@@ -56,8 +58,7 @@ class Linear:
         return phd.update(
             mixture,
             self.measurements,
-            expected=self.expected,
-            jacobians=self.jacobians,
+            expected=Expected.of(self.expected, self.jacobians),
             noise=self.noise,
             detection_probability=detection_probability,
             clutter_intensity=clutter_intensity,
@@ -163,6 +164,24 @@ def test_a_gate_that_is_wide_enough_changes_nothing() -> None:
     assert_array_equal(shut.measurement_weights, np.zeros(5))
 
 
+@pytest.mark.parametrize("gate", [1.0, 4.0, 30.0])
+def test_within_the_gate_are_the_pairs_of_so_small_a_mahalanobis_distance(gate: float) -> None:
+    mixture = random_mixture(np.random.default_rng(4), 30, 4)
+    linear = Linear(mixture, 7, count=30)
+    updated = linear.update(mixture, 0.9, 0.1, gate=gate)
+    distances = np.empty((30, 30))
+    for j in range(30):
+        for z in range(30):
+            noise = linear.noise[z if len(linear.noise) > 1 else 0]
+            spread = linear.matrix @ mixture.covariances[j] @ linear.matrix.T + noise
+            residual = linear.measurements[z] - linear.expected[j]
+            distances[j, z] = residual @ np.linalg.solve(spread, residual)
+    wanted = set(zip(*(side.tolist() for side in np.nonzero(distances <= gate)), strict=True))
+    pairs = zip(updated.parents[30:].tolist(), updated.measurements[30:].tolist(), strict=True)
+    assert set(pairs) == wanted
+    assert ((distances > gate) & (distances < 1.2 * gate)).any(), "some are just outside"
+
+
 def test_a_component_that_cannot_be_detected_is_left_alone() -> None:
     mixture = random_mixture(np.random.default_rng(2), 3, 2)
     linear = Linear(mixture, 5, count=2)
@@ -193,8 +212,7 @@ def test_a_measurement_far_from_everybody_gives_no_nonsense(distance: float) -> 
         updated = phd.update(
             mixture,
             np.array([[distance, 0.0]]),
-            expected=mixture.means,
-            jacobians=np.stack([np.eye(2)] * 2),
+            expected=Expected.of(mixture.means, np.stack([np.eye(2)] * 2)),
             noise=np.eye(2)[None],
             detection_probability=0.9,
             clutter_intensity=clutter,
@@ -226,8 +244,7 @@ def test_nobody_and_nothing() -> None:
     updated = phd.update(
         mixture,
         nothing,
-        expected=np.zeros((5, 2)),
-        jacobians=np.zeros((5, 2, 4)),
+        expected=Expected.of(np.zeros((5, 2)), np.zeros((5, 2, 4))),
         noise=np.zeros((0, 2, 2)),
         detection_probability=0.9,
         clutter_intensity=0.1,
@@ -263,8 +280,7 @@ def test_one_sure_target_is_the_kalman_filter(d: int) -> None:
         updated = phd.update(
             mixture,
             z[None],
-            expected=mixture.means @ matrix.T,
-            jacobians=matrix[None],
+            expected=Expected.of(mixture.means @ matrix.T, matrix[None]),
             noise=measurement_noise,
             detection_probability=1.0,
             clutter_intensity=0.0,
@@ -292,16 +308,15 @@ def test_one_sure_target_before_a_camera_is_the_extended_kalman_filter() -> None
         oracle.predict()
         oracle.update(
             z,
-            HJacobian=lambda x: camera.project_with_jacobian(x[None])[1][0],
+            HJacobian=lambda x: camera.project_with_jacobian(x[None]).jacobians[0],
             Hx=lambda x: camera.project(x[None])[0][0],
         )
         mixture = gaussian_mixture.predict(mixture, np.eye(3), noise, 1.0)
-        expected, jacobians, _ = camera.project_with_jacobian(mixture.means)
+        drawn = camera.project_with_jacobian(mixture.means)
         updated = phd.update(
             mixture,
             z[None],
-            expected=expected,
-            jacobians=jacobians,
+            expected=Expected.of(drawn.pixels, drawn.jacobians),
             noise=measurement_noise[None],
             detection_probability=1.0,
             clutter_intensity=0.0,
@@ -317,10 +332,7 @@ def test_a_noise_that_is_no_covariance_is_refused() -> None:
         update_kernels.kalman_pairs(
             np.zeros((1, 2)),
             np.zeros((1, 2, 2)),
-            np.zeros((1, 2)),
-            np.eye(2)[None],
-            np.zeros((1, 2)),
-            np.zeros((1, 2, 2)),
-            np.zeros((0, 2, 2)),
+            Expected.of(np.zeros((1, 2)), np.eye(2)[None]),
+            Measurements(np.zeros((1, 2)), np.zeros((1, 2, 2))),
             np.inf,
         )

@@ -47,6 +47,7 @@ from stonesoup.updater.pointprocess import PHDUpdater
 from tests.engine.mixtures import random_mixture, reference_reduce
 from tracker.filters import gaussian_mixture, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.kernels.kalman import Expected
 
 STEPS = 40
 SURVIVAL, DETECTION, CLUTTER_RATE, EXTENT = 0.98, 0.9, 4.0, 100.0
@@ -121,8 +122,9 @@ def our_update(posterior: GaussianMixture, scan: ndarray) -> GaussianMixture:
     updated = phd.update(
         predicted,
         scan,
-        expected=predicted.means @ POSITION.T,
-        jacobians=np.broadcast_to(POSITION, (predicted.size, 2, 4)),
+        expected=Expected.of(
+            predicted.means @ POSITION.T, np.broadcast_to(POSITION, (predicted.size, 2, 4))
+        ),
         noise=NOISE[None],
         detection_probability=DETECTION,
         clutter_intensity=CLUTTER,

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from tests.engine.association.test_association import exact
 from tracker.filters import pmb
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.kernels.kalman import Alternative
+from tracker.kernels.kalman import Expected
 
 H = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
 R = 0.3 * np.eye(2)
@@ -38,8 +38,7 @@ def update(
     return pmb.update(
         before,
         boxes,
-        expected=before.means @ H.T,
-        jacobians=np.tile(H, (before.size, 1, 1)),
+        expected=Expected.of(before.means @ H.T, np.tile(H, (before.size, 1, 1))),
         noise=R[None],
         detection_probability=np.broadcast_to(np.asarray(p_d, dtype=float), (before.size,)).copy(),
         unexplained_intensity=np.full(len(boxes), rho),
@@ -153,16 +152,18 @@ def test_outside_every_picture_nothing_changes() -> None:
 
 def test_what_a_component_adds_to_the_noise_counts_as_noise() -> None:
     before, box = tracks([0.9]), np.array([[0.4, -0.2]])
-    more = 0.2 * np.eye(2)
+    more, straight = 0.2 * np.eye(2), before.means @ H.T
     common = {
-        "expected": before.means @ H.T,
-        "jacobians": H[None],
         "detection_probability": np.array([0.9]),
         "unexplained_intensity": np.array([0.05]),
         "gate": np.inf,
     }
-    spread = pmb.update(before, box, noise=R[None], spread=more[None], **common)
-    noisy = pmb.update(before, box, noise=(R + more)[None], **common)
+    spread = pmb.update(
+        before, box, expected=Expected.of(straight, H[None], more[None]), noise=R[None], **common
+    )
+    noisy = pmb.update(
+        before, box, expected=Expected.of(straight, H[None]), noise=(R + more)[None], **common
+    )
     assert_allclose(spread.tracks.means, noisy.tracks.means)
     assert_allclose(spread.tracks.covariances, noisy.tracks.covariances)
     assert_allclose(spread.tracks.weights, noisy.tracks.weights)
@@ -173,16 +174,21 @@ def test_a_box_of_two_kinds_is_bayes_over_both() -> None:
     before, box = tracks([0.7], 3), rng.normal(0.0, 0.5, (1, 2))
     share, drift, more = 0.3, np.diag([0.2, 0.0, 0.0, 0.0]), 0.4 * np.eye(2)
     shifted = before.means @ H.T + [0.3, -0.2]
+    both = Expected.of(before.means @ H.T, H[None])._replace(
+        posture_values=shifted,
+        posture_jacobians=2.0 * H[None],
+        posture_spreads=more[None],
+        posture_drift=drift,
+        posture_share=share,
+    )
     found = pmb.update(
         before,
         box,
-        expected=before.means @ H.T,
-        jacobians=H[None],
+        expected=both,
         noise=R[None],
         detection_probability=np.array([0.9]),
         unexplained_intensity=np.array([0.05]),
         gate=np.inf,
-        other=Alternative(shifted, 2.0 * H[None], more[None], drift, share),
     ).tracks
     parts, weights = [(before.means[0], before.covariances[0])], [0.7 * 0.1]
     for expected, slope, noise, spread, part in (

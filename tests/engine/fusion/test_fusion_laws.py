@@ -21,6 +21,7 @@ from tests.engine.standing import (
     watch,
 )
 from tracker.fusion.protocol import FusionResult
+from tracker.parameters import RunParameters
 from tracker.single_view.protocol import ViewResult
 
 both_methods = pytest.mark.parametrize("method", METHODS, ids=lambda method: method.__name__)
@@ -112,7 +113,7 @@ def test_who_is_hidden_is_told_by_whom(method: Method) -> None:
 @both_methods
 def test_a_step_is_pure_and_repeatable(method: Method) -> None:
     views = watch(three_people(30), seed=3, clutter_rate=2.0)
-    fusion = method(empty_room(10.0, frames=30), RECOMMENDED)
+    fusion = method(empty_room(10.0, frames=30), RunParameters(fusion=RECOMMENDED))
     state = fusion.start()
     for step in views[:20]:
         state, _ = fusion.step(state, step)
@@ -196,7 +197,7 @@ def test_people_outside_the_room_are_followed_and_not_reported(method: Method) -
 def bytes_held(method: Method, steps: int) -> list[int]:
     """Memory held by a filter that walks on and on, measured ten times."""
     views = watch(three_people(100), seed=8, clutter_rate=1.0)
-    fusion = method(empty_room(10.0), RECOMMENDED)
+    fusion = method(empty_room(10.0), RunParameters(fusion=RECOMMENDED))
     state, held = fusion.start(), []
     result: FusionResult | None = None
     tracemalloc.start()

@@ -6,12 +6,22 @@ import numpy as np
 import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose
+from scipy.special import logit, logsumexp
+from scipy.stats import multivariate_normal
 
 from tests.engine.standing import CAMERAS, HALF_EXTENTS, ROOM, watch
-from tracker.fusion.measurement_births import Evidence, MeasurementBirths, Newborns
+from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths, Newborns
 from tracker.fusion.model import all_boxes
 from tracker.fusion.target_model import MeasurementKind, TargetModel
+from tracker.kernels.gating import Measurements
 from tracker.single_view.protocol import ViewResult
+
+BIRTH_RATE, P_D = 0.005, 0.98
+
+
+def clutter_of(kind: MeasurementKind) -> float:
+    """κ, per unit of the measurement space."""
+    return 1e-8 if kind != "centre" else 1e-6
 
 
 def births(kind: MeasurementKind = "box", margin: float = 0.0) -> MeasurementBirths:
@@ -20,12 +30,14 @@ def births(kind: MeasurementKind = "box", margin: float = 0.0) -> MeasurementBir
         CAMERAS,
         ROOM,
         TargetModel(HALF_EXTENTS, kind),
-        birth_rate=0.005,
-        detection_probability=0.98,
-        clutter=np.full(len(CAMERAS), 1e-8 if kind != "centre" else 1e-6),
-        gate=21.0,
-        margin=margin,
-        largest_gap=1.0,
+        BirthModel(
+            birth_rate=BIRTH_RATE,
+            detection_probability=P_D,
+            clutter=np.full(len(CAMERAS), clutter_of(kind)),
+            gate=21.0,
+            margin=margin,
+            largest_gap=1.0,
+        ),
     )
 
 
@@ -33,12 +45,13 @@ def evidence(
     views: tuple[ViewResult, ...], kind: MeasurementKind = "box", unexplained: float = 1.0
 ) -> Evidence:
     """All boxes equally unexplained."""
-    boxes, _, starts = all_boxes(views)
+    seen = all_boxes(views)
     model = TargetModel(HALF_EXTENTS, kind)
-    values, noises = (
-        np.concatenate(part) for part in zip(*(model.measured(v, 1.0) for v in views), strict=True)
+    each = [model.measured(view, 1.0) for view in views]
+    measured = Measurements(
+        np.concatenate([one.values for one in each]), np.concatenate([one.noises for one in each])
     )
-    return Evidence(boxes[:, :2], values, noises, np.full(len(boxes), unexplained), starts)
+    return Evidence(seen.boxes[:, :2], measured, np.full(len(seen.boxes), unexplained), seen.starts)
 
 
 def seen(places: ndarray, clutter_rate: float = 0.0, seed: int = 0) -> tuple[ViewResult, ...]:
@@ -61,6 +74,36 @@ def test_people_are_found_where_they_stand(kind: MeasurementKind) -> None:
     assert (sure.sources >= 0).sum(axis=0).tolist() == [4, 4]
     sigmas = np.sqrt(np.diagonal(sure.covariances, axis1=1, axis2=2))
     assert (np.abs(sure.positions[order] - places) < 5.0 * sigmas[order]).all()
+
+
+@pytest.mark.parametrize("kind", ["centre", "box"])
+@pytest.mark.parametrize("missing", [None, 1, 2])
+def test_the_odds_are_the_integral_over_the_room(
+    kind: MeasurementKind, missing: int | None
+) -> None:
+    """Λ by importance sampling, term by term as the class says it."""
+    none = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
+    views = tuple(
+        none if c == missing else view
+        for c, view in enumerate(seen(np.array([[0.5, -0.3, 0.85]]), seed=3))
+    )
+    found = proposed(births(kind).propose(evidence(views, kind))).take(np.array([0]))
+    assert (found.sources[:, 0] >= 0).tolist() == [c != missing for c in range(4)]
+
+    proposal = multivariate_normal(found.positions[0], 2.0 * found.covariances[0], seed=1)
+    places = np.atleast_2d(proposal.rvs(20_000))
+    model = TargetModel(HALF_EXTENTS, kind)
+    log_terms = np.full(len(places), np.log(BIRTH_RATE / np.prod(ROOM.maximum - ROOM.minimum)))
+    for camera, view in zip(CAMERAS, views, strict=True):
+        if not len(view.boxes):
+            log_terms += np.log(1.0 - P_D)
+            continue
+        (value,), (noise,) = model.measured(view, 1.0)
+        residuals = model.expected(camera, places).values - value
+        density = multivariate_normal(np.zeros(len(value)), noise).logpdf(residuals)
+        log_terms += np.log(P_D) + density - np.log(clutter_of(kind))
+    log_odds = logsumexp(log_terms - proposal.logpdf(places)) - np.log(len(places))
+    assert logit(found.existences[0]) == pytest.approx(log_odds, abs=0.1)
 
 
 def test_no_box_is_used_twice() -> None:

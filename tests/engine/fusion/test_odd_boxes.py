@@ -21,7 +21,7 @@ from tests.engine.standing import (
     watch,
 )
 from tracker.fusion.protocol import FusionResult
-from tracker.parameters import DetectionBoxParams
+from tracker.parameters import DetectionBoxParams, RunParameters
 from tracker.sequences.sequence import Room
 from tracker.single_view.detector_boxes import trust
 from tracker.single_view.protocol import ViewResult
@@ -41,7 +41,7 @@ def with_boxes(view: ViewResult, more: ndarray) -> ViewResult:
 
 def results_of(method: Method, views: list[Step], room: Room = ROOM) -> list[FusionResult]:
     """The posterior of every step in some room."""
-    fusion = method(replace(empty_room(10.0), room=room), RECOMMENDED)
+    fusion = method(replace(empty_room(10.0), room=room), RunParameters(fusion=RECOMMENDED))
     state, results = fusion.start(), []
     for step in views:
         state, result = fusion.step(state, step)

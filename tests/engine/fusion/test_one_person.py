@@ -15,6 +15,7 @@ from tracker.filters import phd
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.filters.phd import PhdUpdate
 from tracker.fusion import one_person
+from tracker.kernels.kalman import Expected
 
 R = 0.04 * np.eye(2)
 NO_BIRTHS = range(900, 900)
@@ -34,8 +35,7 @@ def plain(before: GaussianMixture, boxes: ndarray, p_d: float) -> PhdUpdate:
     return phd.update(
         before,
         boxes,
-        expected=before.means,
-        jacobians=np.tile(np.eye(2), (before.size, 1, 1)),
+        expected=Expected.of(before.means, np.tile(np.eye(2), (before.size, 1, 1))),
         noise=R[None],
         detection_probability=p_d,
         clutter_intensity=CLUTTER,

@@ -164,6 +164,6 @@ def test_who_falls_and_lies_is_followed_and_keeps_his_id(method: Method, fps: fl
     heights = [tracks.positions[tracks.at(step)][0, 2] for step in range(lying.stop)[lying]]
     assert np.mean(heights) < 0.45
     # who may only stand is lost
-    stiff = RECOMMENDED.model_copy(update={"low_share": 0.0})
+    stiff = RECOMMENDED.model_copy(update={"posture_share": 0.0})
     _, tracks = fuse(method, views, fps=fps, parameters=stiff)
     assert (ids_of(tracks, path, 0.6)[lying] > 0).mean() < 0.5

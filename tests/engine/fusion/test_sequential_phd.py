@@ -27,7 +27,7 @@ def published(**changes: object) -> FusionParams:
 
 def fuse(whole: Sequence, parameters: FusionParams = PUBLISHED) -> list[FusionResult]:
     """The posterior of every step."""
-    method = SequentialPhd(whole, parameters)
+    method = SequentialPhd(whole, RunParameters(fusion=parameters))
     state, results = method.start(), []
     for frame in range(whole.frames):
         state, result = method.step(state, views_at(whole, frame))
@@ -228,14 +228,16 @@ def test_two_people_who_come_in_together_end_as_two_tracks() -> None:
 def test_nobody_looks_so_the_weights_decay_by_survival_alone() -> None:
     people = crossing(60)
     whole = sequence(people, 60, CAMERAS[:2])
-    method = SequentialPhd(whole, published(birth_rate=1e-4))
+    method = SequentialPhd(whole, RunParameters(fusion=published(birth_rate=1e-4)))
     state = method.start()
     for frame in range(40):
         state, _ = method.step(state, views_at(whole, frame))
     before = state.mixture.cardinality
     # the same room, but both cameras are turned away
     away = look_at("away", (-3.4, -3.2, 2.6), (-9.0, -9.0, 1.0))
-    blind = SequentialPhd(sequence([], 60, (away, away)), published(birth_rate=1e-4))
+    blind = SequentialPhd(
+        sequence([], 60, (away, away)), RunParameters(fusion=published(birth_rate=1e-4))
+    )
     for _ in range(10):
         state, result = blind.step(state, views_at(sequence([], 1, (away, away)), 0))
         assert not result.detection_probabilities.any()
@@ -262,7 +264,7 @@ def test_the_same_input_gives_the_same_output() -> None:
 
 def test_a_step_leaves_the_state_it_was_given_as_it_was() -> None:
     whole = sequence(crossing(20), 20, clutter_rate=1.0)
-    method = SequentialPhd(whole, PUBLISHED)
+    method = SequentialPhd(whole, RunParameters(fusion=PUBLISHED))
     state = method.start()
     for frame in range(10):
         state, _ = method.step(state, views_at(whole, frame))

@@ -12,6 +12,7 @@ from tests.engine.synthetic import look_at
 from tracker.camera import Camera
 from tracker.fusion.target_model import SIZES, MeasurementKind, TargetModel, UpdateKind
 from tracker.kernels import kalman
+from tracker.kernels.gating import Measurements
 from tracker.single_view.protocol import ViewResult
 
 KINDS: tuple[MeasurementKind, ...] = ("centre", "box", "box_and_width")
@@ -105,14 +106,11 @@ def update(
     found = kalman.kalman_pairs(
         mean[None],
         covariance[None],
-        expected.values,
-        expected.jacobians,
-        z[None],
-        noise[None],
-        expected.spreads,
+        expected.expected,
+        Measurements(z[None], noise[None]),
         np.inf,
     )
-    return found[3][0], found[4][0]
+    return found.means[0], found.covariances[0]
 
 
 def particles(
@@ -200,30 +198,39 @@ def test_who_lies_or_bends_has_a_low_and_broad_box(kind: MeasurementKind) -> Non
     # a box of half the height and a width of 1.2 half heights, loosely: what a person gives on
     # average over the sides from which he may be seen
     states = np.array([[0.3, 0.4, 0.3, 0.0, 0.0, 0.0], [-0.5, 1.0, 0.25, 0.0, 0.0, 0.0]])
-    expected = TargetModel(HALF_EXTENTS, kind, low_share=0.2).expected(NEAR, states)
-    low = expected.other
-    assert low is not None
-    assert low.share == 0.2
+    expected = TargetModel(HALF_EXTENTS, kind, posture_share=0.2).expected(NEAR, states)
+    low = expected.expected
+    assert low.posture_share == 0.2
     heights = expected.boxes[:, 3] - expected.boxes[:, 1]
     flat = TargetModel(HALF_EXTENTS * [1.0, 1.0, 0.5], kind).expected(NEAR, states)
-    assert_allclose(low.expected[:, :3], flat.values[:, :3])
-    assert_allclose(low.jacobians[:, :3], flat.jacobians[:, :3])
-    assert_allclose(np.sqrt(low.spreads[:, 0, 0]), 0.15 * heights / 2.0)
-    assert (low.spreads[:, 1, 1] > low.spreads[:, 0, 0]).all()
-    assert np.linalg.eigvalsh(low.spreads).min() > 0.0
-    assert_allclose(np.flatnonzero(low.drift), [2 * 6 + 2], err_msg="only the height may jump")
+    assert_allclose(low.posture_values[:, :3], flat.values[:, :3])
+    assert_allclose(low.posture_jacobians[:, :3], flat.jacobians[:, :3])
+    spreads = low.posture_spreads
+    assert_allclose(np.sqrt(spreads[:, 0, 0]), 0.15 * heights / 2.0)
+    assert (spreads[:, 1, 1] > spreads[:, 0, 0]).all()
+    assert np.linalg.eigvalsh(spreads).min() > 0.0
+    assert_allclose(
+        np.flatnonzero(low.posture_drift), [2 * 6 + 2], err_msg="only the height may jump"
+    )
     if kind == "box_and_width":
-        assert_allclose(low.expected[:, 3] / (low.expected[:, 2] - low.expected[:, 1]), 1.2)
+        values = low.posture_values
+        assert_allclose(values[:, 3] / (values[:, 2] - values[:, 1]), 1.2)
 
 
 def test_a_centre_looks_the_same_in_any_posture_and_behind_the_lens_there_is_none() -> None:
     states = np.array([[0.3, 0.4, 0.85], [0.0, -3.0, 0.85]])
-    assert TargetModel(HALF_EXTENTS, "centre", low_share=0.2).expected(NEAR, states).other is None
-    assert TargetModel(HALF_EXTENTS, "box").expected(NEAR, states).other is None
-    low = TargetModel(HALF_EXTENTS, "box", low_share=0.2).expected(NEAR, states).other
-    assert low is not None
-    assert np.isfinite(low.expected[0]).all()
-    assert np.isinf(low.expected[1]).all(), "beyond every gate"
+    for model in (
+        TargetModel(HALF_EXTENTS, "centre", posture_share=0.2),
+        TargetModel(HALF_EXTENTS, "box"),
+    ):
+        one = model.expected(NEAR, states).expected
+        assert len(one.values) == 2
+        assert (
+            len(one.posture_values) == len(one.posture_jacobians) == len(one.posture_spreads) == 0
+        )
+    low = TargetModel(HALF_EXTENTS, "box", posture_share=0.2).expected(NEAR, states).expected
+    assert np.isfinite(low.posture_values[0]).all()
+    assert np.isinf(low.posture_values[1]).all(), "beyond every gate"
 
 
 def test_nobody_has_no_box() -> None:

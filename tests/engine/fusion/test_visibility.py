@@ -76,6 +76,17 @@ def test_who_stands_behind_is_hidden_and_by_whom() -> None:
     assert_array_equal(found.hidden_by, [-1, 0, -1])
 
 
+def test_whoever_hides_counts_by_his_weight_and_never_more_than_once() -> None:
+    places = np.array([[0.0, -1.0, 0.85], [0.05, 1.0, 0.85]])
+    covered = []
+    for weight in (0.5, 1.0, 1.3):
+        both = people(places)
+        both = GaussianMixture(np.array([weight, 0.9]), both.means, both.covariances, both.labels)
+        covered.append(1.0 - hide(both, strength=0.4).detection_probabilities[1] / 0.9)
+    assert covered[1] == pytest.approx(2.0 * covered[0])
+    assert covered[2] == pytest.approx(covered[1])
+
+
 def test_nobody_hides_behind_himself_or_his_double() -> None:
     two = people(np.array([[0.0, -0.1, 0.85], [0.0, 0.1, 0.85]]))
     assert_array_equal(hide(two).detection_probabilities, [0.9, 0.9])

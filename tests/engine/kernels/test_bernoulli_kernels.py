@@ -1,4 +1,4 @@
-"""The compiled step of one camera against its parts, called one by one; and who is a double."""
+"""The compiled step of one camera against its parts, called one by one; and who is a duplicate."""
 
 from __future__ import annotations
 
@@ -12,19 +12,23 @@ from tracker.filters import phd, pmb
 from tracker.fusion.target_model import TargetModel
 from tracker.fusion.visibility import inside_probability, visibility
 from tracker.kernels import linear_algebra
-from tracker.kernels.kalman import Alternative
+from tracker.kernels.gating import Measurements
 from tracker.kernels.labelled import camera_update
+from tracker.kernels.labelled.camera_update import CameraRule, Tracks
+from tracker.kernels.measurement import ExpectedBoxes
 
 CLUTTER, GATE, P_D, NEAR, STRENGTH, TOLD = 1e-6, 30.0, 0.9, 0.3, 0.8, 0.01
 
 
 @pytest.mark.parametrize("update", ["extended", "unscented"])
 @pytest.mark.parametrize(("tracks", "unseen"), [(4, 2), (0, 3), (5, 0)])
-@pytest.mark.parametrize("low_share", [0.0, 0.1])
-def test_one_call_is_all_its_parts(update: str, tracks: int, unseen: int, low_share: float) -> None:
+@pytest.mark.parametrize("posture_share", [0.0, 0.1])
+def test_one_call_is_all_its_parts(
+    update: str, tracks: int, unseen: int, posture_share: float
+) -> None:
     rng = np.random.default_rng(tracks)
     camera = CAMERAS[0]
-    model = TargetModel(np.array([0.3, 0.3, 0.84]), "box", update, low_share)  # type: ignore[arg-type]
+    model = TargetModel(np.array([0.3, 0.3, 0.84]), "box", update, posture_share)  # type: ignore[arg-type]
     known, undetected = people(rng, tracks, 10), people(rng, unseen, 0)
     truth = np.concatenate([known.means, undetected.means])
     boxes = model.expected(camera, truth).values + rng.normal(0.0, 2.0, (len(truth), 3))
@@ -36,28 +40,26 @@ def test_one_call_is_all_its_parts(update: str, tracks: int, unseen: int, low_sh
         np.concatenate([undetected.means, known.means]),
         np.concatenate([undetected.covariances, known.covariances]),
     )
-    found = camera_update.update_by_camera(
-        *(undetected.weights, undetected.means, undetected.covariances),
-        *(known.weights, known.means, known.covariances, known.labels, occluding),
-        *(boxes, noises, CLUTTER, GATE),
-        *(expected.values, expected.jacobians, expected.spreads),
-        *(expected.boxes, expected.depths, expected.valid),
-        *(expected.other or Alternative.none(3, 6)),
-        *(camera.image_size, True, P_D, 0.5, STRENGTH, NEAR, 0.2, 1e-6, 200, TOLD),
+    updated_at_once = camera_update.update_by_camera(
+        undetected.gaussians,
+        Tracks(known.weights, known.means, known.covariances, known.labels),
+        occluding,
+        Measurements(boxes, noises),
+        ExpectedBoxes(expected.expected, expected.boxes, expected.depths, expected.valid),
+        camera.calibration.image_size,
+        CLUTTER,
+        CameraRule(GATE, True, P_D, 0.5, NEAR, STRENGTH, 0.2, 1e-6, 200, TOLD),
     )
 
     seen = model.expected(camera, undetected.means, undetected.covariances)
     new = phd.update(
         undetected,
         boxes,
-        expected=seen.values,
-        jacobians=seen.jacobians,
+        expected=seen.expected,
         noise=noises,
-        spread=seen.spreads,
         detection_probability=P_D * inside_probability(camera, seen, undetected.covariances),
         clutter_intensity=CLUTTER,
         gate=GATE,
-        other=seen.other,
     )
     newcomer = np.minimum(new.measurement_weights, 1.0 - 1e-9)
     mine = model.expected(camera, known.means, known.covariances)
@@ -74,14 +76,11 @@ def test_one_call_is_all_its_parts(update: str, tracks: int, unseen: int, low_sh
     updated = pmb.update(
         known,
         boxes,
-        expected=mine.values,
-        jacobians=mine.jacobians,
+        expected=mine.expected,
         noise=noises,
-        spread=mine.spreads,
         detection_probability=hidden.detection_probabilities,
         unexplained_intensity=CLUTTER / (1.0 - newcomer),
         gate=GATE,
-        other=mine.other,
     )
     marginals = updated.marginals
     pairs = slice(unseen, None)
@@ -102,16 +101,28 @@ def test_one_call_is_all_its_parts(update: str, tracks: int, unseen: int, low_sh
     wanted: tuple[ndarray, ...] = (
         *(updated.tracks.weights, updated.tracks.means, updated.tracks.covariances),
         *(hidden.detection_probabilities, hidden.hidden_by, best, share),
-        *(new.posterior.weights[:unseen], newcomer, born[1], born[2], marginals.unexplained),
+        *(
+            new.posterior.weights[:unseen],
+            newcomer,
+            born.means,
+            born.covariances,
+            marginals.unexplained,
+        ),
         *(who, what, marginals.detected[who, what]),
     )
     assert tracks == 0 or len(who)
+    found = (
+        *(updated_at_once.existences, updated_at_once.means, updated_at_once.covariances),
+        *updated_at_once.record,
+        *(updated_at_once.undetected, *updated_at_once.newcomers, updated_at_once.unexplained),
+        *updated_at_once.pairs,
+    )
     for one, other in zip(found, wanted, strict=True):
         assert one.shape == other.shape
         assert_allclose(one, other, rtol=1e-5, atol=1e-7)
 
 
-def reference_doubles(
+def reference_duplicates(
     means: ndarray, weights: ndarray, labels: ndarray, sources: ndarray, near: float
 ) -> ndarray:
     """The same rule over the whole table of pairs."""
@@ -127,16 +138,16 @@ def reference_doubles(
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 12])
-def test_doubles_are_those_of_the_table_of_pairs(count: int) -> None:
+def test_duplicates_are_those_of_the_table_of_pairs(count: int) -> None:
     rng = np.random.default_rng(count)
     found = 0
     for _ in range(40):
         means = rng.uniform(0.0, 1.0, (count, 6))
         weights, labels = rng.uniform(0.0, 1.0, count), rng.permutation(count)
         sources = rng.integers(-1, 4, (3, count))
-        double = linear_algebra.doubles(means, weights, labels, sources, 0.5, 0.5)
-        assert_array_equal(double, reference_doubles(means, weights, labels, sources, 0.5))
-        found += int(double.sum())
+        duplicate = linear_algebra.duplicates(means, weights, labels, sources, 0.5, 0.5)
+        assert_array_equal(duplicate, reference_duplicates(means, weights, labels, sources, 0.5))
+        found += int(duplicate.sum())
     assert found > 0 or count < 2
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -97,23 +98,29 @@ def test_the_digest_follows_imports(
     monkeypatch.setattr(compilation, "_ROOT", root)
     files = {
         "a_kernels.py": f"{importing}\n@kernel\ndef f(): ...\n",
-        "b_kernels.py": "from tracker.plain import y\n@kernel\ndef g(): ...\n",
+        "b_kernels.py": "from tracker.plain import y\nfrom tracker.kernels.pairs import Pair\n"
+        "from tracker.kernels.compilation import kernel\n@kernel\ndef g(): ...\n",
+        "kernels/pairs.py": "class Pair(NamedTuple): ...\n",
+        "kernels/compilation.py": "def kernel(): ...\n",
         "plain.py": "from tracker.c_kernels import z\n",
         "c_kernels.py": "@kernel\ndef h(): ...\n",
     }
+    (root / "kernels").mkdir()
     for name, text in files.items():
         (root / name).write_text(text, encoding="utf-8")
 
     def digest() -> str:
         known = compilation._with_used(root / "a_kernels.py", set())
-        assert {path.name for path in known} == {"a_kernels.py", "b_kernels.py"}
+        assert {path.name for path in known} == {"a_kernels.py", "b_kernels.py", "pairs.py"}
         return compilation._digest(known)
 
     before = digest()
     (root / "c_kernels.py").write_text("@kernel\ndef other(): ...\n", encoding="utf-8")
     assert digest() == before
-    (root / "b_kernels.py").write_text(files["b_kernels.py"] + "# changed\n", encoding="utf-8")
-    assert digest() != before
+    for name in ("b_kernels.py", "kernels/pairs.py"):
+        (root / name).write_text(files[name] + "# changed\n", encoding="utf-8")
+        assert digest() != before
+        before = digest()
 
 
 def test_what_was_not_used_for_long_is_deleted(
@@ -141,10 +148,10 @@ def test_the_warm_up_calls_every_kernel_that_a_run_may_call() -> None:
     code = """
         from tracker import warm_up
         from tracker.kernels import compilation
-        compilation.mark_compiled = lambda: None
         told = []
-        warm_up.compile_kernels(lambda *counts: told.append(counts), lambda: told.append("ready"))
-        assert told.count("ready") == 1
+        for half in warm_up.HALVES:
+            warm_up.compile_kernels(half, ready=lambda: told.append("ready"))
+        assert told == ["ready"]
         kernels = {id(each.py_func): each.py_func for each in compilation._KERNELS}
         reached = {id(each.py_func) for each in compilation._KERNELS if each.signatures}
         open_ones = list(reached)
@@ -167,3 +174,45 @@ def test_the_warm_up_calls_every_kernel_that_a_run_may_call() -> None:
         *("disjoint_matchings", "_nearest", "_augment", "_push", "_pop"),
     }
     assert set(done.stdout.strip().split(",")) <= library_only
+
+
+BY_HAND = """
+    import sys
+    sys.path.insert(0, {folder!r})
+    from tracker.kernels import compilation
+    import some_kernels
+    compilation.while_compiling()
+    assert some_kernels.quadruple(3.0) == 12.0
+    print(compilation.counts())
+    {then}
+    assert some_kernels.quadruple(3.0) == 12.0
+    print(compilation.counts())
+"""
+
+
+def test_while_another_process_compiles_a_kernel_runs_as_plain_python(
+    package: Path, tmp_path: Path
+) -> None:
+    def counts(then: str) -> list[str]:
+        return python(
+            BY_HAND.format(folder=str(package), then=then), tmp_path / "cache"
+        ).splitlines()
+
+    assert counts("pass") == ["(0, 2)", "(0, 2)"]
+    # what the other process has put on disk is used when it has told of it, and not before
+    assert python(USE.format(folder=str(package), result=12.0), tmp_path / "cache")
+    assert counts("pass") == ["(1, 2)", "(1, 2)"]
+    assert counts("compilation.news_of_compiling()") == ["(1, 2)", "(1, 2)"]
+    shutil.rmtree(tmp_path / "cache")
+    assert counts("pass") == ["(0, 2)", "(0, 2)"]
+    elsewhere = (
+        "import subprocess; subprocess.run([sys.executable, '-c', "
+        f'"import sys; sys.path.insert(0, {str(package)!r}); '
+        'import some_kernels; some_kernels.quadruple(3.0)"], check=True)'
+    )
+    assert counts(elsewhere) == ["(0, 2)", "(0, 2)"]
+    shutil.rmtree(tmp_path / "cache")
+    assert counts(f"{elsewhere}; compilation.news_of_compiling()") == ["(0, 2)", "(1, 2)"]
+    shutil.rmtree(tmp_path / "cache")
+    # where the other process has failed, it is compiled here
+    assert counts("compilation.no_longer_compiling()") == ["(0, 2)", "(2, 2)"]

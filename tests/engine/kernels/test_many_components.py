@@ -9,13 +9,15 @@ from hypothesis import strategies as st
 from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tests.benchmarks import scenario as scene
+from tests.benchmarks.plane import scenario as scene
 from tests.engine import plain_phd
 from tests.engine.mixtures import random_covariances, random_mixture
 from tracker.filters import gaussian_mixture, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.kernels import kalman
+from tracker.kernels.gating import Measurements
 from tracker.kernels.intensity import merging
+from tracker.kernels.kalman import Expected
 
 
 def crowd(seed: int, size: int, dimension: int) -> GaussianMixture:
@@ -94,7 +96,6 @@ def test_reducing_is_pruning_merging_and_capping(seed: int, size: int, dimension
 def test_one_jacobian_for_all_is_as_good_as_one_each() -> None:
     mixture = crowd(5, 30, 4)
     settings = {
-        "expected": mixture.means[:, [0, 2]],
         "noise": scene.NOISE[None],
         # some are out of sight, so that the others are picked out
         "detection_probability": np.where(np.arange(30) % 3 == 0, 0.0, 0.9),
@@ -102,8 +103,11 @@ def test_one_jacobian_for_all_is_as_good_as_one_each() -> None:
     }
     measurements = mixture.means[:8, [0, 2]] + 0.5
     each = np.tile(scene.POSITION, (30, 1, 1))
-    one = phd.update(mixture, measurements, jacobians=scene.POSITION[None], **settings)
-    many = phd.update(mixture, measurements, jacobians=each, **settings)
+    places = mixture.means[:, [0, 2]]
+    one, many = (
+        phd.update(mixture, measurements, expected=Expected.of(places, jacobians), **settings)
+        for jacobians in (scene.POSITION[None], each)
+    )
     assert one.posterior.size > mixture.size
     assert_array_equal(one.posterior.weights, many.posterior.weights)
     assert_array_equal(one.posterior.means, many.posterior.means)
@@ -143,7 +147,11 @@ def test_every_pair_inside_the_gate_is_found_and_no_other(
     noises = random_covariances(rng, 1 if shared else count, 2)
     spreads = random_covariances(rng, size if spread else 0, 2)
     component, measured, likelihood, means, covariances = kalman.kalman_pairs(
-        mixture.means, mixture.covariances, expected, jacobians, measurements, noises, spreads, gate
+        mixture.means,
+        mixture.covariances,
+        Expected.of(expected, jacobians, spreads),
+        Measurements(measurements, noises),
+        gate,
     )
     wanted = []
     for z in range(count):
@@ -205,8 +213,10 @@ def test_the_recursion_is_the_one_of_plain_numpy(targets: int, steps: int) -> No
         updated = phd.update(
             predicted,
             scan,
-            expected=predicted.means @ scene.POSITION.T,
-            jacobians=np.broadcast_to(scene.POSITION, (predicted.size, 2, 4)),
+            expected=Expected.of(
+                predicted.means @ scene.POSITION.T,
+                np.broadcast_to(scene.POSITION, (predicted.size, 2, 4)),
+            ),
             noise=scene.NOISE[None],
             detection_probability=scene.DETECTION,
             clutter_intensity=case.clutter_intensity,

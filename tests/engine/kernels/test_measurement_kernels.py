@@ -7,7 +7,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.engine.synthetic import CAMERAS
-from tracker.camera import NEAREST_DEPTH
 from tracker.fusion.target_model import MeasurementKind, TargetModel
 from tracker.kernels import boxes as box_kernels
 from tracker.kernels import measurement
@@ -43,11 +42,11 @@ def test_the_unscented_regression_is_that_of_numpy(kind: MeasurementKind) -> Non
         spread = covariance[:3, :3]
         lower = np.linalg.cholesky(spread)
         offsets = np.sqrt(3.0) * np.concatenate([lower.T, -lower.T])
-        values, _, _, _, ahead = box_kernels.expected_boxes(
-            state[:3] + offsets, model.half_height, model.half_width, model.size,
-            camera.image_size, *camera.numbers, NEAREST_DEPTH, camera.largest_radius,
-        )  # fmt: skip
-        assert ahead.all()
+        drawn = box_kernels.expected_boxes(
+            state[:3] + offsets, model.half_height, model.half_width, model.size, camera.calibration
+        )
+        values = drawn.values
+        assert drawn.valid.all()
         off = values - values.mean(axis=0)
         slopes = (off.T @ offsets / 6.0) @ np.linalg.inv(spread)
         assert_allclose(found.values[j], values.mean(axis=0), rtol=1e-12)

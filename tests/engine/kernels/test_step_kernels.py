@@ -15,13 +15,26 @@ from tracker.filters import gaussian_mixture
 from tracker.filters.gaussian_mixture import GaussianMixture, concatenate
 from tracker.fusion.target_model import TargetModel
 from tracker.kernels import linear_algebra
-from tracker.kernels.kalman import Alternative
+from tracker.kernels.gating import Measurements
 from tracker.kernels.labelled import camera_update, step
+from tracker.kernels.labelled.camera_update import CameraRule, Tracks
+from tracker.kernels.measurement import ExpectedBoxes
 
 CLUTTER = np.array([1e-6, 3e-6, 2e-6])
 GATE, P_D, P_S, CONFIRMED, STRENGTH, NEAR, COVERED = 30.0, 0.9, 0.98, 0.5, 0.8, 0.3, 0.2
-TOLERANCE, ITERATIONS, TOLD, LEAST = 1e-6, 200, 0.01, 1e-4
-FACTOR = 1.3
+TOLD, LEAST, FACTOR = 0.01, 1e-4, 1.3
+RULE = CameraRule(
+    gate=GATE,
+    soft=True,
+    detection_probability=P_D,
+    confirmed=CONFIRMED,
+    near=NEAR,
+    strength=STRENGTH,
+    worth_telling=COVERED,
+    tolerance=1e-6,
+    iterations=200,
+    least_told=TOLD,
+)
 TRANSITION = np.eye(6) + 0.1 * np.eye(6, k=3)
 NOISE = np.diag([1e-3, 1e-3, 1e-4, 0.01, 0.01, 1e-3])
 
@@ -67,19 +80,20 @@ def one_by_one(
             np.concatenate([unseen.means, tracks.means]),
             np.concatenate([unseen.covariances, tracks.covariances]),
         )
-        (
-            existences, means, covariances, p_d, by, best, share,
-            left, newcomer, born_means, born_covariances, free, who, what, chance,
-        ) = camera_update.update_by_camera(
-            *(unseen.weights, unseen.means, unseen.covariances),
-            *(tracks.weights, tracks.means, tracks.covariances, tracks.labels, occluding),
-            *(values, noises, CLUTTER[c], GATE),
-            *(expected.values, expected.jacobians, expected.spreads),
-            *(expected.boxes, expected.depths, expected.valid),
-            *(expected.other or Alternative.none(model.size, 6)),
-            *(camera.image_size, True, P_D, CONFIRMED, STRENGTH, NEAR, COVERED),
-            *(TOLERANCE, ITERATIONS, TOLD),
-        )  # fmt: skip
+        found = camera_update.update_by_camera(
+            unseen.gaussians,
+            Tracks(tracks.weights, tracks.means, tracks.covariances, tracks.labels),
+            occluding,
+            Measurements(values, noises),
+            ExpectedBoxes(expected.expected, expected.boxes, expected.depths, expected.valid),
+            camera.calibration.image_size,
+            CLUTTER[c],
+            RULE,
+        )
+        p_d, by, best, share = found.record
+        newcomer, born_means, born_covariances = found.newcomers
+        who, what, chance = found.pairs
+        free = found.unexplained
         born = np.flatnonzero(free * newcomer > LEAST)
         labels = next_label + np.arange(len(born))
         next_label += len(born)
@@ -92,10 +106,10 @@ def one_by_one(
         newborn = GaussianMixture(
             (free * newcomer)[born], born_means[born], born_covariances[born], labels
         )
-        tracks = GaussianMixture(existences, means, covariances, tracks.labels)
+        tracks = GaussianMixture(found.existences, found.means, found.covariances, tracks.labels)
         tracks = concatenate([tracks, newborn])
         occluding = np.append(occluding, np.zeros(len(born)))
-        unseen = GaussianMixture(left, unseen.means, unseen.covariances, unseen.labels)
+        unseen = GaussianMixture(found.undetected, unseen.means, unseen.covariances, unseen.labels)
         for name, old, new in (
             ("p_d", p_d, np.full(len(born), P_D)),
             ("by", by, np.full(len(born), -1)),
@@ -119,47 +133,69 @@ def one_by_one(
 
 @pytest.mark.parametrize("update", ["extended", "unscented"])
 @pytest.mark.parametrize(("tracks", "unseen"), [(3, 2), (0, 2), (4, 0)])
-@pytest.mark.parametrize("low_share", [0.0, 0.1])
-def test_one_call_is_all_cameras(update: Any, tracks: int, unseen: int, low_share: float) -> None:
+@pytest.mark.parametrize("posture_share", [0.0, 0.1])
+def test_one_call_is_all_cameras(
+    update: Any, tracks: int, unseen: int, posture_share: float
+) -> None:
     rng = np.random.default_rng(7 + tracks)
-    model = TargetModel(np.array([0.3, 0.3, 0.84]), "box", update, low_share)
+    model = TargetModel(np.array([0.3, 0.3, 0.84]), "box", update, posture_share)
     known, undetected, births = people(rng, tracks, 10), people(rng, unseen, 0), people(rng, 2, 0)
     births = GaussianMixture(np.full(2, 0.2), births.means, births.covariances, births.labels)
     places = np.concatenate([known.means, undetected.means, births.means[:1]])
     boxes, sigmas = seen(model, places, rng)
     starts = np.cumsum([0, *(len(one) for one in boxes)])
-    (
-        existences, means, covariances, labels, next_label, left, unseen_means, unseen_covariances,
-        p_d, by, best, share, cameras, names, what, chance, values, noises, free,
-    ) = step.predict_and_update(
-        *(known.weights, known.means, known.covariances, known.labels, 20),
-        *(undetected.weights, undetected.means, undetected.covariances),
-        *(np.concatenate(boxes), np.concatenate(sigmas), starts, TRANSITION, NOISE[None], P_S),
-        *(births.weights, births.means, births.covariances),
-        *(FACTOR, *model.transforms, model.unscented, *model.numbers, model.drift(6), low_share),
-        *(*stacked(CAMERAS), CLUTTER, GATE, True, P_D, CONFIRMED, STRENGTH, NEAR, COVERED),
-        *(TOLERANCE, ITERATIONS, TOLD, LEAST),
-    )  # fmt: skip
+    transform, products = model.transforms
+    found = step.predict_and_update(
+        Tracks(known.weights, known.means, known.covariances, known.labels),
+        20,
+        undetected.gaussians,
+        step.CameraBoxes(np.concatenate(boxes), np.concatenate(sigmas), starts),
+        step.StepModel(
+            transition=TRANSITION,
+            motion_noise=NOISE[None],
+            survival_probability=P_S,
+            birth_weights=births.weights,
+            birth_means=births.means,
+            birth_covariances=births.covariances,
+            transform=transform,
+            products=products,
+            sigma_factor=FACTOR,
+            clutter=CLUTTER,
+            least_existence=LEAST,
+        ),
+        model.target(6),
+        stacked(CAMERAS),
+        RULE,
+    )
     wanted = one_by_one(model, known, undetected, births, boxes, sigmas, 20)
-    assert len(existences) > tracks, "somebody is new"
-    assert next_label == wanted["next"]
-    assert_array_equal(labels, wanted["tracks"].labels)
+    assert len(found.existences) > tracks, "somebody is new"
+    assert found.next_label == wanted["next"]
+    assert_array_equal(found.labels, wanted["tracks"].labels)
     for one, other in (
-        (existences, wanted["tracks"].weights), (means, wanted["tracks"].means),
-        (covariances, wanted["tracks"].covariances), (left, wanted["unseen"].weights),
-        (unseen_means, wanted["unseen"].means),
-        (unseen_covariances, wanted["unseen"].covariances),
-        (p_d, wanted["p_d"]), (by, wanted["by"]), (best, wanted["best"]),
-        (share, wanted["share"]), (free, wanted["free"]),
-        (np.column_stack([cameras, names, what, chance]), np.array(wanted["told"])),
-    ):  # fmt: skip
+        (found.existences, wanted["tracks"].weights),
+        (found.means, wanted["tracks"].means),
+        (found.covariances, wanted["tracks"].covariances),
+        (found.undetected_weights, wanted["unseen"].weights),
+        (found.undetected_means, wanted["unseen"].means),
+        (found.undetected_covariances, wanted["unseen"].covariances),
+        (found.detection_probabilities, wanted["p_d"]),
+        (found.hidden_by, wanted["by"]),
+        (found.sources, wanted["best"]),
+        (found.shares, wanted["share"]),
+        (found.unexplained, wanted["free"]),
+        (
+            np.column_stack(
+                [found.pair_cameras, found.pair_labels, found.pair_boxes, found.pair_probabilities]
+            ),
+            np.array(wanted["told"]),
+        ),
+    ):
         assert_allclose(one, other, rtol=1e-8, atol=1e-10)
-    transform, _ = model.transforms
-    assert_allclose(values, np.concatenate(boxes) @ transform.T, rtol=1e-12)
-    assert noises.shape == (len(values), 3, 3)
+    assert_allclose(found.values, np.concatenate(boxes) @ transform.T, rtol=1e-12)
+    assert found.noises.shape == (len(found.values), 3, 3)
 
 
-def test_the_kept_are_neither_faint_nor_strayed_nor_doubles_nor_too_many() -> None:
+def test_the_kept_are_neither_faint_nor_strayed_nor_duplicates_nor_too_many() -> None:
     rng = np.random.default_rng(3)
     low, high = np.full(3, -1.0), np.full(3, 1.0)
     for _ in range(30):
@@ -171,11 +207,15 @@ def test_the_kept_are_neither_faint_nor_strayed_nor_doubles_nor_too_many() -> No
             i for i in range(count) if existences[i] >= 0.2 and (np.abs(means[i, :3]) <= 1.0).all()
         ]
         order = np.array(sorted(alive, key=lambda i: -existences[i])[:5], dtype=np.int64)
-        double = linear_algebra.doubles(
+        duplicate = linear_algebra.duplicates(
             means[order], existences[order], labels[order],
             np.ascontiguousarray(sources[:, order]), 0.8, CONFIRMED,
         )  # fmt: skip
         found = step.kept_tracks(
-            existences, means, labels, sources, 0.2, low, high, 5, 0.8, CONFIRMED
+            existences,
+            means,
+            labels,
+            sources,
+            step.KeepingRule(0.2, low, high, 5, 0.8, CONFIRMED),
         )
-        assert found.tolist() == order[~double].tolist()
+        assert found.tolist() == order[~duplicate].tolist()

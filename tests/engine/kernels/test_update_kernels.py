@@ -11,11 +11,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.engine.standing import CAMERAS, HALF_EXTENTS, watch
 from tracker import association
-from tracker.camera import NEAREST_DEPTH
+from tracker.camera import stacked
 from tracker.fusion.target_model import MeasurementKind, TargetModel
 from tracker.kernels import births as birth_kernels
 from tracker.kernels import linear_algebra
+from tracker.kernels.gating import Measurements
 from tracker.kernels.labelled import marginals as marginal_kernels
+from tracker.kernels.labelled.marginals import LabelledWeights, PairOdds
 
 seeds = st.integers(0, 10_000)
 
@@ -78,9 +80,13 @@ def test_shared_boxes(seed: int, size: int, boxes: int) -> None:
     measured = np.array([z for _, z in pairs], dtype=np.int64)
     log_odds = rng.normal(0.0, 3.0, len(pairs))
     factors, shares, known = marginal_kernels.share_boxes(
-        weights, labels, p_d, births.start, births.stop, parents, measured, log_odds, boxes,
-        600.0, association.TOLERANCE, association.ITERATIONS,
-    )  # fmt: skip
+        LabelledWeights(weights, labels, p_d),
+        births.start,
+        births.stop,
+        PairOdds(parents, measured, log_odds, boxes),
+        600.0,
+        association.SETTLING,
+    )
     expected = reference_shares(weights, labels, p_d, births, parents, measured, log_odds, boxes)
     assert_allclose(factors, expected[0], rtol=1e-9)
     assert_allclose(shares, expected[1], rtol=1e-9)
@@ -183,14 +189,15 @@ def test_places_are_fitted_as_by_numpy(kind: MeasurementKind, seed: int) -> None
         boxes.append((values, noises, rng.random(len(values)) < 0.8))
     starts = people[rng.integers(0, 4, 12)] + rng.normal(0.0, 0.3, (12, 3))
     counts = [len(values) for values, _, _ in boxes]
-    parts = [np.array([camera.numbers[k] for camera in CAMERAS]) for k in range(4)]
     places, covariances, sources, fits = birth_kernels.fit_places(
-        starts, 1.0, 3,
-        *(np.concatenate([one[k] for one in boxes]) for k in range(3)),
-        np.cumsum([0, *counts]), 21.0, model.half_height, model.half_width,
-        np.array([camera.image_size for camera in CAMERAS]), *parts,
-        NEAREST_DEPTH, np.array([camera.largest_radius for camera in CAMERAS]),
-    )  # fmt: skip
+        starts,
+        Measurements(*(np.concatenate([one[k] for one in boxes]) for k in range(2))),
+        np.concatenate([free for _, _, free in boxes]),
+        np.cumsum([0, *counts]),
+        model.target(3),
+        stacked(CAMERAS),
+        birth_kernels.Refinement(start_sigma=1.0, passes=3, gate=21.0),
+    )
     for n, start in enumerate(starts):
         place, covariance, chosen = reference_fit(start, boxes, model, 21.0)
         assert_allclose(places[n], place, atol=1e-8)

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from numpy import ndarray
 
 from tests.engine.rooms import SKIN, clip, empty_room, person_mask, photograph, with_person
-from tracker.foreground import AdaptiveForeground, first_background, kernels
+from tracker.foreground import AdaptiveForeground, first_background
 from tracker.foreground.adaptive import AdaptiveState, choose_iteration, clean, cluster
+from tracker.kernels.pictures.foreground import above, update_background
 from tracker.parameters import ForegroundParams
 
 PUBLISHED = ForegroundParams(
@@ -193,7 +194,7 @@ def test_the_iteration_agrees_with_numpy(
     np.testing.assert_allclose(found.thresholds, thresholds, rtol=1e-12)
     np.testing.assert_array_equal(found.counts, counts)
     assert np.all(found.thresholds >= least)
-    mask = kernels.above(difference, found.thresholds[found.chosen])
+    mask = above(difference, found.thresholds[found.chosen])
     assert mask.sum() == counts[found.chosen]
 
 
@@ -208,10 +209,8 @@ def test_differences_are_compared_in_units_of_each_classs_deviation() -> None:
 def test_a_pixel_is_background_only_if_all_channels_are() -> None:
     difference = np.zeros((2, 2, 3), dtype=np.uint8)
     difference[0, 0, 0] = difference[0, 1, 1] = difference[1, 0, 2] = 30
-    np.testing.assert_array_equal(
-        kernels.above(difference, np.array([29.9, 29.9, 29.9])), [[1, 1], [1, 0]]
-    )
-    assert not kernels.above(difference, np.full(3, 30.0)).any()
+    np.testing.assert_array_equal(above(difference, np.array([29.9, 29.9, 29.9])), [[1, 1], [1, 0]])
+    assert not above(difference, np.full(3, 30.0)).any()
 
 
 def test_cleaning_drops_small_pieces_and_closes_cracks() -> None:
@@ -248,7 +247,8 @@ def test_the_background_changes_only_where_it_may() -> None:
     still = rng.integers(0, 5, (30, 40)).astype(np.uint8)
     still[0] = 255
     near = (rng.random((30, 40)) < 0.2).astype(np.uint8)
-    after, counts = kernels.update_background(background, still, picture, shown, near, 6, 3, 0.1)
+    found = update_background(background, still, picture, shown, near, 6, 3, 0.1)
+    after, counts = found.levels, found.still
     wanted, wanted_counts = updated_in_numpy(background, still, picture, shown, near)
     np.testing.assert_array_equal(counts, wanted_counts)
     np.testing.assert_array_equal(after, wanted)

@@ -8,9 +8,12 @@ import pytest
 from numpy import ndarray
 
 from tests.engine.synthetic import CAMERAS, ROOM
+from tracker.parameters import JpdaParams
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import upright_boxes
 from tracker.single_view.jpda.crowns import TargetSizes, crowns
+
+NUMBERS = JpdaParams()
 
 HALF = np.array([0.17, 0.17, 0.36])
 """Head and torso."""
@@ -19,7 +22,7 @@ CAMERA = CAMERAS[0]
 
 @pytest.fixture(scope="module")
 def sizes() -> TargetSizes:
-    return TargetSizes(CAMERA, ROOM, HALF)
+    return TargetSizes(CAMERA, ROOM, HALF, NUMBERS.height_sigmas)
 
 
 def standing(*places: tuple[float, float], height: float = 1.0) -> tuple[ndarray, ndarray]:
@@ -50,7 +53,7 @@ def compare(found: ndarray, boxes: ndarray) -> None:
 def test_one_person_is_found_from_the_crown_down(sizes: TargetSizes) -> None:
     for place in ((0.0, 0.0), (-0.8, 0.6), (0.9, -0.4)):
         mask, boxes = standing(place)
-        found = crowns(mask, sizes, 40)
+        found = crowns(mask, sizes, 40, NUMBERS)
         compare(found.boxes, boxes)
         assert found.inside[0] > 0.6
         assert found.pieces[0, 3] > 1.5 * found.boxes[0, 3], "the piece shows the legs too"
@@ -59,28 +62,28 @@ def test_one_person_is_found_from_the_crown_down(sizes: TargetSizes) -> None:
 def test_two_in_one_piece_are_two(sizes: TargetSizes) -> None:
     mask, boxes = standing((-0.1, 0.1), (0.12, -0.12))
     assert cv2.connectedComponents(mask)[0] == 2, "one piece, and the background"
-    compare(crowns(mask, sizes, 40).boxes, boxes)
+    compare(crowns(mask, sizes, 40, NUMBERS).boxes, boxes)
 
 
 def test_a_crack_across_a_person_makes_nobody_new(sizes: TargetSizes) -> None:
     mask, boxes = standing((0.0, 0.0))
     row = round(boxes[0, 1] - 0.45 * boxes[0, 3])
     mask[row : row + 3] = 0
-    compare(crowns(mask, sizes, 40).boxes, boxes)
+    compare(crowns(mask, sizes, 40, NUMBERS).boxes, boxes)
 
 
 def test_what_is_higher_than_people_come_in_is_nobody() -> None:
-    walked = TargetSizes(CAMERA, ROOM, HALF)
-    anything = TargetSizes(CAMERA, Room(ROOM.minimum, ROOM.maximum), HALF)
+    walked = TargetSizes(CAMERA, ROOM, HALF, NUMBERS.height_sigmas)
+    anything = TargetSizes(CAMERA, Room(ROOM.minimum, ROOM.maximum), HALF, NUMBERS.height_sigmas)
     mask, _ = standing((1.3, 1.3), height=1.85)  # the entrances are at 1 m, give or take 0.15
-    assert len(crowns(mask, anything, 40).boxes) == 1
-    assert len(crowns(mask, walked, 40).boxes) == 0
+    assert len(crowns(mask, anything, 40, NUMBERS).boxes) == 1
+    assert len(crowns(mask, walked, 40, NUMBERS).boxes) == 0
 
 
 @pytest.mark.parametrize("filled", [False, True])
 def test_an_empty_mask_and_a_full_one_show_nobody(sizes: TargetSizes, filled: bool) -> None:
     mask = np.full(CAMERA.image_size[::-1], filled, dtype=np.uint8)
-    found = crowns(mask, sizes, 40)
+    found = crowns(mask, sizes, 40, NUMBERS)
     assert found.boxes.shape == (0, 4)
     assert found.pieces.shape == (0, 4)
 
@@ -88,11 +91,14 @@ def test_an_empty_mask_and_a_full_one_show_nobody(sizes: TargetSizes, filled: bo
 def test_single_pixels_raise_nothing(sizes: TargetSizes) -> None:
     mask = np.zeros(CAMERA.image_size[::-1], dtype=np.uint8)
     mask[::9, ::7] = 1
-    assert np.isfinite(crowns(mask, sizes, 1).boxes).all()
-    assert len(crowns(mask, sizes, 40).boxes) == 0
+    assert np.isfinite(crowns(mask, sizes, 1, NUMBERS).boxes).all()
+    assert len(crowns(mask, sizes, 40, NUMBERS).boxes) == 0
 
 
 def test_a_camera_that_sees_nothing_of_the_room_finds_nobody() -> None:
     away = Room(np.array([50.0, 50.0, 0.0]), np.array([51.0, 51.0, 2.0]))
     mask, _ = standing((0.0, 0.0))
-    assert len(crowns(mask, TargetSizes(CAMERA, away, HALF), 40).boxes) == 0
+    assert (
+        len(crowns(mask, TargetSizes(CAMERA, away, HALF, NUMBERS.height_sigmas), 40, NUMBERS).boxes)
+        == 0
+    )

@@ -13,8 +13,12 @@ from numpy.testing import assert_array_equal
 
 from tests.engine.rooms import SKIN, clip, empty_room, person_mask, photograph, with_person
 from tracker import foreground
-from tracker.foreground import BackgroundModel, LearntForeground, kernels, tone_curve
-from tracker.kernels import images
+from tracker.foreground import BackgroundModel, LearntForeground, tone_curve
+from tracker.kernels.pictures import images
+from tracker.kernels.pictures.foreground import level_medians, upper_medians
+from tracker.parameters import ForegroundParams
+
+PLAIN = ForegroundParams(threshold=24.0)
 
 
 def learnt(gains: ndarray) -> BackgroundModel:
@@ -33,7 +37,7 @@ def test_the_background_comes_out_of_pictures_that_all_show_somebody() -> None:
 def test_a_person_is_foreground_at_any_exposure_and_the_room_is_not(gain: float) -> None:
     model = learnt(1.0 + 0.15 * np.sin(np.arange(25)))
     picture = photograph(with_person(empty_room(), 70), gain, seed=99)
-    mask = model.foreground(picture, 24.0).astype(bool)
+    mask = model.foreground(picture, PLAIN).astype(bool)
     person = person_mask(70)
     differs = np.abs(empty_room() - np.array(SKIN)).max(axis=2) > 40.0
     assert mask[person & differs].mean() > 0.85
@@ -44,7 +48,7 @@ def test_a_shadow_is_not_foreground() -> None:
     model = learnt(np.ones(25))
     shaded = empty_room()
     shaded[40:80, 30:70] *= 0.75
-    assert model.foreground(photograph(shaded, seed=5), 24.0).mean() < 0.01
+    assert model.foreground(photograph(shaded, seed=5), PLAIN).mean() < 0.01
 
 
 @given(st.floats(0.5, 1.2), st.floats(-10.0, 10.0))
@@ -69,14 +73,14 @@ def test_a_tone_curve_ignores_a_person_over_a_third_of_the_picture() -> None:
 @pytest.mark.parametrize("level", [0, 255])
 def test_a_black_or_white_frame_has_no_foreground(level: int) -> None:
     model = learnt(np.ones(9))
-    assert model.foreground(np.full((96, 128, 3), level, dtype=np.uint8), 24.0).mean() < 0.01
+    assert model.foreground(np.full((96, 128, 3), level, dtype=np.uint8), PLAIN).mean() < 0.01
 
 
 def test_a_frozen_camera_has_no_foreground() -> None:
     picture = clip(np.ones(1))[0]
     model = BackgroundModel.learn([picture] * 5)
     assert model is not None
-    assert not model.foreground(picture, 24.0).any()
+    assert not model.foreground(picture, PLAIN).any()
 
 
 def test_no_pictures_give_no_model() -> None:
@@ -119,10 +123,10 @@ def test_the_mask_agrees_with_numpy() -> None:
 def test_the_learnt_model_has_the_face_of_all_models() -> None:
     model = learnt(np.ones(9))
     picture = photograph(with_person(empty_room(), 70), seed=99)
-    face = LearntForeground(model, 24.0)
+    face = LearntForeground(model, PLAIN)
     state, found = face.step(face.start(), picture)
     assert state is None
-    np.testing.assert_array_equal(found.mask, model.foreground(picture, 24.0))
+    np.testing.assert_array_equal(found.mask, model.foreground(picture, PLAIN))
     np.testing.assert_array_equal(found.thresholds, 24.0)
 
 
@@ -156,19 +160,20 @@ def test_medians_agree_with_sorting(count: int) -> None:
     rng = np.random.default_rng(count)
     values = rng.choice(np.array([0, 3, 16, 17, 200, 255], dtype=np.uint8), (count, 2500))
     values[:, 1000:] = rng.integers(0, 256, (count, 1500))
-    assert_array_equal(kernels.upper_medians(values), np.sort(values, axis=0)[count // 2])
+    assert_array_equal(upper_medians(values), np.sort(values, axis=0)[count // 2])
 
 
 def test_medians_of_levels_agree_with_counting_one_by_one() -> None:
     rng = np.random.default_rng(4)
     source = rng.integers(0, 200, (900, 3), dtype=np.uint8)
     target = rng.integers(0, 256, (900, 3), dtype=np.uint8)
-    totals, sums, medians = kernels.level_medians(source, target, 16)
+    found = level_medians(source, target, 16)
+    totals, medians = found.totals, found.medians
     for channel in range(3):
         for group in range(16):
             here = source[:, channel] // 16 == group
             assert totals[channel, group] == here.sum()
-            assert sums[channel, group] == source[here, channel].sum()
+            assert found.sums[channel, group] == source[here, channel].sum()
             values = np.sort(target[here, channel])
             assert medians[channel, group] == (values[(len(values) - 1) // 2] if len(values) else 0)
     assert (totals[:, 13:] == 0).all()

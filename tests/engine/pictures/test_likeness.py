@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from tests.engine.painted import GREEN, RED, painted_sequence
 from tests.engine.standing import line
 from tracker import pipeline
-from tracker.parameters import RunParameters, SingleViewName
+from tracker.parameters import RunParameters
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
@@ -83,7 +83,7 @@ def test_a_template_that_cannot_be_read_is_told_and_hinders_nobody(
 
 @pytest.mark.parametrize("method", ["colour_phd", "pseudo_particle", "jpda", "association_matrix"])
 def test_every_method_with_pictures_passes_it_on(painted: Sequence, method: str) -> None:
-    parameters = RunParameters(single_view=cast(SingleViewName, method))
+    parameters = RunParameters(single_view=cast(str, method))
     found = pipeline.compute(painted, parameters, seed=0)
     boxes = [view for views in found.views for view in views if len(view.boxes)]
     assert all(view.likenesses.shape == (len(view.boxes), 2) for view in boxes)

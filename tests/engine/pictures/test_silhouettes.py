@@ -11,12 +11,13 @@ from numpy import ndarray
 
 from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, ROOM
 from tracker.blobs import blobs
+from tracker.parameters import AssociationMatrixParams
 from tracker.single_view.association_matrix.joining import join
 from tracker.single_view.association_matrix.silhouettes import Fits, Silhouettes
 from tracker.single_view.box_sizes import BoxSizes, upright_boxes
 
 CAMERA = CAMERAS[0]
-NUMBERS = {"acceptance": -2.0, "further_acceptance": -1.4, "spare_acceptance": -0.7}
+NUMBERS = AssociationMatrixParams(acceptance=-2.0, further_acceptance=-1.4, spare_acceptance=-0.7)
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +42,7 @@ def standing(*places: tuple[float, float, float]) -> tuple[ndarray, ndarray]:
 
 def found(silhouettes: Silhouettes, mask: ndarray, wanted: int) -> Fits:
     pieces = blobs(mask, 20)
-    return silhouettes.fit(mask, pieces, np.full(pieces.size, wanted), **NUMBERS)
+    return silhouettes.fit(mask, pieces, np.full(pieces.size, wanted), NUMBERS)
 
 
 def test_a_head_is_found_on_top_of_its_body(silhouettes: Silhouettes) -> None:
@@ -91,7 +92,7 @@ def test_what_is_no_person_gives_no_error(silhouettes: Silhouettes, kind: str) -
     elif kind == "a line":
         mask[height // 2] = 1
     pieces = blobs(mask, 1)
-    fits = silhouettes.fit(mask, pieces, np.ones(pieces.size), **NUMBERS)
+    fits = silhouettes.fit(mask, pieces, np.ones(pieces.size), NUMBERS)
     assert len(fits.boxes) == len(fits.scores) == len(fits.owners)
     assert len(fits.boxes) <= 1
     assert len(silhouettes.half_heights(pieces.boxes[:, :2])) == pieces.size

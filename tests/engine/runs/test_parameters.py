@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import product
 from typing import Any
 
 import pytest
@@ -77,15 +78,14 @@ def test_every_group_says_what_it_is_for() -> None:
     assert all(text.endswith(".") for text in GROUPS.values())
 
 
-@pytest.mark.parametrize("fusion_method", METHODS["fusion_method"])
-def test_every_value_belongs_to_exactly_one_stage(fusion_method: str) -> None:
+def test_every_value_belongs_to_exactly_one_stage() -> None:
     covered: set[str] = set()
-    for single_view in METHODS["single_view"]:
-        methods = {"single_view": single_view, "fusion_method": fusion_method}
-        parameters = with_values(DEFAULTS, methods)
+    for *chosen, model in product(*METHODS.values(), ("learnt", "adaptive")):
+        methods = dict(zip(METHODS, chosen, strict=True))
+        parameters = with_values(DEFAULTS, {**methods, "foreground.model": model})
         keys = [key for stage in STAGES for key in stage_values(parameters, stage)]
         assert len(keys) == len(set(keys))
-        assert {*METHODS, *(key for key in PARAMETERS if key.startswith("fusion."))} <= set(keys)
+        assert set(METHODS) <= set(keys)
         for stage in STAGES:
             for key, found in stage_values(parameters, stage).items():
                 assert found == value(parameters, key)

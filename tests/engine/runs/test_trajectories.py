@@ -15,7 +15,7 @@ from tracker import trajectories
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.protocol import FusionResult
 from tracker.sequences.sequence import Room
-from tracker.trajectories import Trajectories
+from tracker.trajectories import Bounds, Trajectories
 
 CAMERAS = 3
 COLUMNS = tuple(Trajectories.__slots__)
@@ -98,9 +98,9 @@ def test_the_threshold_itself_is_not_enough() -> None:
 def test_outside_the_room_nobody_is_reported() -> None:
     room = Room(np.array([0.5, 5.0, 50.0]), np.array([1.5, 15.0, 150.0]))
     results = [posterior([0.9, 0.9, 0.9], [1, 2, 3])]
-    assert_array_equal(extract(results, room=room, margin=0.1).labels, [2])
-    assert_array_equal(extract(results, room=room, margin=50.0).labels, [1, 2, 3])
-    assert_array_equal(extract(results, room=room).labels, [1, 2, 3])
+    assert_array_equal(extract(results, bounds=Bounds(room, 0.1)).labels, [2])
+    assert_array_equal(extract(results, bounds=Bounds(room, 50.0)).labels, [1, 2, 3])
+    assert_array_equal(extract(results, bounds=Bounds(room)).labels, [1, 2, 3])
 
 
 @st.composite

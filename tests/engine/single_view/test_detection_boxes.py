@@ -9,7 +9,7 @@ from tests.engine import synthetic
 from tests.engine.painted import corner_box
 from tracker import single_view
 from tracker.camera import Camera
-from tracker.parameters import DetectionBoxParams
+from tracker.parameters import DetectionBoxParams, RunParameters
 from tracker.sequences.sequence import Detections, Sequence, View
 from tracker.single_view.box_sizes import BoxSizes, entrance_boxes, upright_boxes
 from tracker.single_view.none import DetectionBoxes
@@ -32,7 +32,7 @@ def sequence_of(detections: Detections | None) -> Sequence:
 
 def test_boxes_scores_and_sigmas() -> None:
     detections = Detections(np.array([0, 0, 2]), BOXES, np.array([0.9, 0.3, 1.0]))
-    parameters = DetectionBoxParams(
+    trust = DetectionBoxParams(
         score_threshold=0.3,
         room_tolerance=100.0,
         centre_sigma=0.2,
@@ -40,8 +40,7 @@ def test_boxes_scores_and_sigmas() -> None:
         width_sigma=0.2,
         pixel_sigma=0.0,
     )
-    method = DetectionBoxes(sequence_of(detections), 0, parameters)
-    assert not method.needs_pictures
+    method = DetectionBoxes(sequence_of(detections), 0, RunParameters(detection_boxes=trust))
     rng = np.random.default_rng(0)
     results = [method.step(method.start(), frame, None, rng)[1] for frame in range(3)]
     assert [len(result.boxes) for result in results] == [2, 0, 1]
@@ -49,20 +48,20 @@ def test_boxes_scores_and_sigmas() -> None:
     np.testing.assert_array_equal([corner_box(box) for box in results[0].boxes], BOXES[:2])
     np.testing.assert_array_equal(results[0].weights, [0.9, 0.3])
     np.testing.assert_allclose(results[0].sigmas[0], [6.0, 6.0, 3.0, 3.0])
-    floor = parameters.model_copy(update={"pixel_sigma": 8.0})
+    floor = RunParameters(detection_boxes=trust.model_copy(update={"pixel_sigma": 8.0}))
     noisy = DetectionBoxes(sequence_of(detections), 0, floor).step(None, 0, None, rng)[1]
     np.testing.assert_allclose(noisy.sigmas[0], np.hypot([6.0, 6.0, 3.0, 3.0], 8.0))
-    strict = DetectionBoxes(sequence_of(detections), 0, DetectionBoxParams(score_threshold=0.5))
+    half = RunParameters(detection_boxes={"score_threshold": 0.5})
+    strict = DetectionBoxes(sequence_of(detections), 0, half)
     assert len(strict.step(None, 0, None, rng)[1].boxes) == 1
 
 
 def test_a_camera_without_detections_says_what_to_do() -> None:
     with pytest.raises(ValueError, match="has no detections; name a CSV file"):
-        DetectionBoxes(sequence_of(None), 0, DetectionBoxParams())
+        DetectionBoxes(sequence_of(None), 0, RunParameters())
 
 
 def test_the_methods_are_made_by_name() -> None:
-    from tracker.parameters import RunParameters
     from tracker.sequences.frames import FrameReader
 
     detections = Detections(np.array([0]), BOXES[:1], np.ones(1))

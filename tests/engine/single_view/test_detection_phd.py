@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.engine.standing import CAMERAS, HALF_EXTENTS, ROOM, empty_room, line, watch
 from tracker import single_view
 from tracker.fusion.target_model import TargetModel
-from tracker.parameters import DetectionPhdParams, RunParameters
+from tracker.parameters import RunParameters
 from tracker.sequences.sequence import Detections, Room, Sequence, View
 from tracker.single_view.detection_phd import DetectionPhd
 from tracker.single_view.detector_boxes import meets, standing_between
@@ -49,7 +49,7 @@ def recorded(
 
 def filtered(whole: Sequence, **changes: object) -> list[ViewResult]:
     """Every step of the filter."""
-    method = DetectionPhd(whole, 0, DetectionPhdParams().model_copy(update=changes))
+    method = DetectionPhd(whole, 0, RunParameters(detection_phd=changes))
     state, results = method.start(), []
     for frame in range(whole.frames):
         state, result = method.step(state, frame, None, np.random.default_rng(0))
@@ -128,9 +128,8 @@ def test_the_method_is_made_by_name() -> None:
         None,  # type: ignore[arg-type]
     )
     assert isinstance(made, DetectionPhd)
-    assert not made.needs_pictures
     with pytest.raises(ValueError, match="has no detections; name a CSV file"):
-        DetectionPhd(empty_room(10.0), 0, DetectionPhdParams())
+        DetectionPhd(empty_room(10.0), 0, RunParameters())
 
 
 @given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.integers(0, 3))
@@ -170,12 +169,12 @@ def test_a_box_that_contradicts_the_room_is_shown_and_not_used() -> None:
     whole = replace(
         empty_room(10.0, CAMERAS[:1], 1), views=(View(CAMERAS[0], detections=detections),)
     )
-    parameters = RunParameters().detection_boxes.model_copy(update={"room_tolerance": 0.3})
+    parameters = RunParameters(detection_boxes={"room_tolerance": 0.3})
     _, result = DetectionBoxes(whole, 0, parameters).step(None, 0, None, np.random.default_rng(0))
     assert len(result.boxes) == 1
     assert len(result.measurements) == 3
     assert result.information["boxes outside the room"] == 2.0
-    wide = parameters.model_copy(update={"room_tolerance": 100.0})
+    wide = RunParameters(detection_boxes={"room_tolerance": 100.0})
     _, everything = DetectionBoxes(whole, 0, wide).step(None, 0, None, np.random.default_rng(0))
     assert len(everything.boxes) == 3
     assert ROOM.contains(WALK[:1]).all()

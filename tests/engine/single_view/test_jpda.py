@@ -58,7 +58,7 @@ def track(
         method = single_view.create("jpda", sequence, camera, parameters, reader)
         state, results = method.start(), []
         for step in range(sequence.frames):
-            picture = reader.picture(camera, step) if method.needs_pictures else None
+            picture = reader.picture(camera, step)
             state, result = method.step(state, step, picture, np.random.default_rng(step))
             results.append(result)
     return results

@@ -7,7 +7,10 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_array_equal
 
+from tracker.parameters import JpdaParams
 from tracker.single_view.jpda.cases import Cases, look_into_pieces, part_strangers, tell_apart
+
+LEAP = JpdaParams().leap
 
 
 def read(rows: list[list[float]], own: list[int], *, every: bool = False) -> Cases:
@@ -91,6 +94,7 @@ def test_who_is_lost_in_a_piece_is_hidden_behind_its_owner() -> None:
         boxes((100, 100, 10, 20), (116, 98, 10, 20)),
         boxes((100, 100, 10, 20)),
         boxes((108, 100, 18, 22)),
+        LEAP,
     )
     assert_array_equal(found.shared, [0, 0])
     assert not found.missed.any()
@@ -100,13 +104,15 @@ def test_a_free_measurement_near_a_lost_target_is_its_own() -> None:
     cases = read([[0.0, 0.0]], [-1])
     expected = boxes((100, 100, 10, 20))
     measured = boxes((115, 100, 10, 20), (180, 100, 10, 20))
-    found = look_into_pieces(cases, expected, measured, boxes((110, 100, 30, 30), (180, 99, 9, 9)))
+    found = look_into_pieces(
+        cases, expected, measured, boxes((110, 100, 30, 30), (180, 99, 9, 9)), LEAP
+    )
     assert_array_equal(found.own, [0])
     assert_array_equal(found.new, [False, True])
     assert not found.missed.any()
     # one that is too far away stays somebody new, who hides it
     far = boxes((130, 100, 10, 20))
-    found = look_into_pieces(read([[0.0]], [-1]), expected, far, boxes((110, 100, 40, 30)))
+    found = look_into_pieces(read([[0.0]], [-1]), expected, far, boxes((110, 100, 40, 30)), LEAP)
     assert_array_equal(found.own, [-1])
     assert_array_equal(found.shared, [0])
     assert found.new.all()
@@ -115,7 +121,7 @@ def test_a_free_measurement_near_a_lost_target_is_its_own() -> None:
 def test_who_is_nowhere_stays_missed() -> None:
     cases = read([[0.0]], [-1])
     found = look_into_pieces(
-        cases, boxes((10, 10, 5, 5)), boxes((200, 200, 5, 5)), boxes((200, 200, 9, 9))
+        cases, boxes((10, 10, 5, 5)), boxes((200, 200, 5, 5)), boxes((200, 200, 9, 9)), LEAP
     )
     assert found.missed.all()
     assert found.new.all()

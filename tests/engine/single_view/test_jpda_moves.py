@@ -87,7 +87,7 @@ def test_which_edges_are_left_over(
     piece: tuple[float, ...], shown: list[tuple[float, ...]], edges: list[int]
 ) -> None:
     boxes: ndarray = np.array(shown, dtype=float)
-    found = _left_over(np.array(piece, dtype=float), boxes, np.array(HALF))
+    found = _left_over(np.array(piece, dtype=float), boxes, np.array(HALF), JpdaParams().one_side)
     assert_array_equal(found, edges)
 
 

@@ -231,7 +231,7 @@ def test_a_missing_picture_only_spreads_the_particles(
     after, result = method.step(state, 10, None, np.random.default_rng(10))
     assert len(result.boxes) == len(result.measurements) == len(result.samples) == 0
     np.testing.assert_array_equal(result.estimates, before.estimates)
-    assert after.register is state.register
+    assert after.tracks is state.tracks
     assert after.particles[:, 0].std() > state.particles[:, 0].std()
     found = method.step(after, 11, reader.picture(0, 11), np.random.default_rng(11))[1]
     assert off(true_boxes(one_person, 11)[0], found.estimates) < 1.0

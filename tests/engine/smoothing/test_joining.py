@@ -10,7 +10,7 @@ from numpy import ndarray
 from numpy.testing import assert_allclose
 
 from tracker.filters.models import Motion
-from tracker.kernels.smoothing.presence import presence
+from tracker.kernels.smoothing.presence import Habits, presence
 from tracker.parameters import FusionParams
 from tracker.smoothing.joining import chains, join
 from tracker.smoothing.paths import Links, Paths
@@ -97,7 +97,7 @@ def test_when_somebody_was_there_is_the_best_of_all_sequences(seed: int) -> None
     ways = {there: score(there) for there in itertools.product((False, True), repeat=count)}
     best = max(ways, key=lambda there: ways[there])
     chances, odds = presence(
-        np.array([0, count]), np.array([count - 1]), votes, stay, enter, change, end
+        np.array([0, count]), np.array([count - 1]), votes, Habits(stay, enter, change), end
     )
     assert (chances > 0.5).tolist() == list(best)
     assert odds[0] == pytest.approx(max(v for there, v in ways.items() if any(there)))

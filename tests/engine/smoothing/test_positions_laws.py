@@ -16,13 +16,13 @@ from tracker import pipeline
 from tracker.kernels.smoothing import passes
 from tracker.parameters import RunParameters, with_values
 from tracker.sequences.sequence import Detections, Sequence
-from tracker.smoothing import smooth
+from tracker.smoothing import create
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.smoother import START_SIGMA, Smoother
 
 STEPS = 40
 PLAIN = with_values(
-    RunParameters(single_view="none"), {"fusion.low_share": 0.0, "smoothing.learning": False}
+    RunParameters(single_view="none"), {"fusion.posture_share": 0.0, "smoothing.learning": False}
 )
 
 
@@ -71,9 +71,9 @@ def test_a_target_without_clutter_is_where_the_least_squares_over_all_boxes_put_
         for c, camera in enumerate(smoother.cameras):
             own = links.take(links.cameras == c)
             expected = smoother.model.target.expected(smoother.model.cameras[c], states[own.rows])
-            for value, box in zip(expected.values, own.boxes, strict=True):
-                factor = np.linalg.inv(np.linalg.cholesky(camera.noises[box]))
-                parts.append(factor @ (camera.values[box] - value))
+            for value, box in zip(expected.expected.values, own.boxes, strict=True):
+                factor = np.linalg.inv(np.linalg.cholesky(camera.measurements.noises[box]))
+                parts.append(factor @ (camera.measurements.values[box] - value))
         return np.concatenate(parts)
 
     best = least_squares(residuals, found.ravel() + 0.01, x_scale="jac", xtol=1e-12).x
@@ -118,7 +118,11 @@ def test_without_boxes_a_path_is_only_predicted(size: int) -> None:
     noise, prior = 0.01 * np.eye(size), np.eye(size)
     begin = rng.normal(size=(1, size))
     means, covariances, fits, _, jumps = passes.smooth_paths(
-        np.array([0, 5]), begin, np.zeros((5, 3, 3)), np.zeros((5, 3)), transition, noise, prior
+        np.array([0, 5]),
+        begin,
+        np.zeros((5, 3, 3)),
+        np.zeros((5, 3)),
+        passes.PathMotion(transition, noise, prior),
     )
     assert_allclose(means, np.tile(begin, (5, 1)), atol=1e-12)
     assert_allclose(covariances[-1], prior + 4 * noise, atol=1e-12)
@@ -171,8 +175,10 @@ def test_cameras_in_another_order_tell_the_same() -> None:
         )
         for result in run.fused
     ]
-    one = smooth(whole, run.parameters, run.views, run.fused)
-    two = smooth(other, run.parameters, views, fused)
+    one = create(whole, run.parameters).smooth(run.views, run.fused)
+    two = create(other, run.parameters).smooth(views, fused)
+    assert one is not None
+    assert two is not None
     assert one.labels.tolist() == two.labels.tolist()
     assert one.frames.tolist() == two.frames.tolist()
     assert_allclose(one.means, two.means, atol=1e-8)
@@ -196,8 +202,10 @@ def test_labels_in_another_order_name_the_same_people() -> None:
         )
         for result in run.fused
     ]
-    one = smooth(whole, run.parameters, run.views, run.fused)
-    two = smooth(whole, run.parameters, run.views, fused)
+    one = create(whole, run.parameters).smooth(run.views, run.fused)
+    two = create(whole, run.parameters).smooth(run.views, fused)
+    assert one is not None
+    assert two is not None
     rows = np.lexsort((other(two.labels), two.frames))
     assert one.frames.tolist() == two.frames[rows].tolist()
     assert one.labels.tolist() == other(two.labels)[rows].tolist()

@@ -103,7 +103,7 @@ def report_html(
         ("people", "People", people_table(evaluation)),
         ("tracks", "Tracks", track_table(tracks, evaluation)),
         ("cameras", "Cameras", camera_table(evaluation)),
-        ("parameters", "Parameters", parameter_table(parameters)),
+        ("parameters", "Parameters", parameter_table(parameters, sequence)),
     )
     body = "\n".join(_section(*section) for section in sections)
     return f"""<!doctype html>

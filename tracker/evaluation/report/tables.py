@@ -15,6 +15,8 @@ from tracker.evaluation.matching import Tracks
 from tracker.evaluation.report.figures import DARK, colour
 from tracker.evaluation.result import Evaluation
 from tracker.parameters import METHODS, PARAMETERS, RunParameters
+from tracker.runs.fitting import default_parameters
+from tracker.sequences.sequence import Sequence
 
 MOST_ROWS = 60
 """A longer table scrolls inside the page."""
@@ -176,25 +178,34 @@ def camera_table(evaluation: Evaluation) -> str:
     )  # fmt: skip
 
 
-def parameter_table(parameters: RunParameters | Mapping[str, str] | None) -> str:
-    """What the run depends on; changed values are marked."""
+def parameter_table(
+    parameters: RunParameters | Mapping[str, str] | None, sequence: Sequence
+) -> str:
+    """What the run depends on; values that are not the recording's defaults are marked."""
     if parameters is None:
         return "<p class='muted'>The parameters of these tracks are not known.</p>"
     if isinstance(parameters, RunParameters):
-        return _changed_table(parameters)
+        return _changed_table(parameters, _defaults(sequence))
     known = {k: v for k, v in parameters.items() if k in PARAMETERS or k in METHODS}
     try:
-        return _changed_table(table.with_values(RunParameters(), known))
+        defaults = _defaults(sequence)
+        return _changed_table(table.with_values(defaults, known), defaults)
     except table.ParameterError:  # of another version: show what the file says
         return _table(("", "value"), [_row(escaped(k), escaped(v)) for k, v in parameters.items()])
 
 
-def _changed_table(parameters: RunParameters) -> str:
+def _defaults(sequence: Sequence) -> RunParameters:
+    try:
+        return default_parameters(sequence)
+    except ValueError:  # of truth alone, which tracks from elsewhere are compared with
+        return RunParameters()
+
+
+def _changed_table(parameters: RunParameters, defaults: RunParameters) -> str:
     used: dict[str, Any] = {key: table.value(parameters, key) for key in METHODS}
     for stage in ("single_view", "fusion", "tracks"):
         used |= table.stage_values(parameters, stage)
-    changed = table.changed(parameters)
-    defaults = RunParameters()
+    changed = table.changed(parameters, defaults)
     rows, group = [], ""
     for key in used:
         parameter = PARAMETERS.get(key)

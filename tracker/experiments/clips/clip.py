@@ -23,6 +23,7 @@ from jaxtyping import Float, UInt8
 from numpy import ndarray
 from scipy.interpolate import PchipInterpolator
 
+from tracker.boxes import Boxes
 from tracker.camera import Camera
 from tracker.sequences.sequence import GroundTruth, Room, Sequence, Template, View
 
@@ -296,10 +297,8 @@ def _templates(clip: Clip, camera: str) -> list[Template]:
     for step in range(clip.steps):
         if len(templates) == len(clip.actors):
             break
-        shares, boxes = clip.visible(step), clip.boxes(step)
+        shares, boxes = clip.visible(step), Boxes(clip.boxes(step)).left_top
         for index in np.flatnonzero(shares > 0.98).tolist():
-            x, y, half_x, half_y = boxes[index]
-            corners = np.array([x - half_x, y - half_y, 2.0 * half_x, 2.0 * half_y])
             name = clip.actors[index].name
-            templates.setdefault(index, Template(name, camera, step, corners))
+            templates.setdefault(index, Template(name, camera, step, boxes[index]))
     return [templates[index] for index in sorted(templates)]

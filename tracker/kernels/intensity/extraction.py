@@ -2,12 +2,39 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy import ndarray
 
 from tracker.kernels.compilation import kernel
 from tracker.kernels.intensity.mixture import heaviest_of_groups
+from tracker.kernels.intensity.phd import UpdatedIntensity
 from tracker.kernels.linear_algebra import merge_moments
+
+
+class Payments(NamedTuple):
+    """What P pairs of a component and a measurement spend on it."""
+
+    spent: ndarray
+    """(P,)."""
+    places: ndarray
+    """(P,), the place of the pair's measurement among the reported ones, -1 for none."""
+    reported: int
+    """How many measurements."""
+
+
+class Reported(NamedTuple):
+    """The T targets that an update reports."""
+
+    weights: ndarray
+    """(T,)."""
+    means: ndarray
+    """(T, d)."""
+    covariances: ndarray
+    """(T, d, d)."""
+    heaviest: ndarray
+    """(T,), the heaviest of the components that each was made of."""
 
 
 @kernel
@@ -19,7 +46,7 @@ def pay_for_measurements(
     log_odds: ndarray,
     sums: ndarray,
     threshold: float,
-) -> tuple[ndarray, ndarray, int]:
+) -> Payments:
     """Which measurements the components can pay for, the surest first.
 
     Args:
@@ -30,10 +57,6 @@ def pay_for_measurements(
         log_odds: (P,), against clutter.
         sums: (M,), of the weights of each measurement.
         threshold: What a measurement costs at least.
-
-    Returns:
-        What each pair spends (P,), the place of its measurement among the reported ones
-        (P,), -1 for none, and their number.
     """
     count = len(sums)
     spent = np.zeros(len(weights))
@@ -58,52 +81,40 @@ def pay_for_measurements(
             left[parents[pair]] -= spent[pair]
             group[pair] = reported
         reported += 1
-    return spent, group, reported
+    return Payments(spent, group, reported)
 
 
 @kernel
 def report(
-    predicted: ndarray,
-    weights: ndarray,
-    means: ndarray,
-    covariances: ndarray,
-    parents: ndarray,
-    sources: ndarray,
-    log_odds: ndarray,
-    sums: ndarray,
-    threshold: float,
-    spare: float,
-) -> tuple[ndarray, ndarray, ndarray, ndarray]:
+    predicted: ndarray, updated: UpdatedIntensity, threshold: float, spare: float
+) -> Reported:
     """The targets that an update reports: :func:`tracker.filters.phd.extract_measured`.
 
     Args:
         predicted: (J,) weights.
-        weights: (K,), as the further ones, of :func:`tracker.kernels.intensity.phd.phd_update`.
+        updated: By one measurement set, not reduced yet.
         threshold: Expected number of targets.
         spare: What a component may spend beyond its weight, or beyond one target.
-
-    Returns:
-        (T,) weights, (T, d) means, (T, d, d) covariances, and (T,) the heaviest of the
-        components that each was made of.
     """
     size = len(predicted)
-    spent, group, count = pay_for_measurements(
+    weights, means, covariances = updated.weights, updated.means, updated.covariances
+    paid = pay_for_measurements(
         np.maximum(predicted, 1.0) + spare,
         weights[size:],
-        parents[size:],
-        sources[size:],
-        log_odds,
-        sums,
+        updated.parents[size:],
+        updated.measured[size:],
+        updated.log_odds,
+        updated.sums,
         threshold,
     )
-    found = merge_moments(spent, means[size:], covariances[size:], group, count)
-    heaviest = size + heaviest_of_groups(spent, group, count)
+    found = merge_moments(paid.spent, means[size:], covariances[size:], paid.places, paid.reported)
+    heaviest = size + heaviest_of_groups(paid.spent, paid.places, paid.reported)
     missed = np.flatnonzero(weights[:size] > threshold)
     if len(missed) == 0:
-        return found[0], found[1], found[2], heaviest
-    return (
-        np.concatenate((found[0], weights[missed])),
-        np.concatenate((found[1], means[missed])),
-        np.concatenate((found[2], covariances[missed])),
+        return Reported(found.weights, found.means, found.covariances, heaviest)
+    return Reported(
+        np.concatenate((found.weights, weights[missed])),
+        np.concatenate((found.means, means[missed])),
+        np.concatenate((found.covariances, covariances[missed])),
         np.concatenate((heaviest, missed)),
     )

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy import ndarray
@@ -25,6 +26,58 @@ from tracker.kernels.linear_algebra import merge_moments
 _CLASSES = 16
 """Components whose reach agrees within a factor of two share a grid: a few very wide ones do
 not make the search wide for all."""
+
+
+class Groups(NamedTuple):
+    """J components around K leaders."""
+
+    places: ndarray
+    """(J,), the group of each, -1 for none."""
+    leaders: ndarray
+    """(K,), the leader of each group."""
+
+
+class Reduced(NamedTuple):
+    """A mixture after pruning, merging and capping."""
+
+    weights: ndarray
+    """(K,), heaviest first."""
+    means: ndarray
+    """(K, d)."""
+    covariances: ndarray
+    """(K, d, d)."""
+    leaders: ndarray
+    """(K,), the component that led each."""
+
+
+class _Axes(NamedTuple):
+    """Two axes of the state."""
+
+    first: int
+    second: int
+
+
+class _Span(NamedTuple):
+    """Cells in a row, both ends included."""
+
+    first: int
+    last: int
+
+
+class _Grids(NamedTuple):
+    """A grid over two axes for each class of reach."""
+
+    by_cell: ndarray
+    """(N,) the components, cell by cell."""
+    begins: ndarray
+    """Where each cell of all grids begins among them."""
+    first_cell: ndarray
+    """For each class that has components its first cell, and one more."""
+    counts: ndarray
+    """Of each such class, rows and columns."""
+    sides: ndarray
+    """Of each such class (6,): the lowest coordinate, the number of cells a metre and the
+    greatest reach along either axis."""
 
 
 @kernel
@@ -67,7 +120,7 @@ def _factors(covariances: ndarray, which: ndarray) -> ndarray:
 
 
 @kernel
-def _widest_axes(means: ndarray, covariances: ndarray, which: ndarray) -> tuple[int, int]:
+def _widest_axes(means: ndarray, covariances: ndarray, which: ndarray) -> _Axes:
     """The two axes along which components lie furthest apart, measured by their variances."""
     first = second = 0
     most = more = -1.0
@@ -84,23 +137,15 @@ def _widest_axes(means: ndarray, covariances: ndarray, which: ndarray) -> tuple[
             first, most = a, width
         elif width > more:
             second, more = a, width
-    return first, second
+    return _Axes(first, second)
 
 
 @kernel
-def _grids(
-    places: ndarray,
-) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
+def _grids(places: ndarray) -> _Grids:
     """A grid over two axes for each class of reach, its cells about half as wide as the reach.
 
     Args:
         places: (N, 4), the coordinates along the two axes and the reach along them.
-
-    Returns:
-        The components cell by cell (N,); where each cell of all grids begins among them;
-        for each class that has components its first cell, and one more; rows and columns;
-        and, (6), the lowest coordinate, the number of cells a metre and the greatest reach
-        along either axis.
     """
     size = len(places)
     # the exponent of a floating-point number is the whole part of its logarithm
@@ -153,41 +198,33 @@ def _grids(
     for i in range(size):
         by_cell[place[cells[i]]] = i
         place[cells[i]] += 1
-    return by_cell, begins, first_cell[: used + 1], counts, sides
+    return _Grids(by_cell, begins, first_cell[: used + 1], counts, sides)
 
 
 @kernel
-def _search(
-    here: float,
-    there: float,
-    beside: ndarray,
-    begins: ndarray,
-    first_cell: ndarray,
-    counts: ndarray,
-    sides: ndarray,
-    hits: ndarray,
-) -> int:
+def _search(here: float, there: float, beside: ndarray, grids: _Grids, hits: ndarray) -> int:
     """Find who reaches a place along both axes of the grids.
 
     Args:
         here: Along the first axis, as ``there`` along the second.
-        beside: (N, 4), as the places of :func:`_grids`, from which the further ones are,
-            cell by cell. Who has a negative reach is not found.
+        beside: (N, 4), as the places of :func:`_grids`, cell by cell. Who has a negative
+            reach is not found.
+        grids: Of these places.
         hits: (N + 1,), takes the rows of ``beside`` that were found.
 
     Returns:
         How many were found.
     """
+    begins, first_cell = grids.begins, grids.first_cell
+    counts, sides = grids.counts, grids.sides
     found = 0
     for c in range(len(first_cell) - 1):
         # whoever reaches the place lies in one of these cells; the last holds its far edge
-        from_row, to_row = _reached(here - sides[c, 0], sides[c, 4], sides[c, 2], counts[c, 0])
-        from_column, to_column = _reached(
-            there - sides[c, 1], sides[c, 5], sides[c, 3], counts[c, 1]
-        )
-        for row in range(from_row, to_row + 1):
+        rows = _reached(here - sides[c, 0], sides[c, 4], sides[c, 2], counts[c, 0])
+        columns = _reached(there - sides[c, 1], sides[c, 5], sides[c, 3], counts[c, 1])
+        for row in range(rows.first, rows.last + 1):
             cell = first_cell[c] + row * counts[c, 1]
-            for k in range(begins[cell + from_column], begins[cell + to_column + 1]):
+            for k in range(begins[cell + columns.first], begins[cell + columns.last + 1]):
                 # without a branch, which nobody could foresee
                 hits[found] = k
                 found += int(
@@ -198,11 +235,11 @@ def _search(
 
 
 @kernel
-def _reached(offset: float, reach: float, cells_a_metre: float, count: int) -> tuple[int, int]:
+def _reached(offset: float, reach: float, cells_a_metre: float, count: int) -> _Span:
     """The first and the last of ``count`` cells in a row whose members may reach an offset."""
     first = min(max((offset - reach) * cells_a_metre - 1e-6, 0.0), count - 1.0)
     last = min(max((offset + reach) * cells_a_metre + 1e-6, -1.0), count - 1.0)
-    return int(first), math.floor(last)
+    return _Span(int(first), math.floor(last))
 
 
 @kernel
@@ -223,7 +260,7 @@ def _squared_distance(
 @kernel
 def merge_groups(
     means: ndarray, covariances: ndarray, order: ndarray, owners: ndarray, threshold: float
-) -> tuple[ndarray, ndarray]:
+) -> Groups:
     """Group components around the heaviest ones left (Table II of [VM06]).
 
     A component i joins the leader l where (m_i − m_l)ᵀ P_i⁻¹ (m_i − m_l) <= threshold.
@@ -237,8 +274,7 @@ def merge_groups(
         threshold: Squared Mahalanobis distance.
 
     Returns:
-        The group of each component (J,), -1 for those that are not in ``order``, and the
-        leader of each group (K,).
+        Groups of those in ``order``.
 
     Raises:
         numpy.linalg.LinAlgError: If a covariance is not positive definite.
@@ -247,11 +283,12 @@ def merge_groups(
     group = np.full(len(means), -1, dtype=np.int64)
     leaders = np.empty(len(order), dtype=np.int64)
     if len(order) == 0:
-        return group, leaders
+        return Groups(group, leaders)
     group[order] = -2
     which = np.flatnonzero(group == -2)
     lower = _factors(covariances, which)
-    first, second = _widest_axes(means, covariances, which)
+    widest = _widest_axes(means, covariances, which)
+    first, second = widest.first, widest.second
     places = np.empty((len(which), 4))
     # a little more than the bound, so that rounding excludes nobody
     bound = threshold * (1.0 + 1e-9)
@@ -260,7 +297,8 @@ def merge_groups(
         places[k, 0], places[k, 1] = means[i, first], means[i, second]
         places[k, 2] = math.sqrt(bound * covariances[i, first, first]) + 1e-300
         places[k, 3] = math.sqrt(bound * covariances[i, second, second]) + 1e-300
-    by_cell, begins, first_cell, counts, sides = _grids(places)
+    grids = _grids(places)
+    by_cell = grids.by_cell
     # place and reach in the order of the cells; nobody reaches out of -1
     beside = np.empty(places.shape)
     slot = np.empty(len(means), dtype=np.int64)
@@ -277,10 +315,7 @@ def merge_groups(
             continue
         group[leader] = count
         beside[slot[leader], 2] = -1.0
-        found = _search(
-            means[leader, first], means[leader, second],
-            beside, begins, first_cell, counts, sides, hits,
-        )  # fmt: skip
+        found = _search(means[leader, first], means[leader, second], beside, grids, hits)
         for k in hits[:found]:
             i = by_cell[k]
             if len(owners) and owners[i] >= 0 and owners[i] != owners[leader]:
@@ -294,7 +329,7 @@ def merge_groups(
                 beside[k, 2] = -1.0
         leaders[count] = leader
         count += 1
-    return group, leaders[:count].copy()
+    return Groups(group, leaders[:count].copy())
 
 
 @kernel
@@ -306,7 +341,7 @@ def reduce_mixture(
     pruning_threshold: float,
     merging_threshold: float,
     max_components: int,
-) -> tuple[ndarray, ndarray, ndarray, ndarray]:
+) -> Reduced:
     """Prune, merge and cap: :func:`tracker.filters.gaussian_mixture.reduce`.
 
     Only the moments of what stays are computed, and nothing is moved in between.
@@ -319,13 +354,11 @@ def reduce_mixture(
         pruning_threshold: The least weight.
         merging_threshold: Squared Mahalanobis distance.
         max_components: How many may stay.
-
-    Returns:
-        (K,) weights, heaviest first, (K, d) means, (K, d, d) covariances and (K,) leaders.
     """
     kept = np.flatnonzero(weights >= pruning_threshold)
     order = kept[heaviest_first(weights[kept])]
-    group, leaders = merge_groups(means, covariances, order, owners, merging_threshold)
+    groups = merge_groups(means, covariances, order, owners, merging_threshold)
+    group, leaders = groups.places, groups.leaders
     sums = np.zeros(len(leaders))
     for i in kept:
         sums[group[i]] += weights[i]
@@ -337,5 +370,5 @@ def reduce_mixture(
         group[i] = place[group[i]]
     merged = merge_moments(weights, means, covariances, group, len(heaviest))
     if len(heaviest) < len(leaders):
-        merged[0][:] *= sums.sum() / merged[0].sum()
-    return merged[0], merged[1], merged[2], leaders[heaviest]
+        merged.weights[:] *= sums.sum() / merged.weights.sum()
+    return Reduced(merged.weights, merged.means, merged.covariances, leaders[heaviest])

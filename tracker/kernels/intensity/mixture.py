@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy import ndarray
@@ -16,10 +17,17 @@ _DIGIT = 10
 """Bits that one pass of sorting looks at."""
 
 
+class Moments(NamedTuple):
+    """Where J components are."""
+
+    means: ndarray
+    """(J, d)."""
+    covariances: ndarray
+    """(J, d, d)."""
+
+
 @kernel
-def predict(
-    means: ndarray, covariances: ndarray, transition: ndarray, noises: ndarray
-) -> tuple[ndarray, ndarray]:
+def predict(means: ndarray, covariances: ndarray, transition: ndarray, noises: ndarray) -> Moments:
     """F m and F P Fᵀ + Q of every component, symmetric to the last bit.
 
     Args:
@@ -37,7 +45,7 @@ def predict(
 @kernel
 def _predicted(
     means: ndarray, covariances: ndarray, transition: ndarray, noises: ndarray, axes: Sequence[int]
-) -> tuple[ndarray, ndarray]:
+) -> Moments:
     """:func:`predict` for axes that are a range, or, to have loops unrolled, a tuple of as many."""
     moved = np.empty(means.shape)
     spread = np.empty(covariances.shape)
@@ -61,7 +69,7 @@ def _predicted(
                     total += half[a, c] * transition[b, c]
                 spread[j, a, b] = total
                 spread[j, b, a] = total
-    return moved, spread
+    return Moments(moved, spread)
 
 
 @kernel

@@ -3,27 +3,55 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy import ndarray
 
 from tracker.kernels.compilation import kernel
-from tracker.kernels.kalman import all_pairs
+from tracker.kernels.gating import Measurements
+from tracker.kernels.kalman import Expected, all_pairs
+from tracker.kernels.linear_algebra import Gaussians
+
+
+class PairWeights(NamedTuple):
+    """Weights of P pairs of a component and one of M measurements."""
+
+    weights: ndarray
+    """(P,)."""
+    log_odds: ndarray
+    """(P,), against clutter."""
+    sums: ndarray
+    """(M,), of the weights."""
+
+
+class UpdatedIntensity(NamedTuple):
+    """An intensity after one measurement set: J components as missed, then P pairs."""
+
+    weights: ndarray
+    """(K,), K = J + P."""
+    means: ndarray
+    """(K, d)."""
+    covariances: ndarray
+    """(K, d, d)."""
+    parents: ndarray
+    """(K,), the component that each comes from."""
+    measured: ndarray
+    """(K,), the measurement that updated it, -1 for a miss."""
+    log_odds: ndarray
+    """(P,), of the pairs against clutter."""
+    sums: ndarray
+    """(M,), of the weights of each measurement's pairs."""
 
 
 @kernel
-def phd_weights(
-    log_terms: ndarray, measured: ndarray, log_clutter: ndarray
-) -> tuple[ndarray, ndarray, ndarray]:
+def phd_weights(log_terms: ndarray, measured: ndarray, log_clutter: ndarray) -> PairWeights:
     """Weights of a PHD update, in logarithms: a far measurement still goes to its nearest.
 
     Args:
         log_terms: (P,), log(p_D w q(z)) of each pair.
         measured: (P,), its measurement.
         log_clutter: (M,), log κ(z); minus infinity without clutter.
-
-    Returns:
-        (P,) weights; (P,) log odds against clutter; (M,) sums of the weights.
     """
     count = len(log_clutter)
     largest = np.empty(count)
@@ -47,7 +75,7 @@ def phd_weights(
         z = measured[pair]
         weights[pair] /= totals[z]
         sums[z] += weights[pair]
-    return weights, odds, sums
+    return PairWeights(weights, odds, sums)
 
 
 @kernel
@@ -72,61 +100,53 @@ def _matrices(values: ndarray, which: ndarray) -> ndarray:
 
 
 @kernel
+def _picked(expected: Expected, which: ndarray, size: int) -> Expected:
+    """What the components ``which`` of ``size`` predict."""
+    nothing, of_all = which[:0], np.zeros(1, dtype=np.int64)
+    there = which if len(expected.posture_values) else nothing
+    return Expected(
+        _vectors(expected.values, which),
+        _matrices(expected.jacobians, which if len(expected.jacobians) == size else of_all),
+        _matrices(expected.spreads, which if len(expected.spreads) else nothing),
+        _vectors(expected.posture_values, there),
+        _matrices(expected.posture_jacobians, there),
+        _matrices(expected.posture_spreads, there),
+        expected.posture_drift,
+        expected.posture_share,
+    )
+
+
+@kernel
 def phd_update(
-    weights: ndarray,
-    means: ndarray,
-    covariances: ndarray,
-    expected: ndarray,
-    jacobians: ndarray,
-    measurements: ndarray,
-    noises: ndarray,
-    spreads: ndarray,
+    predicted: Gaussians,
+    expected: Expected,
+    measurements: Measurements,
     detection_probabilities: ndarray,
     clutter: ndarray,
     gate: float,
-    other_expected: ndarray,
-    other_jacobians: ndarray,
-    other_spreads: ndarray,
-    other_drift: ndarray,
-    other_share: float,
-) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray, ndarray, ndarray]:
+) -> UpdatedIntensity:
     """The GM-PHD update: every component as missed, then one for every gated pair.
 
     Args:
-        weights: (J,).
-        means: (J, d).
-        covariances: (J, d, d).
-        expected: (J, m), as the further ones, of :func:`tracker.kernels.kalman.kalman_pairs`.
+        predicted: J components.
+        expected: The measurement that each predicts.
+        measurements: M of them.
         detection_probabilities: (J,).
         clutter: (M,), κ(z).
         gate: Squared Mahalanobis distance.
-        other_expected: As the further ones, of :func:`tracker.kernels.kalman.all_pairs`.
-
-    Returns:
-        (K,) weights, (K, d) means, (K, d, d) covariances, (K,) parent and (K,)
-        measurement, -1 for a miss; (P,) log odds of the pairs against clutter; (M,) sums
-        of the weights.
     """
+    weights, means, covariances = predicted.weights, predicted.means, predicted.covariances
     size, dimension = means.shape
     detectable = np.flatnonzero(detection_probabilities * weights > 0.0)
-    nothing = detectable[:0]
-    of_all = np.zeros(1, dtype=np.int64)
-    there = detectable if len(other_expected) else nothing
-    parent, measured, log_likelihood, new_means, new_covariances = all_pairs(
+    found = all_pairs(
         _vectors(means, detectable),
         _matrices(covariances, detectable),
-        _vectors(expected, detectable),
-        _matrices(jacobians, detectable if len(jacobians) == size else of_all),
+        _picked(expected, detectable, size),
         measurements,
-        noises,
-        _matrices(spreads, detectable if len(spreads) else nothing),
         gate,
-        _vectors(other_expected, there),
-        _matrices(other_jacobians, there),
-        _matrices(other_spreads, there),
-        other_drift,
-        other_share,
     )
+    parent, measured = found.components, found.measured
+    new_means, new_covariances = found.means, found.covariances
     pairs = len(parent)
     log_clutter = np.empty(len(clutter))
     for z in range(len(clutter)):
@@ -137,9 +157,9 @@ def phd_update(
         log_scales[k] = math.log(detection_probabilities[j] * weights[j])
     log_terms = np.empty(pairs)
     for pair in range(pairs):
-        log_terms[pair] = log_scales[parent[pair]] + log_likelihood[pair]
+        log_terms[pair] = log_scales[parent[pair]] + found.log_likelihoods[pair]
         parent[pair] = detectable[parent[pair]]
-    pair_weights, log_odds, sums = phd_weights(log_terms, measured, log_clutter)
+    shares = phd_weights(log_terms, measured, log_clutter)
 
     all_weights = np.empty(size + pairs)
     all_means = np.empty((size + pairs, dimension))
@@ -153,7 +173,7 @@ def phd_update(
             all_weights[k] = weights[k] * (1.0 - detection_probabilities[k])
             parents[k], sources[k] = k, -1
         else:
-            all_weights[k] = pair_weights[pair]
+            all_weights[k] = shares.weights[pair]
             parents[k], sources[k] = parent[pair], measured[pair]
         for a in range(dimension):
             all_means[k, a] = means[k, a] if k < size else new_means[pair, a]
@@ -161,4 +181,12 @@ def phd_update(
                 all_covariances[k, a, b] = (
                     covariances[k, a, b] if k < size else new_covariances[pair, a, b]
                 )
-    return all_weights, all_means, all_covariances, parents, sources, log_odds, sums
+    return UpdatedIntensity(
+        all_weights,
+        all_means,
+        all_covariances,
+        parents,
+        sources,
+        shares.log_odds,
+        shares.sums,
+    )

@@ -5,55 +5,138 @@ One call a camera and step: the calls between its parts would take longer than t
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy import ndarray
 
-from tracker.kernels.boxes import hide, inside_probability
+from tracker.kernels.association.belief_propagation import Settling
+from tracker.kernels.boxes import Occlusion, hide, inside_probability
 from tracker.kernels.compilation import kernel
+from tracker.kernels.gating import Measurements
 from tracker.kernels.intensity.phd import phd_update
+from tracker.kernels.kalman import Expected
 from tracker.kernels.labelled.marginals import bernoulli_update
-from tracker.kernels.linear_algebra import merge_moments
+from tracker.kernels.linear_algebra import Gaussians, merge_moments
+from tracker.kernels.measurement import ExpectedBoxes
+
+
+class Tracks(NamedTuple):
+    """n Bernoulli tracks: one existence, one Gaussian and one label a person."""
+
+    existences: ndarray
+    """(n,)."""
+    means: ndarray
+    """(n, d)."""
+    covariances: ndarray
+    """(n, d, d)."""
+    labels: ndarray
+    """(n,)."""
+
+
+class CameraRule(NamedTuple):
+    """How every camera's boxes are taken."""
+
+    gate: float
+    """Squared Mahalanobis distance."""
+    soft: bool
+    """Of :func:`tracker.kernels.boxes.inside_probability`."""
+    detection_probability: float
+    """Of somebody in full view."""
+    confirmed: float
+    """Whoever occludes with more weight than this hides others."""
+    near: float
+    """As the next two, of :class:`tracker.kernels.boxes.Occlusion`."""
+    strength: float
+    worth_telling: float
+    tolerance: float
+    """As the next, of :class:`tracker.kernels.association.belief_propagation.Settling`."""
+    iterations: int
+    least_told: float
+    """Association probability from which a pair is told."""
+
+
+class CameraRecord(NamedTuple):
+    """What a camera says of n tracks."""
+
+    detection_probabilities: ndarray
+    """(n,)."""
+    hidden_by: ndarray
+    """(n,), the label of who hides each, -1 for nobody."""
+    sources: ndarray
+    """(n,), the box that is more likely its own than any other and than none, -1 for none."""
+    shares: ndarray
+    """(n,), the probability of that."""
+
+
+class Newcomers(NamedTuple):
+    """What M boxes make of people never yet detected."""
+
+    shares: ndarray
+    """(M,), e / (κ + e): a newcomer's share in what no track explains."""
+    means: ndarray
+    """(M, d)."""
+    covariances: ndarray
+    """(M, d, d)."""
+
+
+class TrackPairs(NamedTuple):
+    """A pairs of a track and a box that are worth telling."""
+
+    tracks: ndarray
+    """(A,), the index."""
+    boxes: ndarray
+    """(A,)."""
+    probabilities: ndarray
+    """(A,)."""
+
+
+class CameraUpdate(NamedTuple):
+    """Everybody in a room after one camera's boxes."""
+
+    existences: ndarray
+    """(n,)."""
+    means: ndarray
+    """(n, d)."""
+    covariances: ndarray
+    """(n, d, d)."""
+    record: CameraRecord
+    undetected: ndarray
+    """(U,), weights of those never yet detected."""
+    newcomers: Newcomers
+    unexplained: ndarray
+    """(M,), the probability that no track made the box."""
+    pairs: TrackPairs
+
+
+@kernel
+def _part(expected: Expected, first: int, last: int) -> Expected:
+    """What the components from ``first`` to ``last``, exclusive, predict."""
+    spreads, others = expected.spreads, len(expected.posture_values) > 0
+    begin, end = (first, last) if others else (0, 0)
+    return Expected(
+        expected.values[first:last],
+        expected.jacobians[first:last],
+        spreads[first:last] if len(spreads) > 0 else spreads,
+        expected.posture_values[begin:end],
+        expected.posture_jacobians[begin:end],
+        expected.posture_spreads[begin:end],
+        expected.posture_drift,
+        expected.posture_share,
+    )
 
 
 @kernel
 def update_by_camera(
-    undetected_weights: ndarray,
-    undetected_means: ndarray,
-    undetected_covariances: ndarray,
-    existences: ndarray,
-    means: ndarray,
-    covariances: ndarray,
-    labels: ndarray,
+    undetected: Gaussians,
+    tracks: Tracks,
     occluding: ndarray,
-    measurements: ndarray,
-    noises: ndarray,
+    measurements: Measurements,
+    seen: ExpectedBoxes,
+    image_size: ndarray,
     clutter: float,
-    gate: float,
-    expected: ndarray,
-    jacobians: ndarray,
-    spreads: ndarray,
-    boxes: ndarray,
-    depths: ndarray,
-    valid: ndarray,
-    other_expected: ndarray,
-    other_jacobians: ndarray,
-    other_spreads: ndarray,
-    other_drift: ndarray,
-    other_share: float,
-    image_size: tuple[int, int],
-    soft: bool,
-    detection_probability: float,
-    confirmed: float,
-    strength: float,
-    near: float,
-    least_covered: float,
-    tolerance: float,
-    iterations: int,
-    least_told: float,
-) -> tuple[
-    ndarray, ndarray, ndarray, ndarray, ndarray, ndarray, ndarray, ndarray,
-    ndarray, ndarray, ndarray, ndarray, ndarray, ndarray, ndarray,
-]:  # fmt: skip
+    rule: CameraRule,
+) -> CameraUpdate:
     """The update of n tracks, and of the U people never yet detected, by one camera's M boxes.
 
     The undetected are updated as a PHD intensity; what a box makes of them, e, stands beside
@@ -61,119 +144,119 @@ def update_by_camera(
     propagation. In what the camera expects, the undetected come first and then the tracks.
 
     Args:
-        undetected_weights: (U,), as the next two (U, d) and (U, d, d).
-        existences: (n,), as the next two (n, d) and (n, d, d).
-        labels: (n,).
+        undetected: U components.
+        tracks: n of them.
         occluding: (n,), the weight with which each track may hide others.
-        measurements: (M, m), as ``noises`` of :func:`tracker.kernels.kalman.kalman_pairs`.
+        measurements: M of them, each with its noise or all with one.
+        seen: What the camera should see of U + n.
+        image_size: (2,) width and height, pixels.
         clutter: κ.
-        gate: Squared Mahalanobis distance.
-        expected: (U + n, m), as the further ones of :func:`tracker.kernels.boxes.expected_boxes`;
-            ``spreads`` as there, or none.
-        other_expected: As the further ones, of :func:`tracker.kernels.kalman.all_pairs`.
-        image_size: As ``soft``, of :func:`tracker.kernels.boxes.inside_probability`.
-        detection_probability: Of somebody in full view.
-        confirmed: Whoever occludes with more weight than this hides others.
-        strength: As the next two, of :func:`tracker.kernels.boxes.hide`.
-        tolerance: As ``iterations``, of
-            :func:`tracker.kernels.labelled.marginals.belief_propagation`.
-        least_told: Association probability from which a pair is told.
-
-    Returns:
-        Of the tracks: (n,) existences, (n, d) means, (n, d, d) covariances; (n,) p_D and (n,)
-        the label of who hides each; (n,) the box that is more likely its own than any other and
-        than none, -1 for none, and (n,) its probability. Of the undetected: (U,) weights.
-        Of the boxes: (M,) e / (κ + e), the share of a newcomer in what no track explains, his
-        mean and covariance, and (M,) the probability that no track made it. Of the pairs worth
-        telling: (A,) track, (A,) box and (A,) probability.
+        rule: How the boxes are taken.
     """
-    size, tracks, count = len(undetected_weights), len(existences), len(measurements)
-    bends = len(spreads) > 0
-    first = size if len(other_expected) > 0 else 0
-    unseen = detection_probability * inside_probability(
-        boxes[:size],
-        jacobians[:size],
-        undetected_covariances,
-        valid[:size],
-        image_size,
-        soft,
-    )
-    weights, places, widths, _, sources, _, sums = phd_update(
-        undetected_weights,
-        undetected_means,
-        undetected_covariances,
-        expected[:size],
-        jacobians[:size],
+    size, count = len(undetected.weights), len(measurements.values)
+    everybody = size + len(tracks.existences)
+    expected, boxes, valid = seen.expected, seen.boxes, seen.valid
+    jacobians = expected.jacobians
+    new = phd_update(
+        undetected,
+        _part(expected, 0, size),
         measurements,
-        noises,
-        spreads[:size] if bends else spreads,
-        unseen,
-        np.full(count, clutter),
-        gate,
-        other_expected[:first],
-        other_jacobians[:first],
-        other_spreads[:first],
-        other_drift,
-        other_share,
-    )
-    _, born_means, born_covariances = merge_moments(
-        weights[size:], places[size:], widths[size:], sources[size:], count
-    )
-    newcomer = np.minimum(sums, 1.0 - 1e-9)
-
-    hiding = np.flatnonzero(occluding > confirmed) if strength > 0.0 else np.arange(0)
-    chances, hidden_by = hide(
-        detection_probability
+        rule.detection_probability
         * inside_probability(
-            boxes[size:], jacobians[size:], covariances, valid[size:], image_size, soft
+            boxes[:size],
+            jacobians[:size],
+            undetected.covariances,
+            valid[:size],
+            image_size,
+            rule.soft,
+        ),
+        np.full(count, clutter),
+        rule.gate,
+    )
+    born = merge_moments(
+        new.weights[size:], new.means[size:], new.covariances[size:], new.measured[size:], count
+    )
+    newcomer = np.minimum(new.sums, 1.0 - 1e-9)
+
+    hiding = np.arange(0)
+    if rule.strength > 0.0:
+        hiding = np.flatnonzero(occluding > rule.confirmed)
+    hidden = hide(
+        rule.detection_probability
+        * inside_probability(
+            boxes[size:],
+            jacobians[size:],
+            tracks.covariances,
+            valid[size:],
+            image_size,
+            rule.soft,
         ),
         boxes[size:],
-        depths[size:],
-        means,
-        labels,
+        seen.depths[size:],
+        tracks.means,
+        tracks.labels,
         hiding,
         occluding[hiding],
-        near,
-        strength,
-        least_covered,
+        Occlusion(rule.near, rule.strength, rule.worth_telling),
     )
-    existing, new_means, new_covariances, rows, unexplained = bernoulli_update(
-        existences,
-        means,
-        covariances,
-        expected[size:],
-        jacobians[size:],
+    updated = bernoulli_update(
+        Gaussians(tracks.existences, tracks.means, tracks.covariances),
+        _part(expected, size, everybody),
         measurements,
-        noises,
-        spreads[size:] if bends else spreads,
-        chances,
+        hidden.detection_probabilities,
         clutter / (1.0 - newcomer),
-        gate,
-        other_expected[first:],
-        other_jacobians[first:],
-        other_spreads[first:],
-        other_drift,
-        other_share,
-        tolerance,
-        iterations,
+        rule.gate,
+        Settling(rule.tolerance, rule.iterations),
+    )
+    likeliest = _likeliest(updated.rows)
+    return CameraUpdate(
+        updated.existences,
+        updated.means,
+        updated.covariances,
+        CameraRecord(
+            hidden.detection_probabilities, hidden.hidden_by, likeliest.boxes, likeliest.shares
+        ),
+        new.weights[:size].copy(),
+        Newcomers(newcomer, born.means, born.covariances),
+        updated.unexplained,
+        _told(updated.rows, rule.least_told),
     )
 
+
+class _Likeliest(NamedTuple):
+    """The box that is more likely a track's own than any other and than none."""
+
+    boxes: ndarray
+    """(n,), -1 for none."""
+    shares: ndarray
+    """(n,), its probability."""
+
+
+@kernel
+def _likeliest(rows: ndarray) -> _Likeliest:
+    """Of the association probabilities (n, 1 + M), of which the first is of a miss."""
+    tracks, count = rows.shape
     best = np.full(tracks, -1, dtype=np.int64)
     shares = np.zeros(tracks)
-    who = np.empty(tracks * count, dtype=np.int64)
-    what = np.empty(tracks * count, dtype=np.int64)
-    chance = np.empty(tracks * count)
+    for i in range(tracks):
+        for z in range(count - 1):
+            if rows[i, 1 + z] > max(shares[i], rows[i, 0]):
+                best[i], shares[i] = z, rows[i, 1 + z]
+    return _Likeliest(best, shares)
+
+
+@kernel
+def _told(rows: ndarray, least: float) -> TrackPairs:
+    """The pairs of (n, 1 + M) association probabilities that are not less than ``least``."""
+    tracks, count = rows.shape
+    who = np.empty(tracks * (count - 1), dtype=np.int64)
+    what = np.empty(tracks * (count - 1), dtype=np.int64)
+    probabilities = np.empty(tracks * (count - 1))
     told = 0
     for i in range(tracks):
-        for z in range(count):
+        for z in range(count - 1):
             share = rows[i, 1 + z]
-            if share > max(shares[i], rows[i, 0]):
-                best[i], shares[i] = z, share
-            if share > 0.0 and share >= least_told:
-                who[told], what[told], chance[told] = i, z, share
+            if share > 0.0 and share >= least:
+                who[told], what[told], probabilities[told] = i, z, share
                 told += 1
-    return (
-        existing, new_means, new_covariances, chances, hidden_by, best, shares,
-        weights[:size].copy(), newcomer, born_means, born_covariances, unexplained,
-        who[:told].copy(), what[:told].copy(), chance[:told].copy(),
-    )  # fmt: skip
+    return TrackPairs(who[:told].copy(), what[:told].copy(), probabilities[:told].copy())

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy import ndarray
 
-from tracker.kernels.boxes import hide, inside_probability
+from tracker.kernels.association.belief_propagation import Settling, belief_propagation
+from tracker.kernels.boxes import Occlusion, hide, inside_probability
 from tracker.kernels.compilation import kernel
-from tracker.kernels.labelled.marginals import belief_propagation
+from tracker.kernels.gating import Measurements
+from tracker.kernels.kalman import Expected
+from tracker.kernels.labelled.camera_update import CameraRule
 from tracker.kernels.linear_algebra import factorise, solve
+from tracker.kernels.measurement import ExpectedBoxes
 
 
 @kernel
@@ -32,45 +37,99 @@ def _posture(difference: ndarray, noise: ndarray, jacobian: ndarray, covariance:
     return -0.5 * total
 
 
+class BoxInformation(NamedTuple):
+    """What boxes say of the positions of N rows of paths: log L(p) = yᵀp − ½ pᵀ Y p + c."""
+
+    matrices: ndarray
+    """Y (N, 3, 3)."""
+    vectors: ndarray
+    """y (N, 3)."""
+    constants: ndarray
+    """c (N,)."""
+
+
+class BoxLinks(NamedTuple):
+    """L pairs of a row of a path and a box of a camera."""
+
+    rows: ndarray
+    """(L,)."""
+    boxes: ndarray
+    """(L,), index among the camera's boxes of all steps."""
+    shares: ndarray
+    """a (L,), association probability."""
+
+
+class Rows(NamedTuple):
+    """N rows of paths, and where each step's are."""
+
+    states: ndarray
+    """(N, d), position first."""
+    covariances: ndarray
+    """(N, d, d)."""
+    existences: ndarray
+    """(N,), that somebody is there."""
+    labels: ndarray
+    """(N,), of their paths."""
+    order: ndarray
+    """(N,), the rows, step after step."""
+    step_starts: ndarray
+    """(T + 1,), where each step's rows begin in ``order``, and the end."""
+
+
+class CameraSteps(NamedTuple):
+    """What one camera gave at T steps."""
+
+    starts: ndarray
+    """(T + 1,), where each step's boxes begin, and the end."""
+    blind: ndarray
+    """(T,), whether it had no frame."""
+    measurements: Measurements
+    clutter: float
+    """κ."""
+
+
+class SharedCamera(NamedTuple):
+    """Who made which of a camera's boxes."""
+
+    links: BoxLinks
+    detection_probabilities: ndarray
+    """(N,)."""
+    missed: ndarray
+    """(N,), probability of a miss."""
+    hidden_by: ndarray
+    """(N,), label of who hides each, -1 for nobody."""
+
+
 @kernel
 def add_information(
-    rows: ndarray,
-    boxes: ndarray,
-    shares: ndarray,
+    links: BoxLinks,
     states: ndarray,
     covariances: ndarray,
-    expected: ndarray,
-    jacobians: ndarray,
-    spreads: ndarray,
-    measurements: ndarray,
-    noises: ndarray,
-    other_expected: ndarray,
-    other_jacobians: ndarray,
-    other_spreads: ndarray,
-    other_drift: ndarray,
-    other_share: float,
-    information: ndarray,
-    vectors: ndarray,
-    constants: ndarray,
+    expected: Expected,
+    measurements: Measurements,
+    information: BoxInformation,
 ) -> None:
     """Add what L boxes of a camera say of the rows of paths, straightened at the states.
 
         Y += a Hᵀ R⁻¹ H,   y += a Hᵀ R⁻¹ (z − h(x) + H x),   c += a log N(z − h + H x; 0, R)
 
-    with the share a of a box. Of a box that may show a person low, each posture counts with
-    its probability at the states.
+    with the share a of a box. Of a box that may show another posture, each counts with its
+    probability at the states.
 
     Args:
-        rows: (L,), to which row each box belongs.
-        boxes: (L,), index into ``measurements``.
-        shares: a (L,).
-        states: (N, d), as ``covariances`` (N, d, d).
-        expected: (L, m), as the next (L, m, d) and (L, m, m) or none.
-        measurements: (B, m), as ``noises`` (B, m, m).
-        other_expected: As the further ones, of :func:`tracker.kernels.kalman.all_pairs`.
-        information: Y (N, 3, 3), added to, as ``vectors`` y (N, 3) and ``constants`` c (N,).
+        links: Whose box each is.
+        states: (N, d).
+        covariances: (N, d, d).
+        expected: Of each of the L pairs.
+        measurements: The camera's.
+        information: Added to.
     """
-    size = measurements.shape[1]
+    rows, boxes, shares = links.rows, links.boxes, links.shares
+    jacobians, spreads = expected.jacobians, expected.spreads
+    other_expected, other_jacobians = expected.posture_values, expected.posture_jacobians
+    other_drift, other_share = expected.posture_drift, expected.posture_share
+    values, noises = measurements.values, measurements.noises
+    size = values.shape[1]
     kinds = 2 if len(other_expected) > 0 else 1
     lower, column, solved = np.zeros((size, size)), np.empty(size), np.empty(size)
     halves = np.empty((3, size))
@@ -82,7 +141,7 @@ def add_information(
         if len(spreads):
             noise[0] += spreads[link]
         if kinds == 2:
-            noise[1] = noises[z] + other_spreads[link]
+            noise[1] = noises[z] + expected.posture_spreads[link]
             h = other_jacobians[link]
             for p in range(size):
                 for q in range(size):
@@ -90,12 +149,12 @@ def add_information(
                         for b in range(3):
                             noise[1, p, q] += h[p, a] * other_drift[a, b] * h[q, b]
             upright = math.log(1.0 - other_share) + _posture(
-                measurements[z] - expected[link], noise[0], jacobians[link], covariances[k]
+                values[z] - expected.values[link], noise[0], jacobians[link], covariances[k]
             )
             low = -math.inf
             if other_expected[link, 0] < math.inf:
                 low = math.log(other_share) + _posture(
-                    measurements[z] - other_expected[link], noise[1], h, covariances[k]
+                    values[z] - other_expected[link], noise[1], h, covariances[k]
                 )
             largest = max(upright, low)
             total = math.exp(upright - largest) + math.exp(low - largest)
@@ -106,9 +165,9 @@ def add_information(
             if a_share < 1e-6:
                 continue
             h = jacobians[link] if kind == 0 else other_jacobians[link]
-            value = expected[link] if kind == 0 else other_expected[link]
+            value = expected.values[link] if kind == 0 else other_expected[link]
             for p in range(size):
-                column[p] = measurements[z, p] - value[p]
+                column[p] = values[z, p] - value[p]
                 for a in range(3):
                     column[p] += h[p, a] * states[k, a]
             log_determinant = factorise(noise[kind], lower)
@@ -116,75 +175,44 @@ def add_information(
             total = size * math.log(2.0 * math.pi) + log_determinant
             for p in range(size):
                 total += column[p] * solved[p]
-            constants[k] -= 0.5 * a_share * total
+            information.constants[k] -= 0.5 * a_share * total
             for a in range(3):
                 for p in range(size):
-                    vectors[k, a] += a_share * h[p, a] * solved[p]
+                    information.vectors[k, a] += a_share * h[p, a] * solved[p]
             for a in range(3):
                 solve(lower, np.ascontiguousarray(h[:, a]), halves[a])
             for a in range(3):
                 for b in range(3):
                     for p in range(size):
-                        information[k, a, b] += a_share * h[p, a] * halves[b, p]
+                        information.matrices[k, a, b] += a_share * h[p, a] * halves[b, p]
 
 
 @kernel
 def share_camera(
-    order: ndarray,
-    step_starts: ndarray,
-    box_starts: ndarray,
-    existences: ndarray,
-    states: ndarray,
-    covariances: ndarray,
-    labels: ndarray,
-    expected: ndarray,
-    jacobians: ndarray,
-    spreads: ndarray,
-    boxes: ndarray,
-    depths: ndarray,
-    valid: ndarray,
-    other_expected: ndarray,
-    other_jacobians: ndarray,
-    other_spreads: ndarray,
-    other_drift: ndarray,
-    other_share: float,
-    measurements: ndarray,
-    noises: ndarray,
-    clutter: float,
-    gate: float,
+    rows: Rows,
+    camera: CameraSteps,
+    seen: ExpectedBoxes,
     image_size: ndarray,
-    soft: bool,
-    detection_probability: float,
-    confirmed: float,
-    strength: float,
-    near: float,
-    least_covered: float,
-    tolerance: float,
-    iterations: int,
-    least: float,
-) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray, ndarray]:
+    rule: CameraRule,
+) -> SharedCamera:
     """Who made which of a camera's boxes, at every step, given where all paths lie.
 
     Args:
-        order: (N,), the rows of paths, step after step.
-        step_starts: (T + 1,), where each step's rows begin in ``order``.
-        box_starts: (T + 1,), where each step's boxes begin.
-        existences: (N,), that somebody is there.
-        states: (N, d), as the next (N, d, d).
-        labels: (N,), the path of each row.
-        expected: (N, m), as the further ones of
-            :func:`tracker.kernels.measurement.expected_measurements`.
-        measurements: (B, m), as ``noises`` (B, m, m).
-        clutter: κ.
-        gate: As the further ones, of
-            :func:`tracker.kernels.labelled.camera_update.update_by_camera`.
-        least: Association probability from which a pair is returned.
-
-    Returns:
-        (L,) row, (L,) box and (L,) probability of each pair; (N,) p_D, (N,) probability of a
-        miss, (N,) label of who hides each.
+        rows: Of the paths.
+        camera: Its boxes.
+        seen: What it should give of each row.
+        image_size: (2,) width and height, pixels.
+        rule: Of the fusion; pairs from its ``least_told`` on are returned.
     """
-    rows_count, size = len(order), measurements.shape[1]
+    order, step_starts, existences = rows.order, rows.step_starts, rows.existences
+    states, covariances, labels = rows.states, rows.covariances, rows.labels
+    expected, boxes, depths, valid = seen.expected, seen.boxes, seen.depths, seen.valid
+    jacobians, spreads = expected.jacobians, expected.spreads
+    other_expected, other_jacobians = expected.posture_values, expected.posture_jacobians
+    other_drift, other_share = expected.posture_drift, expected.posture_share
+    values, noises = camera.measurements.values, camera.measurements.noises
+    box_starts, gate = camera.starts, rule.gate
+    rows_count, size = len(order), values.shape[1]
     chances, missed = np.zeros(rows_count), np.ones(rows_count)
     hidden = np.full(rows_count, -1, dtype=np.int64)
     found_rows, found_boxes, found_shares = [0], [0], [0.0]
@@ -192,28 +220,34 @@ def share_camera(
     kinds = 2 if len(other_expected) > 0 else 1
     for step in range(len(step_starts) - 1):
         own = order[step_starts[step] : step_starts[step + 1]]
-        if len(own) == 0:
+        if len(own) == 0 or camera.blind[step]:
             continue
-        inside = detection_probability * inside_probability(
-            boxes[own], jacobians[own], covariances[own], valid[own],
-            (image_size[0], image_size[1]), soft,
-        )  # fmt: skip
+        inside = rule.detection_probability * inside_probability(
+            boxes[own], jacobians[own], covariances[own], valid[own], image_size, rule.soft
+        )
         weights = existences[own]
-        hiding = np.flatnonzero(weights > confirmed) if strength > 0.0 else np.arange(0)
-        seen, hidden_by = hide(
-            inside, boxes[own], depths[own], states[own], labels[own], hiding, weights[hiding],
-            near, strength, least_covered,
-        )  # fmt: skip
+        hiding = np.flatnonzero(weights > rule.confirmed) if rule.strength > 0.0 else np.arange(0)
+        hidden_here = hide(
+            inside,
+            boxes[own],
+            depths[own],
+            states[own],
+            labels[own],
+            hiding,
+            weights[hiding],
+            Occlusion(rule.near, rule.strength, rule.worth_telling),
+        )
+        chances_here, hidden_by = hidden_here.detection_probabilities, hidden_here.hidden_by
         first, count = box_starts[step], box_starts[step + 1] - box_starts[step]
         detected = np.zeros((len(own), count))
         for i in range(len(own)):
             k = own[i]
-            chances[k], hidden[k] = seen[i], hidden_by[i]
-            if seen[i] <= 0.0:
+            chances[k], hidden[k] = chances_here[i], hidden_by[i]
+            if chances_here[i] <= 0.0:
                 continue
             for kind in range(kinds):
                 h = jacobians[k] if kind == 0 else other_jacobians[k]
-                value = expected[k] if kind == 0 else other_expected[k]
+                value = expected.values[k] if kind == 0 else other_expected[k]
                 if not value[0] < math.inf:
                     continue
                 base = np.zeros((size, size))
@@ -228,7 +262,7 @@ def share_camera(
                 if kind == 0 and len(spreads):
                     base += spreads[k]
                 if kind == 1:
-                    base += other_spreads[k]
+                    base += expected.posture_spreads[k]
                 share = 1.0
                 if kinds == 2:
                     share = 1.0 - other_share if kind == 0 else other_share
@@ -236,14 +270,14 @@ def share_camera(
                     z = first + j
                     within = True
                     for p in range(size):
-                        gap = measurements[z, p] - value[p]
+                        gap = values[z, p] - value[p]
                         within = within and gap * gap <= gate * (base[p, p] + noises[z, p, p])
                     if not within:
                         continue
                     s = base + noises[z]
                     lower, solved = np.zeros((size, size)), np.empty(size)
                     log_determinant = factorise(s, lower)
-                    difference = measurements[z] - value
+                    difference = values[z] - value
                     solve(lower, difference, solved)
                     length = 0.0
                     for p in range(size):
@@ -251,21 +285,26 @@ def share_camera(
                     if length > gate:
                         continue
                     log_density = -0.5 * (length + log_determinant + size * math.log(2.0 * math.pi))
-                    detected[i, j] += weights[i] * seen[i] * share * math.exp(log_density)
-        told, _ = belief_propagation(
-            1.0 - weights * seen, detected, np.full(count, clutter), tolerance, iterations
-        )
+                    detected[i, j] += weights[i] * chances_here[i] * share * math.exp(log_density)
+        told = belief_propagation(
+            1.0 - weights * chances_here,
+            detected,
+            np.full(count, camera.clutter),
+            Settling(rule.tolerance, rule.iterations),
+        ).rows
         for i in range(len(own)):
             missed[own[i]] = told[i, 0]
             for j in range(count):
-                if told[i, 1 + j] >= least:
+                if told[i, 1 + j] >= rule.least_told:
                     found_rows.append(own[i])
                     found_boxes.append(first + j)
                     found_shares.append(told[i, 1 + j])
-    return (
-        np.array(found_rows), np.array(found_boxes), np.array(found_shares), chances, missed,
+    return SharedCamera(
+        BoxLinks(np.array(found_rows), np.array(found_boxes), np.array(found_shares)),
+        chances,
+        missed,
         hidden,
-    )  # fmt: skip
+    )
 
 
 @kernel

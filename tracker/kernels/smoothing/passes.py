@@ -7,11 +7,39 @@ AIAA Journal 3(8), 1965.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy import ndarray
 
 from tracker.kernels.compilation import kernel
+
+
+class PathMotion(NamedTuple):
+    """How a person moves, and what is known of him at first."""
+
+    transition: ndarray
+    """F (d, d)."""
+    noise: ndarray
+    """Q (d, d)."""
+    prior: ndarray
+    """(d, d), covariance of a first state."""
+
+
+class SmoothedRows(NamedTuple):
+    """N rows of paths after both passes."""
+
+    means: ndarray
+    """(N, d)."""
+    covariances: ndarray
+    """(N, d, d)."""
+    fits: ndarray
+    """(N,), log ∫ N(p; m, P) L(p) dp of each row, by the boxes of the rows before."""
+    traces: ndarray
+    """(N,), of the position's covariance by the rows before and this one."""
+    jumps: ndarray
+    """(N,), squared Mahalanobis distance between what the rows before and those from this one on
+    say."""
 
 
 @kernel
@@ -20,10 +48,8 @@ def smooth_paths(
     begins: ndarray,
     information: ndarray,
     vectors: ndarray,
-    transition: ndarray,
-    noise: ndarray,
-    prior: ndarray,
-) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
+    motion: PathMotion,
+) -> SmoothedRows:
     """The states of paths given all their boxes ([RTS65]), and how well these fit.
 
     A row's boxes say of its position p what log L(p) = yᵀp − ½ pᵀ Y p says, whatever their
@@ -38,15 +64,9 @@ def smooth_paths(
         begins: (n, d), mean of each path's first state.
         information: Y (N, 3, 3), one a row.
         vectors: y (N, 3).
-        transition: F (d, d).
-        noise: Q (d, d).
-        prior: (d, d), covariance of a first state.
-
-    Returns:
-        (N, d) means and (N, d, d) covariances; (N,) log ∫ N(p; m, P) L(p) dp of each row, by
-        the boxes of the rows before; (N,) trace of each filtered covariance; (N,) squared
-        Mahalanobis distance between what the rows before and those from this one on say.
+        motion: Of all.
     """
+    transition, noise, prior = motion
     rows, d = len(information), len(transition)
     means, covariances = np.empty((rows, d)), np.empty((rows, d, d))
     ahead, ahead_covariances = np.empty((rows, d)), np.empty((rows, d, d))
@@ -90,4 +110,4 @@ def smooth_paths(
             means[k] = means[k] + gain @ offset
             p = covariances[k] - gain @ lost @ gain.T
             covariances[k] = (p + p.T) / 2.0
-    return means, covariances, fits, traces, jumps
+    return SmoothedRows(means, covariances, fits, traces, jumps)

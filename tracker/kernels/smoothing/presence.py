@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy import ndarray
@@ -10,16 +11,28 @@ from numpy import ndarray
 from tracker.kernels.compilation import kernel
 
 
+class Habits(NamedTuple):
+    """How people come and go: log probabilities."""
+
+    stay: float
+    """From one step to the next."""
+    enter: float
+    """Of coming, and of leaving for good."""
+    change: float
+    """Of going away for a while, and of returning."""
+
+
+class Presence(NamedTuple):
+    """When the people of n paths were there."""
+
+    probabilities: ndarray
+    """(N,), at each row."""
+    odds: ndarray
+    """(n,), log odds of the best sequence with somebody at some step against nobody at any."""
+
+
 @kernel
-def presence(
-    starts: ndarray,
-    lasts: ndarray,
-    votes: ndarray,
-    stay: float,
-    enter: float,
-    change: float,
-    end: int,
-) -> tuple[ndarray, ndarray]:
+def presence(starts: ndarray, lasts: ndarray, votes: ndarray, habits: Habits, end: int) -> Presence:
     """How surely a path's person was there at each step, exactly, by Viterbi's recursion both ways.
 
     A person comes once and leaves once, with the probability e^enter each, and may be away in
@@ -31,15 +44,10 @@ def presence(
         starts: (n + 1,), where each path's rows begin, and the end.
         lasts: (n,), the last step of each path.
         votes: (N,), log of what each row's evidence says for somebody against nobody.
-        stay: Log probability, as the next two.
-        enter: Of coming and of leaving.
-        change: Of going away for a while, and of returning.
+        habits: Of all.
         end: The recording's last step: who is there at it has not left.
-
-    Returns:
-        (N,) probability of being there; (n,) log odds of the best sequence with somebody at
-        some step against nobody at any.
     """
+    stay, enter, change = habits
     chances = np.zeros(len(votes))
     odds = np.full(len(starts) - 1, -np.inf)
     for path in range(len(starts) - 1):
@@ -67,4 +75,4 @@ def presence(
                 max(if_never, enter + on),
                 max(if_away, change + on),
             )
-    return chances, odds
+    return Presence(chances, odds)

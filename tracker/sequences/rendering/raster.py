@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy import ndarray
@@ -26,19 +26,109 @@ def kernel(function: _F) -> _F:
     return compiled_later(function, fastmath={"contract", "arcp", "nsz"})
 
 
+class Surface(NamedTuple):
+    """The V vertices of an upright body, as in ``Body``."""
+
+    vertices: ndarray
+    """(V, 3), metres."""
+    normals: ndarray
+    """(V, 3)."""
+    bones: ndarray
+    """(V, 2), which each follows."""
+    shares: ndarray
+    """(V,), of the second bone."""
+    openness: ndarray
+    """(V,), to the light."""
+
+
+class Skeleton(NamedTuple):
+    """The B bones of a body in F frames."""
+
+    rest: ndarray
+    """(B, 3), joints of the upright body, metres."""
+    rotations: ndarray
+    """(F, B, 3, 3)."""
+    joints: ndarray
+    """(F, B, 3), metres."""
+
+
+class Placed(NamedTuple):
+    """Bodies as they stand in F frames."""
+
+    world: ndarray
+    """(F, V, 3), metres."""
+    light: ndarray
+    """(F, V, 3), red, green, blue."""
+
+
+class Figures(NamedTuple):
+    """What moves before one camera, in F frames: O owners, of which the first P are people."""
+
+    points: ndarray
+    """(F, V, 3), column and row in the fine picture and depth in metres; NaN where behind the
+    lens."""
+    light: ndarray
+    """(F, V, 3) of the vertices."""
+    present: ndarray
+    """(F, O), who is drawn."""
+    boxes: ndarray
+    """(F, P, 4): left, top, right, bottom of each person's target in fine pixels, for the
+    visible share."""
+
+
+class Mesh(NamedTuple):
+    """How the figures' T triangles hang together, and what they are covered with."""
+
+    texture_points: ndarray
+    """(V, 2)."""
+    triangles: ndarray
+    """(T, 3), people first, then doors."""
+    owners: ndarray
+    """(T,), of the triangles."""
+    vertex_ranges: ndarray
+    """(O, 2), first and last + 1 vertex of each owner."""
+    texture: ndarray
+    """(H, W, 3)."""
+
+
+class Backdrop(NamedTuple):
+    """The empty room before one camera."""
+
+    room: ndarray
+    """(h, w, 3)."""
+    room_fine: ndarray
+    """(2h, 2w, 3), twice as fine."""
+    depth_fine: ndarray
+    """(2h, 2w), likewise."""
+    floor_points: ndarray
+    """(h, w, 2), column and row in the shadow grid, negative off the floor."""
+    vignette: ndarray
+    """(h, w)."""
+
+
+class Sensor(NamedTuple):
+    """What a camera makes of light."""
+
+    curve: ndarray
+    """(K,), picture value 0 … 255 of light from 0 to 1."""
+    grain: ndarray
+    """(N, M, 3), noise of unit size, larger than a picture."""
+    offsets: ndarray
+    """(F, 2), row and column of the grain where each picture begins."""
+
+
+class Shots(NamedTuple):
+    """Pictures of one camera in F frames."""
+
+    pictures: ndarray
+    """(F, h, w, 3), 8 bit, blue-green-red."""
+    counts: ndarray
+    """(F, P, 2), for every person the number of fine pixels of its silhouette inside its box,
+    and how many of those are visible."""
+
+
 @kernel
-def place_bodies(
-    vertices: ndarray,
-    normals: ndarray,
-    bones: ndarray,
-    shares: ndarray,
-    openness: ndarray,
-    rest: ndarray,
-    rotations: ndarray,
-    joints: ndarray,
-    lamps: ndarray,
-    ambient: ndarray,
-) -> tuple[ndarray, ndarray]:
+def place_bodies(surface: Surface, skeleton: Skeleton, lamps: ndarray, ambient: ndarray) -> Placed:
     """Move a body's vertices with its bones and light them.
 
     Each vertex follows up to two bones, blended linearly; light is the sum over
@@ -46,16 +136,14 @@ def place_bodies(
     changes from the floor's glow below to the ceiling's above.
 
     Args:
-        vertices: (V, 3) of the upright body, with ``normals`` (V, 3), ``bones``
-            (V, 2), ``shares`` (V,) and ``openness`` (V,) as in ``Body``.
-        rest: (B, 3), joints of the upright body.
-        rotations: (F, B, 3, 3), with ``joints`` (F, B, 3).
+        surface: Of the upright body.
+        skeleton: Its bones in every frame.
         lamps: (L, 9): position, direction, and power by colour.
         ambient: (2, 3): light from below and from above.
-
-    Returns:
-        World positions (F, V, 3) and light (F, V, 3).
     """
+    vertices, normals, bones = surface.vertices, surface.normals, surface.bones
+    shares, openness = surface.shares, surface.openness
+    rest, rotations, joints = skeleton.rest, skeleton.rotations, skeleton.joints
     frames = rotations.shape[0]
     size = vertices.shape[0]
     world = np.empty((frames, size, 3))
@@ -101,7 +189,7 @@ def place_bodies(
                 reached = facing * leaving / (distance2 + 0.05) * (0.35 + 0.65 * openness[v])
                 for c in range(3):
                     light[f, v, c] += lamps[n, 6 + c] * reached
-    return world, light
+    return Placed(world, light)
 
 
 @kernel
@@ -163,25 +251,8 @@ def floor_shadows(
 
 @kernel
 def draw(
-    points: ndarray,
-    light: ndarray,
-    texture_points: ndarray,
-    triangles: ndarray,
-    owners: ndarray,
-    vertex_ranges: ndarray,
-    present: ndarray,
-    boxes: ndarray,
-    texture: ndarray,
-    room: ndarray,
-    room_fine: ndarray,
-    depth_fine: ndarray,
-    floor_points: ndarray,
-    shadows: ndarray,
-    vignette: ndarray,
-    curve: ndarray,
-    grain: ndarray,
-    offsets: ndarray,
-) -> tuple[ndarray, ndarray]:
+    figures: Figures, mesh: Mesh, backdrop: Backdrop, shadows: ndarray, sensor: Sensor
+) -> Shots:
     """Pictures of one camera with the people in them.
 
     The people are drawn twice as fine as the picture, with a depth buffer that
@@ -189,31 +260,18 @@ def draw(
     shadows, the lens's vignette, the tone curve and the sensor's noise.
 
     Args:
-        points: (F, V, 3), column and row in the fine picture and depth in metres; NaN
-            where behind the lens.
-        light: (F, V, 3) of the vertices.
-        texture_points: (V, 2), with ``triangles`` (T, 3) and the ``owners`` (T,) of the
-            triangles: people first, then doors.
-        vertex_ranges: (O, 2), first and last + 1 vertex of each owner.
-        present: (F, O), who is drawn.
-        boxes: (F, P, 4): left, top, right, bottom of each person's target in fine
-            pixels, for the visible share.
-        texture: (H, W, 3).
-        room: (h, w, 3) picture of the empty room, ``room_fine`` (2h, 2w, 3) and
-            ``depth_fine`` (2h, 2w) the same twice as fine.
-        floor_points: (h, w, 2), column and row in the shadow grid, negative off
-            the floor.
-        shadows: (F, rows, columns).
-        vignette: (h, w).
-        curve: (K,), picture value 0 … 255 of light from 0 to 1.
-        grain: (N, M, 3), noise of unit size, larger than a picture.
-        offsets: (F, 2), row and column of the grain where each picture begins.
-
-    Returns:
-        Pictures (F, h, w, 3), 8 bit, blue-green-red, and for every person
-        (F, P, 2) the number of fine pixels of its silhouette inside its box, and
-        how many of those are visible.
+        figures: Who moves.
+        mesh: Of all of them.
+        backdrop: The room.
+        shadows: (F, rows, columns), on the floor.
+        sensor: The camera's.
     """
+    points, light, present, boxes = figures.points, figures.light, figures.present, figures.boxes
+    texture_points, triangles, owners = mesh.texture_points, mesh.triangles, mesh.owners
+    vertex_ranges, texture = mesh.vertex_ranges, mesh.texture
+    room, room_fine, depth_fine = backdrop.room, backdrop.room_fine, backdrop.depth_fine
+    floor_points, vignette = backdrop.floor_points, backdrop.vignette
+    curve, grain, offsets = sensor.curve, sensor.grain, sensor.offsets
     frames = points.shape[0]
     height, width = room.shape[:2]
     people = boxes.shape[1]
@@ -357,4 +415,4 @@ def draw(
                     )
                     shown = min(np.float32(255.0), max(np.float32(0.0), shown + np.float32(0.5)))
                     pictures[f, y, x, 2 - c] = np.uint8(shown)
-    return pictures, counts
+    return Shots(pictures, counts)

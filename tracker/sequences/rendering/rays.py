@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy import ndarray
@@ -11,6 +12,15 @@ from tracker.sequences.rendering.raster import kernel
 
 BOX, BALL, CYLINDER = 0, 1, 2
 """Kinds of solids: the cube, ball and upright cylinder of half size 1 in their own axes."""
+
+
+class Hits(NamedTuple):
+    """The first solid on each of N rays."""
+
+    distances: ndarray
+    """(N,), metres."""
+    solids: ndarray
+    """(N,), the index, -1 where there is none."""
 
 
 @kernel
@@ -22,7 +32,7 @@ def cast(
     inverses: ndarray,
     bounds: ndarray,
     any_hit: bool,
-) -> tuple[ndarray, ndarray]:
+) -> Hits:
     """The first solid on each ray.
 
     Args:
@@ -33,9 +43,6 @@ def cast(
         inverses: (P, 3, 4), from the world to each solid's own axes.
         bounds: (P, 4), centre and radius of a ball around each solid.
         any_hit: Stop at any solid rather than the nearest, for shadows.
-
-    Returns:
-        The distance (N,) and the index of the solid (N,), -1 where there is none.
     """
     count = origins.shape[0]
     distances = np.empty(count, dtype=np.float32)
@@ -106,4 +113,4 @@ def cast(
                 if any_hit:
                     break
         distances[n] = best
-    return distances, solids
+    return Hits(distances, solids)

@@ -15,7 +15,19 @@ from numpy import ndarray
 from scipy.ndimage import gaussian_filter
 
 from tracker.camera import Camera
-from tracker.sequences.rendering.raster import draw, floor_shadows, place_bodies
+from tracker.sequences.rendering.cast.people import Body
+from tracker.sequences.rendering.raster import (
+    Backdrop,
+    Figures,
+    Mesh,
+    Placed,
+    Sensor,
+    Skeleton,
+    Surface,
+    draw,
+    floor_shadows,
+    place_bodies,
+)
 from tracker.sequences.rendering.rooms import CAMERAS, TARGET_HALF_EXTENTS, RoomSpec
 from tracker.sequences.rendering.scene import Figure, Scene, script, shadow_balls
 from tracker.sequences.rendering.walls.background import (
@@ -77,22 +89,22 @@ class Studio:
         ]
         bodies = [f.body for f in self.scene.figures] + [d.body for d in self.scene.leaves]
         sizes = np.cumsum([0] + [len(b.vertices) for b in bodies])
-        self._ranges = np.stack([sizes[:-1], sizes[1:]], axis=1)
         width = max(b.texture.shape[1] for b in bodies)
         tops = np.cumsum([0] + [b.texture.shape[0] for b in bodies])
-        self._texture = np.zeros((int(tops[-1]), width, 3), dtype=np.float32)
+        texture = np.zeros((int(tops[-1]), width, 3), dtype=np.float32)
         points = []
         for body, top in zip(bodies, tops[:-1], strict=True):
             rows, columns = body.texture.shape[:2]
-            self._texture[top : top + rows, :columns] = body.texture
+            texture[top : top + rows, :columns] = body.texture
             points.append(body.texture_points + np.array([0.0, float(top)]))
-        self._texture = _muted(self._texture)
-        self._texture_points = np.concatenate(points).astype(np.float32)
-        self._triangles = np.concatenate(
-            [b.triangles + start for b, start in zip(bodies, sizes[:-1], strict=True)]
-        )
-        self._owners = np.repeat(
-            np.arange(len(bodies), dtype=np.int32), [len(b.triangles) for b in bodies]
+        self._mesh = Mesh(
+            np.concatenate(points).astype(np.float32),
+            np.concatenate(
+                [b.triangles + start for b, start in zip(bodies, sizes[:-1], strict=True)]
+            ),
+            np.repeat(np.arange(len(bodies), dtype=np.int32), [len(b.triangles) for b in bodies]),
+            np.stack([sizes[:-1], sizes[1:]], axis=1),
+            _muted(texture),
         )
         rng = np.random.default_rng([seed, 1])
         # neighbouring pixels share some noise, as after a camera's own interpolation
@@ -109,29 +121,22 @@ class Studio:
         scene = self.scene
         worlds, lights, present = [], [], []
         for figure in scene.figures:
-            world, light = self._place(figure, steps)
-            worlds.append(world)
-            lights.append(light)
+            placed = self._place(figure, steps)
+            worlds.append(placed.world)
+            lights.append(placed.light)
             present.append(figure.drawn[steps])
         for door in scene.leaves:
             angle = door.angle[steps]
             c, s, zero, one = np.cos(angle), np.sin(angle), 0.0 * angle, 1.0 + 0.0 * angle
             turned = np.stack([c, -s, zero, s, c, zero, zero, zero, one], axis=1)
-            body = door.body
-            world, light = place_bodies(
-                body.vertices,
-                body.normals,
-                body.bones,
-                body.shares,
-                body.openness,
+            bones = Skeleton(
                 np.zeros((1, 3)),
                 np.ascontiguousarray(turned.reshape(-1, 1, 3, 3)),
                 np.tile(door.hinge, (last - first, 1, 1)),
-                self._lamps,
-                AMBIENT,
             )
-            worlds.append(world)
-            lights.append(light)
+            placed = place_bodies(_surface(door.body), bones, self._lamps, AMBIENT)
+            worlds.append(placed.world)
+            lights.append(placed.light)
             present.append(np.ones(last - first, dtype=bool))
         world = np.concatenate(worlds, axis=1)
         light = np.concatenate(lights, axis=1)
@@ -144,21 +149,13 @@ class Studio:
             visible.append(seen)
         return Drawn(first, tuple(pictures), np.stack(visible, axis=2))
 
-    def _place(self, figure: Figure, steps: slice) -> tuple[ndarray, ndarray]:
-        body = figure.body
-        world, light = place_bodies(
-            body.vertices,
-            body.normals,
-            body.bones,
-            body.shares,
-            body.openness,
+    def _place(self, figure: Figure, steps: slice) -> Placed:
+        bones = Skeleton(
             figure.rest,
             np.ascontiguousarray(figure.poses.rotations[steps]),
             np.ascontiguousarray(figure.poses.joints[steps]),
-            self._lamps,
-            AMBIENT,
         )
-        return world, light
+        return place_bodies(_surface(figure.body), bones, self._lamps, AMBIENT)
 
     def _view(
         self,
@@ -189,28 +186,31 @@ class Studio:
                 for step in range(steps.start, steps.stop)
             ]
         )
-        pictures, counts = draw(
-            points.reshape(*world.shape),
-            light,
-            self._texture_points,
-            self._triangles,
-            self._owners,
-            self._ranges,
-            np.stack(present, axis=1),
-            np.stack(boxes, axis=1),
-            self._texture,
-            background.room,
-            background.room_fine,
-            background.depth_fine,
-            self._floor_points[number],
+        shots = draw(
+            Figures(
+                points.reshape(*world.shape),
+                light,
+                np.stack(present, axis=1),
+                np.stack(boxes, axis=1),
+            ),
+            self._mesh,
+            Backdrop(
+                background.room,
+                background.room_fine,
+                background.depth_fine,
+                self._floor_points[number],
+                self._vignettes[number],
+            ),
             shadows,
-            self._vignettes[number],
-            self._curve,
-            self._grain,
-            offsets,
+            Sensor(self._curve, self._grain, offsets),
         )
+        counts = shots.counts
         inside = np.nan_to_num(np.stack(shares, axis=1))
-        return pictures, inside * counts[:, :, 1] / np.maximum(counts[:, :, 0], 1)
+        return shots.pictures, inside * counts[:, :, 1] / np.maximum(counts[:, :, 0], 1)
+
+
+def _surface(body: Body) -> Surface:
+    return Surface(body.vertices, body.normals, body.bones, body.shares, body.openness)
 
 
 def in_order(

@@ -44,13 +44,16 @@ def rewritten(
     document: Any = tomlkit.parse(text)
     if name is not None:
         document["name"] = values["name"] = name
-    _write_room(document["room"], before["room"], after["room"])
+    if "room" in values:
+        _write_room(document["room"], before["room"], after["room"])
+    elif before["room"] != after["room"]:  # it was found out; now somebody says where it is
+        document["room"] = tomlkit.item(after["room"])
     _write_templates(document, before["template"], after["template"])
     result = tomlkit.dumps(document)
     if "\r\n" in text:
         result = result.replace("\r\n", "\n").replace("\n", "\r\n")
     got = tomllib.loads(result)
-    if taught_in(got) != after or _rest_of(got) != _rest_of(values):
+    if taught_in(got, after) != after or _rest_of(got) != _rest_of(values):
         raise SequenceError(
             f"{where}: is written in a way that cannot be kept while it changes; write [room] and "
             "[[template]] as tables of their own, as the README shows them, then save again"
@@ -137,7 +140,7 @@ def _steps(pairs: Pairs) -> tuple[list[tuple[int, int]], list[int], list[int]]:
 
 
 def _check_unchanged(values: dict[str, Any], before: Values, where: str) -> None:
-    found = taught_in(values)
+    found = taught_in(values, before)
     for field, word in (("room", "[room]"), ("template", "[[template]]")):
         if found[field] != before[field]:
             raise SequenceError(
@@ -146,13 +149,18 @@ def _check_unchanged(values: dict[str, Any], before: Values, where: str) -> None
             )
 
 
-def taught_in(values: dict[str, Any]) -> Values:
-    """Room and templates of a file in the form of :func:`taught_values`."""
+def taught_in(values: dict[str, Any], otherwise: Values | None = None) -> Values:
+    """Room and templates of a file in the form of :func:`taught_values`.
+
+    Args:
+        values: Of the file.
+        otherwise: Has the room where the file has none.
+    """
 
     def numbers(vector: list[Any]) -> list[float]:
         return [float(value) for value in vector]
 
-    room = values["room"]
+    room: dict[str, Any] = values["room"] if "room" in values else (otherwise or {})["room"]
     return {
         "room": {
             "min": numbers(room["min"]),

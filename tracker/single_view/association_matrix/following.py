@@ -5,15 +5,15 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt16
 from numpy import ndarray
 
-from tracker.kernels.compilation import kernel
+from tracker.kernels.pictures.following import follow_colours
 
 ITERATIONS = 20
+"""At most; a climb that goes on for longer goes nowhere."""
+
 TOLERANCE = 0.1
 """Pixels: a shift shorter than this is the last one."""
 
@@ -66,55 +66,7 @@ def follow(
     Returns:
         The centre; where it was if there is nothing of it.
     """
-    centre: ndarray = _follow(
+    centre: ndarray = follow_colours(
         bins, moving, np.asarray(box, dtype=float), histogram, ITERATIONS, TOLERANCE
     )
     return centre
-
-
-@kernel
-def _follow(
-    bins: ndarray,
-    moving: ndarray,
-    box: ndarray,
-    histogram: ndarray,
-    iterations: int,
-    tolerance: float,
-) -> ndarray:
-    height, width = bins.shape
-    x, y = box[0], box[1]
-    half_x, half_y = max(box[2], 0.5), max(box[3], 0.5)
-    here = np.zeros(len(histogram))
-    for _ in range(iterations):
-        first_x, last_x = max(math.ceil(x - half_x), 0), min(math.floor(x + half_x), width - 1)
-        first_y, last_y = max(math.ceil(y - half_y), 0), min(math.floor(y + half_y), height - 1)
-        here[:] = 0.0
-        total = 0.0
-        for row in range(first_y, last_y + 1):
-            v = (row - y) / half_y
-            for column in range(first_x, last_x + 1):
-                u = (column - x) / half_x
-                weight = 1.0 - u * u - v * v
-                if moving[row, column] and weight > 0.0:
-                    here[bins[row, column]] += weight
-                    total += weight
-        if total == 0.0:
-            break
-        sum_x, sum_y, mass = 0.0, 0.0, 0.0
-        for row in range(first_y, last_y + 1):
-            v = (row - y) / half_y
-            for column in range(first_x, last_x + 1):
-                u = (column - x) / half_x
-                if moving[row, column] and u * u + v * v < 1.0:
-                    b = bins[row, column]
-                    weight = math.sqrt(histogram[b] * total / here[b])
-                    sum_x += weight * column
-                    sum_y += weight * row
-                    mass += weight
-        if mass == 0.0:
-            break
-        shift = math.hypot(sum_x / mass - x, sum_y / mass - y)
-        x, y = sum_x / mass, sum_y / mass
-        if shift < tolerance:
-            break
-    return np.array([x, y])

@@ -21,9 +21,6 @@ from tracker.single_view.association_matrix.following import coefficients
 from tracker.single_view.association_matrix.moving_objects import MovingObject, Situation, Track
 from tracker.single_view.protocol import ViewEvent
 
-STRAYING = 0.1
-"""How much further a lost object may be found with every step, as a share of its reach."""
-
 
 def decide(
     situation: Situation, seen: Blobs, parameters: AssociationMatrixParams
@@ -161,7 +158,7 @@ class _Step:
         apart = decision_matrices.distances(
             np.array([one.expected for one in self.lost]), self.seen.boxes[self.unknown, :2]
         )
-        reach = [p.reach * one.size * (1.0 + STRAYING * one.missing) for one in self.lost]
+        reach = [p.reach * one.size * (1.0 + p.straying * one.missing) for one in self.lost]
         alike[(apart > np.array(reach)[:, None]) | (alike < p.return_similarity)] = -1.0
         rows, columns = linear_sum_assignment(alike, maximize=True)
         found = [(r, c) for r, c in zip(rows.tolist(), columns.tolist(), strict=True)

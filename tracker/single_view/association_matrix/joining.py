@@ -8,6 +8,7 @@ from numpy import ndarray
 from scipy.sparse.csgraph import connected_components
 
 from tracker.blobs import Blobs
+from tracker.boxes import Boxes
 
 
 def join(pieces: Blobs, gaps: Float[ndarray, " N"]) -> Blobs:
@@ -23,7 +24,7 @@ def join(pieces: Blobs, gaps: Float[ndarray, " N"]) -> Blobs:
     count = pieces.size
     if count < 2:
         return pieces
-    low, high = pieces.boxes[:, :2] - pieces.boxes[:, 2:], pieces.boxes[:, :2] + pieces.boxes[:, 2:]
+    low, high = Boxes(pieces.boxes).low, Boxes(pieces.boxes).high
     common = np.minimum(high[:, None], high[None]) - np.maximum(low[:, None], low[None])
     narrower = np.minimum(pieces.boxes[:, None, 2], pieces.boxes[None, :, 2])
     near = (common[..., 0] >= narrower) & (-common[..., 1] <= np.maximum(gaps[:, None], gaps[None]))
@@ -38,7 +39,7 @@ def join(pieces: Blobs, gaps: Float[ndarray, " N"]) -> Blobs:
     lows, highs = np.full((groups, 2), np.inf), np.full((groups, 2), -np.inf)
     np.minimum.at(lows, owners, low)
     np.maximum.at(highs, owners, high)
-    boxes = np.concatenate([lows + highs, highs - lows], axis=1) / 2.0
+    boxes = Boxes.from_corners(lows, highs).centred
     areas = np.bincount(owners, weights=pieces.areas, minlength=groups).astype(np.int64)
     names = np.append(owners, -1).astype(np.int32)  # -1, the background, is the last of them
     return Blobs(boxes, areas, names[pieces.owners])

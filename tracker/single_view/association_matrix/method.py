@@ -7,7 +7,7 @@ sequence", Control and Decision 22(4), 2007.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
@@ -17,8 +17,8 @@ from tracker import colour
 from tracker.blobs import Blobs, blobs
 from tracker.colour import BINS
 from tracker.foreground import ForegroundModel, learn, pack
-from tracker.parameters import AssociationMatrixParams, ForegroundParams
-from tracker.sequences.frames import FrameReader
+from tracker.parameters import AssociationMatrixParams
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.association_matrix.following import follow, object_histograms
 from tracker.single_view.association_matrix.handing_over import advance
@@ -26,6 +26,9 @@ from tracker.single_view.association_matrix.joining import join
 from tracker.single_view.association_matrix.moving_objects import MovingObject, Situation
 from tracker.single_view.association_matrix.silhouettes import Fits, Silhouettes
 from tracker.single_view.protocol import ViewEvent, ViewResult
+
+if TYPE_CHECKING:
+    from tracker.parameters import RunParameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,15 +58,12 @@ class AssociationMatrix:
     so. The preset ``published`` hands over the objects themselves.
     """
 
-    needs_pictures = True
-
     def __init__(
         self,
         sequence: Sequence,
         camera_index: int,
-        parameters: AssociationMatrixParams,
-        foreground: ForegroundParams,
-        reader: FrameReader,
+        parameters: RunParameters,
+        reader: Pictures,
     ) -> None:
         """Learn the background.
 
@@ -76,7 +76,8 @@ class AssociationMatrix:
                 f'camera "{view.camera.name}" of {sequence.name} has no pictures; give it a video '
                 "or images in sequence.toml, or choose single_view none to use its detections"
             )
-        self._parameters = parameters
+        self._parameters = parameters.of(AssociationMatrixParams)
+        foreground = parameters.foreground
         self._minimum_area = foreground.minimum_area
         self._foreground: ForegroundModel | None = learn(sequence, camera_index, reader, foreground)
         reader.check()
@@ -144,14 +145,7 @@ class AssociationMatrix:
         objects, p = situation.objects, self._parameters
         wanted = np.array([len(one.labels) for one in objects], dtype=np.int64)
         if p.output == "targets":
-            fits = self._silhouettes.fit(
-                mask,
-                seen,
-                wanted,
-                acceptance=p.acceptance,
-                further_acceptance=p.further_acceptance,
-                spare_acceptance=p.spare_acceptance,
-            )
+            fits = self._silhouettes.fit(mask, seen, wanted, p)
             boxes, weights = fits.boxes, np.exp(np.minimum(fits.scores, 0.0))
             labels = _labels_of_fits(fits, situation)
         else:

@@ -16,13 +16,10 @@ from tracker import colour
 from tracker.colour import ColourSpaceName, KernelName
 from tracker.foreground import ForegroundModel, integral, learn, shape_scores
 from tracker.parameters import ForegroundParams
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.templates import read_templates
-
-SIZE_JITTER = 0.1
-"""Relative spread around the size that the target has at a place of the room: people differ."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,10 +52,11 @@ class Appearance:
         self,
         sequence: Sequence,
         camera_index: int,
-        reader: FrameReader,
+        reader: Pictures,
         *,
         colour_space: ColourSpaceName,
         histogram_kernel: KernelName,
+        size_jitter: float,
         foreground: ForegroundParams | None,
     ) -> None:
         """Read the templates and learn the background.
@@ -69,6 +67,7 @@ class Appearance:
             reader: Of the pictures.
             colour_space: The histograms' bins.
             histogram_kernel: How the pixels of a box count.
+            size_jitter: Relative spread of drawn boxes around the size of a target there.
             foreground: Numbers of the foreground model; None where none is needed.
 
         Raises:
@@ -83,11 +82,16 @@ class Appearance:
         self.model = read_templates(sequence, colour_space, histogram_kernel, reader)
         camera, room, half_extents = view.camera, sequence.room, sequence.target_half_extents
         # no parameter has a say in it, so that a moved slider does not wait for it again
-        numbers = (*camera.numbers, room.minimum, room.maximum, half_extents)
+        lens = camera.calibration
+        numbers = (
+            *(lens.rotation, lens.translation, lens.intrinsics, lens.distortion),
+            *(room.minimum, room.maximum, half_extents),
+        )
         self.sizes = reader.once(
             ("sizes", camera.image_size, *(number.tobytes() for number in numbers)),
             lambda: BoxSizes.of(camera, room, half_extents),
         )
+        self._size_jitter = size_jitter
         self._image_size = view.camera.image_size
         self._foreground: ForegroundModel | None = None
         if foreground is not None:
@@ -167,7 +171,7 @@ class Appearance:
     ) -> Float[ndarray, "N 4"]:
         centres = pixels + rng.uniform(-0.5, 0.5, pixels.shape)
         sizes, possible = self.sizes.draw(centres, rng)
-        sizes *= np.exp(SIZE_JITTER * rng.standard_normal((len(pixels), 1)))
+        sizes *= np.exp(self._size_jitter * rng.standard_normal((len(pixels), 1)))
         return np.concatenate([centres[possible], sizes[possible]], axis=1)
 
     def within(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:

@@ -15,7 +15,7 @@ from tracker.colour import ColourModel
 from tracker.single_view.box_sizes import BoxSizes
 
 COLUMNS = 72
-"""Places across a picture."""
+"""Places across a picture: as fine as the eye follows in a pane."""
 
 
 def likelihood_map(

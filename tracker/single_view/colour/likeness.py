@@ -1,4 +1,4 @@
-"""What colours the boxes of one camera have, and whose: told of every method given pictures."""
+"""Whose colours the boxes of one camera have: told of every method that is given pictures."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from numpy import ndarray
 from scipy.special import softmax
 
 from tracker import colour
+from tracker.boxes import Boxes
 from tracker.colour import ColourModel, ColourSpaceName
 from tracker.parameters import ColourPhdParams
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.templates import read_templates
 
@@ -35,7 +36,7 @@ class Likeness:
         self._model = model
 
     @staticmethod
-    def of(sequence: Sequence, reader: FrameReader) -> Likeness | None:
+    def of(sequence: Sequence, reader: Pictures) -> Likeness | None:
         """Read the templates; None where there are not two people to tell apart.
 
         A template that cannot be read is told to the log: a method that needs none goes on.
@@ -70,7 +71,7 @@ class Likeness:
         return told
 
 
-def looks(
+def looks_of(
     picture: UInt8[ndarray, "h w 3"], boxes: Float[ndarray, "N 4"]
 ) -> Float16[ndarray, "N A"]:
     """The root of each box's colour histogram: a unit vector, 0 outside the picture.
@@ -94,8 +95,8 @@ def _covered(
     Boxes are few and the picture may be large: the rest of it is not looked at.
     """
     height, width = picture.shape[:2]
-    low = np.floor(np.clip(boxes[:, :2] - boxes[:, 2:] - 1.0, 0.0, [width, height]))
-    high = np.ceil(np.clip(boxes[:, :2] + boxes[:, 2:] + 2.0, 0.0, [width, height]))
+    low = np.floor(np.clip(Boxes(boxes).low - 1.0, 0.0, [width, height]))
+    high = np.ceil(np.clip(Boxes(boxes).high + 2.0, 0.0, [width, height]))
     inside = np.flatnonzero((high > low).all(axis=1))
     if not len(inside):
         return inside, np.zeros((0, 0), dtype=np.uint16), np.zeros(4)

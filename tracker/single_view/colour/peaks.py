@@ -16,16 +16,10 @@ from numpy import ndarray
 from tracker import mean_shift
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.parameters import ColourPeakParams, ForegroundParams
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.appearance import Appearance, Scene
-
-MERGE_DISTANCE = 0.8
-"""Peaks closer than this, in half sizes, are one."""
-
-SAME_PERSON_DISTANCE = 1.5
-"""Peaks of the same person's colours closer than this, in half sizes, are one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +53,7 @@ class PeakFinder:
         camera_index: int,
         parameters: ColourPeakParams,
         foreground: ForegroundParams,
-        reader: FrameReader,
+        reader: Pictures,
     ) -> None:
         """Read the templates and learn the background.
 
@@ -67,19 +61,14 @@ class PeakFinder:
             ValueError: If there are no pictures or templates, or a template cannot be read.
         """
         self._parameters = p = parameters
-        asked = (
-            p.acceptance_foreground,
-            p.foreground_weight,
-            p.surroundings_weight,
-            p.foreground_samples,
-        )
         self._appearance = Appearance(
             sequence,
             camera_index,
             reader,
             colour_space=p.colour_space,
             histogram_kernel=p.histogram_kernel,
-            foreground=foreground if max(asked) > 0.0 else None,
+            size_jitter=p.size_jitter,
+            foreground=foreground if p.asks_foreground else None,
         )
 
     @property
@@ -187,7 +176,7 @@ class PeakFinder:
                 weights,
                 samples[starts],
                 bandwidth=p.bandwidth,
-                merge_distance=MERGE_DISTANCE,
+                merge_distance=p.merge_distance,
             )
             found.append(peaks)
         return np.concatenate(found)
@@ -205,7 +194,7 @@ class PeakFinder:
         kept: list[int] = []
         for i in np.argsort(-best, kind="stable"):
             apart = (candidates[kept, :2] - candidates[i, :2]) / candidates[kept, 2:]
-            least = np.where(person[kept] == person[i], SAME_PERSON_DISTANCE, MERGE_DISTANCE)
+            least = np.where(person[kept] == person[i], p.same_person_distance, p.merge_distance)
             if good[i] and np.all((apart**2).sum(axis=1) >= least**2):
                 kept.append(int(i))
         return candidates[kept], nearest[kept]

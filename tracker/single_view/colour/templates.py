@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from tracker import colour
+from tracker.boxes import Boxes
 from tracker.colour import ColourModel, ColourSpaceName, KernelName
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 
 
 def read_templates(
-    sequence: Sequence, space: ColourSpaceName, kernel: KernelName, reader: FrameReader
+    sequence: Sequence, space: ColourSpaceName, kernel: KernelName, reader: Pictures
 ) -> ColourModel:
     """The colour model of the sequence's templates, read once for all cameras that ask for it.
 
@@ -36,7 +37,7 @@ def read_templates(
 
 
 def _read(
-    sequence: Sequence, space: ColourSpaceName, kernel: KernelName, reader: FrameReader
+    sequence: Sequence, space: ColourSpaceName, kernel: KernelName, reader: Pictures
 ) -> ColourModel:
     names = [camera.name for camera in sequence.cameras]
     histograms = []
@@ -47,8 +48,7 @@ def _read(
         picture = reader.picture(names.index(template.camera), template.frame)
         if picture is None:
             raise ValueError(f"{place}: its picture cannot be read; choose another frame")
-        left, top, width, height = template.box
-        box = np.array([[left + width / 2, top + height / 2, width / 2, height / 2]])
+        box = Boxes.from_left_top(template.box[None]).centred
         histogram = colour.histograms(colour.bin_map(picture, space), box, space, kernel)[0]
         if not histogram.any():
             raise ValueError(

@@ -16,9 +16,6 @@ from scipy.optimize import linear_sum_assignment
 UNREACHED = 1e6
 """Instead of −ln β, where it is 0; more than those of all others together."""
 
-LEAP = 2.0
-"""A measurement may be that of a target whose gate it missed if it is so many half sizes away."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cases:
@@ -135,6 +132,7 @@ def look_into_pieces(
     expected: Float[ndarray, "n 4"],
     boxes: Float[ndarray, "M 4"],
     pieces: Float[ndarray, "M 4"],
+    furthest: float,
 ) -> Cases:
     """Beyond [WW10]_: what comes together makes a measurement outside everybody's gate.
 
@@ -147,6 +145,7 @@ def look_into_pieces(
         expected: The targets' boxes, pixels.
         boxes: The measurements.
         pieces: What each was found in.
+        furthest: Half sizes within which a measurement of nobody may be such a target's.
     """
     lost = np.flatnonzero(cases.missed)
     if not len(lost) or not len(boxes):
@@ -163,7 +162,7 @@ def look_into_pieces(
         # of the measurements of one piece the nearest
         j = int(covering[leap[i, covering].argmin()])
         missed[lost[i]] = False
-        if new[j] and leap[i, j] <= LEAP:
+        if new[j] and leap[i, j] <= furthest:
             own[lost[i]] = j
             new[j] = False
         else:

@@ -25,23 +25,9 @@ from scipy.ndimage import minimum_filter1d
 from tracker.blobs import Blobs, blobs
 from tracker.camera import Camera
 from tracker.foreground import integral, shape_shares
+from tracker.parameters import JpdaParams
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BELOW_FLOOR, BoxSizes
-
-HEIGHT_SIGMAS = 2.0
-"""Targets move within so many standard deviations of the heights they come in at."""
-
-CRACK = 0.5
-"""Cracks across a piece, between head and shirt for instance, of up to so many half heights."""
-
-TOP_REACH = 1.2
-"""The pixels under a top that are taken for the target's: so many half widths either side."""
-
-LEAST_INSIDE, MOST_ABOVE, MOST_BESIDE = 0.4, 0.5, 0.8
-"""Shares of foreground in a target's box, above it, and beside its upper part."""
-
-SAME_ACROSS, SAME_DOWN = 1.0, 1.5
-"""A top so many half widths beside and half heights under another is that target's shoulder."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,10 +49,24 @@ class TargetSizes:
     instance, is nobody. A room without entrances says nothing of heights.
     """
 
-    def __init__(self, camera: Camera, room: Room, half_extents: Float[ndarray, " 3"]) -> None:
+    def __init__(
+        self,
+        camera: Camera,
+        room: Room,
+        half_extents: Float[ndarray, " 3"],
+        height_sigmas: float,
+    ) -> None:
+        """Work out the sizes at each place.
+
+        Args:
+            camera: The calibrated camera.
+            room: Where targets are, and where they come in.
+            half_extents: Of a target, metres.
+            height_sigmas: Deviations of the entrances' heights within which they keep.
+        """
         upright, lower = (
             BoxSizes.of(camera, part, half_extents)
-            for part in _walked(room, float(half_extents[2]))
+            for part in _walked(room, float(half_extents[2]), height_sigmas)
         )
         self._grid, places = lower, lower.places()
         standing, there = upright.typical(places)
@@ -88,7 +88,7 @@ class TargetSizes:
         return sizes
 
 
-def _walked(room: Room, half_height: float) -> tuple[Room, Room]:
+def _walked(room: Room, half_height: float, sigmas_wide: float) -> tuple[Room, Room]:
     """The parts of the room's volume that the centres of upright, and of all, targets are in."""
     if not room.entrances:
         return room, room
@@ -96,12 +96,14 @@ def _walked(room: Room, half_height: float) -> tuple[Room, Room]:
     sigmas = np.array([entrance.sigma[2] for entrance in room.entrances])
     low, high = room.minimum.copy(), room.maximum.copy()
     # the volume of box sizes begins where a target stands on its floor
-    low[2] = (heights - HEIGHT_SIGMAS * sigmas).min() - half_height + BELOW_FLOOR
-    high[2] = (heights + HEIGHT_SIGMAS * sigmas).max()
+    low[2] = (heights - sigmas_wide * sigmas).min() - half_height + BELOW_FLOOR
+    high[2] = (heights + sigmas_wide * sigmas).max()
     return Room(low, high), Room(room.minimum, high)
 
 
-def crowns(mask: UInt8[ndarray, "h w"], sizes: TargetSizes, minimum_area: int) -> Crowns:
+def crowns(
+    mask: UInt8[ndarray, "h w"], sizes: TargetSizes, minimum_area: int, parameters: JpdaParams
+) -> Crowns:
     """The targets that a mask shows from above the shoulders.
 
     Cracks across a piece are closed. A column of a piece is a top where its first pixel
@@ -114,28 +116,30 @@ def crowns(mask: UInt8[ndarray, "h w"], sizes: TargetSizes, minimum_area: int) -
         mask: Foreground is what is not 0.
         sizes: Of targets in this camera.
         minimum_area: Smaller pieces are nobody.
+        parameters: What a target under a top must look like.
     """
-    crack = max(3, round(CRACK * float(sizes.middle[1])) | 1)
+    p = parameters
+    crack = max(3, round(p.crack * float(sizes.middle[1])) | 1)
     closed = cv2.morphologyEx(
         (mask != 0).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((crack, 3), np.uint8)
     )
     pieces = blobs(closed, minimum_area)
-    found = [_tops(pieces, piece, sizes) for piece in range(pieces.size)]
+    found = [_tops(pieces, piece, sizes, p.top_reach) for piece in range(pieces.size)]
     boxes = np.concatenate([np.zeros((0, 4)), *found])
     owners = np.repeat(np.arange(pieces.size), [len(tops) for tops in found])
     inside, above, beside = shape_shares(integral(closed), boxes)
-    good = (inside >= LEAST_INSIDE) & (above <= MOST_ABOVE) & (beside <= MOST_BESIDE)
+    good = (inside >= p.least_inside) & (above <= p.most_above) & (beside <= p.most_beside)
     kept: list[int] = []
     for i in np.argsort(boxes[:, 1] - boxes[:, 3], kind="stable").tolist():
         apart = boxes[i, :2] - boxes[kept, :2]
         across = np.abs(apart[:, 0]) / np.maximum(boxes[kept, 2], boxes[i, 2])
-        same = (across < SAME_ACROSS) & (apart[:, 1] < SAME_DOWN * boxes[kept, 3])
+        same = (across < p.shoulder_across) & (apart[:, 1] < p.shoulder_down * boxes[kept, 3])
         if good[i] and not same.any():
             kept.append(i)
     return Crowns(boxes[kept], inside[kept], pieces.boxes[owners[kept]])
 
 
-def _tops(pieces: Blobs, piece: int, sizes: TargetSizes) -> Float[ndarray, "N 4"]:
+def _tops(pieces: Blobs, piece: int, sizes: TargetSizes, top_reach: float) -> Float[ndarray, "N 4"]:
     """The boxes of targets under every top of one piece."""
     x, y, half_width, half_height = pieces.boxes[piece]
     left, top = round(x - half_width + 0.5), round(y - half_height + 0.5)
@@ -153,8 +157,8 @@ def _tops(pieces: Blobs, piece: int, sizes: TargetSizes) -> Float[ndarray, "N 4"
         column = (start + end - 1) // 2
         across, down = half_sizes[column]
         rows = slice(first[column], int(first[column] + down) + 1)
-        begin = max(0, int(column - TOP_REACH * across))
-        upper = pixels[rows, begin : int(column + TOP_REACH * across) + 1].sum(axis=0)
+        begin = max(0, int(column - top_reach * across))
+        upper = pixels[rows, begin : int(column + top_reach * across) + 1].sum(axis=0)
         centre = left + begin + float(upper @ np.arange(len(upper))) / upper.sum()
         boxes.append([centre, top + first[column] + down - 0.5, across, down])
     return np.array(boxes).reshape(-1, 4)

@@ -6,24 +6,30 @@ Boxes are ``centre_x, centre_y, half_width, half_height`` in pixels.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
 from tracker.blobs import blobs
+from tracker.boxes import Boxes
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.foreground import ForegroundModel, box_shares, integral, learn
-from tracker.parameters import ForegroundParams, JpdaParams, RunParameters
-from tracker.sequences.frames import FrameReader
+from tracker.parameters import (
+    ColourPhdParams,
+    DetectionBoxParams,
+    ForegroundParams,
+    JpdaParams,
+)
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.peaks import PeakFinder
 from tracker.single_view.detector_boxes import DetectorBoxes, trust
 from tracker.single_view.jpda.crowns import TargetSizes, crowns
 
-COVER = 2.0
-"""Without a piece of foreground, whoever is hidden lies within so many half sizes of the box."""
+if TYPE_CHECKING:
+    from tracker.parameters import RunParameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,8 +61,6 @@ class Measured:
 class Source(Protocol):
     """Where one camera's measurements come from."""
 
-    needs_pictures: bool
-
     def start(self) -> Any:
         """The state before the first step."""
         ...
@@ -86,7 +90,7 @@ class Source(Protocol):
 
 
 def source_of(
-    sequence: Sequence, camera_index: int, parameters: RunParameters, reader: FrameReader
+    sequence: Sequence, camera_index: int, parameters: RunParameters, reader: Pictures
 ) -> Source:
     """The chosen source, prepared for one camera.
 
@@ -96,7 +100,7 @@ def source_of(
     Raises:
         ValueError: If the camera lacks what the source needs.
     """
-    p = parameters.jpda
+    p = parameters.of(JpdaParams)
     if p.measurements == "detections":
         return _Detector(sequence, camera_index, parameters)
     if p.measurements == "colour" and sequence.templates:
@@ -113,22 +117,22 @@ def source_of(
 class _Foreground:
     """Boxes of the pieces of foreground, or of a target under each top of a piece."""
 
-    needs_pictures = True
-
     def __init__(
         self,
         sequence: Sequence,
         camera_index: int,
         parameters: JpdaParams,
         foreground: ForegroundParams,
-        reader: FrameReader,
+        reader: Pictures,
     ) -> None:
         self._parameters = parameters
         self._minimum_area = foreground.minimum_area
         self._model: ForegroundModel | None = learn(sequence, camera_index, reader, foreground)
         camera = sequence.views[camera_index].camera
         self._sizes = (
-            TargetSizes(camera, sequence.room, sequence.target_half_extents)
+            TargetSizes(
+                camera, sequence.room, sequence.target_half_extents, parameters.height_sigmas
+            )
             if parameters.foreground_box == "target"
             else None
         )
@@ -150,10 +154,9 @@ class _Foreground:
         if self._sizes is None:
             boxes = blobs(found.mask, self._minimum_area).boxes
             pieces = boxes
-            edges = np.concatenate([boxes[:, :2] - boxes[:, 2:], boxes[:, :2] + boxes[:, 2:]], 1)
-            scores = box_shares(integral(found.mask), edges)
+            scores = box_shares(integral(found.mask), Boxes(boxes).corners)
         else:
-            targets = crowns(found.mask, self._sizes, self._minimum_area)
+            targets = crowns(found.mask, self._sizes, self._minimum_area, self._parameters)
             boxes, pieces, scores = targets.boxes, targets.pieces, targets.inside
         return state, Measured(
             boxes,
@@ -174,17 +177,16 @@ class _Foreground:
 class _Colours:
     """Peaks of the colour likelihood, with the numbers of ``colour_phd``."""
 
-    needs_pictures = True
-
     def __init__(
         self,
         sequence: Sequence,
         camera_index: int,
         parameters: RunParameters,
-        reader: FrameReader,
+        reader: Pictures,
     ) -> None:
+        self._cover = parameters.of(JpdaParams).cover
         self._finder = PeakFinder(
-            sequence, camera_index, parameters.colour_phd, parameters.foreground, reader
+            sequence, camera_index, parameters.of(ColourPhdParams), parameters.foreground, reader
         )
 
     def start(self) -> Any:
@@ -205,7 +207,7 @@ class _Colours:
             peaks.boxes,
             peaks.scores,
             self.sigmas(peaks.boxes),
-            peaks.boxes * [1.0, 1.0, COVER, COVER],
+            peaks.boxes * [1.0, 1.0, self._cover, self._cover],
             samples=peaks.samples,
             sample_weights=peaks.sample_weights,
             mask=peaks.mask,
@@ -219,10 +221,9 @@ class _Colours:
 class _Detector:
     """An outside detector's boxes, with the numbers of ``detection_boxes``."""
 
-    needs_pictures = False
-
     def __init__(self, sequence: Sequence, camera_index: int, parameters: RunParameters) -> None:
-        self._parameters = parameters.detection_boxes
+        self._cover = parameters.of(JpdaParams).cover
+        self._parameters = parameters.of(DetectionBoxParams)
         self._boxes = DetectorBoxes(sequence, camera_index, self._parameters)
 
     def start(self) -> None:
@@ -243,7 +244,7 @@ class _Detector:
             boxes,
             found.scores[good],
             found.sigmas[good],
-            boxes * [1.0, 1.0, COVER, COVER],
+            boxes * [1.0, 1.0, self._cover, self._cover],
             shown=found.boxes,
             shown_scores=found.scores,
             information={"boxes outside the room": float((~good).sum())},

@@ -7,7 +7,7 @@ data association", patent CN101783020A, 2010.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import UInt8
@@ -16,22 +16,23 @@ from scipy.stats import chi2
 
 from tracker.association import validation_matrix
 from tracker.foreground import pack
-from tracker.parameters import RunParameters
-from tracker.sequences.frames import FrameReader
+from tracker.parameters import JpdaParams
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.jpda.association import associate
 from tracker.single_view.jpda.cases import Cases, look_into_pieces, part_strangers, tell_apart
-from tracker.single_view.jpda.lives import Lives, live_on
 from tracker.single_view.jpda.measurements import Measured, source_of
 from tracker.single_view.jpda.moves import Moved, move
 from tracker.single_view.jpda.targets import Targets, innovations
+from tracker.single_view.jpda.track_management import Managed, manage
 from tracker.single_view.protocol import ViewEvent, ViewResult
 
-LONGEST_HIDDEN = 4.0
-"""Seconds after which somebody who never came out from behind another is given up."""
+if TYPE_CHECKING:
+    from tracker.parameters import RunParameters
 
 BELIEVED = 0.5
-"""A measurement that targets explain with more than this probability is somebody's."""
+"""A measurement that targets explain with more than this probability is somebody's: more likely
+than not."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,18 +71,17 @@ class Jpda:
         sequence: Sequence,
         camera_index: int,
         parameters: RunParameters,
-        reader: FrameReader,
+        reader: Pictures,
     ) -> None:
         """Prepare for one camera.
 
         Raises:
             ValueError: If the camera lacks what the measurements are made from.
         """
-        self._parameters = p = parameters.jpda
+        self._parameters = p = parameters.of(JpdaParams)
         self._source = source_of(sequence, camera_index, parameters, reader)
-        self.needs_pictures = self._source.needs_pictures
         self._step_time = sequence.step_time
-        self._longest_hidden = max(1, round(LONGEST_HIDDEN * sequence.fps))
+        self._longest_hidden = max(1, round(p.longest_hidden * sequence.fps))
         self._gate = float(chi2.ppf(p.gate_probability, df=2))
         width, height = sequence.cameras[camera_index].image_size
         self._area = float(width * height)
@@ -109,7 +109,7 @@ class Jpda:
         matrix, own = associate(found, possible, self._area, p)
         cases, matrix = self._cases(expected, matrix, own, seen)
         moved = move(expected, found, matrix, cases, seen, p)
-        lives = live_on(
+        managed = manage(
             moved.targets,
             vanished,
             state.next_label,
@@ -119,8 +119,8 @@ class Jpda:
             gate=self._gate,
             longest_hidden=self._longest_hidden,
         )
-        result = self._result(expected, seen, cases, moved, lives)
-        return JpdaState(lives.targets, lives.vanished, lives.next_label, source), result
+        result = self._result(expected, seen, cases, moved, managed)
+        return JpdaState(managed.targets, managed.vanished, managed.next_label, source), result
 
     def _cases(
         self, expected: Targets, matrix: ndarray, own: ndarray, seen: Measured
@@ -134,21 +134,21 @@ class Jpda:
         cases = tell_apart(matrix, own, p.least_probability, every_shared_row=not inside)
         if inside:
             cases, matrix = part_strangers(cases, matrix, expected.boxes, seen.boxes)
-            cases = look_into_pieces(cases, expected.boxes, seen.boxes, seen.pieces)
+            cases = look_into_pieces(cases, expected.boxes, seen.boxes, seen.pieces, p.leap)
         return cases, matrix
 
     def _result(
-        self, expected: Targets, seen: Measured, cases: Cases, moved: Moved, lives: Lives
+        self, expected: Targets, seen: Measured, cases: Cases, moved: Moved, managed: Managed
     ) -> ViewResult:
-        p, targets = self._parameters, lives.targets
+        p, targets = self._parameters, managed.targets
         # those that are back or new are where they were measured
-        arrived = np.ones(len(lives.sources))
-        weights = np.concatenate([_weights(moved, cases)[lives.stayed], arrived])
+        arrived = np.ones(len(managed.sources))
+        weights = np.concatenate([_weights(moved, cases)[managed.stayed], arrived])
         counting = targets.labels > 0
         shown = np.flatnonzero(counting)
         estimates = targets.boxes[shown]
         if p.output == "measurements":
-            boxes, sigmas, box_weights, labels = self._believed(seen, moved, lives)
+            boxes, sigmas, box_weights, labels = self._believed(seen, moved, managed)
         else:
             seen_now = counting & (targets.misses == 0)
             if p.occlusion == "inside":
@@ -169,21 +169,21 @@ class Jpda:
             samples=seen.samples.astype(np.float32),
             sample_weights=seen.sample_weights.astype(np.float32),
             information={**seen.information, "newcomers": float((~counting).sum())},
-            events=_events(expected, cases, moved, lives),
+            events=_events(expected, cases, moved, managed),
             gates=self._gates(expected),
             foreground=None if seen.mask is None else pack(seen.mask),
         )
 
     def _believed(
-        self, seen: Measured, moved: Moved, lives: Lives
+        self, seen: Measured, moved: Moved, managed: Managed
     ) -> tuple[ndarray, ndarray, ndarray, ndarray]:
         """The measurements that are somebody's: boxes, sigmas, probabilities and labels."""
-        after = len(lives.targets.labels)
+        after = len(managed.targets.labels)
         matrix = np.zeros((after, len(seen.boxes)))
-        matrix[: len(lives.stayed)] = moved.matrix[lives.stayed]
-        matrix[np.arange(len(lives.stayed), after), lives.sources] = 1.0
-        matrix = matrix[lives.targets.labels > 0]
-        labels = lives.targets.labels[lives.targets.labels > 0]
+        matrix[: len(managed.stayed)] = moved.matrix[managed.stayed]
+        matrix[np.arange(len(managed.stayed), after), managed.sources] = 1.0
+        matrix = matrix[managed.targets.labels > 0]
+        labels = managed.targets.labels[managed.targets.labels > 0]
         explained = matrix.sum(axis=0)
         taken = np.flatnonzero(explained > BELIEVED)
         if not len(taken):
@@ -206,7 +206,9 @@ def _weights(moved: Moved, cases: Cases) -> ndarray:
     return np.where(moved.hidden, 0.5, weights)
 
 
-def _events(expected: Targets, cases: Cases, moved: Moved, lives: Lives) -> tuple[ViewEvent, ...]:
+def _events(
+    expected: Targets, cases: Cases, moved: Moved, managed: Managed
+) -> tuple[ViewEvent, ...]:
     """What happened to whom; of newcomers that do not count yet nothing is told."""
     labels = expected.labels
     events = []
@@ -216,10 +218,10 @@ def _events(expected: Targets, cases: Cases, moved: Moved, lives: Lives) -> tupl
             events.append(ViewEvent("occluded", tuple(sorted(labels[group].tolist()))))
     for label in labels[cases.split & (labels > 0)].tolist():
         events.append(ViewEvent("split", (label,)))
-    for label in lives.vanished_labels:
+    for label in managed.vanished_labels:
         events.append(ViewEvent("vanished", (label,)))
-    for label in lives.returned_labels:
+    for label in managed.returned_labels:
         events.append(ViewEvent("returned", (label,)))
-    for label in lives.new_labels:
+    for label in managed.new_labels:
         events.append(ViewEvent("new", (label,)))
     return tuple(events)

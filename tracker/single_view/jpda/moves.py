@@ -14,12 +14,6 @@ from tracker.single_view.jpda.cases import Cases
 from tracker.single_view.jpda.measurements import Measured
 from tracker.single_view.jpda.targets import Innovations, Targets, X, Y, innovations
 
-SAME_SIZE = 1.5
-"""A measurement that differs from its target's box by more than this factor is not of it alone."""
-
-ONE_SIDE = 2.0
-"""An edge of a piece is left over if so much more is than of the edge across from it."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moved:
@@ -53,7 +47,7 @@ def move(
     p = parameters
     hidden = cases.shared >= 0
     if p.occlusion == "inside":
-        hidden &= ~((cases.own == cases.shared) & _alike(targets, cases, seen))
+        hidden &= ~((cases.own == cases.shared) & _alike(targets, cases, seen, p.same_size))
     if p.five_cases and p.occlusion == "inside":
         matrix = _one_each(targets, cases, matrix, p.least_probability)
     # whom the update by all associations is not for
@@ -66,7 +60,7 @@ def move(
             one = _at_rest(targets, int(t), j, seen, p)
         else:
             alone = (hidden & (cases.shared >= 0) & _in_piece(cases.shared, j, seen)).sum() == 1
-            one = _behind(targets, int(t), j, seen, alone=bool(alone))
+            one = _behind(targets, int(t), j, seen, p.one_side, alone=bool(alone))
         moved = _put(moved, int(t), one)
     # who is measured by himself is hidden by nobody, even if he stands still for it
     lost = hidden & ((cases.own != cases.shared) | (p.occlusion == "inside"))
@@ -82,12 +76,12 @@ def move(
     )
 
 
-def _alike(targets: Targets, cases: Cases, seen: Measured) -> Bool[ndarray, " n"]:
+def _alike(targets: Targets, cases: Cases, seen: Measured, factor: float) -> Bool[ndarray, " n"]:
     """Whether each target's own measurement is of about its size; false where it has none."""
     alike = np.zeros(targets.size, dtype=bool)
     there = np.flatnonzero(cases.own >= 0)
     ratios = np.log(seen.boxes[cases.own[there], 2:] / targets.half_sizes[there])
-    alike[there] = (np.abs(ratios) < np.log(SAME_SIZE)).all(axis=1)
+    alike[there] = (np.abs(ratios) < np.log(factor)).all(axis=1)
     return alike
 
 
@@ -141,7 +135,9 @@ def _at_rest(targets: Targets, t: int, j: int, seen: Measured, p: JpdaParams) ->
     return replace(one, means=rest.means, covariances=rest.covariances)
 
 
-def _behind(targets: Targets, t: int, j: int, seen: Measured, *, alone: bool) -> Targets:
+def _behind(
+    targets: Targets, t: int, j: int, seen: Measured, one_side: float, *, alone: bool
+) -> Targets:
     """One occluded target: it goes on inside its piece.
 
     Where the boxes measured in a piece leave one of its edges over, and only one target is
@@ -155,7 +151,9 @@ def _behind(targets: Targets, t: int, j: int, seen: Measured, *, alone: bool) ->
     # no innovation while it is inside; how far it may be off, the piece tells
     unsure = np.hypot(room, seen.sigmas[j, :2])
     if alone:
-        edges = _left_over(piece, seen.boxes[(seen.pieces == piece).all(axis=1)], half_sizes)
+        edges = _left_over(
+            piece, seen.boxes[(seen.pieces == piece).all(axis=1)], half_sizes, one_side
+        )
         told = edges != 0
         place = np.where(told, np.where(edges < 0, low, high), place)
         unsure = np.where(told, seen.sigmas[j, :2], unsure)
@@ -166,7 +164,10 @@ def _behind(targets: Targets, t: int, j: int, seen: Measured, *, alone: bool) ->
 
 
 def _left_over(
-    piece: Float[ndarray, " 4"], shown: Float[ndarray, "S 4"], half_sizes: Float[ndarray, " 2"]
+    piece: Float[ndarray, " 4"],
+    shown: Float[ndarray, "S 4"],
+    half_sizes: Float[ndarray, " 2"],
+    one_side: float,
 ) -> Int[ndarray, " 2"]:
     """Which edge of a piece the boxes shown in it do not reach, across and down.
 
@@ -176,7 +177,7 @@ def _left_over(
     before = (shown[:, :2] - shown[:, 2:]).min(axis=0) - (piece[:2] - piece[2:])
     after = (piece[:2] + piece[2:]) - (shown[:, :2] + shown[:, 2:]).max(axis=0)
     wider, narrower = np.maximum(before, after), np.minimum(before, after)
-    clear = (wider > ONE_SIDE * np.maximum(narrower, 0.0)) & (wider <= 2.0 * half_sizes)
+    clear = (wider > one_side * np.maximum(narrower, 0.0)) & (wider <= 2.0 * half_sizes)
     return np.where(clear & (wider > 0.0), np.where(before > after, -1, 1), 0)
 
 

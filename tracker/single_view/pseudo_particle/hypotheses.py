@@ -11,10 +11,7 @@ from numpy import ndarray
 from scipy.optimize import linear_sum_assignment
 from scipy.special import logsumexp
 
-from tracker.single_view.pseudo_particle.register import Targets
-
-GATE = 3.0
-"""Standard deviations: a target at an unknown place is as likely as one this far off."""
+from tracker.single_view.pseudo_particle.track_management import Targets
 
 
 def vacancies(targets: Targets, persons: int, per_person: int) -> Int[ndarray, " A"]:
@@ -33,14 +30,15 @@ def hypothesis_matrix(
     sharpness: float,
     background_distance: float,
     position_sigma: float,
+    position_gate: float,
 ) -> Float[ndarray, "M columns"]:
     """Logarithms of how likely each mode is each target, a newcomer, or background ([SG08]).
 
         h(m, t) = ε_m exp(-λ d(m, t)) exp(-½ |(x_m - x_t) / (σ_a H_t)|²)   of T targets
-        h(m, a) = ε_m exp(-λ d(m, a)) exp(-½ 3²)                          of A newcomers
-        h(m, 0) = exp(-λ d_0) exp(-½ 3²)                                  of the background
+        h(m, a) = ε_m exp(-λ d(m, a)) exp(-½ k_a²)                        of A newcomers
+        h(m, 0) = exp(-λ d_0) exp(-½ k_a²)                                of the background
 
-    A newcomer's and the background's place is unknown; they count as three standard
+    A newcomer's and the background's place is unknown; they count as k_a standard
     deviations off, so that a target that is followed may look a little worse than they.
 
     Args:
@@ -52,6 +50,7 @@ def hypothesis_matrix(
         sharpness: λ.
         background_distance: d_0.
         position_sigma: σ_a, in half sizes H_t of a target.
+        position_gate: k_a: a target at an unknown place is as likely as one so many σ_a off.
 
     Returns:
         T + A + 1 columns; the background is the last.
@@ -59,7 +58,7 @@ def hypothesis_matrix(
     colours = evidence[:, None] - sharpness * distances
     apart = modes[:, None, :2] - expected.boxes[None, :, :2]
     apart = apart / (position_sigma * np.maximum(expected.boxes[None, :, 2:], 0.5))
-    unknown = -0.5 * GATE**2
+    unknown = -0.5 * position_gate**2
     return np.concatenate(
         [
             colours[:, expected.persons] - 0.5 * (apart**2).sum(axis=2),

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float, Float32, Int, UInt8
@@ -15,18 +15,22 @@ from scipy.special import expit
 
 from tracker import particles as particle_set
 from tracker.foreground import pack
-from tracker.parameters import ForegroundParams, PseudoParticleParams
-from tracker.sequences.frames import FrameReader
+from tracker.parameters import PseudoParticleParams
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.appearance import Scene
 from tracker.single_view.protocol import ViewEvent, ViewResult
 from tracker.single_view.pseudo_particle import hypotheses
-from tracker.single_view.pseudo_particle.hypotheses import GATE
 from tracker.single_view.pseudo_particle.particles import ColourParticles
-from tracker.single_view.pseudo_particle.register import UNCONFIRMED, Register, Targets, follow
+from tracker.single_view.pseudo_particle.track_management import (
+    UNCONFIRMED,
+    Targets,
+    Tracks,
+    manage,
+)
 
-MERGE_DISTANCE = 1.0
-"""Modes closer than this, in half sizes, are one."""
+if TYPE_CHECKING:
+    from tracker.parameters import RunParameters
 
 CLASSICAL_LABEL = 1
 """Of the one estimate that the classical filter has."""
@@ -38,7 +42,7 @@ class PseudoParticleState:
 
     particles: Float[ndarray, "S 4"]
     """Around the targets, or the classical filter's posterior; all of the same weight."""
-    register: Register
+    tracks: Tracks
     """Targets of the pseudo particle filter; the classical one has none."""
     foreground: Any
     """Of the foreground model."""
@@ -64,28 +68,25 @@ class PseudoParticle:
     the confirmed targets, go to the fusion.
     """
 
-    needs_pictures = True
-
     def __init__(
         self,
         sequence: Sequence,
         camera_index: int,
-        parameters: PseudoParticleParams,
-        foreground: ForegroundParams,
-        reader: FrameReader,
+        parameters: RunParameters,
+        reader: Pictures,
     ) -> None:
         """Read the templates and learn the background.
 
         Raises:
             ValueError: If there are no pictures or templates, or a template cannot be read.
         """
-        self._parameters = parameters
-        self._model = ColourParticles(sequence, camera_index, parameters, foreground, reader)
+        self._parameters = p = parameters.of(PseudoParticleParams)
+        self._model = ColourParticles(sequence, camera_index, p, parameters.foreground, reader)
         self._step_time = sequence.step_time
 
     def start(self) -> PseudoParticleState:
         """Nobody is in the picture."""
-        return PseudoParticleState(np.zeros((0, 4)), Register.empty(), self._model.start())
+        return PseudoParticleState(np.zeros((0, 4)), Tracks.empty(), self._model.start())
 
     def step(
         self,
@@ -101,24 +102,24 @@ class PseudoParticle:
         foreground, scene = self._model.look(state.foreground, picture)
         if self._parameters.filter == "classical":
             particles, result = self._classical(moved, scene, rng)
-            after = PseudoParticleState(particles, state.register, foreground)
+            after = PseudoParticleState(particles, state.tracks, foreground)
         else:
-            particles, register, result = self._pseudo(state.register, moved, scene, rng)
-            after = PseudoParticleState(particles, register, foreground)
+            particles, tracks, result = self._pseudo(state.tracks, moved, scene, rng)
+            after = PseudoParticleState(particles, tracks, foreground)
         mask = None if scene.mask is None else pack(scene.mask)
         return after, replace(result, foreground=mask)
 
     def _pseudo(
         self,
-        register: Register,
+        tracks: Tracks,
         moved: Float[ndarray, "S 4"],
         scene: Scene,
         rng: np.random.Generator,
-    ) -> tuple[Float[ndarray, "S 4"], Register, ViewResult]:
+    ) -> tuple[Float[ndarray, "S 4"], Tracks, ViewResult]:
         """Clusters, the hypothesis matrix, drawing anew: particles, targets and result."""
         p = self._parameters
         samples = np.concatenate([moved, self._model.newcomers(p.samples - len(moved), scene, rng)])
-        expected = register.targets.moved(p.velocity_share)
+        expected = tracks.targets.moved(p.velocity_share)
         scores, persons = self._model.scores(scene, samples)
         weights = (
             particle_set.normalised(scores)
@@ -131,7 +132,7 @@ class PseudoParticle:
             counts,
             persons if p.clusters == "each" else np.zeros_like(persons),
             bandwidth=p.bandwidth,
-            merge_distance=MERGE_DISTANCE,
+            merge_distance=p.merge_distance,
         )
         modes = found.modes[found.shares >= p.smallest_cluster]
         distances = self._model.distances(scene, modes)
@@ -149,6 +150,7 @@ class PseudoParticle:
             sharpness=p.sharpness,
             background_distance=p.acceptance_distance,
             position_sigma=p.position_sigma,
+            position_gate=p.position_gate,
         )
         existences = hypotheses.somebody(matrix)
         background = matrix.shape[1] - 1
@@ -160,8 +162,8 @@ class PseudoParticle:
             background,
             p.separation,
         )
-        after, events = follow(
-            register,
+        after, events = manage(
+            tracks,
             expected,
             modes,
             existences,
@@ -170,6 +172,8 @@ class PseudoParticle:
             confirmation=p.confirmation,
             patience=self._steps(p.patience),
             memory=self._steps(p.memory),
+            newcomer_misses=p.newcomer_misses,
+            velocity_memory=p.velocity_memory,
         )
         particles = self._around(after.targets, np.repeat(samples, counts, axis=0), rng)
         taken = columns < background
@@ -225,7 +229,8 @@ class PseudoParticle:
         if not len(targets):
             return np.zeros(len(boxes), dtype=np.int64)
         apart = boxes[:, None, :2] - targets.boxes[None, :, :2]
-        reach = GATE * self._parameters.position_sigma * np.maximum(targets.boxes[:, 2:], 0.5)
+        p = self._parameters
+        reach = p.position_gate * p.position_sigma * np.maximum(targets.boxes[:, 2:], 0.5)
         squared = ((apart / reach) ** 2).sum(axis=2)
         return np.asarray(np.where(squared.min(axis=1) < 1.0, squared.argmin(axis=1), len(targets)))
 
@@ -248,7 +253,8 @@ class PseudoParticle:
 
     def _gates(self, expected: Targets) -> Float[ndarray, "T 5"]:
         """Ellipses within which the targets' modes are looked for."""
-        variances = (GATE * self._parameters.position_sigma * expected.boxes[:, 2:]) ** 2
+        p = self._parameters
+        variances = (p.position_gate * p.position_sigma * expected.boxes[:, 2:]) ** 2
         across, down = variances.T
         return np.column_stack([expected.boxes[:, :2], across, np.zeros_like(across), down])
 
@@ -293,7 +299,7 @@ class PseudoParticle:
     def _unseen(self, state: PseudoParticleState) -> ViewResult:
         """Without a picture: the targets of the step before, and nothing for the fusion."""
         none = np.zeros(0)
-        confirmed = state.register.targets.take(state.register.targets.confirmed)
+        confirmed = state.tracks.targets.take(state.tracks.targets.confirmed)
         return replace(
             ViewResult.of_boxes(np.zeros((0, 4)), none, np.zeros((0, 4))),
             estimates=confirmed.boxes,

@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tracker import particles as particle_set
 from tracker.parameters import ForegroundParams, PseudoParticleParams
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.appearance import Appearance, Scene
 
@@ -29,7 +29,7 @@ class ColourParticles:
         camera_index: int,
         parameters: PseudoParticleParams,
         foreground: ForegroundParams,
-        reader: FrameReader,
+        reader: Pictures,
     ) -> None:
         """Read the templates and learn the background, where something asks for it.
 
@@ -37,15 +37,14 @@ class ColourParticles:
             ValueError: If there are no pictures or templates, or a template cannot be read.
         """
         p = self._parameters = parameters
-        weights = (p.foreground_weight, p.surroundings_weight, p.acceptance_foreground)
-        asked = p.birth == "foreground" or max(weights) > 0.0
         self._appearance = Appearance(
             sequence,
             camera_index,
             reader,
             colour_space=p.colour_space,
             histogram_kernel=p.histogram_kernel,
-            foreground=foreground if asked else None,
+            size_jitter=p.size_jitter,
+            foreground=foreground if p.asks_foreground else None,
         )
         self._root_time = float(np.sqrt(sequence.step_time))
         self.persons = len(self._appearance.model.names)

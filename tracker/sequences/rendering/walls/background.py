@@ -10,7 +10,7 @@ from numpy import ndarray
 from scipy.ndimage import gaussian_filter
 
 from tracker.camera import Camera
-from tracker.sequences.rendering.rays import BOX, cast
+from tracker.sequences.rendering.rays import BOX, Hits, cast
 from tracker.sequences.rendering.walls.interior import Interior, Lamp, Solid
 from tracker.sequences.rendering.walls.paint import paint
 from tracker.sequences.rendering.walls.textures import linear
@@ -53,18 +53,15 @@ class Tracer:
         self.bounds = np.column_stack([centres, radii]).astype(np.float32)
         self.reflectance = np.array([linear(s.finish.colour) for s in self.solids], np.float32)
 
-    def nearest(self, origins: ndarray, directions: ndarray) -> tuple[ndarray, ndarray]:
+    def nearest(self, origins: ndarray, directions: ndarray) -> Hits:
         """Distance and solid of the first hit of each ray, up to 20 m."""
         limits = np.full(len(origins), 20.0, dtype=np.float32)
-        distances, solids = cast(
-            origins, directions, limits, self.kinds, self.inverses, self.bounds, False
-        )
-        return distances, solids
+        return cast(origins, directions, limits, self.kinds, self.inverses, self.bounds, False)
 
     def blocked(self, origins: ndarray, directions: ndarray, limits: ndarray) -> ndarray:
         """Whether anything stands on each ray within its limit."""
-        _, solids = cast(origins, directions, limits, self.kinds, self.inverses, self.bounds, True)
-        return np.asarray(solids >= 0)
+        hits = cast(origins, directions, limits, self.kinds, self.inverses, self.bounds, True)
+        return np.asarray(hits.solids >= 0)
 
     def surface(self, places: ndarray, solids: ndarray) -> tuple[ndarray, ndarray, ndarray]:
         """Own coordinates in metres, face (axis 0, 1, 2; 3 where round) and world normal."""
@@ -111,7 +108,8 @@ def render_background(tracer: Tracer, camera: Camera, rounds: int = 4) -> Backgr
     pixels = (grid + 0.5) / FINE - 0.5
     directions = camera.back_project(pixels).astype(np.float32)
     origins = np.broadcast_to(camera.centre.astype(np.float32), directions.shape).copy()
-    distance, solids = tracer.nearest(origins, directions)
+    hits = tracer.nearest(origins, directions)
+    distance, solids = hits.distances, hits.solids
     solids = np.maximum(solids, 0)
     places = origins + distance[:, None] * directions
     own, face, normals = tracer.surface(places, solids)
@@ -138,7 +136,8 @@ def render_background(tracer: Tracer, camera: Camera, rounds: int = 4) -> Backgr
     mirrored = directions[shiny] + 2.0 * cosine[:, None] * normals[shiny]
     share = gloss[shiny] * (0.04 + 0.96 * (1.0 - np.clip(cosine, 0.0, 1.0)) ** 5)
     start = places[shiny] + 2e-3 * normals[shiny]
-    length, hit = tracer.nearest(start, mirrored)
+    hits = tracer.nearest(start, mirrored)
+    length, hit = hits.distances, hits.solids
     there = start + length[:, None] * mirrored
     seen_there = _rough_light(tracer, there, np.maximum(hit, 0), glowing=True)
     image = np.zeros((rows * columns, 3), np.float32)
@@ -188,7 +187,8 @@ def _gather(
         radius, angle = np.sqrt(u)[:, None], (2.0 * np.pi * v)[:, None]
         outward = radius * (np.cos(angle) * first + np.sin(angle) * second)
         outward = (outward + np.sqrt(1.0 - u)[:, None] * normals).astype(np.float32)
-        length, hit = tracer.nearest(places, outward)
+        hits = tracer.nearest(places, outward)
+        length, hit = hits.distances, hits.solids
         there = places + length[:, None] * outward
         total += _rough_light(tracer, there, np.maximum(hit, 0)) / rounds
     return total

@@ -1,0 +1,152 @@
+"""``import``, ``check``, ``formats`` and ``export-calibration``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from app.command.flags import Check, ExportCalibration, Formats, Import
+from app.command.terminal import Bar, CommandError, print_table, say
+from tracker.parameters import ParameterError
+
+FAILURE = 1
+
+SIGNS = {"good": "ok", "warning": "!", "absent": "–"}
+"""Of a check's outcome, in the first column."""
+
+
+def run(command: Import | Check | Formats | ExportCalibration) -> int:
+    """Run one of the commands; returns the exit status."""
+    match command:
+        case Import():
+            return _import(command)
+        case Check():
+            return _check(command)
+        case Formats():
+            _formats()
+        case ExportCalibration():
+            _export(command)
+    return 0
+
+
+def _import(command: Import) -> int:
+    if command.output is None and not command.dry_run:
+        raise ParameterError("--output", "expected the folder to write (-o FOLDER), or --dry-run")
+    if not command.sources:
+        raise ParameterError("SOURCE", "expected files or a folder to import, got none")
+    options = _options(command)
+    from tracker.importing.gathering import gather
+    from tracker.importing.settling import settle
+    from tracker.importing.writing import FILE, write
+    from tracker.sequences import library
+
+    if command.output is not None and (command.output / FILE).exists():
+        raise CommandError(f"{command.output}: holds a {FILE} already; name another folder")
+    taken = gather([*command.sources, *_not_inside(options.cameras.values(), command.sources)])
+    print_table(
+        ("file", "taken for", "note"),
+        [(one.label, one.format if one.pieces else "–", one.complaint) for one in taken],
+    )
+    settled = settle(taken, options)
+    print_table(("\nfound out", "as"), [*settled.found, *(("not used", t) for t in settled.told)])
+    facts = (
+        f"{len(settled.views)} cameras, {settled.frames} steps at {settled.fps:g} a second, "
+        f"{'with' if settled.truth is not None else 'without'} truth"
+    )
+    if command.dry_run or command.output is None:
+        say(f"{facts}; nothing was written")
+        return 0
+    name = command.name or command.output.resolve().name
+    for sentence in write(settled, command.output, name, copy=command.copy):
+        say(sentence)
+    say(f"{facts}, written to {command.output}")
+    _print_checks(library.open_sequence(str(command.output)))
+    return 0
+
+
+def _not_inside(files: Any, sources: Sequence[Path]) -> list[Path]:
+    """Files of ``--camera`` that no source holds."""
+    homes = [source.resolve() for source in sources]
+    return [
+        path for path in files if not any(path.resolve().is_relative_to(home) for home in homes)
+    ]
+
+
+def _options(command: Import) -> Any:
+    from tracker.importing.options import ImportOptions
+
+    unit: Any = command.unit
+    if unit is not None and unit not in ("m", "cm", "mm"):
+        try:
+            unit = float(unit)
+        except ValueError:
+            unit = -1.0
+        if not 0.0 < unit < 1e6:
+            raise ParameterError(
+                "--unit", f"expected m, cm, mm or metres in one unit, got {command.unit!r}"
+            )
+    if command.first_index not in (None, 0, 1):
+        raise ParameterError("--first-index", f"expected 0 or 1, got {command.first_index}")
+    if command.fps is not None and not 0.0 < command.fps <= 1000.0:
+        raise ParameterError(
+            "--fps", f"expected a rate above 0 and up to 1000, got {command.fps:g}"
+        )
+    cameras: dict[str, Path] = {}
+    for item in command.camera:
+        name, mark, path = item.partition("=")
+        if not mark or not path:
+            raise ParameterError("--camera", f"expected NAME=FILE, got {item!r}")
+        cameras[name] = Path(path)
+    first: Any = command.first_index
+    return ImportOptions(
+        unit=unit,
+        up=command.up,
+        pose=command.pose,
+        axes=command.axes,
+        boxes=command.boxes,
+        first_index=first,
+        fps=command.fps,
+        cameras=cameras,
+    )
+
+
+def _check(command: Check) -> int:
+    from tracker.sequences import library
+
+    with Bar("rendering", "frame") as rendering:
+        sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    return _print_checks(sequence)
+
+
+def _print_checks(sequence: Any) -> int:
+    """Every check in a row; status 1 where one of them warns."""
+    from tracker.checks import check
+
+    checks = check(sequence)
+    rows = [(SIGNS[one.status], one.name, str(one)) for one in checks]
+    rows += [("!", "opening", warning) for warning in sequence.warnings]
+    print_table(("", "check", "found"), rows)
+    return FAILURE if any(row[0] == SIGNS["warning"] for row in rows) else 0
+
+
+def _formats() -> None:
+    from tracker.formats.export import WRITTEN
+    from tracker.formats.registry import all_formats
+
+    rows = [
+        (one.KIND, one.NAME, "a file a frame, too" if one.SERIES else "") for one in all_formats()
+    ]
+    print_table(("read", "format", ""), [*rows, *(("written", name, "") for name in WRITTEN)])
+
+
+def _export(command: ExportCalibration) -> None:
+    from tracker.formats.export import save_calibration
+    from tracker.sequences import library
+
+    if command.output.exists():
+        raise CommandError(f"{command.output} exists; name a file that does not")
+    with Bar("rendering", "frame") as rendering:
+        sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    save_calibration(command.output, sequence.cameras, command.form)
+    say(f"{len(sequence.cameras)} cameras, written to {command.output}")

@@ -1,0 +1,104 @@
+/**
+ * Where the camera pictures go: one large and the others in a column beside it, or all alike.
+ * Every picture keeps its own shape.
+ */
+
+/**
+ * @param {number[]} aspects  width by height of each camera
+ * @param {number | null} large  index of the large one; null for all alike
+ * @param {{width: number, most: number, gap: number}} room  `most` is the height that may be used
+ * @returns {{cells: Cell[], height: number}} cells relative to the mosaic, its height with the gaps
+ * around
+ */
+export function mosaic(aspects, large, { width, most, gap }) {
+	if (aspects.length === 0) return { cells: [], height: 0 };
+	const inner = Math.max(1, width - 2 * gap);
+	const tall = Math.max(1, most - 2 * gap);
+	return large === null || aspects.length === 1 || large >= aspects.length
+		? alike(aspects, inner, tall, gap)
+		: oneLarge(aspects, large, inner, tall, gap);
+}
+
+/**
+ * In the number of columns that makes the pictures largest.
+ * @param {number[]} aspects
+ * @param {number} inner
+ * @param {number} tall
+ * @param {number} gap
+ */
+function alike(aspects, inner, tall, gap) {
+	const widest = Math.max(...aspects);
+	const grids = aspects.map((_, index) => {
+		const columns = index + 1;
+		const rows = Math.ceil(aspects.length / columns);
+		const width = (inner - gap * (columns - 1)) / columns;
+		return {
+			columns,
+			rows,
+			width,
+			height: Math.min((tall - gap * (rows - 1)) / rows, width / widest),
+		};
+	});
+	const { columns, rows, width, height } = grids.reduce((best, grid) =>
+		grid.height > best.height + 0.5 ? grid : best,
+	);
+	const cells = aspects.map((aspect, index) =>
+		fit(aspect, {
+			x: gap + (index % columns) * (width + gap),
+			y: gap + Math.floor(index / columns) * (height + gap),
+			width,
+			height,
+		}),
+	);
+	return { cells, height: Math.round(rows * (height + gap) + gap) };
+}
+
+/**
+ * @param {number[]} aspects
+ * @param {number} large
+ * @param {number} inner
+ * @param {number} tall
+ * @param {number} gap
+ */
+function oneLarge(aspects, large, inner, tall, gap) {
+	const others = aspects.length - 1;
+	const rows = others <= 3 ? Math.max(2, others) : Math.ceil(others / 2);
+	const columns = Math.ceil(others / rows);
+	const small = Math.max(...aspects.filter((_, index) => index !== large));
+	// Width = a H + columns (gap + b h), with h = (H - gap (rows - 1)) / rows.
+	const wanted =
+		(inner - columns * gap + (columns * small * gap * (rows - 1)) / rows) /
+		(aspects[large] + (columns * small) / rows);
+	const height = Math.min(wanted, tall);
+	const cellHeight = (height - gap * (rows - 1)) / rows;
+	const bigWidth = aspects[large] * height;
+	const cellWidth = (inner - bigWidth - columns * gap) / columns;
+	const cells = aspects.map((aspect, index) => {
+		if (index === large) return fit(aspect, { x: gap, y: gap, width: bigWidth, height });
+		const place = index - Number(index > large);
+		const x = gap + bigWidth + gap + Math.floor(place / rows) * (cellWidth + gap);
+		return fit(aspect, {
+			x,
+			y: gap + (place % rows) * (cellHeight + gap),
+			width: cellWidth,
+			height: cellHeight,
+		});
+	});
+	return { cells, height: Math.round(height + 2 * gap) };
+}
+
+/**
+ * The largest picture of a shape in the middle of a frame, on whole pixels.
+ * @param {number} aspect
+ * @param {Cell} frame
+ */
+function fit(aspect, { x, y, width, height }) {
+	const w = Math.min(width, height * aspect);
+	const hgt = w / aspect;
+	return {
+		x: Math.round(x + (width - w) / 2),
+		y: Math.round(y + (height - hgt) / 2),
+		width: Math.round(w),
+		height: Math.round(hgt),
+	};
+}

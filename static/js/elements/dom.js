@@ -1,0 +1,105 @@
+/** Building and filling elements. */
+
+/**
+ * An element with attributes and children. `on…` is a listener, `class` and the rest are
+ * attributes; `true` sets an empty one, `false` and `null` none; `--x` is a style property.
+ * @template {keyof HTMLElementTagNameMap} K
+ * @param {K} tag
+ * @param {Attributes} [attributes]
+ * @param {...(Child | Child[])} children
+ */
+export function h(tag, attributes = {}, ...children) {
+	const element = document.createElement(tag);
+	for (const [name, value] of Object.entries(attributes)) {
+		if (value === null || value === undefined || value === false) continue;
+		if (name.startsWith("on"))
+			element.addEventListener(name.slice(2), /** @type {EventListener} */ (value));
+		else if (name.startsWith("--")) element.style.setProperty(name, String(value));
+		else element.setAttribute(name, value === true ? "" : String(value));
+	}
+	fill(element, ...children);
+	return element;
+}
+
+/**
+ * Replace what an element holds.
+ * @param {Element} element
+ * @param {...(Child | Child[])} children
+ */
+export function fill(element, ...children) {
+	const nodes = children
+		.flat()
+		.filter((child) => child !== null && child !== undefined && child !== false);
+	element.replaceChildren(
+		.../** @type {(Node | string)[]} */ (nodes.map((n) => (typeof n === "number" ? String(n) : n))),
+	);
+}
+
+/**
+ * Write a text only where it changed: cheap enough for every frame.
+ * @param {Node} node
+ * @param {string} text
+ */
+export function write(node, text) {
+	if (node.textContent !== text) node.textContent = text;
+}
+
+/**
+ * The elements of the markup that a selector finds.
+ * @param {string} selector
+ * @param {ParentNode} [root]
+ * @returns {Part[]}
+ */
+export const all = (selector, root = document) =>
+	[...root.querySelectorAll(selector)].map((element) => /** @type {any} */ (element));
+
+/** The one that there is. @param {string} selector @param {ParentNode} [root] */
+export const one = (selector, root) => all(selector, root)[0];
+
+/**
+ * Those that the markup names with `data-ref`, by that name.
+ * @param {ParentNode} root
+ * @returns {Record<string, Part>}
+ */
+export const parts = (root) =>
+	Object.fromEntries(all("[data-ref]", root).map((element) => [element.dataset.ref, element]));
+
+/**
+ * @param {Part} select
+ * @param {[string | number, string][]} choices  values and words
+ * @param {string | number} chosen
+ */
+export function choices(select, choices, chosen) {
+	fill(
+		select,
+		choices.map(([value, word]) => h("option", { value }, word)),
+	);
+	select.value = String(chosen);
+}
+
+/** @param {string} name  of a symbol in the page  @param {string} [kind]  further classes */
+export function icon(name, kind = "") {
+	const ns = "http://www.w3.org/2000/svg";
+	const svg = document.createElementNS(ns, "svg");
+	svg.setAttribute("class", `i ${kind}`);
+	svg.append(document.createElementNS(ns, "use"));
+	svg.firstElementChild?.setAttribute("href", `#${name}`);
+	return svg;
+}
+
+/** 1 … 24: colour follows the id and never the rank. @param {number} id */
+export const colourIndex = (id) => ((((id - 1) % 24) + 24) % 24) + 1;
+
+/** @param {number} id */
+export function idTag(id) {
+	const n = colourIndex(id);
+	return h("span", { class: "id", "--c": `var(--id-${n})`, "--on-id": `var(--on-${n})` }, id);
+}
+
+/** @param {number} value  @returns {string} as short as it stays readable */
+export function show(value) {
+	if (Number.isInteger(value)) return String(value);
+	return Math.abs(value) < 1e-3
+		? value.toExponential().replace("e-", "e−")
+		: String(Number(value.toPrecision(5)));
+}

@@ -1,0 +1,121 @@
+/**
+ * The panels whose tables the server writes: they are fetched while they are looked at, when
+ * something that they tell of is new. Their buttons name an action and its value.
+ */
+import { fetcher, request } from "../state/api.js";
+import { all, choices, one, parts, write } from "../elements/dom.js";
+
+/**
+ * What a panel tells of, and where it comes from.
+ * @type {Record<string, {keys: (keyof PageState)[], path: (state: Readonly<PageState>) => string}>}
+ */
+const TABLES = {
+	step: { keys: ["result", "scores"], path: ({ shown }) => `step/${Math.max(0, shown)}` },
+	events: {
+		keys: ["timeline", "scores", "eventKind"],
+		path: ({ eventKind }) => `events${eventKind && `?kind=${eventKind}`}`,
+	},
+	teach: { keys: ["server"], path: () => "teach" },
+	changes: { keys: ["server"], path: () => "changes" },
+	compare: { keys: ["scores", "basis", "every"], path: ({ every }) => `compare?every=${every}` },
+	runs: { keys: ["server", "run"], path: () => "runs" },
+};
+
+/** @type {Pane} */
+export function mountTables(root, { store, actions }) {
+	const {
+		kind,
+		presets,
+		presetName,
+		savePreset,
+		renamePreset,
+		removePreset,
+		code,
+		pin,
+		unpin,
+		more,
+		resetAll,
+	} = parts(root);
+	for (const [name, { keys, path }] of Object.entries(TABLES)) {
+		const body = one(`#panel-${name} [data-fill]`, root);
+		let told = "";
+		const refresh = fetcher(async () => {
+			const { tab, sequence } = store.get();
+			if (tab !== name || !sequence) return;
+			const text = await (await request(`/api/tables/${path(store.get())}`)).text();
+			if (text === told) return;
+			told = text;
+			// Where the focus was, it is again, on the one in its place; what is being typed stays, but
+			// for what the server has taken.
+			const held = document.activeElement;
+			const at = all("button, input", body).findIndex((control) => control === held);
+			const typed = all("input", body).filter(({ value, defaultValue }) => value !== defaultValue);
+			body.innerHTML = text;
+			for (const { id, value, defaultValue } of typed)
+				for (const field of all(`#${id}`, body))
+					if (field.defaultValue === defaultValue) field.value = value;
+			if (at >= 0)
+				(
+					(held?.id && all(`#${held.id}`, body)[0]) ||
+					all("button, input", body)[at] ||
+					body
+				).focus();
+		});
+		store.on([...keys, "tab", "sequence"], refresh);
+	}
+	root.addEventListener("click", ({ target }) => {
+		const { do: act, value = "" } = /** @type {Part} */ (
+			/** @type {Part} */ (target).closest("[data-do]") ?? root
+		).dataset;
+		if (act) /** @type {any} */ (actions)[act](value);
+	});
+
+	kind.addEventListener("change", () =>
+		store.set({ eventKind: /** @type {LaneEvent["kind"]} */ (kind.value) }),
+	);
+	more.addEventListener("click", () => store.set({ every: !store.get().every }));
+	presets.addEventListener("change", () => actions.preset(presets.value));
+	for (const button of [savePreset, renamePreset]) {
+		button.addEventListener("click", () => {
+			const old = button === renamePreset ? presets.value : "";
+			Object.assign(presetName, { value: old, hidden: false });
+			presetName.select();
+			presetName.onkeydown = async (event) => {
+				event.stopPropagation();
+				if (
+					event.key === "Enter" &&
+					!(await (old
+						? actions.renamePreset(old, presetName.value)
+						: actions.savePreset(presetName.value)))
+				)
+					return;
+				if (event.key === "Enter" || event.key === "Escape") presets.focus();
+			};
+		});
+	}
+	presetName.addEventListener("blur", () => (presetName.hidden = true));
+	removePreset.addEventListener("click", () => actions.removePreset(presets.value));
+
+	function controls() {
+		const { server, sequence, schema, run, link, every } = store.get();
+		const changed = server?.changed ?? [];
+		const locked = link !== "open" || !sequence;
+		const [own, now] = [server?.presets ?? [], server?.preset ?? ""];
+		choices(
+			presets,
+			[...(now ? [] : [""]), ...Object.keys(schema?.presets ?? {}), ...own].map((name) => [
+				name,
+				name || "own values",
+			]),
+			now,
+		);
+		presets.disabled = savePreset.disabled = locked;
+		renamePreset.hidden = removePreset.hidden = !own.includes(now);
+		resetAll.disabled = locked || changed.length === 0;
+		write(code, server?.command ?? "");
+		unpin.hidden = !server?.pinned;
+		pin.disabled = locked || run?.state !== "done" || server?.pinned?.key === run.key;
+		write(more, every ? "Headlines" : "All figures");
+	}
+	store.watch(["server", "schema", "link", "run", "every", "sequence"], controls);
+}

@@ -1,0 +1,163 @@
+/** The table of tracks: sorted by any column, walked by keyboard, alive at the shown step. */
+import { fill, h, idTag, parts, write } from "../elements/dom.js";
+import {
+	eventsNow,
+	isAlone,
+	nextEvent,
+	resultOf,
+	scoresOf,
+	stateAt,
+	trueCount,
+} from "../state/events.js";
+import { grid } from "../elements/grid.js";
+
+/** Rows beyond this are counted, not drawn. */
+const MOST_ROWS = 300;
+const ORDER = { seen: 0, coasting: 1, lost: 2, "not yet": 3, ended: 4 };
+
+/** @type {Pane} */
+export function mountTracks(root, { store, actions, playback }) {
+	const { summary, upcoming, blank } = parts(root);
+	/** @type {Map<number, Server.ScoredTrackInfo>} */
+	let scored = new Map();
+	const step = () => Math.max(0, store.get().shown);
+	const done = () => store.get().timeline?.done ?? 0;
+	const state = (/** @type {Server.TrackLife} */ track) =>
+		step() < done() ? stateAt(track, step()) : null;
+	const ended = (/** @type {Server.TrackLife} */ track) => track.last < done() - 1;
+	const duration = (/** @type {number} */ seconds) => `${seconds.toFixed(seconds < 1 ? 2 : 1)} s`;
+	const here = (/** @type {Server.TrackLife} */ { id }) =>
+		resultOf(store.get())?.tracks.find((track) => track.id === id);
+	const cameras = (/** @type {Server.TrackLife} */ track) => {
+		const now = here(track)?.seen ?? [];
+		const list = (/** @type {boolean} */ seen) =>
+			track.cameras
+				.flatMap((share, k) => (share && Boolean(now[k]) === seen ? [k + 1] : []))
+				.join(" ");
+		return `${list(true)} ${list(false) && `(${list(false)})`}`.trim() || "–";
+	};
+
+	/** @type {Column<Server.TrackLife>[]} */
+	const columns = [
+		{ word: "Id", cell: ({ id }) => idTag(id), by: ({ id }) => id },
+		{
+			word: "State",
+			cell: (t) => state(t) ?? "–",
+			by: (t) => ORDER[state(t) ?? "ended"],
+			live: true,
+		},
+		{ word: "Born", kind: "num", cell: (t) => t.first, by: (t) => t.first },
+		{
+			word: "Died",
+			kind: "num",
+			cell: (t) => (ended(t) ? t.last : "–"),
+			by: (t) => (ended(t) ? t.last : 1e9),
+		},
+		{
+			word: "Length",
+			kind: "num",
+			cell: (t) => duration((t.last - t.first + 1) / store.get().fps),
+			by: (t) => t.last - t.first,
+		},
+		{ word: "Seen", kind: "num", cell: (t) => `${Math.round(t.seen * 100)} %`, by: (t) => t.seen },
+		{
+			word: "Cameras",
+			help: "That see it now, by number; in brackets those that saw it at other steps",
+			cell: cameras,
+			by: (t) => t.cameras.filter(Boolean).length,
+			live: true,
+		},
+		{ word: "Weight", kind: "num", cell: (t) => here(t)?.existence.toFixed(2) ?? "–", live: true },
+		{
+			word: "x, y, z  m",
+			kind: "num",
+			cell: (t) =>
+				here(t)
+					?.position.map((v) => v.toFixed(2).replace("-", "−"))
+					.join("  ") ?? "–",
+			live: true,
+		},
+		{
+			word: "Error  m",
+			kind: "num truth",
+			cell: ({ id }) => scored.get(id)?.mean_error?.toFixed(3) ?? "–",
+			by: ({ id }) => scored.get(id)?.mean_error ?? 1e9,
+		},
+		{
+			word: "Switches",
+			kind: "num truth",
+			cell: ({ id }) => scored.get(id)?.switches ?? "–",
+			by: ({ id }) => scored.get(id)?.switches ?? -1,
+		},
+	];
+	const table = grid("Tracks", columns, {
+		key: ({ id }) => id,
+		by: "Length",
+		down: true,
+		choose: ({ id }) => actions.select(store.get().selection === id ? null : id),
+		open: ({ id, first }) => {
+			actions.select(id);
+			playback.seek(first);
+		},
+		attributes: ({ id }) => ({
+			onpointerenter: () => store.set({ hover: { id, camera: -1 } }),
+			onpointerleave: () => store.set({ hover: null }),
+		}),
+	});
+	root.prepend(table.element);
+
+	function list() {
+		const { timeline, sequence, run } = store.get();
+		scored = new Map(scoresOf(store.get())?.evaluation.per_track.map((track) => [track.id, track]));
+		table.element.classList.toggle("plain", !sequence?.has_truth);
+		const tracks = (timeline?.tracks ?? []).filter(
+			({ id }) => !isAlone(store.get()) || id === store.get().selection,
+		);
+		table.show(tracks.slice(0, MOST_ROWS));
+		blank.hidden = tracks.length > 0;
+		if (!tracks.length) {
+			const [title, text] = !sequence
+				? ["Tracks appear here", "once a sequence is open."]
+				: run?.state === "computing"
+					? ["No track yet", "The run goes on; tracks appear as they are found."]
+					: !run?.done && run?.state === "cancelled"
+						? ["No track yet", "The run was stopped before its first step."]
+						: [
+								"No track was found",
+								"Lower the extraction threshold, or look at the detections in the pictures: without boxes there is nothing to fuse.",
+							];
+			fill(blank, h("h3", {}, title), h("p", {}, text));
+		}
+		now();
+	}
+
+	/** What changes with the playhead: written only where it differs. */
+	function now() {
+		const { timeline, selection, sequence } = store.get();
+		table.live();
+		table.each((track, row) => {
+			row.classList.toggle("gone", !["seen", "coasting"].includes(state(track) ?? ""));
+			row.ariaSelected = String(track.id === selection);
+		});
+		const result = resultOf(store.get());
+		const more =
+			Math.max(0, (timeline?.tracks.length ?? 0) - MOST_ROWS) + (timeline?.left_out ?? 0);
+		const of = sequence?.has_truth && result ? ` of ${trueCount(result)}` : "";
+		const words = `${result?.tracks.length}${of} people at step ${step()}${more > 0 ? ` · ${more} more tracks` : ""}`;
+		write(summary, result ? words : sequence ? "not computed at this step" : "");
+		const event = nextEvent(eventsNow(store.get()), step(), 1);
+		fill(
+			upcoming,
+			event
+				? ["next: ", h("b", {}, `${event.kind} of ${event.id}, step ${event.step}`)]
+				: "no later event",
+		);
+	}
+
+	store.watch(["timeline", "sequence", "run", "scores", "layers3d"], list);
+	store.on(["shown", "result", "eventKind"], now);
+	store.on(["selection"], () => (isAlone(store.get()) ? list() : now()));
+	store.on(["selection"], ({ selection }) =>
+		table.each(({ id }, row) => id === selection && row.scrollIntoView({ block: "nearest" })),
+	);
+}

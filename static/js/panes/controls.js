@@ -1,0 +1,78 @@
+/** Buttons, layer chips and keys: each performs a command of the one list. */
+import { all } from "../elements/dom.js";
+import { commandFor, commandOf, keyLabel, keyOf, perform } from "../state/commands.js";
+
+/** Fields that take letters. */
+const TYPING =
+	"input:not([type=range], [type=checkbox], [type=color]), textarea, [contenteditable=true]";
+
+/** What is heard while somebody types: it means nothing in a text. */
+const ALWAYS = ["Ctrl+k", "Ctrl+s", "Ctrl+o"];
+
+/** @param {Context} context */
+export function mountControls({ store, actions, press }) {
+	for (const control of all("[data-command], [data-command-key]")) {
+		const { command: name, commandKey } = control.dataset;
+		const command = commandOf(name ?? commandKey ?? "");
+		control.dataset.key = command.keys.slice(0, 1).map(keyLabel).join();
+		if (!name) continue;
+		control.dataset.tip ??= command.title;
+		if (!control.textContent?.trim()) control.ariaLabel = command.title;
+		control.addEventListener("click", () => perform(command, actions));
+	}
+	for (const chip of all("[data-layer2d], [data-layer3d]")) {
+		const { layer2d, layer3d } = chip.dataset;
+		const name = layer2d ?? layer3d ?? "";
+		chip.addEventListener("click", () =>
+			layer2d ? actions.toggleLayer2d(name) : actions.toggleLayer3d(name),
+		);
+		store.watch(
+			["server", "sequence", "layers2d", "layers3d", "link"],
+			({ server, sequence, layers2d, layers3d, link }) => {
+				chip.ariaPressed = String(Boolean((layer2d ? layers2d : layers3d)[name]));
+				chip.disabled = layer2d ? !sequence : link !== "open";
+				chip.disabled ||= name === "truth" && !sequence?.has_truth;
+				chip.hidden = name === "pinned" && !server?.pinned;
+			},
+		);
+	}
+	store.watch(["undoable"], ({ undoable }) => {
+		for (const [index, name] of ["undo", "redo"].entries())
+			for (const button of all(`[data-command=${name}]`)) button.disabled = !undoable[index];
+	});
+	document.addEventListener("keydown", press);
+	// A click leaves the focus where it was, so that Space goes on meaning play; only the 3D view,
+	// which keeps all keys to itself while it has the focus, gives it back.
+	document.addEventListener("mousedown", (event) => {
+		if (document.activeElement instanceof HTMLIFrameElement) document.activeElement.blur();
+		if (event.target instanceof Element && event.target.closest("button, tr, .cam"))
+			event.preventDefault();
+	});
+}
+
+/**
+ * Run the command of a key, unless somebody types.
+ * @param {KeyboardEvent} event
+ * @param {Store<PageState>} store
+ * @param {Actions} actions
+ * @returns {boolean} whether there was one
+ */
+export function pressed(event, store, actions) {
+	const key = keyOf(event);
+	const target = /** @type {HTMLElement} */ (event.target);
+	const open = document.querySelector("dialog[open]");
+	if (open && !(open.matches(".help") ? key === "?" : key === "Ctrl+k")) return false;
+	const types = target.matches?.(TYPING);
+	if (types && !ALWAYS.includes(key)) return false;
+	// In a list letters and arrows choose.
+	if (!key.startsWith("Ctrl+") && target.matches?.("select")) return false;
+	// Space on a focused control presses that control.
+	if (key === "Space" && target.closest?.("button, a, summary, input, [role=button]")) return false;
+	const command = commandFor(key, store.get().singleKeys);
+	if (!command) return false;
+	event.preventDefault();
+	// What is being typed is kept first.
+	if (types && key !== "Ctrl+k") target.blur();
+	perform(command, actions);
+	return true;
+}

@@ -1,0 +1,268 @@
+/**
+ * From the step that is asked for to the step that is painted.
+ *
+ * `step` is what is wanted, `shown` what stands on the screen. A step is painted when its
+ * pictures and its result are there: all cameras, overlays, readout and playhead in one
+ * animation frame. Until then the last whole step stays.
+ */
+import { getJson } from "../state/api.js";
+import { createCache } from "./cache.js";
+import { advance, clampStep, playedRange, prefetchWindow } from "./clock.js";
+import { createPictures, mapNames, pictureName, PICTURE_BUDGET } from "./pictures.js";
+
+const RESULTS_KEPT = 600;
+
+/** How many steps of the shown run are there. @param {Readonly<PageState>} state */
+export function shownDone({ basis, run, timeline }) {
+	return run && basis === run.key ? run.done : (timeline?.done ?? 0);
+}
+
+/** @param {Store<PageState>} store @param {(step: number) => void} sendSeek */
+export function createPlayback(store, sendSeek) {
+	/** @type {((frame: Frame) => void)[]} */
+	const painters = [];
+	let frameAsked = false;
+	let dirty = true;
+	let windowDirty = true;
+	let lastTick = 0;
+	let rest = 0;
+	let lastSent = -1;
+
+	const pictures = createPictures(() => {
+		store.set({ loaded: store.get().loaded + 1 });
+		ask();
+	});
+
+	const results = createCache({
+		load: async (name, signal) => {
+			const [, step, query] = name.split("/");
+			/** @type {Server.Step} */
+			const result = await getJson(`/api/step/${step}${query}`, { signal });
+			if (name !== resultName(result.run, result.step, query))
+				throw new Error(`asked for ${name}, the server shows run ${result.run} by now`);
+			return result;
+		},
+		sizeOf: () => 1,
+		budget: RESULTS_KEPT,
+		parallel: 2,
+		arrived: (name) => {
+			if (Number(name.split("/")[1]) === store.get().step) dirty = true;
+			const { foreground, likelihood } = store.get().layers2d;
+			windowDirty ||= foreground || likelihood;
+			ask();
+		},
+		failed: () => {
+			later();
+			return undefined;
+		},
+	});
+
+	/**
+	 * @param {string} run
+	 * @param {number} step
+	 * @param {string} query  for what is not in every answer
+	 */
+	const resultName = (run, step, query) => `${run || "none"}/${step}/${query}`;
+
+	/** What the layers need of a result besides what is always in it. */
+	const queryNow = () => {
+		const { samples, trails } = store.get().layers2d;
+		return samples || trails ? `?samples=${Boolean(samples)}&trails=${Boolean(trails)}` : "";
+	};
+
+	/** Try again after something failed that may come back. */
+	function later() {
+		setTimeout(() => {
+			windowDirty = true;
+			ask();
+		}, 500);
+	}
+
+	function ask() {
+		if (frameAsked) return;
+		frameAsked = true;
+		requestAnimationFrame(tick);
+	}
+
+	/** @param {PageState} state */
+	function refreshWindow(state) {
+		windowDirty = false;
+		const { sequence, basis, step, speed, playing, layers2d } = state;
+		if (!sequence) {
+			pictures.want([]);
+			results.want([]);
+			return;
+		}
+		const bytes = sequence.cameras.reduce(
+			(sum, c) => sum + (c.has_pictures ? c.width * c.height * 4 : 0),
+			0,
+		);
+		const how = { frames: sequence.frames, fps: sequence.fps, speed, direction: playing };
+		const most = Math.min(400, Math.floor((PICTURE_BUDGET * 0.9) / Math.max(1, bytes)));
+		const steps = prefetchWindow(step, { ...how, most });
+		pictures.want(
+			steps.flatMap((k) => {
+				const result = results.get(resultName(basis, k, queryNow()));
+				const maps = result ? mapNames(sequence.key, result, layers2d).flat() : [];
+				return [
+					...sequence.cameras.flatMap((camera, index) =>
+						camera.has_pictures ? [pictureName(sequence.key, index, k)] : [],
+					),
+					...maps,
+				];
+			}),
+		);
+		const done = shownDone(state);
+		const useful = steps.filter((k) => k === step || k < done);
+		results.want(useful.slice(0, RESULTS_KEPT / 2).map((k) => resultName(basis, k, queryNow())));
+	}
+
+	/**
+	 * @param {PageState} state
+	 * @param {number} step
+	 * @returns {Frame | null} null while something that will come is missing
+	 */
+	function assemble(state, step) {
+		const { sequence } = state;
+		if (!sequence) return null;
+		const lost = state.link === "lost";
+		const found = sequence.cameras.map((camera, index) =>
+			camera.has_pictures
+				? pictures.get(pictureName(sequence.key, index, step))
+				: { bitmap: null, missing: null },
+		);
+		if (!lost && found.some((picture) => picture === undefined)) return null;
+		const result =
+			results.get(resultName(state.basis, step, queryNow())) ??
+			(lost ? results.get(resultName(state.basis, step, "")) : undefined);
+		const names = result ? mapNames(sequence.key, result, state.layers2d) : [];
+		const maps = names.map((list) => list.flatMap((name) => pictures.get(name) ?? []));
+		if (!lost && maps.flat().length < names.flat().length) return null;
+		const frame = { step, pictures: found, maps };
+		const computing = state.run?.state === "computing";
+		if (result?.computed)
+			return { ...frame, result, stale: computing && result.run !== state.run?.key };
+		// Until the new run comes to this step, the one before is faintly better than nothing.
+		const before = state.result;
+		if (computing && before?.computed && before.step === step && state.shown === step) {
+			return { ...frame, result: before, stale: true };
+		}
+		return result || lost ? { ...frame, result: result ?? null, stale: false } : null;
+	}
+
+	/** @param {number} now */
+	function tick(now) {
+		frameAsked = false;
+		let state = store.get();
+		const { sequence } = state;
+		if (!sequence) return;
+		if (state.playing && state.step === state.shown) {
+			const [first, last] = playedRange(state.range, sequence.frames);
+			const how = {
+				fps: sequence.fps,
+				speed: state.speed,
+				direction: state.playing,
+				first,
+				last,
+				loop: state.loop,
+			};
+			const next = advance({ step: state.step, rest }, lastTick ? (now - lastTick) / 1000 : 0, how);
+			rest = next.rest;
+			lastTick = now;
+			if (next.step !== state.step) windowDirty = true;
+			store.set({ step: next.step, playing: next.ended ? 0 : state.playing });
+			state = store.get();
+		}
+		if (windowDirty) refreshWindow(state);
+		if (state.step !== state.shown || dirty) {
+			const frame = assemble(state, state.step);
+			if (frame) {
+				dirty = frame.stale;
+				for (const paint of painters) paint(frame);
+				store.set({ shown: state.step, result: frame.result });
+			}
+		}
+		if (state.step !== lastSent) {
+			lastSent = state.step;
+			sendSeek(state.step);
+		}
+		if (state.playing) ask();
+	}
+
+	store.on(["server", "run", "basis", "timeline"], (state) => {
+		const done = shownDone(state);
+		for (const name of [...results.names()]) {
+			const result = results.get(name);
+			if (result && !result.computed && (result.run !== state.basis || result.step < done))
+				results.forget(name);
+		}
+		dirty = true;
+		windowDirty = true;
+		ask();
+	});
+	store.on(["step", "playing", "speed", "layers2d", "link"], () => {
+		windowDirty = true;
+		ask();
+	});
+	store.on(["link"], () => {
+		// A server that was started anew stands at its own first step.
+		lastSent = -1;
+	});
+	store.on(["playing"], () => {
+		lastTick = 0;
+		rest = 0;
+	});
+
+	return {
+		/** @param {(frame: Frame) => void} painter */
+		onPaint(painter) {
+			painters.push(painter);
+		},
+		/** Paint the shown step again: sizes, layers, selection or theme changed. */
+		repaint() {
+			dirty = true;
+			ask();
+		},
+		/** A result that came by itself. @param {Server.Step} result */
+		receive(result) {
+			results.put(resultName(result.run, result.step, ""), result);
+			if (result.step === store.get().step) dirty = true;
+			ask();
+		},
+		/** @param {number} step */
+		seek(step) {
+			const { frames } = store.get();
+			if (frames > 0) store.set({ step: clampStep(step, frames), moved: true });
+		},
+		/** Another tab or the 3D view moved the playhead. @param {number} step */
+		follow(step) {
+			if (step === lastSent) return;
+			lastSent = step;
+			store.set({ step, playing: 0 });
+		},
+		/**
+		 * Forget everything of the sequence before.
+		 * @param {number} step  where the server stands in the new one
+		 */
+		clear(step) {
+			pictures.clear();
+			results.clear();
+			lastSent = step;
+			dirty = true;
+			windowDirty = true;
+			ask();
+		},
+		/** @returns {number[]} steps with the pictures of all cameras */
+		loadedSteps() {
+			const cameras = store.get().cameras.filter((camera) => camera.has_pictures).length;
+			/** @type {Map<number, number>} */
+			const counts = new Map();
+			for (const name of pictures.names()) {
+				if (!name.startsWith("/api/picture/")) continue;
+				const step = parseInt(name.slice(name.lastIndexOf("/") + 1));
+				counts.set(step, (counts.get(step) ?? 0) + 1);
+			}
+			return [...counts].filter(([, count]) => count === cameras).map(([step]) => step);
+		},
+	};
+}

@@ -1,0 +1,292 @@
+/** What a person can do: the page's own state at once, the server's by request. */
+import { ApiError, request, sendJson } from "./api.js";
+import { SPEEDS, clampStep } from "../play/clock.js";
+import { eventsNow, nextEvent, nextLayers, ordered } from "./events.js";
+
+/** What differs from the defaults. @param {Server.State} server */
+export const valuesOf = ({ changed, parameters }) =>
+	Object.fromEntries(changed.map((key) => [key, parameters[key]]));
+
+/** Changes of one drag that follow each other within this time are undone together. */
+const SAME_DRAG = 1500;
+
+/**
+ * Save what an address gives, once it is known that it gives it.
+ * @param {string} path
+ * @param {string} fallback  name of the file where the answer has none
+ */
+async function download(path, fallback) {
+	const response = await request(path);
+	const named = /filename="?([^";]+)"?/.exec(response.headers.get("content-disposition") ?? "");
+	const link = document.createElement("a");
+	link.href = URL.createObjectURL(await response.blob());
+	link.download = named?.[1] ?? fallback;
+	link.click();
+	setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+}
+
+/**
+ * @param {object} how
+ * @param {Store<PageState>} how.store
+ * @param {(step: number) => void} how.seek
+ * @param {(message: object) => boolean} how.send
+ * @param {(state: Server.State) => void} how.receive
+ * @returns {Actions}
+ */
+export function createActions({ store, seek, send, receive }) {
+	let noteId = 0;
+	/** Values to go back to and on to, newest last.  @type {Record<string, any>[][]} */
+	const [past, future] = [[], []];
+	let rememberedAt = -Infinity;
+	let [undoing, turn] = [0, Promise.resolve()];
+	/** Layers that were on in pictures and off in 3D, or the other way round, before their key. */
+	/** @type {Record<string, (boolean | undefined)[]>} */
+	const mixed = {};
+	const frames = () => store.get().frames;
+
+	const count = () => store.set({ undoable: [past.length, future.length] });
+
+	/** @param {unknown} error */
+	function tell(error) {
+		if (!(error instanceof ApiError)) throw error;
+		// This the socket tells, to all tabs.
+		if (error.code === "cannot_open") return;
+		actions.note("error", error.message, error.hint ?? "");
+	}
+
+	/**
+	 * A change that is undone by itself, however soon it follows another.
+	 * @param {"POST"} method
+	 * @param {string} path
+	 * @param {object} [body]
+	 */
+	function askApart(method, path, body) {
+		rememberedAt = -Infinity;
+		return actions.ask(method, path, body);
+	}
+
+	/** @type {Actions} */
+	const actions = {
+		note(level, title, text, remedy, once) {
+			if (once && store.get().dismissed.includes(once)) return;
+			const id = (noteId += 1);
+			// The same thing said twice is one note.
+			const others = store.get().notes.filter((other) => other.title !== title);
+			store.set({ notes: [...others.slice(-3), { id, level, title, text, remedy, once }] });
+			if (level === "info" && !once)
+				setTimeout(
+					() => store.set({ notes: store.get().notes.filter((other) => other.id !== id) }),
+					6000,
+				);
+		},
+		async ask(method, path, body) {
+			try {
+				const answer = await sendJson(method, `/api/${path}`, body);
+				if (answer && typeof answer === "object" && "version" in answer) receive(answer);
+				return answer;
+			} catch (error) {
+				tell(error);
+				return null;
+			}
+		},
+
+		// play
+		togglePlay() {
+			const { playing, shown, range } = store.get();
+			if (!frames()) return;
+			if (!playing && shown >= (range[1] ?? frames() - 1)) seek(range[0] ?? 0);
+			store.set({ playing: playing ? 0 : 1 });
+		},
+		shuttle(direction) {
+			const { playing, speed } = store.get();
+			if (!frames()) return;
+			if (direction === 0) store.set({ playing: 0, speed: 1 });
+			else if (playing === direction) actions.changeSpeed(1);
+			else store.set({ playing: direction, speed: playing ? 1 : speed });
+		},
+		stepBy(steps) {
+			store.set({ playing: 0 });
+			seek(store.get().step + steps);
+		},
+		secondsBy: (seconds) => actions.stepBy(Math.round(seconds * store.get().fps)),
+		changeSpeed(direction) {
+			const index = SPEEDS.indexOf(store.get().speed) + direction;
+			store.set({ speed: SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, index))] });
+		},
+		toggleLoop: () => store.set({ loop: !store.get().loop }),
+		markRange(end) {
+			const { shown, range } = store.get();
+			/** @type {[number | null, number | null]} */
+			const next = [...range];
+			next[end] = range[end] === shown ? null : clampStep(shown, frames());
+			// An end beyond the other one starts a new range.
+			if (next[0] !== null && next[1] !== null && next[0] >= next[1]) next[1 - end] = null;
+			store.set({ range: next, loop: next[0] !== null || next[1] !== null });
+		},
+		toEvent(direction) {
+			const event = nextEvent(eventsNow(store.get()), store.get().step, direction);
+			if (event) actions.go(`${event.step} ${event.id}`);
+		},
+
+		// tracks
+		select(id) {
+			if (store.get().selection === id) return;
+			store.set({ selection: id });
+			send({ type: "select", id });
+		},
+		nextTrack(direction) {
+			const { timeline, laneOrder, selection } = store.get();
+			const ids = ordered(timeline?.tracks ?? [], laneOrder).map((track) => track.id);
+			const index = ids.indexOf(selection ?? -1);
+			if (ids.length)
+				actions.select(
+					ids[
+						index < 0
+							? direction > 0
+								? 0
+								: ids.length - 1
+							: (index + direction + ids.length) % ids.length
+					],
+				);
+		},
+		go(place) {
+			const [step, id] = place.split(" ").map(Number);
+			store.set({ playing: 0 });
+			seek(step);
+			actions.select(id);
+		},
+		clear() {
+			if (store.get().layout.max) actions.maximise(store.get().layout.max ?? null);
+			else actions.select(null);
+		},
+		exportTracks: () => void download("/api/export/tracks.csv", "tracks.csv").catch(tell),
+
+		// cameras and 3D
+		chooseCamera(index) {
+			const { cameras, large } = store.get();
+			if (index < cameras.length) store.set({ large: large === index ? null : index });
+		},
+		lookThrough: (view) => void actions.ask("POST", "view", { camera: view }),
+		freeView() {
+			store.set({ large: null });
+			actions.lookThrough(null);
+		},
+		toggleLayer(layer) {
+			const { layers2d, layers3d } = store.get();
+			const now = [layers2d[layer], layer === "boxes" ? undefined : layers3d[layer]];
+			const [first, second] = nextLayers(now, mixed[layer]);
+			if (now[0] !== undefined && now[1] !== undefined && now[0] !== now[1]) mixed[layer] = now;
+			if (first !== now[0]) actions.toggleLayer2d(layer);
+			if (second !== now[1]) actions.toggleLayer3d(layer);
+		},
+		toggleLayer2d(layer) {
+			const { layers2d } = store.get();
+			store.set({ layers2d: { ...layers2d, [layer]: !layers2d[layer] } });
+		},
+		toggleLayer3d(layer) {
+			const layers3d = { ...store.get().layers3d, [layer]: !store.get().layers3d[layer] };
+			store.set({ layers3d });
+			void actions.ask("PATCH", "layers", { changes: { [layer]: layers3d[layer] } });
+		},
+
+		// runs and parameters
+		open(name) {
+			store.set({ asked: name });
+			return actions.ask("POST", "sequence", { name });
+		},
+		async change({ taught, ...changes }) {
+			if (taught) await actions.ask("POST", "teach/restore", { key: taught, changes });
+			else await actions.ask("PATCH", "parameters", { changes });
+		},
+		reset: (...keys) => void askApart("POST", "parameters/reset", keys.length ? { keys } : {}),
+		preset: (name) => void askApart("POST", "parameters/preset", { name }),
+		savePreset: (name) => actions.ask("POST", "presets", { name }),
+		renamePreset: (name, to) =>
+			actions.ask("PATCH", `presets/${encodeURIComponent(name)}`, { name: to }),
+		removePreset: (name) => actions.ask("DELETE", `presets/${encodeURIComponent(name)}`),
+		cancel: () => void actions.ask("POST", "run/cancel"),
+		useAgain: (number) => void askApart("POST", `run/again/${number}`),
+		runAgain: () => void actions.ask("POST", "run"),
+		pin: (on) => void actions.ask(on ? "POST" : "DELETE", "run/pin"),
+		remember(before, after) {
+			const old = Object.fromEntries(
+				Object.keys(after)
+					.filter((key) => before[key] !== after[key])
+					.map((key) => [key, before[key]]),
+			);
+			if (Object.keys(old).length === 0) return;
+			const now = performance.now();
+			const last = past[past.length - 1];
+			const same =
+				last && now - rememberedAt < SAME_DRAG && Object.keys(old).every((key) => key in last);
+			rememberedAt = undoing ? -Infinity : now;
+			if (undoing < 0) future.push(old);
+			else if (undoing > 0 || !same) past.push(old);
+			if (!undoing) future.length = 0;
+			if (past.length > 100) past.shift();
+			count();
+		},
+		forget() {
+			past.length = future.length = 0;
+			count();
+		},
+		undo(direction) {
+			// Pressed again before the last answer came, it waits for its turn.
+			turn = turn.then(async () => {
+				const old = (direction < 0 ? past : future).pop();
+				if (!old) return;
+				undoing = direction;
+				await actions.change(old);
+				undoing = 0;
+				count();
+			});
+			return turn;
+		},
+		async copyRun(what) {
+			const { server } = store.get();
+			if (!server?.sequence) return;
+			const text = what === "json" ? JSON.stringify(valuesOf(server), null, 2) : server.command;
+			try {
+				await navigator.clipboard.writeText(text);
+				actions.note("info", "Copied", text.length < 400 ? text : "");
+			} catch {
+				actions.note("warn", "The browser does not let the page use the clipboard", text);
+			}
+		},
+
+		drawTemplate() {},
+		editRoom: () =>
+			void actions.ask("POST", "teach/editing", { on: !store.get().server?.teaching.editing_room }),
+		saveTaught: () => void actions.ask("POST", "teach/save"),
+
+		// page
+		showTab: (tab) =>
+			store.set({
+				tab,
+				layout: { ...store.get().layout, ...(store.get().layout.max && { max: "side" }) },
+			}),
+		showTour: () =>
+			store.set({ dismissed: store.get().dismissed.filter((name) => name !== "tour") }),
+		toggleTheme() {
+			const theme = store.get().theme === "dark" ? "light" : "dark";
+			store.set({ theme });
+			try {
+				localStorage.setItem("theme", theme);
+			} catch {
+				// Without storage the next start follows the system again.
+			}
+			void actions.ask("POST", "theme", { theme });
+		},
+		maximise(pane) {
+			const { layout } = store.get();
+			store.set({
+				layout: pane === null ? {} : { ...layout, max: layout.max === pane ? undefined : pane },
+			});
+		},
+		// what the dialogs and the timeline put in place of these when they are there
+		help() {},
+		palette() {},
+		zoom() {},
+	};
+	return actions;
+}

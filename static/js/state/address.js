@@ -1,0 +1,162 @@
+/**
+ * The place that the address names: gone to once its sequence is open, and written back as the
+ * page moves on; back and forward go over what was chosen.
+ */
+import { valuesOf } from "./actions.js";
+import { readPlace, writePlace } from "./url.js";
+import { viewFrom, viewOf } from "./views.js";
+
+/** @type {Place} */
+const NOWHERE = {
+	sequence: null,
+	step: null,
+	selection: null,
+	camera: null,
+	look: null,
+	values: null,
+	view: {},
+};
+
+/** @param {Store<PageState>} store @param {Actions} actions */
+export function createAddress(store, actions) {
+	const { place: named, unknown } = readPlace(location.search);
+	/** Where to go as soon as its sequence is open. */
+	let place = named;
+	/** The address without the step and the view: what the back button goes back over. */
+	let standing = "";
+	/** @type {Timer} */
+	let writing;
+	if (unknown.length)
+		actions.note(
+			"warn",
+			`The address has unknown parts: ${unknown.join(", ")}`,
+			"The rest of it is followed.",
+		);
+
+	/** Where the page is. @param {Server.State} server @returns {Place} */
+	function here(server) {
+		const { shown, selection, large } = store.get();
+		return {
+			sequence: server.sequence?.opened_as ?? null,
+			step: Math.max(0, shown),
+			selection,
+			camera: large,
+			look: server.view,
+			values: valuesOf(server),
+			view: viewOf(store.get()),
+		};
+	}
+
+	/**
+	 * Whether a sequence is the place's: by its name, or by what opens it.
+	 * @param {Server.SequenceInfo | null} sequence
+	 */
+	const isThere = (sequence) =>
+		Boolean(
+			sequence && place.sequence && [sequence.name, sequence.opened_as].includes(place.sequence),
+		);
+
+	/** Open the place's sequence; where that fails, what is open is looked at as usual. */
+	function open() {
+		if (place.sequence) void actions.open(place.sequence);
+	}
+
+	/** Go to the place as far as the open sequence is the place's. @param {Server.State} server */
+	function arrive(server) {
+		const { sequence } = server;
+		if (!sequence) return;
+		const cameras = sequence.cameras.length;
+		const usual = cameras > 2 ? 0 : null;
+		// It may be that the place's sequence cannot be opened.
+		if (place.sequence && !isThere(sequence))
+			return store.set({ step: server.playhead, large: usual });
+		const { step, camera, selection, look, values, view } = place;
+		const linked = place.sequence !== null;
+		place = NOWHERE;
+		store.set({
+			step: Math.max(0, Math.min(sequence.frames - 1, step ?? server.playhead)),
+			moved: step !== null,
+			large: camera !== null && camera < cameras ? camera : usual,
+			...(linked || Object.keys(view).length ? viewFrom(view) : {}),
+		});
+		// A link says all of it, also that nobody is selected and nothing looked through.
+		if (linked || selection !== null) actions.select(selection);
+		if (
+			look !== server.view &&
+			(linked || look !== null) &&
+			(typeof look !== "number" || look < cameras)
+		)
+			actions.lookThrough(look);
+		if (values) void restore(server, values);
+	}
+
+	/**
+	 * Have these values, and the defaults for all others.
+	 * @param {Server.State} server
+	 * @param {Record<string, any>} values
+	 */
+	async function restore(server, values) {
+		const others = server.changed.filter((key) => !(key in values));
+		if (others.length) await actions.ask("POST", "parameters/reset", { keys: others });
+		const differing = Object.entries(values).filter(
+			([key, value]) => String(server.parameters[key]) !== String(value),
+		);
+		if (differing.length) await actions.change(Object.fromEntries(differing));
+	}
+
+	function write() {
+		writing = undefined;
+		const { server, shown } = store.get();
+		if (!server?.sequence || shown < 0 || server.opening) return;
+		const now = here(server);
+		const search = writePlace(now);
+		const next = writePlace({ ...now, step: null, view: {} });
+		if (search !== location.search)
+			history[standing && next !== standing ? "pushState" : "replaceState"](
+				now,
+				"",
+				(search || location.pathname) + location.hash,
+			);
+		standing = next;
+		document.title = `${server.sequence.name} · multiview-phd`;
+	}
+	const seen = /** @type {const} */ ([
+		"shown",
+		"selection",
+		"large",
+		"server",
+		"tab",
+		"span",
+		"loop",
+		"range",
+		"speed",
+		"layers2d",
+		"measure",
+		"laneOrder",
+	]);
+	// Browsers limit how often the address may change; while it plays, it follows slowly.
+	store.on([...seen], () => (writing ??= setTimeout(write, 400)));
+	addEventListener("popstate", ({ state }) => {
+		const { server } = store.get();
+		if (!state?.view || !server) return;
+		place = state;
+		standing = writePlace({ ...state, step: null, view: {} });
+		store.set({ playing: 0 });
+		if (isThere(server.sequence)) arrive(server);
+		else open();
+	});
+
+	return {
+		arrive,
+		/** Whether the place still waits for this sequence. @param {Server.State} server */
+		waitsFor: (server) => isThere(server.sequence),
+		/** Of the first state: open what the address names, unless it is open. @param {Server.State} server */
+		begin(server) {
+			if (!isThere(server.sequence) && server.opening?.name !== place.sequence) open();
+		},
+		/** The server is away or was started anew: come back to here. @param {Server.State} server */
+		returnTo(server) {
+			if (server.sequence) place = here(server);
+		},
+	};
+}

@@ -1,0 +1,93 @@
+/**
+ * Every command, once: `commands.json` lists them, and buttons, tooltips, keys, the help sheet,
+ * the palette and the keys of the 3D view in a window of its own are made from that list.
+ *
+ * A key is written as `keyOf` names it: modifiers in the order Ctrl, Shift, then the key;
+ * letters are lower case, and signs such as `?` stand for themselves whatever makes them.
+ */
+
+/** @type {Command[]} */
+export const COMMANDS = [];
+
+/**
+ * @param {Record<Command["group"], Omit<Command, "group">[]>} groups  what `commands.json` holds
+ */
+export function register(groups) {
+	COMMANDS.length = 0;
+	for (const [group, rows] of Object.entries(groups)) {
+		for (const row of rows)
+			COMMANDS.push({ ...row, group: /** @type {Command["group"]} */ (group) });
+	}
+}
+
+/** @param {Command} command @param {Actions} actions */
+export const perform = ({ action, value }, actions) =>
+	/** @type {any} */ (actions)[action](...(value === undefined ? [] : [value]));
+
+/**
+ * The name of the key that an event brings.
+ * @param {{key: string, ctrlKey: boolean, metaKey: boolean, altKey: boolean, shiftKey: boolean}}
+ * event
+ * @returns {string} empty for a key that no command may have
+ */
+export function keyOf({ key, ctrlKey, metaKey, altKey, shiftKey }) {
+	if (altKey || !key) return "";
+	const named = key === " " ? "Space" : key;
+	const single = named.length === 1;
+	const letter = single && named.toLowerCase() !== named.toUpperCase();
+	const shift = shiftKey && (letter || !single) ? "Shift+" : "";
+	return `${ctrlKey || metaKey ? "Ctrl+" : ""}${shift}${letter ? named.toLowerCase() : named}`;
+}
+
+/** @type {Record<string, string>} */
+const SIGNS = {
+	ArrowLeft: "←",
+	ArrowRight: "→",
+	Escape: "Esc",
+	PageUp: "Page ↑",
+	PageDown: "Page ↓",
+	"-": "−",
+};
+
+/**
+ * @param {string} key  as `keyOf` names it
+ * @returns {string} as a person reads it, for instance `Shift ←`
+ */
+export function keyLabel(key) {
+	const parts = key === "+" ? [key] : key.split("+");
+	return parts
+		.map((part) => SIGNS[part] ?? (part.length === 1 ? part.toUpperCase() : part))
+		.join(" ");
+}
+
+/** @param {string} name */
+export function commandOf(name) {
+	const found = COMMANDS.find((command) => command.name === name);
+	if (!found) throw new Error(`there is no command ${name}; commands.json lists them all`);
+	return found;
+}
+
+/**
+ * The command of a key.
+ * @param {string} key  as `keyOf` names it
+ * @param {boolean} singleKeys  whether letters, digits and signs alone are on
+ */
+export function commandFor(key, singleKeys = true) {
+	if (!key) return undefined;
+	if (!singleKeys && key !== "?" && key.replace("Shift+", "").length === 1) return undefined;
+	return COMMANDS.find((command) => command.keys.includes(key));
+}
+
+/**
+ * Commands whose title has all words of a text, those that begin with it first.
+ * @param {string} text
+ */
+export function search(text) {
+	const words = text.toLowerCase().split(/\s+/).filter(Boolean);
+	const found = COMMANDS.filter(({ title, group }) =>
+		words.every((word) => `${title} ${group}`.toLowerCase().includes(word)),
+	);
+	const late = (/** @type {Command} */ { title }) =>
+		Number(!title.toLowerCase().startsWith(words[0] ?? ""));
+	return found.sort((a, b) => late(a) - late(b));
+}

@@ -1,0 +1,95 @@
+/** Tracks and what happens to them, as the lanes, the tables and the keys need them. */
+
+/** The scores, where they are of the run that is shown. @param {Readonly<PageState>} state */
+export const scoresOf = ({ scores, basis }) => (scores?.series.run === basis ? scores : null);
+
+/**
+ * The shown step's result, where it is of the run that is shown and computed.
+ * @param {Readonly<PageState>} state
+ */
+export const resultOf = ({ result, basis }) =>
+	result?.run === basis && result.computed ? result : null;
+
+/**
+ * How many people the truth counts: those it does not ask for are neither missed nor false.
+ * @param {Server.Step} result
+ */
+export const trueCount = ({ truth }) => truth.filter(({ valid }) => valid).length;
+
+/**
+ * What a layer's key makes of it: on in pictures and in 3D, then off in both, then as it was where
+ * the two differed.
+ * @param {(boolean | undefined)[]} now  in the pictures and in 3D; undefined where there is none
+ * @param {(boolean | undefined)[] | undefined} mixed  how the two differed, if ever
+ * @returns {(boolean | undefined)[]}
+ */
+export function nextLayers(now, mixed) {
+	const known = now.filter((on) => on !== undefined);
+	if (!known.some(Boolean)) return mixed ?? now.map((on) => (on === undefined ? on : true));
+	const all = known.every(Boolean);
+	return now.map((on) => (on === undefined ? on : !all));
+}
+
+/** Whether only the selected track is shown. @param {Readonly<PageState>} state */
+export const isAlone = ({ selection, layers3d }) => selection !== null && layers3d.others === false;
+
+/**
+ * Events of the shown run that somebody wants to see, by step and track; switches are among them
+ * where there is truth.
+ * @param {Readonly<PageState>} state
+ */
+export function eventsNow(state) {
+	const { timeline, eventKind } = state;
+	/** @type {LaneEvent[]} */
+	const events = (timeline?.events ?? []).map(([step, id, kind]) => ({ step, id, kind }));
+	for (const { step, track } of scoresOf(state)?.series.switches ?? [])
+		events.push({ step, id: track, kind: "switch" });
+	return events
+		.filter(({ kind }) => !eventKind || kind === eventKind)
+		.sort((a, b) => a.step - b.step || a.id - b.id);
+}
+
+/**
+ * The nearest event after or before a step.
+ * @param {LaneEvent[]} events  by step
+ * @param {number} step
+ * @param {-1 | 1} direction
+ */
+export const nextEvent = (events, step, direction) =>
+	(direction > 0 ? events : [...events].reverse()).find(
+		(event) => (event.step - step) * direction > 0,
+	);
+
+/**
+ * What a camera's method says of the people in its picture: "3 and 5 occluded, 7 new".
+ * @param {Server.CameraEvent[]} events
+ */
+export const viewWords = (events) =>
+	events
+		.map(({ kind, labels }) => `${labels.join(", ").replace(/, (?!.*,)/, " and ")} ${kind}`)
+		.join(", ");
+
+/**
+ * Tracks in the order of the lanes.
+ * @param {Server.TrackLife[]} tracks
+ * @param {"longest" | "born"} order  longest: people first, ghosts of a few steps last
+ */
+export function ordered(tracks, order) {
+	const length = (/** @type {Server.TrackLife} */ { first, last }) => last - first;
+	return [...tracks].sort(
+		(a, b) => (order === "longest" ? length(b) - length(a) : a.first - b.first) || a.id - b.id,
+	);
+}
+
+/**
+ * What a track is doing at a step.
+ * @param {Server.TrackLife} track @param {number} step
+ * @returns {"not yet" | "ended" | "seen" | "coasting" | "lost"} lost: not reported at this step,
+ * but later again
+ */
+export function stateAt({ first, last, spans }, step) {
+	if (step < first) return "not yet";
+	if (step > last) return "ended";
+	const kind = spans.find(([from, to]) => step >= from && step <= to)?.[2];
+	return kind === "long miss" ? "coasting" : (kind ?? "lost");
+}

@@ -1,0 +1,196 @@
+/** What the server tells, put into the store: its state, its runs, and the lists that go with them. */
+import { fetcher, getJson } from "./api.js";
+import { commandOf, perform } from "./commands.js";
+
+/** What is known of a sequence is forgotten when another is opened. */
+const FORGOTTEN = /** @type {const} */ ({
+	basis: "",
+	timeline: null,
+	span: null,
+	scores: null,
+	result: null,
+	shown: -1,
+	step: 0,
+	moved: false,
+	playing: 0,
+	loop: false,
+	hover: null,
+});
+
+/**
+ * @param {object} how
+ * @param {Store<PageState>} how.store
+ * @param {Context["playback"]} how.playback
+ * @param {Actions} how.actions
+ * @param {ReturnType<typeof import("./address.js").createAddress>} how.address
+ * @param {(origin: string) => boolean} how.isOld  an own seek that a newer one has overtaken
+ */
+export function createReceiver({ store, playback, actions, address, isOld }) {
+	/** A part was asked for, and not the whole. */
+	let partial = false;
+
+	/**
+	 * @param {Server.State} told
+	 * @param {boolean} [streamed]  it came over the socket, in order
+	 */
+	function receiveState(told, streamed = false) {
+		// A method is a choice like any other: it is listed, undone and taken up again with the
+		// values.
+		const server = {
+			...told,
+			parameters: { ...told.parameters, ...told.methods, taught: told.teaching.key },
+		};
+		const before = store.get().server;
+		const changed = before?.sequence?.key !== server.sequence?.key;
+		// An answer to a request may be older than what the socket has brought since, and another
+		// sequence comes with the socket's word on its playhead.
+		if (!streamed && (!before || changed || server.version < before.version)) return;
+		// The server was started anew: when the same sequence is open again, go where we were.
+		if (before?.sequence && !server.sequence) address.returnTo(before);
+		if (before === null) address.begin(server);
+		if (changed) {
+			if (before?.sequence && server.sequence) tellWhoOpened(before.sequence, server.sequence);
+			playback.clear(server.playhead);
+			actions.forget();
+			store.set({
+				// What went wrong before it was opened is over.
+				notes: store
+					.get()
+					.notes.filter(({ level }) => level !== "error" || !before || !server.sequence),
+				...FORGOTTEN,
+				range: [null, null],
+				selection: server.selection,
+			});
+		} else if (before) {
+			actions.remember(before.parameters, server.parameters);
+			if (before.selection !== server.selection) store.set({ selection: server.selection });
+			// Whoever looks through a camera in 3D wants to see its picture.
+			if (before.view !== server.view && typeof server.view === "number")
+				store.set({ large: server.view });
+		}
+		const { sequence } = server;
+		const same = sequence && JSON.stringify(sequence) === JSON.stringify(before?.sequence);
+		if (!same)
+			store.set({
+				sequence,
+				frames: sequence?.frames ?? 0,
+				fps: sequence?.fps ?? 25,
+				cameras: sequence?.cameras ?? [],
+			});
+		store.set({ server, run: server.run, layers3d: server.layers });
+		// The first word on the theme is this browser's, later ones are everybody's.
+		if (before) store.set({ theme: server.theme });
+		else if (server.theme !== store.get().theme)
+			void actions.ask("POST", "theme", { theme: store.get().theme });
+		if (changed || address.waitsFor(server)) address.arrive(server);
+		if (changed || before?.pinned?.key !== server.pinned?.key) void fetchScores();
+		if (before === null || before.opening?.name !== server.opening?.name) void fetchSequences();
+	}
+
+	/**
+	 * All windows show the same recording: who did not open the new one is told, with the way back.
+	 * @param {Server.SequenceInfo} before
+	 * @param {Server.SequenceInfo} now
+	 */
+	function tellWhoOpened(before, now) {
+		const { asked } = store.get();
+		store.set({ asked: "" });
+		if (asked && [now.name, now.opened_as].includes(asked)) return;
+		actions.note(
+			"warn",
+			`${now.name} was opened in another window`,
+			"All windows of one workbench show the same recording.",
+			{ word: `Back to ${before.name}`, act: () => void actions.open(before.opened_as) },
+		);
+	}
+
+	/** The server shows this run from now on. @param {string} run */
+	function showRun(run) {
+		if (run === store.get().basis) return;
+		store.set({ basis: run, timeline: null });
+		void fetchTimeline();
+	}
+
+	/** What is asked for of a long recording: what is shown and as much again at either side. */
+	function part() {
+		const { span, timeline } = store.get();
+		partial = Boolean(span && (partial || (timeline?.stride ?? 1) > 1));
+		const [first, last] = (partial && span) || [0, 1e9];
+		const beside = last - first;
+		return `first=${Math.max(0, Math.floor(first - beside))}&last=${Math.ceil(last + beside)}`;
+	}
+
+	const fetchTimeline = fetcher(async () => {
+		if (!store.get().sequence) return;
+		const timeline = await getJson(`/api/timeline?${part()}`);
+		// Lanes of another run than the one that is shown would mix the two; its own news is on the
+		// way.
+		if (timeline.run === store.get().basis) store.set({ timeline });
+	});
+
+	const fetchScores = fetcher(async () => {
+		const { sequence, run } = store.get();
+		// A run without a step has no figures; they come with its first news.
+		if (!sequence?.has_truth || (!run?.done && run?.state !== "failed")) return;
+		const told = (/** @type {string} */ what) => getJson(`/api/evaluation${what}`);
+		const [evaluation, series, comparison] = await Promise.all([
+			told(""),
+			told(`/series?${part()}`),
+			told("/comparison"),
+		]);
+		const reference = comparison && (await told(`/series?of=${comparison.against}&${part()}`));
+		if (store.get().sequence?.key === sequence.key)
+			store.set({ scores: { evaluation, series, reference } });
+	});
+
+	const fetchSequences = fetcher(async () =>
+		store.set({ sequences: (await getJson("/api/sequences")).sequences }),
+	);
+	const fetchSchema = fetcher(async () => store.set({ schema: await getJson("/api/schema") }));
+
+	store.on(["span"], ({ timeline }) => {
+		if (!partial && (timeline?.stride ?? 1) <= 1) return;
+		void fetchTimeline();
+		void fetchScores();
+	});
+
+	/** What to do with each kind of message. @type {Record<string, (message: any) => void>} */
+	const KINDS = {
+		state: ({ state }) => receiveState(state, true),
+		progress({ run }) {
+			if (run.key === store.get().server?.run.key) store.set({ run });
+		},
+		playhead({ step, origin }) {
+			if (store.get().sequence && !isOld(origin)) playback.follow(step);
+		},
+		step(message) {
+			showRun(message.run);
+			playback.receive(message);
+		},
+		timeline({ run }) {
+			showRun(run);
+			void fetchTimeline();
+		},
+		evaluation: () => void fetchScores(),
+		notice: ({ level, message, hint }) => actions.note(level, message, hint ?? ""),
+		command({ name }) {
+			// Keys inside our own frame come here by themselves; this is for a 3D view in a window of
+			// its own.
+			if (document.hasFocus() && document.activeElement instanceof HTMLIFrameElement) return;
+			perform(commandOf(name), actions);
+		},
+	};
+
+	return {
+		receiveState,
+		/** A message of the socket. @param {any} message */
+		receive: (message) => KINDS[message.type]?.(message),
+		/** The socket is open: fetch what it does not bring. */
+		refresh() {
+			if (!store.get().schema) void fetchSchema();
+			void fetchSequences();
+			void fetchTimeline();
+			void fetchScores();
+		},
+	};
+}

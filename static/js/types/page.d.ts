@@ -1,0 +1,356 @@
+/**
+ * What the page keeps, known in every module; no browser loads it. What the server sends is in
+ * `server.d.ts`.
+ * Steps are 0-based; boxes are `[left, top, width, height]` in pixels; positions are metres.
+ */
+
+type Timer = ReturnType<typeof setTimeout> | undefined;
+type Brush = CanvasRenderingContext2D;
+type Box = [number, number, number, number];
+
+/** Of an element. */
+type Child = Node | string | number | null | undefined | false;
+
+/** An element of the markup by its `data-ref`: it has what its tag has. */
+type Part = HTMLElement &
+	Omit<HTMLInputElement & HTMLSelectElement & HTMLIFrameElement, keyof HTMLElement>;
+
+/** Of `h`: listeners by `on…`, style properties by `--…`, and plain attributes. */
+interface Attributes {
+	onclick?: (event: MouseEvent) => void;
+	ondblclick?: (event: MouseEvent) => void;
+	onkeydown?: (event: KeyboardEvent) => void;
+	onpointermove?: (event: PointerEvent) => void;
+	[name: string]: unknown;
+}
+
+type ApiFailure = { code: string; message: string; field: string | null; hint: string | null };
+
+/** Each value stands for `stride` steps, the first from step `first` on. */
+type Buckets = { first: number; stride: number };
+
+/** Of each bucket. */
+type Summary = { low: number[]; high: number[]; mean: number[] };
+
+/** What a note offers to do about it. */
+type Remedy = { word: string; act: () => void };
+
+type Note = {
+	id: number;
+	level: "info" | "warn" | "error";
+	title: string;
+	text: string;
+	remedy?: Remedy;
+	/** Once closed, it is not told again in this browser. */
+	once?: string;
+};
+
+interface PageState {
+	link: "connecting" | "open" | "lost";
+	/** Milliseconds since 1970. */
+	lostAt: number;
+	/** Milliseconds since 1970. */
+	retryAt: number;
+	server: Server.State | null;
+	/** The newest progress, also between two states. */
+	run: Server.RunInfo | null;
+	schema: Server.Schema | null;
+	/** That is open, and of it:. */
+	sequence: Server.SequenceInfo | null;
+	frames: number;
+	fps: number;
+	cameras: Server.CameraInfo[];
+	sequences: Server.SequenceEntryInfo[];
+	/**
+	 * Key of the run that the server shows: that in `run`, or while that has no step yet, one before.
+	 */
+	basis: string;
+	/** Always of the run `basis`. */
+	timeline: Server.Timeline | null;
+	/** Steps that the timeline shows of a long recording; null: all of them. */
+	span: [number, number] | null;
+	/** What is asked for. */
+	step: number;
+	/** What is painted. */
+	shown: number;
+	/** Of the painted step. */
+	result: Server.Step | null;
+	/** Counts up whenever a picture arrives or leaves. */
+	loaded: number;
+	playing: 0 | 1 | -1;
+	speed: number;
+	loop: boolean;
+	/** In and out points. */
+	range: [number | null, number | null];
+	selection: number | null;
+	hover: { id: number; camera: number } | null;
+	layers2d: Record<string, boolean>;
+	layers3d: Record<string, boolean>;
+	/** The camera that is shown large; null: all alike. */
+	large: number | null;
+	tab: "tracks" | "step" | "events" | "teach" | "changes" | "compare" | "runs";
+	/** The events that are listed and gone to; all where empty. */
+	eventKind: "" | LaneEvent["kind"];
+	/** Whether all figures are compared, or the headlines. */
+	every: boolean;
+	/** Of the run that was set against the truth last. */
+	scores: Scores | null;
+	/** What the timeline plots. */
+	measure: "ospa" | "gospa";
+	laneOrder: "longest" | "born";
+	/** Shares of the window, and the pane that is alone. */
+	layout: { right?: number; cams?: number; lanes?: number; max?: PaneName };
+	theme: "dark" | "light";
+	singleKeys: boolean;
+	notes: Note[];
+	/** What this page asked the server to open. */
+	asked: string;
+	/** Which of the page's places is looked at. */
+	place: string;
+	/** Whether somebody has chosen a step of this sequence. */
+	moved: boolean;
+	/** Every step is shown, however late; else steps are left out to keep real time. */
+	everyStep: boolean;
+	/** How many changes can be undone, and redone. */
+	undoable: [number, number];
+	/** Notices that were closed for good, by name. */
+	dismissed: string[];
+}
+
+/** Metres over the steps; null where there is no pair. */
+type Course = { first: number; values: (number | null)[] };
+
+type Scores = {
+	evaluation: Server.EvaluationInfo;
+	series: Server.EvaluationSeries;
+	reference: Server.EvaluationSeries | null;
+};
+
+type PaneName = "view" | "cams" | "side" | "time";
+
+interface Command {
+	name: string;
+	title: string;
+	group: "Play" | "Cameras and 3D" | "Teach" | "Tracks" | "Parameters" | "Page";
+	keys: string[];
+	/** A name of `Actions`. */
+	action: string;
+	/** Its argument. */
+	value?: any;
+}
+
+/** What a person can do. */
+interface Actions {
+	note: (
+		level: "info" | "warn" | "error",
+		title: string,
+		text: string,
+		remedy?: Remedy,
+		once?: string,
+	) => void;
+	/** Null after a failure, which is told. */
+	ask: (method: "POST" | "PATCH" | "DELETE", path: string, body?: object) => Promise<any>;
+	togglePlay: () => void;
+	shuttle: (direction: -1 | 0 | 1) => void;
+	stepBy: (steps: number) => void;
+	secondsBy: (seconds: number) => void;
+	changeSpeed: (direction: -1 | 1) => void;
+	toggleLoop: () => void;
+	markRange: (end: 0 | 1) => void;
+	toEvent: (direction: -1 | 1) => void;
+	select: (id: number | null) => void;
+	nextTrack: (direction: -1 | 1) => void;
+	/** To an event: its step and track. */
+	go: (place: string) => void;
+	clear: () => void;
+	exportTracks: () => void;
+	/** As the large picture. */
+	chooseCamera: (index: number) => void;
+	/** In 3D; null is the free view. */
+	lookThrough: (view: number | "top" | null) => void;
+	freeView: () => void;
+	/** In the pictures and in 3D. */
+	toggleLayer: (layer: string) => void;
+	toggleLayer2d: (layer: string) => void;
+	toggleLayer3d: (layer: string) => void;
+	open: (name: string) => Promise<any>;
+	change: (changes: Record<string, any>) => Promise<any>;
+	reset: (...keys: string[]) => void;
+	preset: (name: string) => void;
+	savePreset: (name: string) => Promise<any>;
+	renamePreset: (name: string, to: string) => Promise<any>;
+	removePreset: (name: string) => Promise<any>;
+	cancel: () => void;
+	/** The parameters of a run before, by its number. */
+	useAgain: (number: string) => void;
+	runAgain: () => void;
+	pin: (on: boolean) => void;
+	/** What the parameters were, whoever changed them. */
+	remember: (before: Record<string, any>, after: Record<string, any>) => void;
+	/** What can be undone. */
+	forget: () => void;
+	/** Or redo. */
+	undo: (direction: -1 | 1) => void;
+	copyRun: (what: "command" | "json") => void;
+	/** Begin to drag boxes on pictures, or leave it. */
+	drawTemplate: () => void;
+	/** Handles in 3D, on or off. */
+	editRoom: () => void;
+	saveTaught: () => void;
+	showTab: (tab: PageState["tab"]) => void;
+	showTour: () => void;
+	toggleTheme: () => void;
+	/** Null: all panes as they were at first. */
+	maximise: (pane: PaneName | null) => void;
+	help: () => void;
+	palette: () => void;
+	/** Of the timeline; above 1 shows more steps. */
+	zoom: (factor: number) => void;
+}
+
+/** What is painted at once. */
+interface Frame {
+	step: number;
+	/** By camera; undefined where it is not loaded and will not be. */
+	pictures: (Picture | undefined)[];
+	/** By camera: what is laid over its picture. */
+	maps: Picture[][];
+	result: Server.Step | null;
+	/** The result is of the run before, shown faintly until the new one is there. */
+	stale: boolean;
+}
+
+/** What every pane is given. */
+interface Context {
+	store: Store<PageState>;
+	playback: ReturnType<typeof import("../play/playback.js").createPlayback>;
+	actions: Actions;
+	/** Connect now. */
+	retry: () => void;
+	/** Run the command of a key; whether there was one. */
+	press: (event: KeyboardEvent) => boolean;
+}
+
+/** Fills its part of the page and keeps it current. */
+type Pane = (root: HTMLElement, context: Context) => void;
+
+/** Of the timeline, CSS pixels. */
+type Row = { y: number; height: number };
+
+/** What a row is drawn with. */
+type Pen = { g: Brush; row: Row; view: View; ink: Palette };
+
+interface Lanes {
+	/** In the order of the lanes. */
+	tracks: Server.TrackLife[];
+	pinned: (Server.TrackLife & { like: number | null })[];
+	/** Pixels. */
+	scroll: number;
+	laneHeight: number;
+	done: number;
+	selection: number | null;
+	hover: number | null;
+	switches: Server.Switch[];
+}
+
+/** The steps an axis of `width` CSS pixels shows. */
+type View = { first: number; last: number; width: number };
+
+type LaneEvent = { step: number; id: number; kind: "birth" | "death" | "long miss" | "switch" };
+
+/** Of the mosaic of pictures. */
+type Cell = { x: number; y: number; width: number; height: number };
+
+/** Values: what differs from the defaults. */
+type Place = {
+	sequence: string | null;
+	step: number | null;
+	selection: number | null;
+	camera: number | null;
+	/** Through which camera, or from where, the 3D view looks. */
+	look: number | "top" | null;
+	values: Record<string, any> | null;
+	/** Words of the address. */
+	view: Record<string, string>;
+};
+
+type Picture = { bitmap: ImageBitmap | null; missing: string | null };
+
+interface Palette {
+	/** A token without its dashes. */
+	get: (name: string) => string;
+	id: (id: number) => string;
+	/** Ink on the colour of an id. */
+	on: (id: number) => string;
+	font: string;
+}
+
+interface Scene {
+	/** CSS pixels a picture pixel. */
+	scale: number;
+	/** CSS pixels. */
+	width: number;
+	/** CSS pixels. */
+	height: number;
+	layers: Record<string, boolean>;
+	selection: number | null;
+	hover: number | null;
+	/** Only the selected track. */
+	alone: boolean;
+	people: Server.Step["truth"];
+	opacity: number;
+	ink: Palette;
+}
+
+interface Store<T extends object> {
+	get: () => Readonly<T>;
+	set: (patch: Partial<T>) => void;
+	on: (keys: (keyof T)[], listener: (state: Readonly<T>) => void) => () => void;
+	/** The same, and told at once. */
+	watch: (keys: (keyof T)[], listener: (state: Readonly<T>) => void) => () => void;
+}
+
+/** Of a table. */
+interface Column<R> {
+	word: string;
+	/** Classes. */
+	kind?: string;
+	help?: string;
+	cell: (row: R) => string | number | Child | Child[];
+	/** Makes it sortable. */
+	by?: (row: R) => number;
+	/** Changes with the shown step. */
+	live?: boolean;
+}
+
+/** A table. */
+interface Grid<R> {
+	element: HTMLElement;
+	show: (rows: R[]) => void;
+	/** Fill the columns that change with the step. */
+	live: () => void;
+	each: (act: (row: R, element: HTMLTableRowElement) => void) => void;
+}
+
+/** Things that belong to a step. */
+interface Kept<V> {
+	want: (names: string[]) => void;
+	get: (name: string) => V | undefined;
+	put: (name: string, value: V) => void;
+	forget: (name: string) => void;
+	clear: () => void;
+	names: () => IterableIterator<string>;
+}
+
+interface CacheHow<V> {
+	load: (name: string, signal: AbortSignal) => Promise<V>;
+	sizeOf: (value: V) => number;
+	/** In the unit of `sizeOf`. */
+	budget: number;
+	/** Requests at a time. */
+	parallel?: number;
+	arrived: (name: string) => void;
+	dispose?: (value: V) => void;
+	/** A value stands for the failure and is kept; without one the name may be wanted again. */
+	failed: (name: string, error: unknown) => V | undefined;
+}

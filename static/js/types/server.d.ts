@@ -1,0 +1,598 @@
+/**
+ * What the server sends, made from the models of its answers by `python -m app.web.typescript`.
+ * Steps are 0-based; boxes are `[left, top, width, height]` in pixels; positions are metres.
+ */
+declare namespace Server {
+	/** Something that happened to people in a camera's picture, as its method tells it. */
+	interface CameraEvent {
+		kind: "new" | "vanished" | "returned" | "occluded" | "merged" | "split";
+		/** Labels of the camera's own 2D estimates. */
+		labels: number[];
+	}
+
+	/** One camera of the sequence. */
+	interface CameraInfo {
+		name: string;
+		width: number;
+		height: number;
+		has_pictures: boolean;
+		has_detections: boolean;
+	}
+
+	/** One camera's reprojected boxes against the truth projected the same way. */
+	interface CameraScoreInfo {
+		camera: string;
+		people: number;
+		estimates: number;
+		/** Pixels. */
+		error: number | null;
+		error_95: number | null;
+		overlap: number | null;
+		found_share: number | null;
+		false_per_picture: number | null;
+	}
+
+	/** One camera at one step. */
+	interface CameraStep {
+		name: string;
+		measurements: Measurement[];
+		estimates: Estimate[];
+		/** x, y and relative weight; only where asked for. */
+		samples: [number, number, number][] | null;
+		events: CameraEvent[];
+		/** Where the method expects its targets, in pixels. */
+		gates: [number, number, number, number, number][];
+		/** ``?run=`` of the foreground's address; null where the method has none. */
+		foreground: string | null;
+		/** ``?run=`` of the likelihood map's address; null without pictures or templates. */
+		likelihood: string | null;
+		tracks: CameraTrack[];
+		truth: CameraTruth[];
+		/** Numbers of the method worth showing, by name. */
+		information: Record<string, number>;
+	}
+
+	/** One 3D target as one camera should see it, and what that camera said of it. */
+	interface CameraTrack {
+		id: number;
+		/** Reprojected; null where a part is behind the camera. */
+		box: [number, number, number, number] | null;
+		/** Whether one of the camera's boxes fed it at this step. */
+		seen: boolean;
+		detection_probability: number;
+		/** Index of the box that fed it among what the camera gave the fusion, -1 for none. */
+		source: number;
+		fed_by: Feeding | null;
+		/** Id of the target in front of it. */
+		hidden_by: number | null;
+		visible: boolean;
+		/** Why it is not, or hardly, visible. */
+		reason: "out of view" | "behind camera" | "near the edge" | null;
+		centre: [number, number] | null;
+		/** Steps from this one, x and y of the feet; only where asked for. */
+		trail: [number, number, number][];
+	}
+
+	/** Where a person really is in this picture. */
+	interface CameraTruth {
+		id: number;
+		box: [number, number, number, number];
+		/** False where the position is not certain. */
+		valid: boolean;
+	}
+
+	/** One side of a comparison. */
+	interface ComparedRun {
+		run: string;
+		steps: number;
+		partial: boolean;
+		/** Values that are not the default. */
+		changed: Record<string, any>;
+	}
+
+	/** The shown run against the pinned or the previous one, over the steps that both have. */
+	interface Comparison {
+		against: "pinned" | "previous";
+		/** Steps that both were scored over. */
+		steps: number;
+		a: ComparedRun;
+		b: ComparedRun;
+		parameters: ParameterDifference[];
+		rows: DifferenceInfo[];
+	}
+
+	/** Whole numbers over time: of each bucket the lowest, the highest and the mean. */
+	interface Counts {
+		low: number[];
+		high: number[];
+		mean: number[];
+	}
+
+	/** One figure of two runs: A the reference, B the shown run. */
+	interface DifferenceInfo {
+		name: string;
+		label: string;
+		unit: string;
+		digits: number;
+		direction: "higher" | "lower" | "zero" | "none";
+		headline: boolean;
+		a: number | null;
+		b: number | null;
+		/** B − A. */
+		difference: number | null;
+		/** What B is. */
+		verdict: "better" | "worse" | "same" | "different" | "undefined";
+		/** False where the two were measured with different settings. */
+		comparable: boolean;
+		settings: string;
+	}
+
+	/** Where people appear: mean and standard deviation. */
+	interface EntranceInfo {
+		position: [number, number, number];
+		sigma: [number, number, number];
+	}
+
+	/** A camera's own 2D estimate. */
+	interface Estimate {
+		box: [number, number, number, number];
+		weight: number;
+		/** -1 where the method has no labels. */
+		label: number;
+	}
+
+	/** The shown run against the truth. */
+	interface EvaluationInfo {
+		run: string;
+		/** Steps 0 … ``steps`` − 1 were scored. */
+		steps: number;
+		/** Whether steps of the sequence are missing. */
+		partial: boolean;
+		settings: Record<string, any>;
+		figures: FigureInfo[];
+		per_person: PersonInfo[];
+		per_track: ScoredTrackInfo[];
+		cameras: CameraScoreInfo[];
+		/** What a reader of the figures must know. */
+		notes: string[];
+	}
+
+	/**
+	 * A run against the truth over time: one value a bucket of steps. Of a bucket with several steps
+	 * the worst is told: that with the greatest OSPA, for GOSPA and its parts that with the greatest
+	 * GOSPA, for errors the greatest error.
+	 */
+	interface EvaluationSeries {
+		run: string;
+		of: "shown" | "pinned" | "previous";
+		steps: number;
+		partial: boolean;
+		/** The first step of the first bucket. */
+		first: number;
+		/** Steps a bucket: 1 where each step has its own value. */
+		stride: number;
+		/** Of the distance: m, or none for boxes. */
+		unit: string;
+		/** Cut-off and order of OSPA and GOSPA, in words. */
+		cost: string;
+		/** The gate of errors and switches, in words. */
+		gate: string;
+		ospa: number[];
+		ospa_localisation: number[];
+		ospa_cardinality: number[];
+		ospa2: number[];
+		gospa: number[];
+		gospa_localisation: number[];
+		gospa_missed: number[];
+		/** The parts of GOSPA are p-th powers and sum to its p-th power. */
+		gospa_false: number[];
+		ospa_share: number[];
+		/** How much of each is location, 0 … 1; of GOSPA by its powers. */
+		gospa_share: number[];
+		/** Metres, over the tracks; null where there is no pair. */
+		mean_error: (number | null)[];
+		/** Round upper ends for plots; a few spikes leave them. */
+		axes: Record<"ospa" | "gospa" | "error", number>;
+		truth: number[];
+		estimates: number[];
+		misses: number[];
+		false_positives: number[];
+		errors: PersonError[];
+		track_errors: TrackError[];
+		switches: Switch[];
+	}
+
+	/** The box that fed a track, as the camera gave it to the fusion. */
+	interface Feeding {
+		box: [number, number, number, number];
+		/** Its weight, existence or detector's score. */
+		weight: number;
+		/** Probability that it is this track's. */
+		share: number;
+	}
+
+	/** One figure of a run. */
+	interface FigureInfo {
+		/** Its key. */
+		name: string;
+		label: string;
+		group: string;
+		/** Null where it is not defined. */
+		value: number | null;
+		unit: string;
+		/** Decimals that matter. */
+		digits: number;
+		/** Which values are better. */
+		direction: "higher" | "lower" | "zero" | "none";
+		help: string;
+		/** What it was measured with, in words: distance, gate, cut-off, order, window. */
+		settings: string;
+		source: string;
+		/** Whether a short table shows it. */
+		headline: boolean;
+	}
+
+	/** A group of parameters. */
+	interface GroupInfo {
+		name: string;
+		help: string;
+	}
+
+	/** A peak or detection that the camera's filter was given. */
+	interface Measurement {
+		box: [number, number, number, number];
+		score: number;
+	}
+
+	/** The chosen methods. */
+	interface MethodsInfo {
+		single_view: string;
+		fusion_method: string;
+		smoothing_method: string;
+	}
+
+	/** Numbers over time: of each bucket the lowest, the highest and the mean. */
+	interface Numbers {
+		low: number[];
+		high: number[];
+		mean: number[];
+	}
+
+	/** A sequence on its way. */
+	interface OpeningInfo {
+		name: string;
+		message: string;
+		done: number;
+		/** 0 while it is not known. */
+		total: number;
+	}
+
+	/** A parameter that the two runs do not share. */
+	interface ParameterDifference {
+		key: string;
+		a: any;
+		b: any;
+	}
+
+	/** One parameter: what a slider needs. */
+	interface ParameterInfo {
+		key: string;
+		group: string;
+		name: string;
+		label: string;
+		help: string;
+		symbol: string;
+		unit: string;
+		/** The first stage that a change re-runs. */
+		stage: string;
+		kind: "float" | "int" | "bool" | "choice";
+		default: any;
+		minimum: number | null;
+		maximum: number | null;
+		step: number | null;
+		log: boolean;
+		choices: string[];
+		advanced: boolean;
+		/** Among the few that are shown first. */
+		essential: boolean;
+	}
+
+	/** A person's position error over time. */
+	interface PersonError {
+		person: number;
+		/** The first step of the first value's bucket. */
+		first: number;
+		/** Metres; null where there is no pair. */
+		values: (number | null)[];
+	}
+
+	/** One person of the truth. */
+	interface PersonInfo {
+		id: number;
+		first: number;
+		last: number;
+		steps: number;
+		/** Steps with a pair. */
+		tracked: number;
+		status: "mostly tracked" | "partly tracked" | "mostly lost";
+		found_share: number;
+		/** Metres; null without pairs. */
+		mean_error: number | null;
+		error_95: number | null;
+		switches: number;
+		fragmentations: number;
+		/** The track that stands for the person in the identity figures. */
+		track: number | null;
+	}
+
+	/** The pinned run: the A of comparisons. */
+	interface PinnedInfo {
+		key: string;
+		/** Methods and values. */
+		parameters: Record<string, any>;
+		/** Keys whose value is not the default. */
+		changed: string[];
+		/** Keys whose value is not the one that the parameters have now. */
+		differs: string[];
+	}
+
+	/** A track of the pinned run. */
+	interface PinnedLife {
+		id: number;
+		first: number;
+		/** Of its whole life. */
+		last: number;
+		/** Share of its whole life in which a camera saw it. */
+		seen: number;
+		/** The same share for each camera by itself. */
+		cameras: number[];
+		/**
+		 * Within the steps asked for; ones shorter than ``stride`` are joined with their neighbours.
+		 */
+		spans: ([number, number, "seen" | "coasting" | "long miss"])[];
+		/** The track of the shown run that it is most often paired with. */
+		like: number | null;
+	}
+
+	/** The pinned run, in the same buckets. */
+	interface PinnedTimeline {
+		run: string;
+		count: Counts;
+		tracks: PinnedLife[];
+	}
+
+	/** The volume that people are tracked in. */
+	interface RoomInfo {
+		min: [number, number, number];
+		max: [number, number, number];
+		entrances: EntranceInfo[];
+	}
+
+	/** The run that the parameters ask for. */
+	interface RunInfo {
+		/** A step or timeline with this key is of these parameters; with another, of earlier ones. */
+		key: string;
+		state: "idle" | "computing" | "done" | "failed" | "cancelled";
+		done: number;
+		total: number;
+		steps_per_second: number;
+		seconds_left: number | null;
+		/** The stage that takes the time. */
+		message: string;
+		error: string | null;
+	}
+
+	/** Every parameter, method and preset. */
+	interface Schema {
+		groups: GroupInfo[];
+		parameters: ParameterInfo[];
+		methods: Record<string, string[]>;
+		presets: Record<string, Record<string, any>>;
+	}
+
+	/** One track against the truth. */
+	interface ScoredTrackInfo {
+		id: number;
+		first: number;
+		last: number;
+		steps: number;
+		/** Steps with a pair. */
+		matched: number;
+		/** Steps at which it matched a position that is not certain. */
+		ignored: number;
+		kind: "person" | "false" | "don't care";
+		/** With whom it is paired most often. */
+		person: number | null;
+		/** Share of its steps that it is. */
+		person_share: number | null;
+		/** To whomever it is paired with, in the unit of the distance. */
+		mean_error: number | null;
+		/** How often somebody's identity switched to this track. */
+		switches: number;
+	}
+
+	/** A sequence that can be opened. */
+	interface SequenceEntryInfo {
+		name: string;
+		description: string;
+		kind: "rendered" | "folder";
+		cameras: number | null;
+		frames: number | null;
+		/** Whether it opens without rendering. */
+		ready: boolean;
+		/** Why it cannot be opened. */
+		error: string | null;
+	}
+
+	/** The sequence that is open. */
+	interface SequenceInfo {
+		/** Part of the pictures' addresses; another for every content. */
+		key: string;
+		name: string;
+		/** The name or folder that opens it again. */
+		opened_as: string;
+		description: string;
+		fps: number;
+		frames: number;
+		has_pictures: boolean;
+		has_detections: boolean;
+		has_truth: boolean;
+		room: RoomInfo;
+		target: TargetInfo;
+		cameras: CameraInfo[];
+		/** How many colour templates it has. */
+		templates: number;
+	}
+
+	/** What can be opened. */
+	interface SequenceList {
+		sequences: SequenceEntryInfo[];
+	}
+
+	/** Everything that all pages share, but for the results themselves. */
+	interface State {
+		/** Grows with every change; of two states the larger is the newer. */
+		version: number;
+		sequence: SequenceInfo | null;
+		opening: OpeningInfo | null;
+		parameters: Record<string, any>;
+		/** Keys whose value is not the default. */
+		changed: string[];
+		/** The command that computes the same in a terminal; empty while nothing is open. */
+		command: string;
+		methods: MethodsInfo;
+		/**
+		 * Methods that cannot work on the sequence with the values chosen: by ``single_view``,
+		 * ``fusion_method`` or ``smoothing_method``, the sentence why by the method's name.
+		 */
+		unfit: Record<string, Record<string, string>>;
+		/** Names of those that a person has saved. */
+		presets: string[];
+		/** The one whose values the parameters have, built in or saved. */
+		preset: string | null;
+		playhead: number;
+		selection: number | null;
+		/** Of the 3D view. */
+		layers: Record<string, boolean>;
+		/** What the 3D view looks through: a camera's index, from above, or freely. */
+		view: number | "top" | null;
+		/** Of the 3D view. */
+		theme: "dark" | "light";
+		run: RunInfo;
+		pinned: PinnedInfo | null;
+		teaching: TeachingInfo;
+		viser: ViserInfo;
+	}
+
+	/** One step of the shown run; the truth is there whether it is computed or not. */
+	interface Step {
+		/** Key of the run that it is of; empty where none is shown. */
+		run: string;
+		step: number;
+		computed: boolean;
+		cameras: CameraStep[];
+		tracks: Track[];
+		truth: Truth[];
+		components: number;
+		/** Expected number of people: the sum of the weights. */
+		cardinality: number;
+	}
+
+	/** A person's identity switched. */
+	interface Switch {
+		step: number;
+		person: number;
+		/** The track until then. */
+		before: number;
+		track: number;
+	}
+
+	/** The upright box around a person. */
+	interface TargetInfo {
+		half_extents: [number, number, number];
+	}
+
+	/** What the sequence was taught since its file was read. */
+	interface TeachingInfo {
+		/** Names room and templates as they are; POST /api/teach/restore goes back to them. */
+		key: string;
+		/** Changes that its file does not have. */
+		unsaved: number;
+		/** Whether the 3D view has handles on the room. */
+		editing_room: boolean;
+	}
+
+	/** The shown run over time, as far as it is computed, summed up in buckets of steps. */
+	interface Timeline {
+		run: string;
+		done: number;
+		frames: number;
+		/** The first step of the first bucket. */
+		first: number;
+		/** Steps a bucket: 1 where each step has its own value. */
+		stride: number;
+		cardinality: Numbers;
+		/** Targets reported. */
+		count: Counts;
+		/** People really there, over all steps asked for. */
+		truth: Counts | null;
+		/** Those that live in the steps asked for, by id. */
+		tracks: TrackLife[];
+		/** Where a run is pinned that is not the shown one. */
+		pinned: PinnedTimeline | null;
+		/** Of all steps, also of those not asked for, in their order. */
+		events: ([number, number, "birth" | "death" | "long miss"])[];
+		/** How many more live there: the shorter ones, where they are very many. */
+		left_out: number;
+	}
+
+	/** One 3D target at one step. */
+	interface Track {
+		id: number;
+		position: [number, number, number];
+		sigma: [number, number, number];
+		/** Weight or probability of existence. */
+		existence: number;
+		/** By camera. */
+		seen: boolean[];
+	}
+
+	/** A track's distance to whomever it is paired with, over time. */
+	interface TrackError {
+		track: number;
+		first: number;
+		values: (number | null)[];
+	}
+
+	/** A track's life. */
+	interface TrackLife {
+		id: number;
+		first: number;
+		/** Of its whole life. */
+		last: number;
+		/** Share of its whole life in which a camera saw it. */
+		seen: number;
+		/** The same share for each camera by itself. */
+		cameras: number[];
+		/**
+		 * Within the steps asked for; ones shorter than ``stride`` are joined with their neighbours.
+		 */
+		spans: ([number, number, "seen" | "coasting" | "long miss"])[];
+	}
+
+	/** Where a person really is. */
+	interface Truth {
+		id: number;
+		position: [number, number, number];
+		valid: boolean;
+		/** The track that is this person's at this step. */
+		track: number | null;
+		/** How far that is away, metres. */
+		error: number | null;
+	}
+
+	/** Where the 3D view is. */
+	interface ViserInfo {
+		path: string;
+	}
+}

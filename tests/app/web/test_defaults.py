@@ -1,0 +1,103 @@
+"""One default wherever it is told, methods that cannot work here, and hints that lead on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.web.tables import teaching_tables
+from tests.app.conftest import Runs
+from tests.app.web.test_api import assert_error
+from tracker import export, pipeline
+from tracker.evaluation import evaluate_sequence
+from tracker.evaluation.report.page import report_html
+from tracker.parameters import FOLLOWS, METHODS, PARAMETERS, RunParameters, value, with_values
+from tracker.sequences.reader import read_sequence
+
+DEFINED = RunParameters()
+
+
+def test_one_default_in_definition_list_help_page_report_and_plain_run(
+    client: TestClient, run: Runs, crossing: Path, tmp_path: Path
+) -> None:
+    sequence = read_sequence(crossing)
+    followed = pipeline.default_parameters(sequence)
+    assert followed.model_copy(update={"single_view": DEFINED.single_view}) == DEFINED
+
+    state = client.get("/api/state").json()
+    assert state["methods"] == {key: value(followed, key) for key in METHODS}
+    assert state["changed"] == []
+    assert state["parameters"] == {key: value(DEFINED, key) for key in PARAMETERS}
+    schema = client.get("/api/schema").json()
+    assert {p["key"]: p["default"] for p in schema["parameters"]} == state["parameters"]
+
+    listed = run("parameters")[1]
+    cells = {line.split()[0]: line for line in listed.splitlines() if line.strip()}
+    assert f"|{DEFINED.fusion_method}  " in cells["fusion_method"]
+    assert cells["fusion_method"].count(DEFINED.fusion_method) == 2, "a choice, and the default"
+    assert FOLLOWS in cells["single_view"]
+
+    out = tmp_path / "tracks.csv"
+    assert run("track", crossing, "-o", out)[0] == 0
+    tracks = export.read_tracks_csv(out)
+    told = {key: tracks.settings[key] for key in (*METHODS, *PARAMETERS)}
+    assert with_values(DEFINED, told) == followed
+
+    text = report_html(sequence, tracks, followed, evaluate_sequence(sequence, tracks))
+    assert "all at their defaults" in text
+    other = followed.model_copy(update={"fusion_method": "sequential_phd"})
+    text = report_html(sequence, tracks, other, evaluate_sequence(sequence, tracks))
+    assert "1 changed from the default" in text
+
+
+def test_the_page_is_told_which_methods_cannot_work_here_and_why(client: TestClient) -> None:
+    unfit = client.get("/api/state").json()["unfit"]
+    assert unfit["fusion_method"] == {}
+    assert set(unfit["single_view"]) == {
+        "colour_phd", "jpda", "pseudo_particle", "association_matrix",
+    }  # fmt: skip
+    assert unfit["single_view"]["jpda"].startswith("jpda needs pictures of every camera, and ")
+    boxes = {"changes": {"jpda.measurements": "detections"}}
+    after = client.patch("/api/parameters", json=boxes).json()
+    assert "jpda" not in after["unfit"]["single_view"], "it depends on the values, too"
+
+
+@pytest.mark.parametrize(
+    ("changes", "asks"),
+    [
+        ({"single_view": "colour_phd"}, False),
+        ({"single_view": "pseudo_particle"}, False),
+        ({"single_view": "jpda"}, True),
+        ({"single_view": "jpda", "jpda.measurements": "colour"}, False),
+        ({"single_view": "association_matrix"}, True),
+        ({"single_view": "none"}, True),
+    ],
+)
+def test_teach_says_where_a_method_looks_at_no_templates(
+    client: TestClient, changes: dict[str, Any], asks: bool
+) -> None:
+    client.patch("/api/parameters", json={"changes": changes})
+    words = teaching_tables._method(client.app.state.workbench.snapshot())  # type: ignore[attr-defined]
+    assert ("looks at no templates" in str(words)) == asks
+    assert ("Use colour_phd" in str(words)) == asks
+
+
+def test_what_was_asked_for_wrongly_is_told_where_to_find_what_there_is(
+    client: TestClient,
+) -> None:
+    def hint(answer: Any) -> str:
+        assert_error(answer, 422, "bad_parameter")
+        words: str = answer.json()["error"]["hint"]
+        return words
+
+    wrong = client.patch("/api/parameters", json={"changes": {"fusion.clutter_rate": -1.0}})
+    assert hint(wrong) == "GET /api/schema lists every parameter with its range."
+    preset = client.post("/api/parameters/preset", json={"name": "nobody's"})
+    assert hint(preset).startswith("GET /api/schema has the built-in presets, ")
+    assert hint(client.post("/api/run/again/999")) == "GET /api/tables/runs lists them."
+    assert "the cameras" in hint(client.post("/api/view", json={"camera": 9}))
+    assert "the layers" in hint(client.patch("/api/layers", json={"changes": {"walls": True}}))
+    assert "your presets" in hint(client.delete("/api/presets/none-such"))

@@ -1,0 +1,1 @@
+"""Many targets in the plane, which every filter of the field can be fed."""

@@ -1,0 +1,101 @@
+"""The main states at all sizes, dark and light: everything is inside the window, and pictures.
+
+``pytest tests/browser/access --screenshots FOLDER`` keeps the pictures, to be looked at.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.looking import as_at_first, ask, readout, until
+from tests.browser.serving import Server
+
+SIZES = {"720p": (1280, 720), "laptop": (1440, 900), "4k": (3840, 2160)}
+
+OTHERS = [("720p", "light"), ("laptop", "dark"), ("4k", "dark"), ("4k", "light")]
+
+OUTSIDE = """() => {
+  // what is shown and reaches out of the window or is cut off by its own pane
+  const seen = (e) => e.checkVisibility() && e.getBoundingClientRect().width > 1;
+  const outside = [...document.querySelectorAll(
+    '.top, .pane, .pane-head > *, .tabs, .tab, .chip, .cam, .foot, .trans, .gr, .plot')]
+    .filter(seen)
+    .filter((e) => {
+      if (e.closest('.lanes') && e.matches('.lane')) return false;  // they scroll
+      const { left, top, right, bottom } = e.getBoundingClientRect();
+      return left < -1 || top < -1 || right > innerWidth + 1 || bottom > innerHeight + 1;
+    })
+    .map((e) => e.className + ' ' + (e.dataset.ref ?? e.innerText.slice(0, 30)));
+  const words = [...document.querySelectorAll('.chips, .tablist, .seg')]
+    .filter(seen)
+    .filter((e) => e.scrollWidth > e.clientWidth + 1)
+    .map((e) => 'cut off: ' + e.ariaLabel);
+  return [...outside, ...words];
+}"""
+
+
+def keep(page: Page, folder: Path | None, name: str, tmp_path: Path) -> None:
+    """Check that all is in the window, and make a picture of it."""
+    assert page.evaluate(OUTSIDE) == [], name
+    path = (folder or tmp_path) / f"{name}.png"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=path)
+    picture = cv2.imread(str(path))
+    assert picture is not None
+    assert picture.std() > 10.0, f"{name} is blank"
+
+
+@pytest.mark.parametrize(
+    ("size", "theme"),
+    [
+        ("720p", "dark"),
+        ("laptop", "light"),
+        # the software renderer takes long for so many pixels
+        *(pytest.param(*both, marks=pytest.mark.long) for both in OTHERS),
+    ],
+)
+def test_everything_is_inside_the_window(
+    browser: Browser,
+    server: Server,
+    size: str,
+    theme: str,
+    tmp_path: Path,
+    screenshots: Path | None,
+) -> None:
+    as_at_first(server)
+    ask(server, "POST", "seek", {"step": 45})
+    width, height = SIZES[size]
+    context = browser.new_context(
+        viewport={"width": width, "height": height}, color_scheme=theme, reduced_motion="reduce"
+    )
+    page = context.new_page()
+    page.goto(server.address)
+    until(page, lambda: readout(page) == "45", "the step")
+    expect(page.locator("#panel-tracks tbody tr").first).to_be_visible()
+    for strip in ("People", "OSPA", "Position error"):
+        expect(page.locator(".gr.strip", has_text=strip)).to_be_visible()
+    head = page.get_by_role("columnheader", name="x, y, z")
+    head.scroll_into_view_if_needed()
+    expect(head).to_be_in_viewport()
+    keep(page, screenshots, f"{size}-{theme}-tracks", tmp_path)
+    if size != "4k":
+        for tab in ("Step", "Changes", "Compare", "Runs"):
+            page.get_by_role("tab", name=tab).click()
+            expect(page.locator(f"#panel-{tab.lower()} [data-fill] > *").first).to_be_visible()
+            keep(page, screenshots, f"{size}-{theme}-{tab.lower()}", tmp_path)
+        wide = page.locator("#panel-runs [data-fill]").evaluate(
+            "e => e.scrollWidth - e.clientWidth"
+        )
+        assert wide == 0, "every column of the runs is in sight"
+        expect(page.get_by_role("button", name="only selected")).to_be_visible()
+        page.get_by_role("tab", name="Tracks").click()
+    page.locator(".lane").first.click()
+    page.locator(".lane").first.hover()
+    expect(page.locator(".card:visible")).to_be_visible()
+    keep(page, screenshots, f"{size}-{theme}-selected", tmp_path)
+    context.close()
+    as_at_first(server)

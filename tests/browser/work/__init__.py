@@ -1,0 +1,1 @@
+"""What people do with the page: see, tune, select, teach, share."""

@@ -1,0 +1,166 @@
+"""Teaching in the browser: a box becomes a template, a face is dragged, all of it is saved."""
+
+from __future__ import annotations
+
+import copy
+import re
+import tomllib
+from pathlib import Path
+
+import httpx2
+import numpy as np
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.scene import geometry
+from app.scene.scene import _margin_around
+from tests.browser.conftest import Server
+from tests.browser.looking import readout, until, viser
+from tracker import pipeline
+from tracker.export import read_tracks_csv
+from tracker.sequences.reader import FILE, read_sequence
+from tracker.sequences.writing.teaching import taught_values, with_taught
+
+
+def drag(page: Page, begin: tuple[float, float], end: tuple[float, float], pause: int = 0) -> None:
+    """Press at one place of the page, move, let go at another."""
+    page.mouse.move(*begin)
+    page.wait_for_timeout(pause)
+    page.mouse.down()
+    page.wait_for_timeout(pause)
+    for share in np.linspace(0.1, 1.0, 10):
+        page.mouse.move(*(a + share * (b - a) for a, b in zip(begin, end, strict=True)))
+        page.wait_for_timeout(pause // 4)
+    page.wait_for_timeout(pause)
+    page.mouse.up()
+
+
+def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(
+    page: Page, server: Server, tmp_path: Path
+) -> None:
+    expect(page.locator(".lane").first).to_be_visible(timeout=30_000)
+    page.keyboard.press("Home")
+    for _ in range(2):
+        page.keyboard.press("PageDown")
+    until(page, lambda: readout(page) == "20", "twenty steps on")
+    httpx2.patch(server.address + "api/parameters", json={"changes": {"single_view": "colour_phd"}})
+    server.wait(lambda state: state["run"]["state"] == "failed")  # there is no template yet
+    page.keyboard.press("c")
+    expect(page.locator(".mosaic")).to_have_class(re.compile("drawing"), timeout=20_000)
+    expect(page.get_by_text("Drag a box around a person.")).to_be_visible(timeout=20_000)
+    picture = page.locator(".cam").first.bounding_box()
+    assert picture is not None
+    scale = picture["width"] / 192
+    left, top = picture["x"], picture["y"]
+    drag(
+        page,
+        (left + 40 * scale, top + 30 * scale),
+        (left + 64 * scale, top + 78 * scale),
+    )
+    name = page.get_by_label("Name of template 1")
+    expect(name).to_be_focused(timeout=20_000)
+    page.keyboard.type("Anna")
+    page.keyboard.press("Enter")
+    state = server.wait(
+        lambda state: state["run"]["state"] == "done" and state["teaching"]["unsaved"] == 1
+    )
+    assert state["sequence"]["templates"] == 1
+    expect(page.locator("#panel-teach img")).to_have_count(2, timeout=20_000)
+    expect(page.get_by_text("1 change not saved")).to_be_visible(timeout=20_000)
+    expect(page.get_by_text("template Anna added")).to_be_visible(timeout=20_000)
+    natural = "images => images.every((i) => i.complete && i.naturalWidth > 0)"
+    until(page, lambda: page.locator("#panel-teach img").evaluate_all(natural), "its pictures")
+    assert page.locator(".cam[aria-pressed=true]").count() == 0  # the drag chose no camera
+
+    # what is shown is what the engine finds with that box
+    opened = read_sequence(Path(server.folder))
+    values = copy.deepcopy(taught_values(opened))
+    box = [40.0, 30.0, 24.0, 48.0]
+    values["template"].append({"name": "Anna", "camera": "cam1", "frame": 20, "box": box})
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Export").first.click()
+    path = tmp_path / "tracks.csv"
+    download.value.save_as(path)
+    shown = read_tracks_csv(path)
+    httpx2.post(server.address + "api/teach/save", json={})
+    (template,) = read_sequence(Path(server.folder)).templates
+    assert (template.name, template.camera, template.frame) == ("Anna", "cam1", 20)
+    assert template.box == pytest.approx(box, abs=0.6)  # whole pixels of the screen
+    values["template"][0]["box"] = template.box.tolist()
+    taught = with_taught(opened, values, FILE)
+    run = pipeline.compute(taught, pipeline.default_parameters(taught), seed=0)
+    assert run.tracks.frames.tolist() == shown.frames.tolist()
+    assert shown.positions == pytest.approx(run.tracks.positions, abs=1e-4)
+
+    # undo takes it back, redo brings it again; Escape leaves the mode
+    page.keyboard.press("Escape")  # out of the name
+    page.evaluate("document.activeElement.blur()")
+    page.keyboard.press("Escape")
+    expect(page.get_by_text("Drag a box around a person.")).to_be_hidden(timeout=20_000)
+    page.keyboard.press("Control+z")
+    server.wait(lambda state: state["teaching"]["unsaved"] > 0)
+    page.keyboard.press("Control+Shift+z")
+    server.wait(lambda state: state["teaching"]["unsaved"] == 0)
+
+    # so it is with an earlier run: its templates and its method are one step
+    taught = server.wait_for_run()
+    page.get_by_role("tab", name="Runs").click()
+    again = page.get_by_role("button", name="Use the parameters of run 1 again")
+    again.click()
+    state = server.wait(lambda state: state["sequence"]["templates"] == 0)
+    assert state["methods"]["single_view"] != "colour_phd"
+    expect(again).to_have_count(0)
+    for key, templates in (("Control+z", 1), ("Control+Shift+z", 0), ("Control+z", 1)):
+        page.keyboard.press(key)
+        state = server.wait(lambda state, n=templates: state["sequence"]["templates"] == n)
+        assert (state["methods"] == taught["methods"]) == (templates == 1)
+        assert (state["teaching"]["key"] == taught["teaching"]["key"]) == (templates == 1)
+        page.wait_for_timeout(300)  # the page hears of it
+    httpx2.post(server.address + "api/parameters/reset", json={})
+    server.wait_for_run()
+
+
+def test_a_face_is_dragged_in_3d_saved_and_reopened(page: Page, server: Server) -> None:
+    scene = viser(page)
+    before = server.get("/api/state").json()["sequence"]["room"]["min"]
+    page.keyboard.press("u")  # from above
+    page.keyboard.press("r")
+    server.wait(lambda state: state["teaching"]["editing_room"])
+    expect(page.locator("[data-command=edit-room]")).to_have_attribute("aria-pressed", "true")
+    canvas = scene.locator("canvas").first
+    page.wait_for_timeout(3000)  # the flight, a few frames a second
+    place = canvas.bounding_box()
+    assert place is not None
+    room = read_sequence(Path(server.folder)).room
+    pose = geometry.from_above(_margin_around(room), place["width"] / place["height"])
+    focal = place["height"] / 2.0 / np.tan(pose.fov / 2.0)
+
+    def on_screen(point: list[float]) -> tuple[float, float]:
+        away = focal / (pose.position[2] - point[2])
+        x = place["x"] + place["width"] / 2.0 + away * (point[0] - pose.position[0])
+        y = place["y"] + place["height"] / 2.0 - away * (point[1] - pose.position[1])
+        return float(x), float(y)
+
+    middle = (room.minimum + room.maximum) / 2.0
+    arrow = [float(room.minimum[0]) - 0.3, float(middle[1]), float(middle[2])]
+    drag(page, on_screen(arrow), on_screen([arrow[0] + 0.6, arrow[1], arrow[2]]), pause=400)
+    state = server.wait(lambda state: state["sequence"]["room"]["min"][0] != before[0], 20.0)
+    wide = state["sequence"]["room"]["min"][0]
+    assert wide == pytest.approx(before[0] + 0.6, abs=0.15)
+    assert state["sequence"]["room"]["min"][1:] == before[1:]
+    page.keyboard.press("Escape")
+    server.wait(lambda state: not state["teaching"]["editing_room"])
+    key = server.wait_for_run()["run"]["key"]
+    page.get_by_role("tab", name="Teach").click()
+    expect(page.get_by_label("Room, from x, metres")).to_have_value(f"{wide:g}")
+    page.get_by_role("button", name="Save in").click()
+    state = server.wait(lambda state: state["teaching"]["unsaved"] == 0)
+    assert state["run"]["key"] == key
+    assert tomllib.loads((Path(server.folder) / FILE).read_text("utf-8"))["room"]["min"][0] == wide
+    assert list(Path(server.folder).glob("sequence.toml.bak*"))
+    shown = server.get("/api/export/tracks.csv").text.splitlines()
+    httpx2.post(server.address + "api/sequence", json={"name": str(server.folder)})
+    server.wait(lambda state: state["opening"] is None and state["run"]["state"] == "done")
+    again = server.get("/api/export/tracks.csv").text.splitlines()
+    assert [line for line in again if line[0] != "#"] == [line for line in shown if line[0] != "#"]
+    page.keyboard.press("0")

@@ -1,0 +1,64 @@
+"""What the fusion methods share: the gate, the clutter, the births, who is one person."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Many
+
+import numpy as np
+import pytest
+
+from tests.engine.standing import HALF_EXTENTS, RECOMMENDED, empty_room
+from tracker.filters import models
+from tracker.fusion.model import FusionModel
+from tracker.fusion.target_model import SIZES, MeasurementKind
+
+KINDS: Many[MeasurementKind] = ("centre", "box", "box_and_width")
+every_kind = pytest.mark.parametrize("kind", KINDS)
+
+
+def model(fps: float = 10.0, **changes: object) -> FusionModel:
+    """Of the room with a door and four cameras."""
+    return FusionModel(empty_room(fps), RECOMMENDED.model_copy(update=changes))
+
+
+@every_kind
+@pytest.mark.parametrize("probability", [0.9, 0.99])
+def test_the_gate_holds_the_share_of_true_boxes_that_it_promises(
+    kind: MeasurementKind, probability: float
+) -> None:
+    gate = model(measurement=kind, gate_probability=probability).gate
+    innovations = np.random.default_rng(0).standard_normal((200_000, SIZES[kind]))
+    share = float(((innovations**2).sum(axis=1) <= gate).mean())
+    assert share == pytest.approx(probability, abs=4.0 * np.sqrt(0.25 / 200_000))
+
+
+@every_kind
+def test_clutter_is_spread_over_the_whole_measurement_space(kind: MeasurementKind) -> None:
+    room = empty_room(10.0)
+    found = model(measurement=kind, clutter_rate=3.0).clutter
+    for camera, clutter in zip(room.cameras, found, strict=True):
+        volume = models.visible_area(camera, room.room)
+        width, height = camera.image_size
+        volume *= {2: 1.0, 3: height / 2.0, 4: height / 2.0 * width / 2.0}[SIZES[kind]]
+        assert clutter * volume == pytest.approx(3.0), "as many false boxes a picture as are said"
+
+
+@pytest.mark.parametrize("fps", [5.0, 25.0])
+def test_newcomers_are_expected_by_the_second(fps: float) -> None:
+    made = model(fps, birth_rate=0.05)
+    assert made.births.cardinality * fps == pytest.approx(0.05 * len(made.room.entrances))
+
+
+def test_two_within_a_share_of_a_persons_width_are_one_unless_each_has_a_box() -> None:
+    made = model(duplicate_distance=0.5)
+    width = 2.0 * float(HALF_EXTENTS[:2].mean())
+    nobodys, their_own = np.full((4, 2), -1), np.array([[-1, -1], [3, 4], [0, -1], [2, 2]])
+    for apart, sources, duplicate in (
+        (0.49 * width, nobodys, True),
+        (0.51 * width, nobodys, False),
+        (0.49 * width, their_own, False),  # the second camera gave each a box
+        (0.24 * width, their_own, True),  # but two people cannot stand in one place
+    ):
+        means = np.array([[0.0, 0.0, 0.85], [apart, 0.0, 0.85]])
+        found = made.duplicates(means, np.array([0.9, 0.9]), np.array([1, 2]), sources)
+        assert found.tolist() == [False, duplicate]

@@ -1,0 +1,166 @@
+"""People with templates keep their labels by their looks: laws, and a return after long absence."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy import ndarray
+
+from tests.engine.standing import RECOMMENDED, fuse, ids_of, line, watch
+from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.fusion.multi_bernoulli import MultiBernoulli
+from tracker.fusion.protocol import Associations
+from tracker.fusion.reidentification import Identities, reidentify
+from tracker.single_view.protocol import ViewResult
+
+NOBODY = np.zeros(0, dtype=np.int64)
+
+
+def step(
+    names: Identities, labels: list[int], looks: list[list[float]], seconds: float = 0.2
+) -> tuple[dict[int, int], Identities]:
+    """One camera sees one box of each sure track, with these likenesses."""
+    count = len(labels)
+    boxes = np.ones((count, 4))
+    view = ViewResult.of_boxes(boxes, np.ones(count), boxes)
+    people = len(looks[0]) if looks else 2
+    view = replace(view, likenesses=np.array(looks).reshape(count, people))
+    posterior = GaussianMixture(
+        np.full(count, 0.99), np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1)),
+        np.array(labels, dtype=np.int64),
+    )  # fmt: skip
+    own = np.arange(count, dtype=np.int32)
+    pairs = Associations(np.zeros(count, dtype=np.int32), own, own, np.ones(count, np.float32))
+    return reidentify(names, posterior, pairs, [view], NOBODY, seconds)
+
+
+def watched(
+    names: Identities, labels: list[int], looks: list[list[float]], steps: int
+) -> Identities:
+    """Many steps in which no label changes."""
+    for _ in range(steps):
+        renamed, names = step(names, labels, looks)
+        assert renamed == {}
+    return names
+
+
+FIRST, SECOND, EITHER = [0.95, 0.05], [0.05, 0.95], [0.5, 0.5]
+
+
+def test_who_returns_after_long_absence_gets_his_label_back_once_it_is_sure() -> None:
+    names = watched(Identities.none(), [1, 2], [FIRST, SECOND], 30)
+    assert names.owners.tolist() == [1, 2]
+    names = watched(names, [2], [SECOND], 300)
+    renamed, names = step(names, [2, 7], [SECOND, FIRST])
+    assert renamed == {}, "a fifth of a second is not enough to be sure"
+    for _ in range(20):
+        renamed, names = step(names, [2, 7], [SECOND, FIRST])
+        if renamed:
+            break
+    assert renamed == {7: 1}
+
+
+def test_a_stranger_is_not_named_by_exclusion() -> None:
+    names = watched(Identities.none(), [1, 2], [FIRST, SECOND], 30)
+    names = watched(names, [2], [SECOND], 20)
+    watched(names, [2, 7], [SECOND, EITHER], 100)
+
+
+def test_two_tracks_that_were_exchanged_are_exchanged_back() -> None:
+    names = watched(Identities.none(), [1, 2], [FIRST, SECOND], 20)
+    renamed: dict[int, int] = {}
+    for _ in range(60):
+        renamed, names = step(names, [1, 2], [SECOND, FIRST])
+        if renamed:
+            break
+    assert renamed == {1: 2, 2: 1}
+    watched(names, [2, 1], [SECOND, FIRST], 40)
+
+
+def test_people_who_look_alike_keep_their_labels() -> None:
+    names = watched(Identities.none(), [1, 2], [EITHER, EITHER], 200)
+    assert names.owners.tolist() == [-1, -1]
+
+
+def test_looks_that_nobody_renews_are_forgotten_at_the_rate_of_the_leak() -> None:
+    names = watched(Identities.none(), [1, 2], [FIRST, SECOND], 30)
+
+    def share() -> float:
+        """π of the first person in the first track's looks."""
+        chances = np.exp(names.looks[names.labels.tolist().index(1)])
+        return float(chances[0] / chances.sum())
+
+    begin, seconds, steps = share(), 0.2, 40
+    assert begin > 0.9
+    names = watched(names, [1, 2], [EITHER, EITHER], steps)
+    # π − 1/G shrinks by 1 − Δt/T a step, T = 30 s
+    assert share() - 0.5 == pytest.approx((begin - 0.5) * (1.0 - seconds / 30.0) ** steps)
+
+
+def test_no_evidence_lasts_for_ever() -> None:
+    soon = watched(Identities.none(), [1, 2], [FIRST, SECOND], 200)
+    late = watched(soon, [1, 2], [FIRST, SECOND], 2000)
+    odds = [float(np.ptp(names.looks[0])) for names in (soon, late)]
+    assert odds[1] == pytest.approx(odds[0], abs=0.01)
+    assert odds[1] < 10.0
+
+
+def test_pictures_of_one_moment_count_as_one_look() -> None:
+    odds = []
+    for seconds in (0.02, 0.1):
+        names = Identities.none()
+        for _ in range(round(1.0 / seconds)):
+            _, names = step(names, [1, 2], [FIRST, SECOND], seconds)
+        odds.append(float(np.ptp(names.looks[0])))
+    assert odds[0] == pytest.approx(odds[1], rel=0.03), "the frame rate makes nobody surer"
+
+
+def test_without_two_people_to_tell_apart_nothing_is_done() -> None:
+    for looks in ([[1.0], [1.0]], [[], []]):
+        renamed, names = step(Identities.none(), [1, 2], looks)
+        assert renamed == {}
+        assert len(names.labels) == 0
+
+
+@given(st.integers(0, 10_000))
+def test_labels_stay_unique_and_what_is_kept_is_bounded(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    names, labels, free = Identities.none(), [1, 2, 3], 4
+    for _ in range(40):
+        looks = rng.dirichlet([0.3, 0.3, 0.3], len(labels)).tolist()
+        renamed, names = step(names, labels, looks, seconds=0.5)
+        labels = [renamed.get(label, label) for label in labels]
+        assert len(set(labels)) == len(labels)
+        assert len(names.labels) == len(labels)
+        owned = names.owners[names.owners >= 0].tolist()
+        assert len(set(owned)) == len(owned)
+        if rng.random() < 0.2:
+            labels[int(rng.integers(3))], free = free, free + 1
+
+
+def two_visits() -> tuple[ndarray, list[tuple[ViewResult, ...]]]:
+    """Somebody walks out by one side and comes in at the other eight seconds later."""
+    out = line([(-1.8, -1.8), (0.0, 0.0), (2.9, 0.0)], [0, 3, 6], 10.0)
+    back = line([(-2.6, 1.0), (0.5, 1.0), (0.5, 0.5)], [0, 4, 7], 10.0)
+    path = np.concatenate([out, np.full((80, 3), np.nan), back])
+    views = watch(path[:, None], seed=3, clutter_rate=0.0, miss_rate=0.0)
+    told = [
+        tuple(replace(view, likenesses=np.tile([0.9, 0.1], (len(view.boxes), 1))) for view in row)
+        for row in views
+    ]
+    return path, told
+
+
+def test_recognition_gives_the_id_back_and_can_be_switched_off() -> None:
+    path, views = two_visits()
+    _, tracks = fuse(MultiBernoulli, views)
+    ids = ids_of(tracks, path)
+    assert ids[-1] == ids[40] > 0
+    off = RECOMMENDED.model_copy(update={"recognition": False})
+    _, tracks = fuse(MultiBernoulli, views, parameters=off)
+    ids = ids_of(tracks, path)
+    assert ids[-1] != ids[40]

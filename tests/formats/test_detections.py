@@ -1,0 +1,245 @@
+"""Every format of boxes: what was written comes back, with its counting and its layout."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy import ndarray
+
+from tests.formats.rig import SIZE, boxes, cameras, read, walks
+from tracker.checks.reading import read_boxes
+from tracker.formats.detections.body import NOSE_HEIGHT, boxes_of
+from tracker.formats.pieces import DetectionPiece, TruthPiece
+
+CAMERA = cameras()[0]
+FRAMES, BOXES = boxes(CAMERA, walks())
+
+
+def _detections(path: Path, *series: Path) -> DetectionPiece:
+    (piece,) = (p for p in read(path, *series)[1] if isinstance(p, DetectionPiece))
+    return piece
+
+
+def _assert_boxes(piece: DetectionPiece, tolerance: float = 1e-9, first: int = 0) -> None:
+    size = SIZE if piece.normalised else None
+    found = read_boxes(piece.boxes, piece.layout or "ltwh", size)
+    np.testing.assert_array_equal(piece.frames - first, FRAMES)
+    np.testing.assert_allclose(found, BOXES, atol=tolerance)
+
+
+def _corners(box: ndarray) -> list[float]:
+    left, top, width, height = box.tolist()
+    return [left, top, left + width, top + height]
+
+
+def test_motchallenge_counts_from_1(tmp_path: Path) -> None:
+    path = tmp_path / "det.txt"
+    rows = zip(FRAMES, BOXES.tolist(), strict=True)
+    path.write_text("".join(f"{f + 1},-1,{','.join(map(repr, b))},0.9,-1,-1,-1\n" for f, b in rows))
+    piece = _detections(path)
+    assert (piece.first_index, piece.layout) == (1, "ltwh")
+    _assert_boxes(piece, first=1)
+    np.testing.assert_array_equal(piece.scores, 0.9)
+
+
+def test_motchallenge_truth_leaves_out_what_is_not_counted(tmp_path: Path) -> None:
+    path = tmp_path / "gt.txt"
+    path.write_text("1,1,10,10,20,40,1,1,0.8\n1,2,50,10,20,40,0,1,1\n1,3,90,10,20,40,1,8,1\n")
+    piece = _detections(path)
+    assert piece.format == "MOTChallenge ground truth"
+    np.testing.assert_array_equal(piece.boxes, [[10, 10, 20, 40]])
+
+
+def test_places_of_motchallenge_3d(tmp_path: Path) -> None:
+    path = tmp_path / "gt.txt"
+    path.write_text("1,4,1,2,3,4,1,0.5,0.25,0\n2,4,1,2,3,4,1,0.75,0.25,0\n")
+    truth = next(p for p in read(path)[1] if isinstance(p, TruthPiece))
+    np.testing.assert_array_equal(truth.positions, [[0.5, 0.25, 0], [0.75, 0.25, 0]])
+    np.testing.assert_array_equal(truth.ids, [4, 4])
+
+
+def test_coco_results(tmp_path: Path) -> None:
+    path = tmp_path / "results.json"
+    records = [
+        {"image_id": int(f), "category_id": 1, "bbox": b, "score": 0.8}
+        for f, b in zip(FRAMES, BOXES.tolist(), strict=True)
+    ]
+    other = {"image_id": 0, "category_id": 3, "bbox": [1, 1, 9, 9], "score": 0.9}
+    path.write_text(json.dumps([*records, other]))
+    _assert_boxes(_detections(path))
+
+
+def test_a_coco_data_set_has_a_camera_a_folder(tmp_path: Path) -> None:
+    path = tmp_path / "annotations.json"
+    images = [
+        {"id": 10 * c + n, "file_name": f"cam{c}/frame_{n:04}.jpg", "width": 640, "height": 480}
+        for c in (1, 2) for n in (0, 1)
+    ]  # fmt: skip
+    annotations = [
+        {"id": n, "image_id": image["id"], "category_id": 7, "bbox": [n, 0, 10, 20]}
+        for n, image in enumerate(images)
+    ]
+    path.write_text(
+        json.dumps({"images": images, "annotations": annotations,
+                    "categories": [{"id": 7, "name": "person"}]})
+    )  # fmt: skip
+    pieces = [p for p in read(path)[1] if isinstance(p, DetectionPiece)]
+    assert [p.camera for p in pieces] == ["cam1", "cam2"]
+    assert [p.frames.tolist() for p in pieces] == [[0, 1], [0, 1]]
+    assert pieces[0].image_size == (640, 480)
+
+
+def test_yolo_text_a_file_a_frame(tmp_path: Path) -> None:
+    files = []
+    for frame in np.unique(FRAMES):
+        rows = []
+        for box in BOXES[FRAMES == frame]:
+            # parts of the picture from the corner of its first pixel
+            centre = (box[:2] + 0.5 + box[2:] / 2.0) / SIZE
+            rows.append(" ".join(map(repr, [0, *centre.tolist(), *(box[2:] / SIZE).tolist(), 0.5])))
+        files.append(tmp_path / f"video_{frame + 1}.txt")
+        files[-1].write_text("\n".join([*rows, "2 0.5 0.5 0.1 0.1 0.9"]))
+    piece = _detections(files[0], *files)
+    assert (piece.layout, piece.normalised, piece.first_index) == ("cxcywh", True, 1)
+    _assert_boxes(piece, 1e-6, first=1)
+    np.testing.assert_array_equal(piece.scores, 0.5)
+
+
+def test_results_of_ultralytics(tmp_path: Path) -> None:
+    files = []
+    for frame in np.unique(FRAMES):
+        records = [
+            {"name": "person", "class": 0, "confidence": 0.7,
+             "box": dict(zip(("x1", "y1", "x2", "y2"), _corners(box), strict=True))}
+            for box in BOXES[FRAMES == frame]
+        ]  # fmt: skip
+        files.append(tmp_path / f"frame{frame}.json")
+        files[-1].write_text(json.dumps(records))
+    piece = _detections(files[0], *files)
+    assert piece.format == "Ultralytics results"
+    _assert_boxes(piece)
+
+
+@pytest.mark.parametrize("form", ["csv", "json"])
+def test_sinks_of_supervision(tmp_path: Path, form: str) -> None:
+    names = ["x_min", "y_min", "x_max", "y_max", "class_id", "confidence", "tracker_id",
+             "frame_number"]  # fmt: skip
+    rows = [[*_corners(b), 0, 0.6, "", int(f)] for f, b in zip(FRAMES, BOXES, strict=True)]
+    path = tmp_path / f"out.{form}"
+    if form == "csv":
+        path.write_text("\n".join(",".join(map(str, row)) for row in [names, *rows]))
+    else:
+        path.write_text(json.dumps([dict(zip(names, row, strict=True)) for row in rows]))
+    piece = _detections(path)
+    assert (piece.format, piece.layout) == ("supervision sink", "xyxy")
+    _assert_boxes(piece)
+
+
+def test_csv_with_columns_in_any_order_and_several_cameras(tmp_path: Path) -> None:
+    path = tmp_path / "boxes.csv"
+    head = "Height;Camera;Width;Frame ID;Top;note;Left"
+    rows = [
+        f"{b[3]!r};{camera};{b[2]!r};{f};{b[1]!r};x;{b[0]!r}"
+        for camera in ("north", "south")
+        for f, b in zip(FRAMES, BOXES.tolist(), strict=True)
+    ]
+    path.write_text("\n".join([head, *rows]))
+    pieces = [p for p in read(path)[1] if isinstance(p, DetectionPiece)]
+    assert [p.camera for p in pieces] == ["north", "south"]
+    for piece in pieces:
+        _assert_boxes(piece)
+
+
+def test_four_numbers_without_names_leave_the_layout_open(tmp_path: Path) -> None:
+    path = tmp_path / "boxes.json"
+    path.write_text(json.dumps([{"frame": 0, "bbox": [1, 2, 3, 4], "score": 1.0}] * 3))
+    assert _detections(path).layout is None
+
+
+def test_cvat(tmp_path: Path) -> None:
+    tracks = "".join(
+        f'<track id="{n}" label="person"><box frame="{f}" outside="{int(n % 5 == 4)}" '
+        'xtl="{}" ytl="{}" xbr="{}" ybr="{}"/></track>'.format(*map(repr, _corners(b)))
+        for n, (f, b) in enumerate(zip(FRAMES, BOXES, strict=True))
+    )
+    path = tmp_path / "annotations.xml"
+    path.write_text(
+        "<?xml version='1.0' encoding='utf-8'?><annotations><version>1.1</version><meta><task>"
+        "<name>cam 1</name><original_size><width>1280</width><height>720</height>"
+        f"</original_size></task></meta>{tracks}</annotations>"
+    )
+    piece = _detections(path)
+    kept = np.arange(len(FRAMES)) % 5 != 4
+    np.testing.assert_array_equal(piece.frames, FRAMES[kept])
+    np.testing.assert_allclose(read_boxes(piece.boxes, "xyxy"), BOXES[kept], atol=1e-9)
+    assert (piece.camera, piece.image_size) == ("cam 1", SIZE)
+
+
+def _stick_figure(stature: float) -> dict[str, list[float]]:
+    """Joints of somebody who stands at x = 500 with the floor at y = 900; pixels."""
+    shoulders, hips = 900 - 0.818 * stature, 900 - 0.53 * stature
+    knees, ankles = 900 - 0.285 * stature, 900 - 0.039 * stature
+    nose = 900 - NOSE_HEIGHT * stature
+    half = 0.1 * stature
+    return {
+        "nose": [500, nose], "eyes": [495, nose - 3], "eyes2": [505, nose - 3],
+        "ls": [500 + half, shoulders], "rs": [500 - half, shoulders],
+        "le": [500 + half, shoulders + 90], "re": [500 - half, shoulders + 90],
+        "lw": [500 + half, hips], "rw": [500 - half, hips],
+        "lh": [500 + half / 2, hips], "rh": [500 - half / 2, hips],
+        "lk": [500 + half / 2, knees], "rk": [500 - half / 2, knees],
+        "la": [500 + half / 2, ankles], "ra": [500 - half / 2, ankles],
+    }  # fmt: skip
+
+
+COCO = ["nose", "eyes", "eyes2", "eyes", "eyes2", "ls", "rs", "le", "re", "lw", "rw", "lh", "rh",
+        "lk", "rk", "la", "ra"]  # fmt: skip
+
+
+def test_a_pose_gives_the_box_of_the_whole_body() -> None:
+    joints = _stick_figure(600.0)
+    pose = np.array([[*joints[name], 0.9] for name in COCO])
+    (box,) = boxes_of(pose[None])
+    np.testing.assert_allclose(box[1], 300.0, atol=3.0)  # the crown
+    np.testing.assert_allclose(box[1] + box[3], 900.0, atol=1.0)  # the sole
+    assert 120 < box[2] < 170
+
+
+def test_of_two_layouts_with_25_joints_the_one_with_short_bones_is_taken() -> None:
+    joints = _stick_figure(600.0)
+    mean = {"neck": [500, joints["ls"][1]], "hip": [500, joints["lh"][1]], **joints}
+    body_25 = ["nose", "neck", "rs", "re", "rw", "ls", "le", "lw", "hip", "rh", "rk", "ra", "lh",
+               "lk", "la", "eyes", "eyes2", "eyes", "eyes2", *["la"] * 3, *["ra"] * 3]  # fmt: skip
+    crown = {**mean, "crown": [500, 300.0]}
+    body_25b = [*COCO, "neck", "crown", *["la"] * 3, *["ra"] * 3]
+    for names in (body_25, body_25b):
+        (box,) = boxes_of(np.array([[[*crown[name], 0.9] for name in names]]))
+        np.testing.assert_allclose([box[1], box[1] + box[3]], [300.0, 900.0], atol=4.0)
+
+
+def test_openpose_a_file_a_frame_with_nobody_in_the_first(tmp_path: Path) -> None:
+    joints = _stick_figure(600.0)
+    pose = [value for name in COCO for value in (*joints[name], 0.8)]
+    files = [tmp_path / f"cam1_{n:012}_keypoints.json" for n in range(3)]
+    for number, path in enumerate(files):
+        people = [{"person_id": [-1], "pose_keypoints_2d": pose}] if number else []
+        path.write_text(json.dumps({"version": 1.3, "people": people}))
+    piece = _detections(files[1], *files)
+    assert piece.frames.tolist() == [1, 2]
+    assert (piece.first_index, piece.last_frame) == (0, 2)
+    np.testing.assert_allclose(piece.scores, 0.8)
+
+
+def test_alphapose(tmp_path: Path) -> None:
+    joints = _stick_figure(600.0)
+    pose = [value for name in COCO for value in (*joints[name], 0.8)]
+    path = tmp_path / "alphapose-results.json"
+    record = {"image_id": "12.jpg", "category_id": 1, "keypoints": pose, "score": 2.7,
+              "box": [1, 2, 3, 4], "idx": 1}  # fmt: skip
+    path.write_text(json.dumps([record]))
+    piece = _detections(path)
+    assert (piece.format, piece.frames.tolist()) == ("AlphaPose JSON", [12])
+    np.testing.assert_allclose(piece.boxes[0, 1] + piece.boxes[0, 3], 900.0, atol=1.0)

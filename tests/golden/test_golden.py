@@ -1,0 +1,94 @@
+"""Every stage of every method gives what it gave before: see the package for how to accept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.golden import files
+from tests.golden.combinations import alternatives, combinations, runs
+from tests.golden.exact import WITH_ALTERNATIVES
+from tests.golden.fingerprint import fingerprints
+from tests.golden.pieces import PIECES, Piece
+
+MOST_LINES = 40
+
+ACCEPT = (
+    "If every one of these is what a change was to bring about, accept them with "
+    "`pytest tests/golden --update-golden` (and `--long` where the longer form differs) "
+    "and commit tests/golden/expected with the change."
+)
+
+
+def _parameters(pieces: tuple[Piece, ...]) -> list[object]:
+    return [
+        pytest.param(piece, id=piece.name, marks=[pytest.mark.data] if piece.real else [])
+        for piece in pieces
+    ]
+
+
+every_piece = pytest.mark.parametrize("piece", _parameters(PIECES))
+
+
+@pytest.fixture
+def data(piece: Piece, request: pytest.FixtureRequest) -> Path:
+    """The folder of the real recordings, which a rendered room does not ask for."""
+    folder: Path = request.getfixturevalue("data_folder") if piece.real else Path()
+    return folder
+
+
+@pytest.fixture
+def check(
+    request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str]
+) -> Callable[[str, files.Fingerprints], None]:
+    """Compare with the kept file, or write it where that was asked for."""
+
+    def checked(name: str, found: files.Fingerprints) -> None:
+        differ = files.differences(name, files.read(name), found)
+        if request.config.getoption("--update-golden"):
+            if differ:
+                files.write(name, found)
+                with capsys.disabled():
+                    print("\n" + "\n".join(differ))
+        elif differ:
+            more = len(differ) - MOST_LINES
+            told = differ[:MOST_LINES] + ([f"… and {more} more"] if more > 0 else [])
+            pytest.fail("\n".join([*told, "", ACCEPT]), pytrace=False)
+
+    return checked
+
+
+@every_piece
+def test_every_stage_gives_what_it_gave(
+    piece: Piece, data: Path, check: Callable[[str, files.Fingerprints], None]
+) -> None:
+    sequence = piece.open(data)
+    check(piece.name, fingerprints(runs(sequence, piece.steps, combinations(sequence))))
+
+
+@pytest.mark.long
+@every_piece
+def test_longer_pieces_give_what_they_gave(
+    piece: Piece, data: Path, check: Callable[[str, files.Fingerprints], None]
+) -> None:
+    sequence = piece.open(data)
+    chosen = combinations(sequence)
+    found = fingerprints(runs(sequence, piece.long_steps, chosen), short=True)
+    if piece.name in WITH_ALTERNATIVES:
+        chosen = alternatives(sequence)
+        found |= fingerprints(runs(sequence, piece.steps, chosen), short=True)
+    check(f"{piece.name}-long", found)
+
+
+@every_piece
+def test_people_are_found_in_every_piece(piece: Piece) -> None:
+    kept = files.read(piece.name)
+    robust = {name: run for name, run in kept.items() if name.startswith("robust")}
+    tracked = {name: run for name, run in robust.items() if "tracks" in run}
+    assert tracked
+    for name, run in tracked.items():
+        people = run["tracks"]["all"][0]
+        assert people is not None, name
+        assert people >= piece.steps, name

@@ -1,0 +1,165 @@
+"""Cameras with clocks of their own: rates, offsets, time stamps, frames that are not there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.synthetic import camera_toml, head_toml, number_in, write_lines, write_sequence
+from tracker.sequences.clock import Clock, Timing
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.reader import read_sequence, read_summary
+from tracker.sequences.sequence import SequenceError
+
+
+@given(
+    fps=st.floats(1.0, 60.0),
+    own=st.floats(1.0, 120.0),
+    offset=st.floats(-3.0, 3.0),
+    first=st.integers(0, 30),
+)
+def test_a_step_shows_the_nearest_frame_and_a_frame_belongs_to_one_step(
+    fps: float, own: float, offset: float, first: int
+) -> None:
+    clock = Timing(first, own, offset).clock(fps, 80)
+    assert clock is not None
+    shown = clock.frame_of_step
+    steps = np.flatnonzero(shown >= 0)
+    frames = shown[steps]
+    assert (np.diff(frames) > 0).all()
+    times = (frames - first) / own + offset
+    assert (np.abs(times * fps - steps) <= 0.5 + 1e-6).all()
+    np.testing.assert_array_equal(clock.steps_of(frames), steps)
+    if own >= fps:  # a faster camera has a frame at every step after its first
+        begun = np.arange(80) / fps > offset - (first - 0.5) / own
+        assert (shown[begun] >= 0).all()
+
+
+def test_without_a_clock_frames_are_steps() -> None:
+    assert Timing(7).clock(25.0, 100) is None
+
+
+def test_frames_outside_and_gaps_belong_to_no_step() -> None:
+    clock = Clock.of_times(np.array([-1.0, 0.0, 0.11, np.nan, 0.5]), 10.0, 4)
+    assert clock.frame_of_step.tolist() == [1, 2, -1, -1]
+    assert clock.steps_of(np.array([-1, 0, 1, 2, 3, 4, 9])).tolist() == [-1, -1, 0, 1, -1, -1, -1]
+
+
+def edited(folder: Path, old: str, new: str) -> Path:
+    """The folder with some text of its file replaced."""
+    text = (folder / "sequence.toml").read_text(encoding="utf-8")
+    assert old in text
+    (folder / "sequence.toml").write_text(text.replace(old, new), encoding="utf-8")
+    return folder
+
+
+def test_a_late_camera_shows_and_detects_what_it_took_then(tmp_path: Path) -> None:
+    folder = write_sequence(tmp_path / "room", frames=20, detections=True, container="images")
+    edited(folder, 'images = "cam2/*.jpg"', 'images = "cam2/*.jpg"\ntime_offset = -0.12')
+    sequence = read_sequence(folder)
+    first, second = sequence.views
+    assert [second.frame_at(step) for step in (0, 5, 16)] == [3, 8, 19]
+    assert first.clock is None
+    with FrameReader(sequence) as reader:
+        picture = reader.picture(1, 5)
+        assert picture is not None
+        assert number_in(picture) == 8
+    own = second.detections
+    assert own is not None
+    assert own.boxes[own.at(5), 0].tolist() == [28.5]
+    assert own.frames.max() == 16
+    assert any("from step 17 on it has no picture" in said for said in sequence.warnings)
+
+
+def test_a_slow_camera_has_no_frame_at_most_steps(tmp_path: Path) -> None:
+    folder = write_sequence(tmp_path / "room", frames=20, detections=True, container=None)
+    edited(folder, 'detections = "cam2.csv"', 'detections = "cam2.csv"\nfps = 5')
+    view = read_sequence(folder).views[1]
+    assert view.detections is not None
+    assert np.unique(view.detections.frames).tolist() == [0, 5, 10, 15]
+    assert [view.was_looked_at(step) for step in range(7)] == [1, 0, 0, 0, 0, 1, 0]
+
+
+def test_time_stamps_in_the_layout_of_caliscope(tmp_path: Path) -> None:
+    folder = write_sequence(tmp_path / "room", frames=10, container="images", templates=False)
+    rows = [f"{k},1,{k},{100.0 + k / 25:.4f}" for k in range(10)]
+    rows += [f"{k},2,{k},{100.0 + (2 * k + 1) / 25:.4f}" for k in range(5)]
+    write_lines(folder / "times.csv", "sync_index,port,frame_index,frame_time", rows)
+    for name in ("cam1", "cam2"):
+        line = f'images = "{name}/*.jpg"'
+        edited(folder, line, f'{line}\ntimestamps = "times.csv"')
+    first, second = read_sequence(folder).views
+    assert [first.frame_at(step) for step in range(10)] == list(range(10))
+    assert [second.frame_at(step) for step in range(10)] == [-1, 0, -1, 1, -1, 2, -1, 3, -1, 4]
+    edited(folder, 'name = "cam2"', 'name = "door"')
+    with pytest.raises(SequenceError, match="name the camera after its port"):
+        read_sequence(folder)
+
+
+def test_rows_without_a_box_say_that_nobody_was_seen(tmp_path: Path) -> None:
+    folder = write_sequence(tmp_path / "room", frames=8, container=None, detections=True)
+    rows = ["0,20,30,24,48,0.9", "3,,,,,", "5,25,30,24,48,0.9"]
+    write_lines(folder / "cam1.csv", "frame,left,top,width,height,score", rows)
+    assert read_sequence(folder).views[0].looked_at is None
+    edited(folder, 'detections = "cam1.csv"', 'detections = "cam1.csv"\ndetected_steps = "listed"')
+    view = read_sequence(folder).views[0]
+    assert view.detections is not None
+    assert view.detections.frames.tolist() == [0, 5]
+    assert [step for step in range(8) if view.was_looked_at(step)] == [0, 3, 5]
+
+
+def test_boxes_counted_from_one_are_told_and_put_right(tmp_path: Path) -> None:
+    folder = write_sequence(tmp_path / "room", frames=8, container=None, detections=True)
+    rows = [f"{k},20,30,24,48,0.9" for k in range(1, 9)]
+    write_lines(folder / "cam1.csv", "frame,left,top,width,height,score", rows)
+    with pytest.raises(SequenceError, match="counted from 1; write detections_first_frame = 1"):
+        read_sequence(folder)
+    edited(folder, 'detections = "cam1.csv"', 'detections = "cam1.csv"\ndetections_first_frame = 1')
+    own = read_sequence(folder).views[0].detections
+    assert own is not None
+    assert own.frames.tolist() == list(range(8))
+
+
+def test_what_the_videos_know_need_not_be_stated(tmp_path: Path) -> None:
+    folder = write_sequence(tmp_path / "room", frames=30, first_frame=4)
+    full = read_sequence(folder)
+    for line in ("fps = 25.0\n", "frames = 30\n", "image_size = [192, 144]\n"):
+        edited(folder, line, "")
+    sequence = read_sequence(folder)
+    assert (sequence.fps, sequence.frames) == (25.0, 30)
+    assert [c.image_size for c in sequence.cameras] == [c.image_size for c in full.cameras]
+    assert any(said.startswith("fps is not stated: 25") for said in sequence.warnings)
+    summary = read_summary(folder)
+    assert (summary.fps, summary.frames) == (None, None)
+
+
+def test_everything_that_is_missing_is_told_at_once(tmp_path: Path) -> None:
+    folder = tmp_path / "room"
+    folder.mkdir()
+    text = head_toml(8) + camera_toml("cam1") + camera_toml("cam2")
+    for line in ('name = "numbers"\n', "fps = 25.0\n", "frames = 8\n"):
+        text = text.replace(line, "")
+    text = "\n".join(line for line in text.split("\n") if not line.startswith("t = "))
+    (folder / "sequence.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(SequenceError) as caught:
+        read_sequence(folder)
+    assert str(caught.value) == (
+        "room/sequence.toml: these are missing and cannot be found out: name; fps (steps a "
+        'second); frames (the number of steps); t of camera "cam1"; t of camera "cam2"'
+    )
+
+
+def test_room_and_target_are_found_where_views_overlap(tmp_path: Path) -> None:
+    folder = write_sequence(tmp_path / "room", frames=8)
+    text = (folder / "sequence.toml").read_text(encoding="utf-8")
+    head, _, rest = text.partition("[room]")
+    rest = rest[rest.index("[[camera]]") :]
+    (folder / "sequence.toml").write_text(head + rest, encoding="utf-8")
+    sequence = read_sequence(folder)
+    assert sequence.room.contains(np.array([[0.0, 0.0, 1.0]])).all()
+    assert sequence.target_half_extents.tolist() == [0.3, 0.3, 0.85]
+    assert [said.partition(" is")[0] for said in sequence.warnings][:2] == ["[room]", "[target]"]

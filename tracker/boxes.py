@@ -1,0 +1,69 @@
+"""Boxes in a picture, and the three ways of saying where they are.
+
+Arrays of boxes that are passed around are rows of ``centre_x, centre_y, half_width,
+half_height`` in pixels, unless their docstring says otherwise; whoever needs another form,
+or has another, comes by here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Boxes:
+    """Upright boxes, pixels; any number of leading axes."""
+
+    centred: Float[ndarray, "*N 4"]
+    """Centre x, centre y, half width, half height."""
+
+    def __post_init__(self) -> None:
+        if self.centred.shape[-1:] != (4,):
+            raise ValueError(
+                f"boxes: expected four numbers each, got an array of shape {self.centred.shape}"
+            )
+
+    @staticmethod
+    def from_left_top(boxes: Float[ndarray, "*N 4"]) -> Boxes:
+        """Of ``left, top, width, height``."""
+        half_sizes = boxes[..., 2:] / 2.0
+        return Boxes(np.concatenate([boxes[..., :2] + half_sizes, half_sizes], axis=-1))
+
+    @staticmethod
+    def from_corners(low: Float[ndarray, "*N 2"], high: Float[ndarray, "*N 2"]) -> Boxes:
+        """Of ``left, top`` and ``right, bottom``."""
+        return Boxes(np.concatenate([low + high, high - low], axis=-1) / 2.0)
+
+    @property
+    def centres(self) -> Float[ndarray, "*N 2"]:
+        """Centre x, centre y."""
+        return self.centred[..., :2]
+
+    @property
+    def half_sizes(self) -> Float[ndarray, "*N 2"]:
+        """Half width, half height."""
+        return self.centred[..., 2:]
+
+    @property
+    def low(self) -> Float[ndarray, "*N 2"]:
+        """Left, top."""
+        return np.asarray(self.centres - self.half_sizes)
+
+    @property
+    def high(self) -> Float[ndarray, "*N 2"]:
+        """Right, bottom."""
+        return np.asarray(self.centres + self.half_sizes)
+
+    @property
+    def corners(self) -> Float[ndarray, "*N 4"]:
+        """``left, top, right, bottom``."""
+        return np.concatenate([self.low, self.high], axis=-1)
+
+    @property
+    def left_top(self) -> Float[ndarray, "*N 4"]:
+        """``left, top, width, height``."""
+        return np.concatenate([self.low, 2.0 * self.half_sizes], axis=-1)

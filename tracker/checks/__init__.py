@@ -1,0 +1,49 @@
+"""Is a recording as it should be: what is odd in sentences, each with what mends it.
+
+``check(sequence)`` runs every check that costs no more than a few seconds a camera; nothing is
+changed by it.
+"""
+
+from __future__ import annotations
+
+from tracker.checks.boxes import check_boxes, listen
+from tracker.checks.cameras import check_lenses, check_places
+from tracker.checks.check import Check, Remedy, Status
+from tracker.checks.readings import EVERY_ORDER
+from tracker.checks.timing import check_counting, check_time
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+
+__all__ = ["Check", "Remedy", "Status", "check"]
+
+
+def check(
+    sequence: Sequence,
+    *,
+    pictures: bool = True,
+    quick: bool = False,
+    reader: FrameReader | None = None,
+) -> list[Check]:
+    """Every check of a recording, the ones that matter most first.
+
+    What a wrong reading of the calibration would make nonsense of is left out where the boxes
+    say that it is read wrongly.
+
+    Args:
+        sequence: As it was read.
+        pictures: Whether pictures may be looked at, for the motion where there are no boxes.
+        quick: Whether to leave out what takes more than a second or so: the cameras' clocks, and
+            calibrations exchanged among many cameras.
+        reader: Of the pictures; one is opened where it is needed and none is given.
+    """
+    told = listen(sequence, exchanges=not quick or len(sequence.views) <= EVERY_ORDER)
+    found = [*check_boxes(sequence, told)]
+    lenses = check_lenses(sequence.cameras)
+    if told is not None and told.mistaken:
+        return [*found, lenses, check_counting(sequence, places=False)]
+    found += [lenses, *check_places(sequence.cameras, sequence.room)]
+    if not quick and (sequence.has_detections or pictures):
+        found += check_time(sequence, reader)
+    if told is not None:
+        found.append(check_counting(sequence))
+    return found

@@ -1,0 +1,1 @@
+"""What other programs write, read into pieces that become a sequence folder."""

@@ -1,0 +1,300 @@
+"""What the columns of a table mean, by their names: frame, box, score, person, place.
+
+Shared by CSV and JSON of detectors, of annotation programs and of one's own scripts. The
+four numbers of a box are told apart by the names (``x2`` is no width); where there is but a
+list of four, the layout stays open.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+
+from tracker.formats.pieces import DetectionPiece, Layout, Piece, TruthPiece, Unit
+from tracker.formats.source import SourceFile
+from tracker.formats.values import shown
+
+WORDS: dict[str, tuple[str, ...]] = {
+    "frame": ("frame", "frameid", "frameindex", "framenumber", "frameno", "frameidx", "framenr",
+              "imageid", "imgid", "step", "image", "imagename", "filename", "file", "framename",
+              "imageindex"),
+    "camera": ("camera", "cam", "cameraid", "camid", "view", "cameraname", "viewid", "viewnum"),
+    "left": ("left", "xmin", "x1", "bbleft", "bboxleft", "xtl", "l", "bboxx1", "boxx1", "minx",
+             "bboxxmin", "x0"),
+    "top": ("top", "ymin", "y1", "bbtop", "bboxtop", "ytl", "bboxy1", "boxy1", "miny",
+            "bboxymin", "y0"),
+    "right": ("right", "xmax", "x2", "bbright", "xbr", "r", "bboxx2", "boxx2", "maxx", "bboxxmax"),
+    "bottom": ("bottom", "ymax", "y2", "bbbottom", "ybr", "b", "bboxy2", "boxy2", "maxy",
+               "bboxymax"),
+    "width": ("width", "w", "bbwidth", "bboxwidth", "boxwidth", "bboxw", "bw"),
+    "height": ("height", "h", "bbheight", "bboxheight", "boxheight", "bboxh", "bh"),
+    "cx": ("cx", "xcenter", "xcentre", "xc", "centerx", "centrex"),
+    "cy": ("cy", "ycenter", "ycentre", "yc", "centery", "centrey"),
+    "box": ("bbox", "box", "xyxy", "xywh", "tlwh", "ltwh", "boundingbox"),
+    "score": ("score", "confidence", "conf", "prob", "probability", "detectionscore"),
+    "class": ("class", "classname", "label", "name", "category", "classid", "categoryid",
+              "prediction"),
+    "id": ("id", "trackid", "trackerid", "personid", "objectid", "identity", "targetid", "person",
+           "pid"),
+    "x": ("x", "xm", "worldx", "xworld", "px", "posx", "positionx", "xmm", "xcm"),
+    "y": ("y", "ym", "worldy", "yworld", "py", "posy", "positiony", "ymm", "ycm"),
+    "z": ("z", "zm", "worldz", "zworld", "pz", "posz", "positionz", "zmm", "zcm"),
+    "valid": ("valid",),
+}  # fmt: skip
+"""Names, without case, blanks and underscores, of each meaning; the first that is there counts."""
+
+_MEANING = {word: meaning for meaning, words in WORDS.items() for word in words}
+
+PEOPLE = ("person", "pedestrian", "people", "human", "1", "0")
+"""Classes that are people: by name, or the first of COCO (1) and of YOLO (0)."""
+
+_OURS = "existence"
+"""A column of the track files that this program writes, which are no one's truth."""
+
+Column = Sequence[Any]
+
+
+def plain(name: str) -> str:
+    """A column's name without case, blanks, brackets and underscores."""
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def meanings(names: Sequence[str]) -> dict[str, str]:
+    """The column of each meaning: the one whose name stands first in :data:`WORDS`."""
+    found: dict[str, str] = {}
+    by_word = {plain(name): name for name in reversed(names)}
+    for meaning, words in WORDS.items():
+        for word in words:
+            if word in by_word:
+                found[meaning] = by_word[word]
+                break
+    return found
+
+
+def layout_of(found: Mapping[str, str]) -> tuple[Layout | None, tuple[str, ...]] | None:
+    """The layout of the box, and the meanings of its columns; None where there is no box."""
+    forms: tuple[tuple[Layout, tuple[str, ...]], ...] = (
+        ("ltwh", ("left", "top", "width", "height")),
+        ("xyxy", ("left", "top", "right", "bottom")),
+        ("cxcywh", ("cx", "cy", "width", "height")),
+        ("ltwh", ("x", "y", "width", "height")),
+    )
+    for layout, parts in forms:
+        if all(part in found for part in parts):
+            return layout, parts
+    return None
+
+
+def is_table(names: Sequence[str]) -> bool:
+    """Whether the columns are those of boxes or of places of people."""
+    if _OURS in names:
+        return False
+    found = meanings(names)
+    return layout_of(found) is not None or all(p in found for p in ("frame", "id", "x", "y"))
+
+
+def read_table(
+    file: SourceFile,
+    name: str,
+    columns: Mapping[str, Column],
+    frame: int | None = None,
+    boxes_layout: Layout | None = None,
+) -> Iterator[Piece]:
+    """The boxes, a piece a camera, or the truth that a table holds.
+
+    Args:
+        file: For the messages.
+        name: The format, as it is shown.
+        columns: Cells by column, as text or numbers.
+        frame: The frame of all rows, where the file's name or place says it.
+        boxes_layout: How a box that is one list of four numbers is meant.
+
+    Raises:
+        FormatError: If there is no frame, or a cell is no number.
+    """
+    found = meanings(list(columns))
+    rows = len(next(iter(columns.values()), ()))
+    if frame is None and "frame" not in found:
+        raise file.error(
+            'expected a column "frame" (or a number in the name of a file a frame), found the '
+            f"columns {shown(', '.join(columns))}"
+        )
+    frames = (
+        np.full(rows, frame, dtype=np.int64)
+        if frame is not None
+        else _frames(file, found["frame"], columns[found["frame"]])
+    )
+    form = layout_of(found)
+    if form is None and "box" in found:
+        values = _table(file, found["box"], columns[found["box"]])
+        yield from _detections(file, name, columns, found, frames, values, boxes_layout)
+    elif form is not None:
+        layout, parts = form
+        values = np.column_stack([_numbers(file, found[p], columns[found[p]]) for p in parts])
+        yield from _detections(file, name, columns, found, frames, values, layout)
+    else:
+        yield _truth(file, name, columns, found, frames)
+
+
+def to_unit(scores: Float[ndarray, " D"]) -> Float[ndarray, " D"]:
+    """Scores as parts of 1: logits through the logistic function, percents divided."""
+    if len(scores) == 0 or (scores.min() >= 0.0 and scores.max() <= 1.0):
+        return scores
+    if (scores == -1.0).all():  # "none"
+        return np.ones(len(scores))
+    if scores.min() >= 0.0:
+        return scores / max(float(scores.max()), 100.0 if scores.max() <= 100.0 else 0.0)
+    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(scores, -50.0, 50.0))))
+
+
+def is_normalised(boxes: Float[ndarray, "D 4"]) -> bool:
+    """Whether all numbers are parts of the picture: no box of pixels is that small."""
+    return len(boxes) > 0 and bool(np.abs(boxes).max() <= 1.5)
+
+
+def _detections(
+    file: SourceFile,
+    name: str,
+    columns: Mapping[str, Column],
+    found: Mapping[str, str],
+    frames: Int[ndarray, " D"],
+    boxes: Float[ndarray, "D 4"],
+    layout: Layout | None,
+) -> Iterator[Piece]:
+    scores = np.ones(len(frames))
+    if "score" in found:
+        scores = to_unit(_numbers(file, found["score"], columns[found["score"]], blank=1.0))
+    keep = np.isfinite(boxes).all(axis=1)
+    if "class" in found:
+        keep &= people([str(cell) for cell in columns[found["class"]]])
+    cameras = np.array(
+        [str(cell) for cell in columns[found["camera"]]]
+        if "camera" in found
+        else [""] * len(frames)
+    )
+    for camera in dict.fromkeys(cameras[keep].tolist()) or [""]:
+        rows = keep & (cameras == camera) if len(cameras) else keep
+        yield DetectionPiece(
+            source=file.path,
+            format=name,
+            camera=str(camera),
+            frames=frames[rows],
+            boxes=boxes[rows],
+            scores=scores[rows],
+            layout=layout,
+            normalised=is_normalised(boxes[rows]),
+            last_frame=int(frames.max()) if len(frames) else None,
+        )
+
+
+def people(classes: Sequence[str]) -> Bool[ndarray, " D"]:
+    """Which rows are people: by a class's name; numbers count where no name is known.
+
+    A single class other than those is taken for people whatever it is called.
+    """
+    words = [re.sub(r"\.0$", "", word.strip().lower()) for word in classes]
+    for group in (PEOPLE[:4], ("0",), ("1",)):
+        is_one = np.array([word in group for word in words], dtype=bool)
+        if is_one.any():
+            return is_one
+    return np.full(len(words), len(set(words)) <= 1)
+
+
+def _truth(
+    file: SourceFile,
+    name: str,
+    columns: Mapping[str, Column],
+    found: Mapping[str, str],
+    frames: Int[ndarray, " G"],
+) -> TruthPiece:
+    axes = [axis for axis in "xyz" if axis in found]
+    places = np.full((len(frames), 3), np.nan)
+    for axis in axes:
+        places[:, "xyz".index(axis)] = _numbers(file, found[axis], columns[found[axis]])
+    ids = _whole_or_names(columns[found["id"]])
+    valid = None
+    if "valid" in found:
+        valid = _numbers(file, found["valid"], columns[found["valid"]]) > 0.5
+    unit: Unit | None = None
+    ending = plain(found["x"])[-2:]
+    if ending in ("mm", "cm"):
+        unit = "mm" if ending == "mm" else "cm"
+    good = np.isfinite(places[:, :2]).all(axis=1)
+    return TruthPiece(
+        source=file.path,
+        format=f"{name}: places",
+        frames=frames[good],
+        ids=ids[good],
+        positions=places[good],
+        unit=unit,
+        valid=None if valid is None else valid[good],
+    )
+
+
+def number_in(text: str) -> int | None:
+    """The last run of digits of a name: the frame of ``cam1/frame_0012.jpg``."""
+    name = text.replace("\\", "/").rsplit("/", 1)[-1]
+    stem = re.sub(r"\.[A-Za-z]\w{0,4}$", "", name)  # of "cam1.0012.json" the number stays
+    runs = re.findall(r"\d+", stem)
+    return int(runs[-1]) if runs and len(runs[-1]) <= 15 else None
+
+
+def _frames(file: SourceFile, name: str, cells: Column) -> Int[ndarray, " D"]:
+    try:
+        values = np.asarray(cells, dtype=float)
+    except (ValueError, TypeError):
+        numbers = [number_in(str(cell)) for cell in cells]
+        if None in numbers:
+            cell = cells[numbers.index(None)]
+            raise file.error(f"expected a frame's number, found {shown(cell)}", name) from None
+        return np.array(numbers, dtype=np.int64)
+    whole = np.isfinite(values) & (values == np.round(values)) & (np.abs(values) < 2**53)
+    if not whole.all():
+        row = int(np.argmin(whole))
+        raise file.error(
+            f"row {row + 1}: expected the whole number of a frame, found {shown(cells[row])}", name
+        )
+    return values.astype(np.int64)
+
+
+def _numbers(
+    file: SourceFile, name: str, cells: Column, blank: float = np.nan
+) -> Float[ndarray, " D"]:
+    try:
+        return np.asarray([blank if c is None or c == "" else c for c in cells], dtype=float)
+    except (ValueError, TypeError):
+        for row, cell in enumerate(cells):
+            try:
+                float(cell if cell not in (None, "") else blank)
+            except (ValueError, TypeError):
+                raise file.error(
+                    f"row {row + 1}: expected a number, found {shown(cell)}", name
+                ) from None
+        raise
+
+
+def _table(file: SourceFile, name: str, cells: Column) -> Float[ndarray, "D 4"]:
+    try:
+        values = np.asarray(list(cells), dtype=float).reshape(-1, 4)
+    except (ValueError, TypeError):
+        raise file.error("expected lists of four numbers", name) from None
+    if len(values) != len(cells):
+        raise file.error("expected lists of four numbers", name)
+    return values
+
+
+def _whole_or_names(cells: Column) -> Int[ndarray, " G"]:
+    """Persons as whole numbers: as they are, or counted in the order of their first row."""
+    try:
+        values = np.asarray(cells, dtype=float)
+        if (values == np.round(values)).all() and (np.abs(values) < 2**53).all():
+            return values.astype(np.int64)
+    except (ValueError, TypeError):
+        pass
+    order = {name: place for place, name in enumerate(dict.fromkeys(map(str, cells)), 1)}
+    return np.array([order[str(cell)] for cell in cells], dtype=np.int64)

@@ -1,0 +1,1 @@
+"""Boxes of people as detectors and annotation programs write them."""

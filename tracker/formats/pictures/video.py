@@ -1,0 +1,65 @@
+"""Video files: whatever FFmpeg decodes, told by the first bytes of its container."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+
+from tracker.formats.pieces import Piece, VideoPiece
+from tracker.formats.protocol import Certainty, Kind
+from tracker.formats.source import SourceFile
+from tracker.sequences.video import VideoError, VideoIndex, index_video
+
+NAME = "video"
+KIND: Kind = "pictures"
+SERIES = False
+
+_STARTS = (
+    b"\x1aE\xdf\xa3",  # Matroska, WebM
+    b"\x00\x00\x01\xba", b"\x00\x00\x01\xb3",  # MPEG
+    b"FLV\x01", b"OggS", b"\x30\x26\xb2\x75",
+)  # fmt: skip
+_BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip")
+"""Of MP4 and QuickTime, from the fifth byte."""
+_PACKET = 188
+"""Bytes of a packet of an MPEG transport stream, which begins with 0x47."""
+
+
+def recognise(file: SourceFile) -> Certainty:
+    """The signature of a container."""
+    head = file.head
+    is_avi = head[:4] == b"RIFF" and head[8:12] == b"AVI "
+    is_stream = len(head) > 2 * _PACKET and head[0] == head[_PACKET] == head[2 * _PACKET] == 0x47
+    is_it = head.startswith(_STARTS) or head[4:8] in _BOXES or is_avi or is_stream
+    return Certainty.SURE if is_it else Certainty.NO
+
+
+def read(file: SourceFile) -> Iterator[Piece]:
+    """Its frames, counted, its rate and the size of its pictures as they are shown."""
+    try:
+        index = index_video(file.path)
+    except (VideoError, OSError) as error:
+        raise file.error(
+            f"({file.size:,} bytes) cannot be read as a video ({error}); expected MP4, AVI or "
+            "another format that FFmpeg decodes; it may be cut short"
+        ) from None
+    capture = cv2.VideoCapture(str(file.path), cv2.CAP_FFMPEG)
+    try:
+        rate = float(capture.get(cv2.CAP_PROP_FPS))
+        turned = round(capture.get(cv2.CAP_PROP_ORIENTATION_META)) % 360 != 0
+    finally:
+        capture.release()
+    yield VideoPiece(file.path, index.frames, _rate(index, rate), index.size, turned)
+
+
+def _rate(index: VideoIndex, header: float) -> float:
+    """Frames a second from the time stamps; the header's where they differ by rounding only."""
+    if index.times is None or len(index.times) < 2:
+        return header if 0.0 < header < 1000.0 else 0.0
+    span = float(index.times[-1] - index.times[0]) * 1e-6
+    counted = (len(index.times) - 1) / span
+    typical = 1e6 / float(np.median(np.diff(index.times)))
+    near = 0.0 < header < 1000.0 and abs(header / counted - 1.0) < 0.02
+    return header if near else counted if abs(counted / typical - 1.0) > 0.02 else typical

@@ -1,0 +1,100 @@
+"""Every format that is read: one line each, and what is installed beside the program."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from importlib.metadata import entry_points
+
+from tracker.formats.calibration import (
+    camera_tables,
+    colmap,
+    kalibr,
+    matlab,
+    nerfstudio,
+    opencv,
+    panoptic,
+    plain,
+    projection,
+    qualisys,
+    ros,
+    tsai,
+)
+from tracker.formats.detections import coco, cvat, motchallenge, openpose, table, yolo
+from tracker.formats.pictures import images, video
+from tracker.formats.pieces import FormatError
+from tracker.formats.protocol import Certainty, Format
+from tracker.formats.source import SourceFile
+from tracker.formats.truth import panoptic as panoptic_skeletons
+from tracker.formats.truth import trc, wildtrack
+
+GROUP = "multiview_phd.formats"
+"""Entry points: each names a module or object that is a :class:`Format`."""
+
+FORMATS: tuple[Format, ...] = (
+    opencv,
+    camera_tables,
+    qualisys,
+    colmap,
+    nerfstudio,
+    kalibr,
+    ros,
+    panoptic,
+    tsai,
+    projection,
+    matlab,
+    plain,
+    motchallenge,
+    coco,
+    yolo,
+    openpose,
+    cvat,
+    table,
+    wildtrack,
+    trc,
+    panoptic_skeletons,
+    video,
+    images,
+)
+
+
+@cache
+def all_formats() -> tuple[Format, ...]:
+    """The program's own formats, and those of installed packages.
+
+    Raises:
+        FormatError: If an installed one is no format.
+    """
+    found: list[Format] = list(FORMATS)
+    for point in entry_points(group=GROUP):
+        try:
+            added: Format = point.load()
+            _ = (added.NAME, added.KIND, added.SERIES, added.recognise, added.read)
+        except Exception as error:
+            raise FormatError(
+                f"{GROUP}: {point.name} ({point.value}) cannot be used as a format: {error}"
+            ) from None
+        found.append(added)
+    return tuple(found)
+
+
+def recognise(
+    file: SourceFile, formats: Sequence[Format] | None = None
+) -> tuple[Format | None, Certainty, FormatError | None]:
+    """The surest format of a file; of two that are as sure, the one registered last.
+
+    Returns:
+        The format, None where there is none; its certainty; and, where there is none, what
+        one of them said that saw the file begin as its own.
+    """
+    best: tuple[Format | None, Certainty] = (None, Certainty.NO)
+    complaint: FormatError | None = None
+    for one in all_formats() if formats is None else formats:
+        try:
+            certainty = one.recognise(file)
+        except FormatError as error:
+            complaint = complaint or error
+            continue
+        if certainty > Certainty.NO and certainty >= best[1]:
+            best = (one, certainty)
+    return *best, complaint if best[0] is None else None

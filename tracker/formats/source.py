@@ -1,0 +1,223 @@
+"""One file to be recognised and read: its content on demand, within limits of size and depth.
+
+Files come from anywhere. Whatever is read here is bounded in memory and time, executes
+nothing and follows no reference to another file; what does not fit gets a sentence.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+import xml.etree.ElementTree as ElementTree
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from tracker.formats.pieces import FormatError
+from tracker.formats.yaml_text import parse_yaml
+
+HEAD_BYTES = 65536
+"""Read to recognise a file; a format shows itself within its first lines."""
+
+MOST_BYTES = 256 * 2**20
+"""A text table; an hour of a crowd in seven views takes some 100 MB."""
+
+MOST_TREE_BYTES = 64 * 2**20
+"""JSON and XML, which take about ten times their size in memory."""
+
+MOST_CONFIGURATION_BYTES = 4 * 2**20
+"""TOML, YAML: calibrations, whose readers are slow."""
+
+MOST_DEPTH = 100
+"""Levels of lists and tables within each other."""
+
+
+class SourceFile:
+    """One file, or a series of files whose names differ in a number only."""
+
+    def __init__(self, path: Path, root: Path | None = None, series: tuple[Path, ...] = ()) -> None:
+        """Wrap a file; nothing is read yet.
+
+        Args:
+            path: The file; of a series the one that stands for all.
+            root: The folder that was asked for, which messages leave out.
+            series: All files of the series in the order of their numbers, this one among them.
+        """
+        self.path = path
+        self.series = series or (path,)
+        self._root = root
+
+    @property
+    def where(self) -> str:
+        """How messages call it."""
+        if self._root is not None and self.path.is_relative_to(self._root):
+            return self.path.relative_to(self._root).as_posix() or self.path.name
+        return self.path.name
+
+    def member(self, path: Path) -> SourceFile:
+        """Another file of the series or of the folder, by itself."""
+        return SourceFile(path, self._root)
+
+    @property
+    def label(self) -> str:
+        """Folder and name without the suffix: what may name the camera."""
+        return self.where.removesuffix(self.path.suffix)
+
+    def error(self, message: str, field: str = "") -> FormatError:
+        """An error about the file or one field of it."""
+        return FormatError(f"{self.where}{', ' if field else ''}{field}: {message}")
+
+    @cached_property
+    def size(self) -> int:
+        """Bytes."""
+        return self.path.stat().st_size
+
+    @cached_property
+    def head(self) -> bytes:
+        """The first bytes of the file."""
+        try:
+            with self.path.open("rb") as stream:
+                return stream.read(HEAD_BYTES)
+        except OSError as error:
+            raise self.error(f"cannot be read ({error.strerror})") from None
+
+    @cached_property
+    def is_text(self) -> bool:
+        """Whether the beginning is text in UTF-8."""
+        if b"\0" in self.head:
+            return False
+        try:
+            self.head[: HEAD_BYTES - 4].decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            return len(self.head) >= HEAD_BYTES - 4 and error.start > len(self.head) - 8
+        return True
+
+    @cached_property
+    def head_text(self) -> str:
+        """The beginning as text; empty where it is not text."""
+        return self.head.decode("utf-8-sig", errors="ignore") if self.is_text else ""
+
+    def bytes(self, most: int = MOST_BYTES) -> bytes:
+        """The whole file, at most so many bytes.
+
+        Raises:
+            FormatError: If it is larger or cannot be read.
+        """
+        if self.size > most:
+            raise self.error(
+                f"has {self.size / 2**20:,.0f} MB, expected at most {most / 2**20:,.0f}; "
+                "leave out what is not needed or cut it into pieces"
+            )
+        try:
+            return self.path.read_bytes()
+        except OSError as error:
+            raise self.error(f"cannot be read ({error.strerror})") from None
+
+    def text(self, most: int = MOST_BYTES) -> str:
+        """The whole file as text.
+
+        Raises:
+            FormatError: If it is too large or not text in UTF-8.
+        """
+        data = self.bytes(most)
+        try:
+            if b"\0" in data:
+                raise self.error("expected text, found binary data; it may be cut short or spoilt")
+            return data.decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            line = data.count(b"\n", 0, error.start) + 1
+            raise self.error(
+                f"line {line}: expected text in UTF-8, found byte 0x{data[error.start]:02x}; "
+                "save the file as UTF-8"
+            ) from None
+
+    def lines(self) -> list[str]:
+        """The lines of a text file."""
+        return self.text().splitlines()
+
+    @cached_property
+    def json(self) -> Any:
+        """The content of a JSON file.
+
+        Raises:
+            FormatError: If it is not JSON, too large or too deep.
+        """
+        try:
+            return json.loads(self.text(MOST_TREE_BYTES))
+        except json.JSONDecodeError as error:
+            raise self.error(
+                f"line {error.lineno}: is not valid JSON ({error.msg.lower()}); "
+                "it may be cut short: get the file again"
+            ) from None
+        except RecursionError:
+            raise self._too_deep() from None
+        except ValueError as error:  # a number of thousands of digits
+            raise self.error(f"is not a JSON file of data ({error})") from None
+
+    @cached_property
+    def xml(self) -> ElementTree.Element:
+        """The root of an XML file. Entities, which can make a small file endless, are refused.
+
+        Raises:
+            FormatError: If it is not XML, too large, too deep, or declares entities.
+        """
+        text = self.text(MOST_TREE_BYTES)
+        if re.search(r"<!\s*(ENTITY|DOCTYPE[^>]*\[)", text, re.IGNORECASE):
+            raise self.error(
+                "declares XML entities, which no calibration or annotation needs; "
+                "remove its <!DOCTYPE …>"
+            )
+        parser: Any = ElementTree.XMLPullParser(events=("start", "end"))
+        depth = 0
+        root: ElementTree.Element | None = None
+        try:
+            # the declaration may name another encoding than the text has by now
+            text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text)
+            for begin in range(0, len(text), HEAD_BYTES):
+                parser.feed(text[begin : begin + HEAD_BYTES])
+                for event, element in parser.read_events():
+                    root = element if root is None else root
+                    depth += 1 if event == "start" else -1
+                    if depth > MOST_DEPTH:
+                        raise self._too_deep()
+            parser.close()
+        except ElementTree.ParseError as error:
+            raise self.error(
+                f"line {error.position[0]}: is not valid XML ({error}); "
+                "it may be cut short: get the file again"
+            ) from None
+        if root is None:
+            raise self.error("is not valid XML: it is empty")
+        return root
+
+    @cached_property
+    def toml(self) -> dict[str, Any]:
+        """The content of a TOML file.
+
+        Raises:
+            FormatError: If it is not TOML, too large or too deep.
+        """
+        try:
+            return tomllib.loads(self.text(MOST_CONFIGURATION_BYTES))
+        except tomllib.TOMLDecodeError as error:
+            raise self.error(f"is not valid TOML ({error})") from None
+        except RecursionError:
+            raise self._too_deep() from None
+
+    @cached_property
+    def yaml(self) -> Any:
+        """The content of a YAML file; OpenCV's matrices come as tables of their fields.
+
+        Raises:
+            FormatError: If it is not YAML, too large, too deep, or uses references.
+        """
+        try:
+            return parse_yaml(self.text(MOST_CONFIGURATION_BYTES), MOST_DEPTH)
+        except RecursionError:
+            raise self._too_deep() from None
+        except ValueError as error:
+            raise self.error(str(error)) from None
+
+    def _too_deep(self) -> FormatError:
+        return self.error(f"has more than {MOST_DEPTH} levels of nesting; it is no data of ours")

@@ -1,0 +1,1 @@
+"""Where people really were, as data sets give it."""

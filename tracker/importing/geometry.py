@@ -1,0 +1,65 @@
+"""What the poses alone tell of how they are meant, where no boxes do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.checks.reading import Reading, pose
+from tracker.checks.readings import upwards
+from tracker.formats.pieces import METRES, Axes, Direction, RawCamera, Unit
+
+_USUAL_WAY = 5.0
+"""Metres from a camera to the middle of what it looks at."""
+
+
+def read_poses(cameras: Sequence[RawCamera]) -> Reading:
+    """The reading in which cameras look at one place in front of all of them.
+
+    What the files state is not questioned. Up is where the cameras have up, and the unit the
+    one in which they are a few metres from what they look at.
+    """
+    convention = cameras[0].convention
+    directions: tuple[Direction, ...] = ("world-to-camera", "camera-to-world")
+    axes: tuple[Axes, ...] = ("opencv", "opengl")
+    if convention.direction is not None:
+        directions = (convention.direction,)
+    if convention.axes is not None:
+        axes = (convention.axes,)
+    readings = [Reading(direction=d, axes=a) for a in axes for d in directions]
+    best = max(readings, key=lambda reading: _converging(cameras, reading))
+    poses = [pose(camera, best) for camera in cameras]
+    up = convention.up or upwards(-np.mean([own.rotation[1] for own in poses], axis=0))
+    centres = np.array([own.centre for own in poses])
+    way = float(np.median(np.linalg.norm(centres - _focus(cameras, best), axis=1)))
+    units: tuple[Unit, ...] = ("m", "cm", "mm")
+    if convention.unit is not None:
+        units = (convention.unit,)
+    off = [abs(float(np.log(max(METRES[one] * way, 1e-9) / _USUAL_WAY))) for one in units]
+    unit = units[int(np.argmin(off))]
+    return Reading(direction=best.direction, axes=best.axes, unit=unit, up=up)
+
+
+def _focus(cameras: Sequence[RawCamera], reading: Reading) -> Float[ndarray, " 3"]:
+    """The place that is nearest to the optical axes of all, in the sense of least squares."""
+    total, side = 1e-9 * np.eye(3), np.zeros(3)
+    for camera in cameras:
+        own = pose(camera, reading)
+        across = np.eye(3) - np.outer(own.rotation[2], own.rotation[2])
+        total, side = total + across, side + across @ own.centre
+    return np.asarray(np.linalg.solve(total, side))
+
+
+def _converging(cameras: Sequence[RawCamera], reading: Reading) -> float:
+    """Cosines, summed, between where each camera looks and where that place is."""
+    focus = _focus(cameras, reading)
+    total = 0.0
+    for camera in cameras:
+        own = pose(camera, reading)
+        way = focus - own.centre
+        length = float(np.linalg.norm(way))
+        total += float(own.rotation[2] @ way) / length if length > 0.0 else 0.0
+    return total

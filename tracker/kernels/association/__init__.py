@@ -1,0 +1,1 @@
+"""Kernels of the association: matchings, sums over subsets, belief propagation."""

@@ -1,0 +1,91 @@
+"""Marginal association probabilities by belief propagation, compiled."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy import ndarray
+
+from tracker.kernels.compilation import kernel
+
+
+class Settling(NamedTuple):
+    """When messages have settled."""
+
+    tolerance: float
+    """Largest change of a message, relative to the intensity it meets."""
+    iterations: int
+    """At most this many, should they not settle."""
+
+
+class Marginals(NamedTuple):
+    """Marginal association probabilities of n targets and M measurements."""
+
+    rows: ndarray
+    """(n, 1 + M), of a miss and of each measurement for every target."""
+    unexplained: ndarray
+    """(M,), that no target made the measurement."""
+
+
+@kernel
+def belief_propagation(
+    missed: ndarray, detected: ndarray, unexplained: ndarray, settling: Settling
+) -> Marginals:
+    """Messages between targets and measurements until they settle.
+
+    Args:
+        missed: (n,) weight of each target's miss.
+        detected: (n, M) weight of each pair, 0 outside the gate.
+        unexplained: (M,) weight of each measurement being nobody's.
+        settling: When to stop.
+    """
+    targets, count = detected.shape
+    # only pairs inside a gate exchange messages: row by row, whose measurement and weight
+    rows = np.zeros((targets, 1 + count))
+    starts = np.zeros(targets + 1, dtype=np.int64)
+    for i in range(targets):
+        starts[i + 1] = starts[i]
+        for j in range(count):
+            if detected[i, j] > 0.0:
+                starts[i + 1] += 1
+    measured = np.empty(starts[targets], dtype=np.int64)
+    weights = np.empty(starts[targets])
+    to_target = np.empty(starts[targets])
+    to_measurement = np.empty(starts[targets])
+    pair = 0
+    for i in range(targets):
+        for j in range(count):
+            if detected[i, j] > 0.0:
+                measured[pair] = j
+                weights[pair] = detected[i, j]
+                to_target[pair] = 1.0 / unexplained[j]
+                pair += 1
+    totals = unexplained.copy()
+    for _ in range(settling.iterations):
+        totals[:] = unexplained
+        for i in range(targets):
+            total = missed[i]
+            for pair in range(starts[i], starts[i + 1]):
+                total += weights[pair] * to_target[pair]
+            for pair in range(starts[i], starts[i + 1]):
+                rest = max(total - weights[pair] * to_target[pair], 1e-300)
+                to_measurement[pair] = weights[pair] / rest
+                totals[measured[pair]] += to_measurement[pair]
+        change = 0.0
+        for pair in range(len(measured)):
+            j = measured[pair]
+            new = 1.0 / max(totals[j] - to_measurement[pair], 1e-300)
+            change = max(change, abs(new - to_target[pair]) * unexplained[j])
+            to_target[pair] = new
+        if change < settling.tolerance:
+            break
+    for i in range(targets):
+        total = missed[i]
+        for pair in range(starts[i], starts[i + 1]):
+            total += weights[pair] * to_target[pair]
+        total = max(total, 1e-300)
+        rows[i, 0] = missed[i] / total
+        for pair in range(starts[i], starts[i + 1]):
+            rows[i, 1 + measured[pair]] = weights[pair] * to_target[pair] / total
+    return Marginals(rows, unexplained / totals)

@@ -1,0 +1,246 @@
+"""Heaviest matchings that share no pair, one after the other, compiled.
+
+A matching of n rows starts from the columns' duals of the one before, which stay feasible
+when pairs grow dearer. Of each row only the few nearest columns are looked at until a
+search has come so far that another could be nearer: duals of columns only fall, so what
+a row's other columns cost at the start bounds what they cost later. A matching takes
+O(n²) to find the nearest columns, and searches of about √n rows each for the quarter of
+the rows that the nearest columns do not serve ([V96] calls the nearest ones the core).
+
+[V96] A. Volgenant, "Linear and semi-assignment problems: a core oriented approach",
+Computers & Operations Research 23(10), 1996.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy import ndarray
+
+from tracker.kernels.compilation import kernel
+
+CORE = 6
+"""Of each row so many of the nearest columns are kept."""
+
+
+class _Matching(NamedTuple):
+    """A matching on its way, with the duals that prove it the heaviest."""
+
+    row_duals: ndarray
+    """(N,), feasible with the columns'."""
+    column_duals: ndarray
+    """(N,)."""
+    column_of: ndarray
+    """(N,) the column of each row, -1 for none."""
+    row_of: ndarray
+    """(N,) the row of each column, -1 for none."""
+
+
+class _Room(NamedTuple):
+    """What a search writes in."""
+
+    shortest: ndarray
+    """(N,) all infinite, before a search and after it."""
+    before: ndarray
+    """(N,) for the row that each column is reached from."""
+    settled: ndarray
+    """(N,) all false, before a search and after it."""
+    touched: ndarray
+    """(N,) for the columns that were reached."""
+    keys: ndarray
+    """(N (N + 2),) for the heap, as the next."""
+    nodes: ndarray
+
+
+@kernel
+def disjoint_matchings(weights: ndarray, count: int) -> ndarray:
+    """Matchings one after the other, each the heaviest without the pairs of those before.
+
+    Args:
+        weights: (N, N), 0 where there is no pair.
+        count: At most so many.
+
+    Returns:
+        (K, N) the column of each row, -1 where its pair has no weight; the last is the
+        only one that may be without pairs.
+    """
+    size = weights.shape[0]
+    kept = min(CORE, size)
+    found = np.empty((count, size), dtype=np.int64)
+    cost = -weights
+    column_duals = np.zeros(size)
+    column_of = np.empty(size, dtype=np.int64)
+    row_of = np.empty(size, dtype=np.int64)
+    core = np.empty((size, kept), dtype=np.int64)
+    reduced = np.empty((size, kept))
+    row_duals = np.empty(size)
+    matching = _Matching(row_duals, column_duals, column_of, row_of)
+    room = _Room(
+        np.full(size, np.inf),
+        np.empty(size, dtype=np.int64),
+        np.zeros(size, dtype=np.bool_),
+        np.empty(size, dtype=np.int64),
+        np.empty(size * (size + 2)),
+        np.empty(size * (size + 2), dtype=np.int64),
+    )
+    for k in range(count):
+        column_of[:] = -1
+        row_of[:] = -1
+        for i in range(size):
+            _nearest(cost[i], column_duals, core[i], reduced[i])
+            row_duals[i] = reduced[i, 0]
+            # rows whose nearest column is still free need no search
+            for m in range(kept):
+                if reduced[i, m] > reduced[i, 0]:
+                    break
+                if row_of[core[i, m]] < 0:
+                    row_of[core[i, m]] = i
+                    column_of[i] = core[i, m]
+                    break
+        for i in range(size):
+            if column_of[i] < 0:
+                _augment(cost, i, matching, core, reduced[:, kept - 1], room)
+        pairs = 0
+        for i in range(size):
+            found[k, i] = -1
+            if cost[i, column_of[i]] < 0.0:
+                found[k, i] = column_of[i]
+                cost[i, column_of[i]] = 0.0
+                pairs += 1
+        if pairs == 0:
+            return found[: k + 1].copy()
+    return found
+
+
+@kernel
+def _nearest(cost: ndarray, duals: ndarray, columns: ndarray, reduced: ndarray) -> None:
+    """The columns of the least reduced cost of one row, nearest first, in place."""
+    kept = len(columns)
+    filled = 0
+    for j in range(len(cost)):
+        value = cost[j] - duals[j]
+        if filled == kept and not value < reduced[kept - 1]:
+            continue
+        place = filled if filled < kept else kept - 1
+        filled = min(filled + 1, kept)
+        while place > 0 and value < reduced[place - 1]:
+            reduced[place] = reduced[place - 1]
+            columns[place] = columns[place - 1]
+            place -= 1
+        reduced[place] = value
+        columns[place] = j
+
+
+@kernel
+def _augment(
+    cost: ndarray,
+    start: int,
+    matching: _Matching,
+    core: ndarray,
+    bounds: ndarray,
+    room: _Room,
+) -> None:
+    """Give one more row its column by the shortest augmenting path, in place.
+
+    Dijkstra's search over rows, from a heap of columns (0 … N - 1) and of rows whose other
+    columns have not been looked at (N … 2N - 1), by the least that these can be away.
+
+    Args:
+        cost: (N, N), finite.
+        start: The row without a column.
+        matching: Of the other rows.
+        core: (N, C) the nearest columns of each row.
+        bounds: (N,) the least reduced cost of each row's other columns.
+        room: To write in.
+    """
+    row_duals, column_duals = matching.row_duals, matching.column_duals
+    column_of, row_of = matching.column_of, matching.row_of
+    shortest, before, settled = room.shortest, room.before, room.settled
+    touched, keys, nodes = room.touched, room.keys, room.nodes
+    size = len(cost)
+    partial = core.shape[1] < size
+    heap, reached = 0, 0
+    row, distance = start, 0.0
+    sink, best = -1, np.inf
+    whole = False  # whether all columns of the row are looked at, or its core
+    while True:
+        offset = distance - row_duals[row]
+        for m in range(size if whole else core.shape[1]):
+            j = m if whole else core[row, m]
+            length = offset + cost[row, j] - column_duals[j]
+            if not length < best or not length < shortest[j] or settled[j]:
+                continue
+            if shortest[j] == np.inf:
+                touched[reached] = j
+                reached += 1
+            shortest[j] = length
+            before[j] = row
+            if row_of[j] < 0:
+                sink, best = j, length
+            else:
+                heap = _push(keys, nodes, heap, length, j)
+        if partial and not whole and offset + bounds[row] < best:
+            heap = _push(keys, nodes, heap, offset + bounds[row], size + row)
+        row = -1
+        while row < 0 and heap and keys[0] < best:
+            distance, node = keys[0], nodes[0]
+            heap = _pop(keys, nodes, heap)
+            whole = node >= size
+            if whole:
+                row = node - size
+                distance = 0.0 if row == start else shortest[column_of[row]]
+            elif not settled[node]:
+                settled[node] = True
+                row = row_of[node]
+        if row < 0:
+            break
+    row_duals[start] += best
+    for m in range(reached):
+        j = touched[m]
+        if settled[j]:
+            row_duals[row_of[j]] += best - shortest[j]
+            column_duals[j] -= best - shortest[j]
+        settled[j] = False
+        shortest[j] = np.inf
+    j = sink
+    while True:
+        row = before[j]
+        row_of[j] = row
+        j, column_of[row] = column_of[row], j
+        if row == start:
+            return
+
+
+@kernel
+def _push(keys: ndarray, nodes: ndarray, count: int, key: float, node: int) -> int:
+    """One more node of a binary heap, least key first, in place; how many there are now."""
+    place = count
+    while place > 0:
+        parent = (place - 1) >> 1
+        if keys[parent] <= key:
+            break
+        keys[place], nodes[place] = keys[parent], nodes[parent]
+        place = parent
+    keys[place], nodes[place] = key, node
+    return count + 1
+
+
+@kernel
+def _pop(keys: ndarray, nodes: ndarray, count: int) -> int:
+    """The heap without its first node, in place; how many there are now."""
+    count -= 1
+    key, node = keys[count], nodes[count]
+    place = 0
+    while True:
+        child = 2 * place + 1
+        if child >= count:
+            break
+        if child + 1 < count and keys[child + 1] < keys[child]:
+            child += 1
+        if key <= keys[child]:
+            break
+        keys[place], nodes[place] = keys[child], nodes[child]
+        place = child
+    keys[place], nodes[place] = key, node
+    return count

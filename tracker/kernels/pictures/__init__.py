@@ -1,0 +1,1 @@
+"""Kernels over pixels and boxes of one picture."""

@@ -1,0 +1,298 @@
+"""The loops over pixels of the adaptive segmentation, compiled by numba.
+
+Each has a NumPy counterpart in the tests that it must agree with.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy import ndarray
+
+from tracker.kernels.compilation import pixel_kernel
+
+
+class ClassThresholds(NamedTuple):
+    """The K iterations of a c-means on differences."""
+
+    thresholds: ndarray
+    """(K, 3), a channel each."""
+    counts: ndarray
+    """(K,) the foreground pixels n(k)."""
+
+
+class Background(NamedTuple):
+    """A background that follows the light."""
+
+    levels: ndarray
+    """(h, w, 3) uint16, 256 times the level."""
+    still: ndarray
+    """(h, w) uint8, for how many pictures each pixel has been away from the foreground."""
+
+
+class LevelMedians(NamedTuple):
+    """What a target shows at groups of a source's levels: (3, groups) each, channel by channel."""
+
+    totals: ndarray
+    """Pixels of the group."""
+    sums: ndarray
+    """Of their levels in the source."""
+    medians: ndarray
+    """The lower median of their levels in the target, 0 where there is none."""
+
+
+@pixel_kernel
+def two_classes(
+    difference: ndarray,
+    background_centre: float,
+    foreground_centre: float,
+    ratio: float,
+    least: float,
+    enough: int,
+    iterations: int,
+) -> ClassThresholds:
+    """Split differences into background and foreground by the modified c-means.
+
+    Each class has one centre a channel. A difference d belongs to the background
+    where (d - m_b) / r <= m_f - d, that is up to the threshold
+
+        t = (m_b + r m_f) / (1 + r)
+
+    and a pixel where all its channels do. The means of both classes are the next
+    centres; a class too small to have a mean keeps its centres.
+
+    Args:
+        difference: (h, w, 3) uint8.
+        background_centre: Start of m_b in every channel.
+        foreground_centre: Start of m_f in every channel.
+        ratio: r, the background's deviation over the foreground's.
+        least: No threshold is lower.
+        enough: A class of fewer pixels keeps its centres.
+        iterations: At most so many; fewer where the thresholds come to rest.
+    """
+    height, width, _ = difference.shape
+    total = np.zeros(3)
+    for y in range(height):
+        row = np.zeros(3, dtype=np.int64)
+        for x in range(width):
+            for c in range(3):
+                row[c] += difference[y, x, c]
+        for c in range(3):
+            total[c] += row[c]
+    thresholds = np.empty((iterations, 3))
+    counts = np.empty(iterations, dtype=np.int64)
+    m_b = np.full(3, background_centre)
+    m_f = np.full(3, foreground_centre)
+    before = np.full(3, -1)
+    for k in range(iterations):
+        for c in range(3):
+            thresholds[k, c] = max((m_b[c] + ratio * m_f[c]) / (1.0 + ratio), least)
+        # differences are whole numbers: above t is above its floor
+        t0, t1, t2 = int(thresholds[k, 0]), int(thresholds[k, 1]), int(thresholds[k, 2])
+        count, s0, s1, s2 = 0, 0, 0, 0
+        for y in range(height):
+            for x in range(width):
+                d0, d1, d2 = difference[y, x, 0], difference[y, x, 1], difference[y, x, 2]
+                if d0 > t0 or d1 > t1 or d2 > t2:
+                    count += 1
+                    s0 += d0
+                    s1 += d1
+                    s2 += d2
+        counts[k] = count
+        if before[0] == t0 and before[1] == t1 and before[2] == t2:
+            return ClassThresholds(thresholds[: k + 1].copy(), counts[: k + 1].copy())
+        before[0], before[1], before[2] = t0, t1, t2
+        rest = height * width - count
+        sums = (s0, s1, s2)
+        for c in range(3):
+            if count >= enough:
+                m_f[c] = sums[c] / count
+            if rest >= enough:
+                m_b[c] = (total[c] - sums[c]) / rest
+    return ClassThresholds(thresholds, counts)
+
+
+@pixel_kernel
+def above(difference: ndarray, thresholds: ndarray) -> ndarray:
+    """1 where any channel differs by more than its threshold.
+
+    Args:
+        difference: (h, w, 3) uint8.
+        thresholds: (3,).
+
+    Returns:
+        (h, w) uint8.
+    """
+    height, width, _ = difference.shape
+    mask = np.empty((height, width), dtype=np.uint8)
+    t0, t1, t2 = int(thresholds[0]), int(thresholds[1]), int(thresholds[2])
+    for y in range(height):
+        for x in range(width):
+            mask[y, x] = (
+                difference[y, x, 0] > t0 or difference[y, x, 1] > t1 or difference[y, x, 2] > t2
+            )
+    return mask
+
+
+@pixel_kernel
+def clear_shadows(
+    difference: ndarray,
+    picture: ndarray,
+    background: ndarray,
+    darkest: float,
+    tint: float,
+    least: float,
+) -> None:
+    """Set the difference to 0 where all channels fell by nearly the same share.
+
+    Args:
+        difference: (h, w, 3) uint8; changed in place.
+        picture: (h, w, 3) uint8.
+        background: (h, w, 3) uint8, at the picture's exposure.
+        darkest: A shadow leaves at least this share of the light.
+        tint: The channels' shares differ by at most this in a shadow.
+        least: Differences up to this are left as they are.
+    """
+    height, width, _ = difference.shape
+    for y in range(height):
+        for x in range(width):
+            if max(difference[y, x, 0], difference[y, x, 1], difference[y, x, 2]) <= least:
+                continue
+            low, high = 1e9, 0.0
+            for c in range(3):
+                share = (picture[y, x, c] + 4.0) / (background[y, x, c] + 4.0)
+                low, high = min(low, share), max(high, share)
+            if low >= darkest and high <= 1.0 and high - low <= tint:
+                for c in range(3):
+                    difference[y, x, c] = 0
+
+
+@pixel_kernel
+def update_background(
+    background: ndarray,
+    still: ndarray,
+    picture: ndarray,
+    shown: ndarray,
+    near: ndarray,
+    limit: int,
+    frames: int,
+    rate: float,
+) -> Background:
+    """Let the background follow where a pixel has been background for long enough.
+
+        M ← M + α (I - M)
+
+    where a pixel has not been near the foreground for ``frames`` pictures, and no
+    channel differs by ``limit`` or more.
+
+    Args:
+        background: (h, w, 3) uint16, 256 times the level.
+        still: (h, w) uint8, for how many pictures each pixel has been
+            away from the foreground, 255 at most.
+        picture: (h, w, 3) uint8, I.
+        shown: (h, w, 3) uint8, the background as it was compared with the picture.
+        near: (h, w) uint8, 1 on and near the foreground.
+        limit: Th, grey levels.
+        frames: w.
+        rate: α.
+
+    Returns:
+        The background and the counts after this picture.
+    """
+    height, width, _ = background.shape
+    after = background.copy()
+    counts = np.empty_like(still)
+    steps = np.empty((2 * limit + 1), dtype=np.int64)
+    for i in range(2 * limit + 1):
+        steps[i] = round(rate * 256.0 * (i - limit))
+    for y in range(height):
+        for x in range(width):
+            counts[y, x] = 0
+            if near[y, x]:
+                continue
+            d0 = np.int64(picture[y, x, 0]) - np.int64(shown[y, x, 0])
+            d1 = np.int64(picture[y, x, 1]) - np.int64(shown[y, x, 1])
+            d2 = np.int64(picture[y, x, 2]) - np.int64(shown[y, x, 2])
+            counts[y, x] = min(still[y, x] + 1, 255)
+            if counts[y, x] < frames or max(abs(d0), abs(d1), abs(d2)) >= limit:
+                continue
+            after[y, x, 0] = min(max(np.int64(after[y, x, 0]) + steps[d0 + limit], 0), 65280)
+            after[y, x, 1] = min(max(np.int64(after[y, x, 1]) + steps[d1 + limit], 0), 65280)
+            after[y, x, 2] = min(max(np.int64(after[y, x, 2]) + steps[d2 + limit], 0), 65280)
+    return Background(after, counts)
+
+
+@pixel_kernel
+def level_medians(source: ndarray, target: ndarray, groups: int) -> LevelMedians:
+    """What a target shows at each of some levels of a source, channel by channel.
+
+    Args:
+        source: (N, 3) uint8.
+        target: (N, 3) uint8.
+        groups: The source's 256 levels are taken together into so many.
+    """
+    totals = np.zeros((3, groups), dtype=np.int64)
+    sums = np.zeros((3, groups))
+    medians = np.zeros((3, groups))
+    for c in range(3):
+        joint = np.zeros((groups, 256), dtype=np.int64)
+        for i in range(len(source)):
+            level = int(source[i, c])
+            group = level * groups // 256
+            joint[group, target[i, c]] += 1
+            totals[c, group] += 1
+            sums[c, group] += level
+        for group in range(groups):
+            if totals[c, group] == 0:
+                continue
+            below = 0
+            for level in range(256):
+                below += joint[group, level]
+                if below >= 0.5 * totals[c, group]:
+                    medians[c, group] = level
+                    break
+    return LevelMedians(totals, sums, medians)
+
+
+@pixel_kernel
+def upper_medians(values: ndarray) -> ndarray:
+    """The median of each column of (N, P) uint8, of an even number the upper one.
+
+    Two counts by four bits each find it: first of the upper half of a value, then, among those
+    that share it, of the lower one.
+    """
+    count, size = values.shape
+    rank = count // 2
+    medians = np.empty(size, dtype=np.uint8)
+    tile = 1024
+    upper = np.empty((tile, 16), dtype=np.int64)
+    lower = np.empty((tile, 16), dtype=np.int64)
+    chosen = np.empty(tile, dtype=np.int64)
+    left = np.empty(tile, dtype=np.int64)
+    for begin in range(0, size, tile):
+        width = min(tile, size - begin)
+        upper[:] = 0
+        lower[:] = 0
+        for n in range(count):
+            for k in range(width):
+                upper[k, values[n, begin + k] >> 4] += 1
+        for k in range(width):
+            left[k] = rank
+            half = 0
+            while left[k] >= upper[k, half]:
+                left[k] -= upper[k, half]
+                half += 1
+            chosen[k] = half
+        for n in range(count):
+            for k in range(width):
+                value = values[n, begin + k]
+                if value >> 4 == chosen[k]:
+                    lower[k, value & 15] += 1
+        for k in range(width):
+            half = 0
+            while left[k] >= lower[k, half]:
+                left[k] -= lower[k, half]
+                half += 1
+            medians[begin + k] = chosen[k] * 16 + half
+    return medians

@@ -1,0 +1,78 @@
+"""What fits a recording: which methods can work on it, and what a run does by default."""
+
+from __future__ import annotations
+
+from tracker.parameters import METHODS, MethodKey, RunParameters, method_of
+from tracker.parameters.registry import FOLLOWING
+from tracker.sequences.sequence import Sequence
+
+
+def default_parameters(sequence: Sequence) -> RunParameters:
+    """The defaults of the definitions, with the single-view method that fits the recording.
+
+    That is the first of :data:`tracker.parameters.registry.FOLLOWING` that has pictures,
+    templates and detections as it wants them, else the first that lacks nothing but templates.
+
+    Raises:
+        ValueError: If the sequence has neither pictures nor detections.
+    """
+    defaults = RunParameters()
+    for templates in (sequence.templates, True):
+        for name in FOLLOWING:
+            lacking = _lacks(sequence, defaults, "single_view", name, bool(templates))
+            if lacking is None:
+                return defaults.model_copy(update={"single_view": name})
+    raise ValueError(
+        f"{sequence.name}: every camera needs pictures (video or images), or every camera "
+        "needs detections; add what is missing to sequence.toml"
+    )
+
+
+def unfit_methods(sequence: Sequence, parameters: RunParameters) -> dict[MethodKey, dict[str, str]]:
+    """The methods that cannot work on a sequence with these values, each with the reason why.
+
+    Args:
+        sequence: The recording as it was taught.
+        parameters: Of the run; of a method that is not chosen, what it would be run with.
+
+    Returns:
+        By the parameter that chooses a method; a sentence by the method's name.
+    """
+    return {
+        key: {
+            name: why
+            for name in METHODS[key]
+            if (why := _lacks(sequence, parameters, key, name, bool(sequence.templates)))
+        }
+        for key in METHODS
+    }
+
+
+def _lacks(
+    sequence: Sequence, parameters: RunParameters, key: MethodKey, name: str, templates: bool
+) -> str | None:
+    """What a method needs and does not find, and what to do about it; None for nothing."""
+    used = method_of(key, name).used(parameters)
+    if used.pictures and not sequence.has_pictures:
+        without = [view.camera.name for view in sequence.views if not view.has_pictures]
+        return (
+            f"{name} needs pictures of every camera, and {_listed(without)} of {sequence.name} "
+            "has none; name a video or images in sequence.toml."
+        )
+    if used.detections and not sequence.has_detections:
+        without = [view.camera.name for view in sequence.views if view.detections is None]
+        return (
+            f"{name} needs a detector's boxes of every camera, and {_listed(without)} of "
+            f"{sequence.name} has none; name a file of detections in sequence.toml."
+        )
+    if used.templates == "needed" and not templates:
+        return (
+            f"{name} looks for the colours of templates, and {sequence.name} has none; "
+            "press C and drag a box around a person in a picture."
+        )
+    return None
+
+
+def _listed(cameras: list[str]) -> str:
+    more = f" and {len(cameras) - 1} more" if len(cameras) > 1 else ""
+    return f'camera "{cameras[0]}"{more}' if cameras else "every camera"

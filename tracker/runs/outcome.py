@@ -1,0 +1,79 @@
+"""Why a run ended with no tracks: what came out of each of its stages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tracker.runs.run import Run
+
+
+@dataclass(frozen=True, slots=True)
+class StageCounts:
+    """What each stage of a run left over, over all steps and cameras."""
+
+    frames: int
+    """Pictures, or frames of an outside detector, that were there."""
+    found: int
+    """Boxes that stage 1 found or was given."""
+    passed: int
+    """Boxes that it passed on: sure enough, and where somebody can stand in the room."""
+    together: int
+    """Steps at which two cameras or more had such a box."""
+    begun: int
+    """Tracks that the fusion began, however faint."""
+    surest: float
+    """The greatest existence or weight that one of them had."""
+    tracks: int
+    """Tracks that were sure enough to be told, in the room."""
+
+
+def count_stages(run: Run) -> StageCounts:
+    """Count what each stage of a run left over."""
+    labels: set[int] = set()
+    surest = 0.0
+    for result in run.fused:
+        labels.update(result.posterior.labels.tolist())
+        if result.posterior.size:
+            surest = max(surest, float(result.posterior.weights.max()))
+    steps = run.views
+    return StageCounts(
+        frames=sum(not view.blind for step in steps for view in step),
+        found=sum(len(view.measurements) for step in steps for view in step),
+        passed=sum(len(view.boxes) for step in steps for view in step),
+        together=sum(sum(len(view.boxes) > 0 for view in step) > 1 for step in steps),
+        begun=len(labels),
+        surest=surest,
+        tracks=len(set(run.tracks.ids.tolist())),
+    )
+
+
+def why_no_tracks(run: Run) -> str | None:
+    """One sentence on where a run without tracks lost everybody; None where it has tracks."""
+    n = count_stages(run)
+    if n.tracks:
+        return None
+    kind = "pictures" if run.costly else "frames of boxes"
+    if not n.frames:
+        return f"no tracks: not one of the {kind} could be read; see that the files are there"
+    head = f"no tracks: {n.frames} {kind}, {n.found} boxes found"
+    if not n.found:
+        return f"{head}; lower what a box must have to count, or teach what people look like"
+    head += f", {n.passed} of them passed on to the fusion"
+    if n.passed < 0.02 * n.found:
+        return (
+            f"{head}: nearly none can stand in [room] by its size and place; "
+            "multiview-phd check tells whether calibration, unit, room or size are wrong"
+        )
+    head += f", {n.together} steps with boxes of two cameras"
+    if not n.together and len(run.sequence.views) > 1:
+        return f"{head}: a track begins where boxes of two cameras meet; see the cameras' clocks"
+    head += f", {n.begun} tracks begun"
+    if not n.begun:
+        return (
+            f"{head}: boxes of different cameras meet nowhere in [room]; multiview-phd check tells "
+            "how the calibration is meant, or which camera is late"
+        )
+    return (
+        f"{head}, the surest with existence {n.surest:.2f}, below the extraction threshold or "
+        "outside [room]; see [target], [room] and multiview-phd check"
+    )

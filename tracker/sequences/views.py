@@ -1,0 +1,132 @@
+"""The tables ``[[camera]]`` of a sequence: their files, their clocks, their calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Many
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tracker.sequences.calibration import POSE, read_camera
+from tracker.sequences.clock import FIELDS, Timing, read_timing
+from tracker.sequences.fields import Fields, shown
+from tracker.sequences.media import Pictures, check_pictures, find_images, locate, probe
+from tracker.sequences.sequence import View
+from tracker.sequences.tables import BoxTable, Reading, read_box_table
+
+CAMERA = (
+    "name", "image_size", "video", "images", "first_frame", *FIELDS, "detections",
+    "detections_first_frame", "detected_steps", *POSE, "projection",
+)  # fmt: skip
+"""The fields of a camera."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Source:
+    """One camera's table and files, before anybody knows how many steps there are."""
+
+    name: str
+    fields: Fields
+    video: Path | None
+    images: tuple[Path, ...]
+    pictures: Pictures | None
+    timing: Timing
+    table: BoxTable | None
+
+
+@dataclass(frozen=True, slots=True)
+class Time:
+    """The steps of a sequence."""
+
+    fps: float
+    steps: int
+    beginning: float = 0.0
+    """The time stamp of step 0, where cameras have time stamps."""
+    told: tuple[str, ...] = ()
+    """What was found out rather than stated."""
+    own_rates: bool = False
+    """Whether each video's own rate counts, since none is stated and they differ."""
+
+
+def read_sources(tables: Many[Fields], reading: Reading) -> tuple[Source, ...]:
+    """The files of all cameras.
+
+    Raises:
+        SequenceError: If a file is missing or cannot be read.
+    """
+    sources: list[Source] = []
+    for fields in tables:
+        name = fields.text("name")
+        if any(character in name for character in ',"#'):
+            raise fields.error(
+                "name", f"expected no comma, quote or # (it heads CSV columns), found {shown(name)}"
+            )
+        if name in [source.name for source in sources]:
+            raise fields.error("name", "two cameras have this name; rename one of them")
+        sources.append(_source(name, fields, reading))
+    return tuple(sources)
+
+
+def _source(name: str, fields: Fields, reading: Reading) -> Source:
+    if "image_size" in fields:
+        _image_size(fields, None)
+    if "video" in fields and "images" in fields:
+        raise fields.error("images", "expected a video or images, found both; remove one")
+    video = locate(reading.folder, fields, "video") if "video" in fields else None
+    images = find_images(reading.folder, fields) if "images" in fields else ()
+    stamps = locate(reading.folder, fields, "timestamps") if "timestamps" in fields else None
+    timing = read_timing(fields, reading.folder, reading.folder.name, stamps)
+    table = read_box_table(fields, reading, timing.first_frame)
+    reading.files += images if video is None else (video,)
+    if stamps is not None:
+        reading.files.append(stamps)
+    return Source(name, fields, video, images, probe(video, images, fields), timing, table)
+
+
+def read_views(sources: Many[Source], time: Time, reading: Reading) -> tuple[View, ...]:
+    """The cameras with all that is known of their pictures and boxes by step.
+
+    Raises:
+        SequenceError: If something in a table is wrong.
+    """
+    return tuple(_view(source, time, reading) for source in sources)
+
+
+def _view(source: Source, time: Time, reading: Reading) -> View:
+    fields, pictures, timing = source.fields, source.pictures, source.timing
+    if time.own_rates and timing.fps is None and pictures is not None and pictures.fps:
+        timing = Timing(timing.first_frame, pictures.fps, timing.time_offset, timing.stamps)
+    clock = timing.clock(time.fps, time.steps, time.beginning)
+    detections, looked_at = (None, None)
+    if source.table is not None:
+        detections, looked_at = source.table.detections(time.steps, clock)
+    view = View(
+        camera=read_camera(source.name, _image_size(fields, pictures), fields),
+        video=source.video,
+        images=source.images,
+        first_frame=timing.first_frame,
+        detections=detections,
+        clock=clock,
+        looked_at=looked_at,
+    )
+    if pictures is not None:
+        reading.warnings += check_pictures(view, pictures, fields, time.steps)
+    return view
+
+
+def _image_size(fields: Fields, pictures: Pictures | None) -> tuple[int, int]:
+    """As stated; else that of the pictures; else about twice the principal point."""
+    if "image_size" in fields:
+        size = fields.vector("image_size", 2, "width and height in pixels", positive=True)
+        if (size != np.floor(size)).any() or (size > 65535).any():
+            found = f"{size[0]:g} and {size[1]:g}"
+            raise fields.error(
+                "image_size", f"expected two whole numbers of pixels up to 65535, found {found}"
+            )
+        return int(size[0]), int(size[1])
+    if pictures is not None:
+        return pictures.size
+    lens = read_camera("", (1, 1), fields).intrinsics
+    width, height = (min(65535, max(2, round(2.0 * float(middle) + 1.0))) for middle in lens[:2, 2])
+    return width, height
