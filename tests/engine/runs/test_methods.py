@@ -30,7 +30,7 @@ from tracker.runs.fitting import default_parameters, unfit_methods
 from tracker.runs.run import Run
 from tracker.sequences.sequence import Sequence
 
-STAGES = ("single_view", "fusion", "tracks")
+STAGES = ("single_view", "fusion", "smoothing", "tracks")
 CONDITIONS = sorted({key for p in PARAMETERS.values() for key in p.when})
 """The parameters on which it depends whether others have an effect."""
 
@@ -173,6 +173,9 @@ def test_every_file_of_a_method_is_registered() -> None:
             text = path.read_text()
             if "def start(self)" in text and "def step(" in text and "Protocol" not in text:
                 found.add(".".join(path.relative_to(root.parent).with_suffix("").parts))
+    for path in (root / "smoothing").rglob("*.py"):
+        if "    def smooth(\n" in path.read_text():
+            found.add(".".join(path.relative_to(root.parent).with_suffix("").parts))
     assert found == loaded
 
 
@@ -186,7 +189,7 @@ def without(recording: Sequence, what: str) -> Sequence:
 
 def test_a_method_that_cannot_work_is_known_with_the_reason(recording: Sequence) -> None:
     defaults = RunParameters()
-    assert unfit_methods(recording, defaults) == {"single_view": {}, "fusion_method": {}}
+    assert unfit_methods(recording, defaults) == {key: {} for key in METHODS}
     dark = unfit_methods(without(recording, "pictures"), defaults)["single_view"]
     assert set(dark) == {"colour_phd", "jpda", "pseudo_particle", "association_matrix"}
     assert dark["jpda"] == (
