@@ -1,0 +1,350 @@
+"""What the boxes of one camera say of paths, and which box belongs to which path: compiled."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy import ndarray
+
+from tracker.kernels.association.belief_propagation import Settling, belief_propagation
+from tracker.kernels.boxes import Occlusion, hide, inside_probability
+from tracker.kernels.compilation import kernel
+from tracker.kernels.gating import Measurements
+from tracker.kernels.kalman import Expected
+from tracker.kernels.labelled.camera_update import CameraRule
+from tracker.kernels.linear_algebra import factorise, solve
+from tracker.kernels.measurement import ExpectedBoxes
+
+
+@kernel
+def _posture(difference: ndarray, noise: ndarray, jacobian: ndarray, covariance: ndarray) -> float:
+    """log N(z; h, R + H P Hᵀ)."""
+    size = len(difference)
+    s = noise.copy()
+    for p in range(size):
+        for q in range(size):
+            for a in range(3):
+                for b in range(3):
+                    s[p, q] += jacobian[p, a] * covariance[a, b] * jacobian[q, b]
+    lower, solved = np.zeros((size, size)), np.empty(size)
+    log_determinant = factorise(s, lower)
+    solve(lower, difference, solved)
+    total = size * math.log(2.0 * math.pi) + log_determinant
+    for p in range(size):
+        total += difference[p] * solved[p]
+    return -0.5 * total
+
+
+class BoxInformation(NamedTuple):
+    """What boxes say of the positions of N rows of paths: log L(p) = yᵀp − ½ pᵀ Y p + c."""
+
+    matrices: ndarray
+    """Y (N, 3, 3)."""
+    vectors: ndarray
+    """y (N, 3)."""
+    constants: ndarray
+    """c (N,)."""
+
+
+class BoxLinks(NamedTuple):
+    """L pairs of a row of a path and a box of a camera."""
+
+    rows: ndarray
+    """(L,)."""
+    boxes: ndarray
+    """(L,), index among the camera's boxes of all steps."""
+    shares: ndarray
+    """a (L,), association probability."""
+
+
+class Rows(NamedTuple):
+    """N rows of paths, and where each step's are."""
+
+    states: ndarray
+    """(N, d), position first."""
+    covariances: ndarray
+    """(N, d, d)."""
+    existences: ndarray
+    """(N,), that somebody is there."""
+    labels: ndarray
+    """(N,), of their paths."""
+    order: ndarray
+    """(N,), the rows, step after step."""
+    step_starts: ndarray
+    """(T + 1,), where each step's rows begin in ``order``, and the end."""
+
+
+class CameraSteps(NamedTuple):
+    """What one camera gave at T steps."""
+
+    starts: ndarray
+    """(T + 1,), where each step's boxes begin, and the end."""
+    blind: ndarray
+    """(T,), whether it had no frame."""
+    measurements: Measurements
+    clutter: float
+    """κ."""
+
+
+class SharedCamera(NamedTuple):
+    """Who made which of a camera's boxes."""
+
+    links: BoxLinks
+    detection_probabilities: ndarray
+    """(N,)."""
+    missed: ndarray
+    """(N,), probability of a miss."""
+    hidden_by: ndarray
+    """(N,), label of who hides each, -1 for nobody."""
+
+
+@kernel
+def add_information(
+    links: BoxLinks,
+    states: ndarray,
+    covariances: ndarray,
+    expected: Expected,
+    measurements: Measurements,
+    information: BoxInformation,
+) -> None:
+    """Add what L boxes of a camera say of the rows of paths, straightened at the states.
+
+        Y += a Hᵀ R⁻¹ H,   y += a Hᵀ R⁻¹ (z − h(x) + H x),   c += a log N(z − h + H x; 0, R)
+
+    with the share a of a box. Of a box that may show another posture, each counts with its
+    probability at the states.
+
+    Args:
+        links: Whose box each is.
+        states: (N, d).
+        covariances: (N, d, d).
+        expected: Of each of the L pairs.
+        measurements: The camera's.
+        information: Added to.
+    """
+    rows, boxes, shares = links.rows, links.boxes, links.shares
+    jacobians, spreads = expected.jacobians, expected.spreads
+    other_expected, other_jacobians = expected.posture_values, expected.posture_jacobians
+    other_drift, other_share = expected.posture_drift, expected.posture_share
+    values, noises = measurements.values, measurements.noises
+    size = values.shape[1]
+    kinds = 2 if len(other_expected) > 0 else 1
+    lower, column, solved = np.zeros((size, size)), np.empty(size), np.empty(size)
+    halves = np.empty((3, size))
+    for link in range(len(rows)):
+        k, z = rows[link], boxes[link]
+        chances = np.ones(2)
+        noise = np.empty((2, size, size))
+        noise[0] = noises[z]
+        if len(spreads):
+            noise[0] += spreads[link]
+        if kinds == 2:
+            noise[1] = noises[z] + expected.posture_spreads[link]
+            h = other_jacobians[link]
+            for p in range(size):
+                for q in range(size):
+                    for a in range(3):
+                        for b in range(3):
+                            noise[1, p, q] += h[p, a] * other_drift[a, b] * h[q, b]
+            upright = math.log(1.0 - other_share) + _posture(
+                values[z] - expected.values[link], noise[0], jacobians[link], covariances[k]
+            )
+            low = -math.inf
+            if other_expected[link, 0] < math.inf:
+                low = math.log(other_share) + _posture(
+                    values[z] - other_expected[link], noise[1], h, covariances[k]
+                )
+            largest = max(upright, low)
+            total = math.exp(upright - largest) + math.exp(low - largest)
+            chances[0] = math.exp(upright - largest) / total
+            chances[1] = math.exp(low - largest) / total
+        for kind in range(kinds):
+            a_share = shares[link] * chances[kind]
+            if a_share < 1e-6:
+                continue
+            h = jacobians[link] if kind == 0 else other_jacobians[link]
+            value = expected.values[link] if kind == 0 else other_expected[link]
+            for p in range(size):
+                column[p] = values[z, p] - value[p]
+                for a in range(3):
+                    column[p] += h[p, a] * states[k, a]
+            log_determinant = factorise(noise[kind], lower)
+            solve(lower, column, solved)
+            total = size * math.log(2.0 * math.pi) + log_determinant
+            for p in range(size):
+                total += column[p] * solved[p]
+            information.constants[k] -= 0.5 * a_share * total
+            for a in range(3):
+                for p in range(size):
+                    information.vectors[k, a] += a_share * h[p, a] * solved[p]
+            for a in range(3):
+                solve(lower, np.ascontiguousarray(h[:, a]), halves[a])
+            for a in range(3):
+                for b in range(3):
+                    for p in range(size):
+                        information.matrices[k, a, b] += a_share * h[p, a] * halves[b, p]
+
+
+@kernel
+def share_camera(
+    rows: Rows,
+    camera: CameraSteps,
+    seen: ExpectedBoxes,
+    image_size: ndarray,
+    rule: CameraRule,
+) -> SharedCamera:
+    """Who made which of a camera's boxes, at every step, given where all paths lie.
+
+    Args:
+        rows: Of the paths.
+        camera: Its boxes.
+        seen: What it should give of each row.
+        image_size: (2,) width and height, pixels.
+        rule: Of the fusion; pairs from its ``least_told`` on are returned.
+    """
+    order, step_starts, existences = rows.order, rows.step_starts, rows.existences
+    states, covariances, labels = rows.states, rows.covariances, rows.labels
+    expected, boxes, depths, valid = seen.expected, seen.boxes, seen.depths, seen.valid
+    jacobians, spreads = expected.jacobians, expected.spreads
+    other_expected, other_jacobians = expected.posture_values, expected.posture_jacobians
+    other_drift, other_share = expected.posture_drift, expected.posture_share
+    values, noises = camera.measurements.values, camera.measurements.noises
+    box_starts, gate = camera.starts, rule.gate
+    rows_count, size = len(order), values.shape[1]
+    chances, missed = np.zeros(rows_count), np.ones(rows_count)
+    hidden = np.full(rows_count, -1, dtype=np.int64)
+    found_rows, found_boxes, found_shares = [0], [0], [0.0]
+    found_rows.pop(), found_boxes.pop(), found_shares.pop()
+    kinds = 2 if len(other_expected) > 0 else 1
+    for step in range(len(step_starts) - 1):
+        own = order[step_starts[step] : step_starts[step + 1]]
+        if len(own) == 0 or camera.blind[step]:
+            continue
+        inside = rule.detection_probability * inside_probability(
+            boxes[own], jacobians[own], covariances[own], valid[own], image_size, rule.soft
+        )
+        weights = existences[own]
+        hiding = np.flatnonzero(weights > rule.confirmed) if rule.strength > 0.0 else np.arange(0)
+        hidden_here = hide(
+            inside,
+            boxes[own],
+            depths[own],
+            states[own],
+            labels[own],
+            hiding,
+            weights[hiding],
+            Occlusion(rule.near, rule.strength, rule.worth_telling),
+        )
+        chances_here, hidden_by = hidden_here.detection_probabilities, hidden_here.hidden_by
+        first, count = box_starts[step], box_starts[step + 1] - box_starts[step]
+        detected = np.zeros((len(own), count))
+        for i in range(len(own)):
+            k = own[i]
+            chances[k], hidden[k] = chances_here[i], hidden_by[i]
+            if chances_here[i] <= 0.0:
+                continue
+            for kind in range(kinds):
+                h = jacobians[k] if kind == 0 else other_jacobians[k]
+                value = expected.values[k] if kind == 0 else other_expected[k]
+                if not value[0] < math.inf:
+                    continue
+                base = np.zeros((size, size))
+                for p in range(size):
+                    for q in range(size):
+                        for a in range(3):
+                            for b in range(3):
+                                spread = covariances[k, a, b]
+                                if kind == 1:
+                                    spread += other_drift[a, b]
+                                base[p, q] += h[p, a] * spread * h[q, b]
+                if kind == 0 and len(spreads):
+                    base += spreads[k]
+                if kind == 1:
+                    base += expected.posture_spreads[k]
+                share = 1.0
+                if kinds == 2:
+                    share = 1.0 - other_share if kind == 0 else other_share
+                for j in range(count):
+                    z = first + j
+                    within = True
+                    for p in range(size):
+                        gap = values[z, p] - value[p]
+                        within = within and gap * gap <= gate * (base[p, p] + noises[z, p, p])
+                    if not within:
+                        continue
+                    s = base + noises[z]
+                    lower, solved = np.zeros((size, size)), np.empty(size)
+                    log_determinant = factorise(s, lower)
+                    difference = values[z] - value
+                    solve(lower, difference, solved)
+                    length = 0.0
+                    for p in range(size):
+                        length += difference[p] * solved[p]
+                    if length > gate:
+                        continue
+                    log_density = -0.5 * (length + log_determinant + size * math.log(2.0 * math.pi))
+                    detected[i, j] += weights[i] * chances_here[i] * share * math.exp(log_density)
+        told = belief_propagation(
+            1.0 - weights * chances_here,
+            detected,
+            np.full(count, camera.clutter),
+            Settling(rule.tolerance, rule.iterations),
+        ).rows
+        for i in range(len(own)):
+            missed[own[i]] = told[i, 0]
+            for j in range(count):
+                if told[i, 1 + j] >= rule.least_told:
+                    found_rows.append(own[i])
+                    found_boxes.append(first + j)
+                    found_shares.append(told[i, 1 + j])
+    return SharedCamera(
+        BoxLinks(np.array(found_rows), np.array(found_boxes), np.array(found_shares)),
+        chances,
+        missed,
+        hidden,
+    )
+
+
+@kernel
+def seen_empty(
+    expected: ndarray,
+    valid: ndarray,
+    chances: ndarray,
+    steps: ndarray,
+    box_starts: ndarray,
+    boxes: ndarray,
+) -> ndarray:
+    """By how much a camera's look at some places speaks against anybody being there.
+
+        log(1 − p_D) where no box of the step touches the one that he should give, else 0:
+        whoever hides him has a box there
+
+    Args:
+        expected: (N, 4) left, top, right, bottom, pixels.
+        valid: (N,), whether there is anything to see.
+        chances: (N,) p_D, 0 outside the picture.
+        steps: (N,).
+        box_starts: (T + 1,), where each step's boxes begin.
+        boxes: (B, 4) centre and half sizes, pixels.
+
+    Returns:
+        (N,), at most 0.
+    """
+    result = np.zeros(len(steps))
+    for k in range(len(steps)):
+        if not valid[k] or chances[k] <= 0.0:
+            continue
+        touched = False
+        for z in range(box_starts[steps[k]], box_starts[steps[k] + 1]):
+            across = min(expected[k, 2], boxes[z, 0] + boxes[z, 2]) - max(
+                expected[k, 0], boxes[z, 0] - boxes[z, 2]
+            )
+            down = min(expected[k, 3], boxes[z, 1] + boxes[z, 3]) - max(
+                expected[k, 1], boxes[z, 1] - boxes[z, 3]
+            )
+            touched = touched or (across > 0.0 and down > 0.0)
+        if not touched:
+            result[k] = math.log(max(1.0 - chances[k], 1e-6))
+    return result
