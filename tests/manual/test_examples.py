@@ -5,7 +5,11 @@ from __future__ import annotations
 import re
 from typing import Any
 
+import pytest
+
 from tests.manual.places import PAGES
+
+pytestmark = pytest.mark.full
 
 
 def test_the_examples_run() -> None:

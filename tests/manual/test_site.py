@@ -20,6 +20,8 @@ from app.web.manual import CONTENT_POLICY, Manual
 from tests.manual.places import MANUAL, ROOT
 from tracker.parameters import GROUPS, METHODS, PARAMETERS
 
+pytestmark = pytest.mark.full
+
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
