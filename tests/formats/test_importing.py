@@ -269,3 +269,20 @@ def test_foreign_recordings_open_without_a_flag(foreign: Path, tmp_path: Path, n
     inside = sequence.room.contains(truth.positions)
     assert inside.mean() > 0.95
     assert HALF_EXTENTS[2] == pytest.approx(float(sequence.target_half_extents[2]), abs=0.06)
+
+
+def test_a_video_of_another_rate_keeps_its_own(tmp_path: Path) -> None:
+    _toml(tmp_path)
+    _videos(tmp_path)
+    slow = str(tmp_path / "cam2.avi")
+    writer = cv2.VideoWriter(slow, cv2.VideoWriter.fourcc(*"MJPG"), 10.0, SIZE)
+    for _ in range(30):
+        writer.write(np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
+    writer.release()
+    settled = _settled(tmp_path, ImportOptions(unit="m"))
+    assert (settled.fps, settled.frames) == (20.0, 60)
+    write(settled, tmp_path / "out", "two rates")
+    text = (tmp_path / "out" / "sequence.toml").read_text()
+    assert text.count("fps = 20.0") == 1
+    assert text.count("fps = 10.0") == 1
+    assert not read_sequence(tmp_path / "out").warnings

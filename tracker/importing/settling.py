@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.agreement.observed import rays_of
@@ -14,7 +14,14 @@ from tracker.agreement.suggestion import STANDING, Suggestion, agreement, sugges
 from tracker.camera import Camera
 from tracker.checks.reading import Reading, read_boxes, to_camera
 from tracker.checks.readings import Open, Seen, find_meaning
-from tracker.formats.pieces import DetectionPiece, FormatError, Layout, RawCamera, TruthPiece
+from tracker.formats.pieces import (
+    DetectionPiece,
+    FormatError,
+    Layout,
+    RawCamera,
+    TruthPiece,
+    VideoPiece,
+)
 from tracker.importing.calibrations import camera_sets
 from tracker.importing.gathering import Taken
 from tracker.importing.geometry import read_poses
@@ -32,6 +39,9 @@ ROOM_MARGIN = 1.0
 
 PERSON = 1.70
 """Metres: the usual stature, by which a reconstruction without a unit is scaled."""
+
+SAME_RATE = 0.002
+"""By how much rates may differ that are the same: 29.97 and 30 are not within ten minutes."""
 
 MOST_FRAMES = 10_000_000
 
@@ -85,15 +95,21 @@ def settle(taken: Sequence[Taken], options: ImportOptions | None = None) -> Sett
         for camera, size in zip(cameras, sizes, strict=True)
     ]
     frames, fps = _time(cameras, matched.truths, options, found)
-    boxes = _boxes(cameras, sizes, frames, options, found, told)
-    reading, raws, boxes = _read(raws, boxes, matched.format.startswith(_WITHOUT_UNIT), found)
+    boxes = _boxes(cameras, sizes, frames, fps, options, found, told)
+    ratios = [fps / (own_rate(camera.video, fps) or fps) for camera in cameras]
+    arbitrary = matched.format.startswith(_WITHOUT_UNIT)
+    reading, raws, boxes = _read(raws, boxes, ratios, arbitrary, found)
     settled = [to_camera(raw, reading, size) for raw, size in zip(raws, sizes, strict=True)]
     detections = [_detections(own) for own in boxes]
-    room = _room(settled, detections, found)
+    at_steps = [
+        None if own is None else replace(own, frames=_steps(own.frames, ratio))
+        for own, ratio in zip(detections, ratios, strict=True)
+    ]
+    room = _room(settled, at_steps, found)
     truth = settle_truth(
         [piece for _, piece in matched.truths],
         settled,
-        detections,
+        at_steps,
         reading,
         frames,
         float(room.half_extents[2]) + room.floor,
@@ -136,7 +152,8 @@ def _time(
     found: list[tuple[str, str]],
 ) -> tuple[int, float]:
     """Steps and rate: those of the pictures, else those of the boxes."""
-    counts = [c.video.frames for c in cameras if c.video is not None]
+    fps = _rate(cameras, truths, options, found)
+    counts = [_in_steps(c.video, fps, c.video.frames) for c in cameras if c.video is not None]
     counts += [len(c.images.files) for c in cameras if c.images is not None]
     if counts:
         frames = min(counts)
@@ -157,19 +174,48 @@ def _time(
         raise FormatError(
             f"expected 1 to {MOST_FRAMES:,} steps in videos, pictures or boxes, found {frames}"
         )
+    return frames, fps
+
+
+def own_rate(video: VideoPiece | None, fps: float) -> float | None:
+    """The rate of a camera's video where it is another than that of the steps."""
+    if video is None or video.fps <= 0.0 or abs(video.fps / fps - 1.0) <= SAME_RATE:
+        return None
+    return video.fps
+
+
+def _in_steps(video: VideoPiece | None, fps: float, frames: int) -> int:
+    """So many frames of a video as steps."""
+    rate = own_rate(video, fps)
+    return frames if rate is None else int(frames * fps / rate)
+
+
+def _rate(
+    cameras: Sequence[MatchedCamera],
+    truths: Sequence[tuple[str, TruthPiece]],
+    options: ImportOptions,
+    found: list[tuple[str, str]],
+) -> float:
+    """Steps a second: the videos' usual rate, else that of the truth's file."""
+    if options.fps is not None:
+        return options.fps
     rates = [c.video.fps for c in cameras if c.video is not None and c.video.fps > 0.0]
     if not rates:
         rates = [truth.fps for _, truth in truths if truth.fps is not None]
-    if options.fps is not None:
-        return frames, options.fps
     if not rates:
         found.append(("fps", f"{USUAL_RATE:g}, since no file says it; --fps"))
-        return frames, USUAL_RATE
-    rate = float(np.median(rates))
-    off = [c.raw.name for c in cameras if c.video and abs(c.video.fps / rate - 1.0) > 0.02]
-    if off:
-        found.append(("fps", f"{rate:.6g}, but the videos of {', '.join(off)} have another rate"))
-    return frames, rate
+        return USUAL_RATE
+    fps = sorted(rates)[len(rates) // 2]
+    for camera in cameras:
+        own = own_rate(camera.video, fps)
+        if own is not None:
+            found.append((f"{camera.raw.name} fps", f"{own:.6g}, the steps have {fps:.6g}"))
+    return fps
+
+
+def _steps(frames: Int[ndarray, " D"], ratio: float) -> Int[ndarray, " D"]:
+    """The step nearest to each frame of a camera with a rate of its own."""
+    return np.round(frames * ratio).astype(np.int64)
 
 
 def _first_index(piece: DetectionPiece, options: ImportOptions, frames: int | None) -> int:
@@ -191,6 +237,7 @@ def _boxes(
     cameras: Sequence[MatchedCamera],
     sizes: Sequence[tuple[int, int]],
     frames: int,
+    fps: float,
     options: ImportOptions,
     found: list[tuple[str, str]],
     told: list[str],
@@ -203,7 +250,8 @@ def _boxes(
     if first and any(p is not None and p.first_index is None for p in pieces):
         found.append(("first index", "1, since no frame is called 0; --first-index"))
     result: list[_Boxes | None] = []
-    for piece, size in zip(pieces, sizes, strict=True):
+    for camera, size in zip(cameras, sizes, strict=True):
+        piece = camera.detections
         if piece is None:
             result.append(None)
             continue
@@ -211,11 +259,13 @@ def _boxes(
         scale = size if piece.normalised else None
         four = read_boxes(piece.boxes, layout or "ltwh", scale)
         steps = piece.frames - first
-        there = (steps >= 0) & (steps < frames)
+        video = camera.video
+        within = frames if own_rate(video, fps) is None or video is None else video.frames
+        there = (steps >= 0) & (steps < within)
         if not there.all():
             told.append(
                 f"{piece.source.name}: {int((~there).sum())} of {len(there)} boxes are of frames "
-                f"outside the {frames} of the pictures; --first-index says where counting begins"
+                f"outside the {within} of the pictures; --first-index says where counting begins"
             )
         scores = np.clip(piece.scores, 0.0, 1.0)
         own = Detections(steps[there], four[there], scores[there])
@@ -226,11 +276,15 @@ def _boxes(
 def _read(
     raws: list[RawCamera],
     boxes: list[_Boxes | None],
+    ratios: Sequence[float],
     arbitrary: bool,
     found: list[tuple[str, str]],
 ) -> tuple[Reading, list[RawCamera], list[_Boxes | None]]:
     """How poses and boxes are meant: by flags, formats, the boxes and the poses, in this order."""
-    seen = [None if own is None else Seen(own[0].frames, own[0].boxes) for own in boxes]
+    seen = [
+        None if own is None else Seen(_steps(own[0].frames, ratio), own[0].boxes)
+        for own, ratio in zip(boxes, ratios, strict=True)
+    ]
     unknown = any(own is not None and own[1] is None for own in boxes)
     layouts: tuple[Layout, ...] = ("ltwh", "xyxy") if unknown else ("ltwh",)
     convention = raws[0].convention
