@@ -315,6 +315,7 @@ def _parameters() -> None:
         "single_view": "Method of stage 1 (--single-view).",
         "fusion_method": "Method of stage 2 (--fusion).",
         "smoothing_method": "Method of stage 3 (--smoothing).",
+        "smoothing_method": "Method of stage 3 (--smoothing).",
     }
     defaults = table.RunParameters()
     chosen = {"fusion_method": defaults.fusion_method, "single_view": table.FOLLOWS}
