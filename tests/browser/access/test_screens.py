@@ -79,8 +79,14 @@ def test_everything_is_inside_the_window(
     for strip in ("People", "OSPA", "Position error"):
         expect(page.locator(".gr.strip", has_text=strip)).to_be_visible()
     head = page.get_by_role("columnheader", name="x, y, z")
-    head.scroll_into_view_if_needed()
-    expect(head).to_be_in_viewport()
+    if size == "720p":  # there the table fits without it, and the step's own tells it
+        expect(head).to_be_hidden()
+        page.get_by_role("tab", name="Step").click()
+        expect(page.locator("#panel-step", has_text="x, y, z")).to_be_visible()
+        page.get_by_role("tab", name="Tracks").click()
+    else:
+        head.scroll_into_view_if_needed()
+        expect(head).to_be_in_viewport()
     keep(page, screenshots, f"{size}-{theme}-tracks", tmp_path)
     if size != "4k":
         for tab in ("Step", "Changes", "Compare", "Runs"):
