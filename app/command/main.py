@@ -47,7 +47,9 @@ TRACEBACK = "MULTIVIEW_PHD_TRACEBACK"
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit status."""
     try:
-        return _run(parse(arguments))
+        status = _run(parse(arguments))
+        sys.stdout.flush()  # at the interpreter's end nobody could hear that the reader is gone
+        return status
     except ParameterError as error:
         say(str(error))
         return USAGE

@@ -10,6 +10,7 @@ import asyncio
 import json
 from collections import OrderedDict
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import Any
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
@@ -60,9 +61,8 @@ class Stream:
     def __init__(self, workbench: Workbench) -> None:
         self._workbench = workbench
         self._pages: set[_Page] = set()
-        self._unheard: str | None = None
+        self._unheard: Notice | None = None
         """What was said last while there was no page, for the first that comes."""
-        self._unheard_level = ""
         self._state: tuple[int, str] = (-1, "")
         self._steps: OrderedDict[tuple[Any, ...], str] = OrderedDict()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -91,9 +91,8 @@ class Stream:
             end()
 
     def _note(self, change: Change) -> None:
-        if change == "sequence":
-            if self._unheard_level == "error":
-                self._unheard = None  # what went wrong before it was opened is over
+        if change == "sequence" and self._unheard is not None and self._unheard.level == "error":
+            self._unheard = None  # what went wrong before it was opened is over
         for page in self._pages:
             page.news.add(change)
             page.wake.set()
@@ -102,11 +101,10 @@ class Stream:
         match event:
             case Command(name):
                 text = json.dumps({"type": "command", "name": name})
-            case Notice(level, message, hint):
-                notice = {"type": "notice", "level": level, "message": message, "hint": hint}
-                text = json.dumps(notice)
+            case Notice():
+                text = _notice(event)
                 if not self._pages:
-                    self._unheard, self._unheard_level = text, level
+                    self._unheard = event
         for page in self._pages:
             page.messages = [*page.messages, text][-MOST_NOTICES:]
             page.wake.set()
@@ -116,7 +114,7 @@ class Stream:
         await socket.accept()
         page = _Page()
         if self._unheard is not None:
-            page.messages.append(self._unheard)
+            page.messages.append(_notice(self._unheard))
         self._unheard = None
         self._pages.add(page)
         sender = asyncio.create_task(self._tell(socket, page))
@@ -142,8 +140,7 @@ class Stream:
             words = str(error)
             if isinstance(error, ValidationError):
                 words = "expected seek, select, motion or ping with their fields"
-            notice = {"type": "notice", "level": "warn", "message": words, "hint": None}
-            page.messages = [*page.messages, json.dumps(notice)][-MOST_NOTICES:]
+            page.messages = [*page.messages, _notice(Notice("warn", words))][-MOST_NOTICES:]
             page.wake.set()
             return
         match wish:
@@ -159,7 +156,7 @@ class Stream:
                 page.wake.set()
 
     def _set_flies(self) -> None:
-        """A click in the 3D view does not say whose it was: one who wants less motion is enough."""
+        """The 3D view flies only if no page asked for less motion: a click there has no sender."""
         self._workbench.set_flies(all(page.flies for page in self._pages))
 
     async def _tell(self, socket: WebSocket, page: _Page) -> None:
@@ -245,6 +242,10 @@ class Stream:
             state = results.state_of(snapshot).model_dump_json()
             self._state = (snapshot.version, f'{{"type":"state","state":{state}}}')
         return self._state[1]
+
+
+def _notice(notice: Notice) -> str:
+    return json.dumps({"type": "notice", **asdict(notice)})
 
 
 def _remind(page: _Page) -> None:

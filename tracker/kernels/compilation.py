@@ -151,6 +151,7 @@ def by_hand(dispatcher: Any) -> Callable[..., Any]:
     return silently
 
 
+@cache  # many kernels call the same ones
 def _plain(dispatcher: Any) -> Callable[..., Any]:
     function = dispatcher.py_func
     names = dict(function.__globals__)

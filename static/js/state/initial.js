@@ -10,7 +10,6 @@ const KEPT = /** @type {const} */ ([
 	"singleKeys",
 	"layout",
 	"dismissed",
-	"everyStep",
 ]);
 
 /** @returns {Partial<PageState>} */
@@ -46,7 +45,6 @@ export function initialState() {
 		loaded: 0,
 		playing: 0,
 		speed: 1,
-		everyStep: false,
 		loop: false,
 		range: [null, null],
 		selection: null,

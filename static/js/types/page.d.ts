@@ -109,8 +109,6 @@ interface PageState {
 	place: string;
 	/** Whether somebody has chosen a step of this sequence. */
 	moved: boolean;
-	/** Every step is shown, however late; else steps are left out to keep real time. */
-	everyStep: boolean;
 	/** How many changes can be undone, and redone. */
 	undoable: [number, number];
 	/** Notices that were closed for good, by name. */

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -393,6 +394,14 @@ def test_whoever_has_read_enough_is_no_failure() -> None:
     )
     assert done.stderr == ""
     assert done.stdout.startswith("key")
+
+
+def test_whoever_reads_nothing_is_no_failure() -> None:
+    # what is short waits in a buffer, and would only be missed at the interpreter's end
+    buffered = {name: text for name, text in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    line = f"{sys.executable} -m app sequences | true"
+    done = subprocess.run(line, shell=True, capture_output=True, text=True, env=buffered)
+    assert done.stderr == ""
 
 
 @pytest.mark.parametrize("port", ["-1", "65536", "99999999"])

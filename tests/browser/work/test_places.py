@@ -84,14 +84,24 @@ def test_a_seek_from_elsewhere_is_followed_whatever_the_page_was_doing(
     as_at_first(server)
     scene = viser(page)
     for wanted in (30, 5, 41):
+        before = int(readout(page))
         page.keyboard.press("ArrowRight")  # its own seek and the other's cross each other
         page.keyboard.press("ArrowRight")
         ask(server, "POST", "seek", {"step": wanted, "origin": "elsewhere"})
-        page.wait_for_timeout(200)
-        step = server.get("/api/state").json()["playhead"]
-        until(page, lambda step=step: readout(page) == str(step), f"the page is at {step}")
-        until(page, lambda step=step: shown_in_3d(scene) == str(step), f"3D is at {step}")
-        assert server.get("/api/state").json()["playhead"] == step
+
+        # Which of the three seeks came last is open; where it ends, all must stand.
+        def agreed() -> bool:
+            told = str(server.get("/api/state").json()["playhead"])
+            return told == readout(page) == shown_in_3d(scene)
+
+        def settled() -> bool:
+            if not agreed():
+                return False
+            page.wait_for_timeout(500)
+            return agreed()
+
+        until(page, settled, f"page, 3D and server at one step after a seek to {wanted}")
+        assert int(readout(page)) in (wanted, before + 1, before + 2)
     as_at_first(server)
 
 

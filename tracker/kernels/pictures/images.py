@@ -24,6 +24,62 @@ class Modes(NamedTuple):
     """(K,), Σ_i w_i k_i there."""
 
 
+class Filled(NamedTuple):
+    """What the pixels of one box made of a histogram."""
+
+    bins: int
+    """How many bins hold something."""
+    weight: float
+    """Of all pixels together."""
+
+
+@pixel_kernel
+def _fill(
+    bin_map: ndarray,
+    box: ndarray,
+    epanechnikov: bool,
+    longest_side: int,
+    histogram: ndarray,
+    touched: ndarray,
+) -> Filled:
+    """Add the weights of a box's pixels to a histogram of zeros.
+
+    Args:
+        bin_map: As the next two, of :func:`box_histograms`.
+        box: (4,), centre x, centre y, half width, half height, pixels.
+        histogram: (bins,), zeros; the weights are put in.
+        touched: (bins,), to be filled with the bins that hold something.
+    """
+    height, width = bin_map.shape
+    centre_x, centre_y = box[0], box[1]
+    # half a pixel at least: the box always holds the pixel that its centre is in
+    half_x, half_y = max(box[2], 0.5), max(box[3], 0.5)
+    stride_x = math.ceil(2.0 * half_x / longest_side)
+    stride_y = math.ceil(2.0 * half_y / longest_side)
+    first_x = max(math.ceil(centre_x - half_x), 0)
+    first_y = max(math.ceil(centre_y - half_y), 0)
+    last_x = min(math.floor(centre_x + half_x), width - 1)
+    last_y = min(math.floor(centre_y + half_y), height - 1)
+    used = 0
+    total = 0.0
+    for y in range(first_y, last_y + 1, stride_y):
+        v = (y - centre_y) / half_y
+        for x in range(first_x, last_x + 1, stride_x):
+            weight = 1.0
+            if epanechnikov:
+                u = (x - centre_x) / half_x
+                weight = 1.0 - u * u - v * v
+                if weight <= 0.0:
+                    continue
+            b = bin_map[y, x]
+            if histogram[b] == 0.0:
+                touched[used] = b
+                used += 1
+            histogram[b] += weight
+            total += weight
+    return Filled(used, total)
+
+
 @pixel_kernel
 def box_histograms(
     bin_map: ndarray, boxes: ndarray, bins: int, epanechnikov: bool, longest_side: int
@@ -40,34 +96,13 @@ def box_histograms(
     Returns:
         (N, bins).
     """
-    height, width = bin_map.shape
     count = boxes.shape[0]
     histograms = np.zeros((count, bins))
+    touched = np.empty(bins, dtype=np.int64)
     for n in range(count):
-        centre_x, centre_y = boxes[n, 0], boxes[n, 1]
-        # half a pixel at least: the box always holds the pixel that its centre is in
-        half_x, half_y = max(boxes[n, 2], 0.5), max(boxes[n, 3], 0.5)
-        stride_x = math.ceil(2.0 * half_x / longest_side)
-        stride_y = math.ceil(2.0 * half_y / longest_side)
-        first_x = max(math.ceil(centre_x - half_x), 0)
-        first_y = max(math.ceil(centre_y - half_y), 0)
-        last_x = min(math.floor(centre_x + half_x), width - 1)
-        last_y = min(math.floor(centre_y + half_y), height - 1)
-        total = 0.0
-        for y in range(first_y, last_y + 1, stride_y):
-            v = (y - centre_y) / half_y
-            for x in range(first_x, last_x + 1, stride_x):
-                weight = 1.0
-                if epanechnikov:
-                    u = (x - centre_x) / half_x
-                    weight = 1.0 - u * u - v * v
-                    if weight <= 0.0:
-                        continue
-                histograms[n, bin_map[y, x]] += weight
-                total += weight
-        if total > 0.0:
-            for b in range(bins):
-                histograms[n, b] /= total
+        filled = _fill(bin_map, boxes[n], epanechnikov, longest_side, histograms[n], touched)
+        for k in range(filled.bins):
+            histograms[n, touched[k]] /= filled.weight
     return histograms
 
 
@@ -96,38 +131,14 @@ def template_distances(
     Returns:
         (N, G) distances, 1 where a box holds no pixel.
     """
-    height, width = bin_map.shape
     count = boxes.shape[0]
     templates, bins = template_roots.shape
     largest = np.zeros((count, groups.max() + 1))
     histogram = np.zeros(bins)
     touched = np.empty(bins, dtype=np.int64)
     for n in range(count):
-        centre_x, centre_y = boxes[n, 0], boxes[n, 1]
-        half_x, half_y = max(boxes[n, 2], 0.5), max(boxes[n, 3], 0.5)
-        stride_x = math.ceil(2.0 * half_x / longest_side)
-        stride_y = math.ceil(2.0 * half_y / longest_side)
-        first_x = max(math.ceil(centre_x - half_x), 0)
-        first_y = max(math.ceil(centre_y - half_y), 0)
-        last_x = min(math.floor(centre_x + half_x), width - 1)
-        last_y = min(math.floor(centre_y + half_y), height - 1)
-        total = 0.0
-        used = 0
-        for y in range(first_y, last_y + 1, stride_y):
-            v = (y - centre_y) / half_y
-            for x in range(first_x, last_x + 1, stride_x):
-                weight = 1.0
-                if epanechnikov:
-                    u = (x - centre_x) / half_x
-                    weight = 1.0 - u * u - v * v
-                    if weight <= 0.0:
-                        continue
-                b = bin_map[y, x]
-                if histogram[b] == 0.0:
-                    touched[used] = b
-                    used += 1
-                histogram[b] += weight
-                total += weight
+        filled = _fill(bin_map, boxes[n], epanechnikov, longest_side, histogram, touched)
+        used, total = filled.bins, filled.weight
         if used == 0:
             continue
         for k in range(used):
