@@ -317,7 +317,6 @@ def _parameters() -> None:
         "single_view": "Method of stage 1 (--single-view).",
         "fusion_method": "Method of stage 2 (--fusion).",
         "smoothing_method": "Method of stage 3 (--smoothing).",
-        "smoothing_method": "Method of stage 3 (--smoothing).",
     }
     defaults = table.RunParameters()
     chosen = {

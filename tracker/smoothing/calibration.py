@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from tracker.fusion.target_model import ExpectedBoxes
@@ -75,8 +75,13 @@ class Calibration:
         """
         half_height = (expected.boxes[:, 3] - expected.boxes[:, 1]) / 2.0
         shares = self.offsets[camera] + self.sizes[people, None] * upright(self.offsets.shape[1])
-        free = np.abs(expected.jacobians[:, :, :3]).max(axis=2, initial=0.0) > 0.0
-        return np.asarray(half_height[:, None] * shares * free)
+        return np.asarray(half_height[:, None] * shares * free(expected))
+
+
+def free(expected: ExpectedBoxes) -> Bool[ndarray, "L m"]:
+    """Which numbers of some boxes move with the person: not those at the picture's edge."""
+    moves = expected.jacobians != 0.0
+    return np.asarray(moves[:, :, 0] | moves[:, :, 1] | moves[:, :, 2])
 
 
 def upright(size: int) -> Float[ndarray, " m"]:

@@ -225,8 +225,6 @@ def _seen_empty(
     """
     inner = pairs.gaps - 1
     told = np.zeros(len(inner))
-    if not inner.sum():
-        return told
     pair = np.repeat(np.arange(len(inner)), inner)
     step = np.arange(len(pair)) - np.repeat(np.cumsum(inner) - inner, inner) + 1
     begin = paths.states[paths.starts[1:][pairs.earlier] - 1][pair]

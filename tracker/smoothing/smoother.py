@@ -25,6 +25,7 @@ from tracker.smoothing.calibration import (
     SIZE_RIDGE,
     WIDEST,
     Calibration,
+    free,
     upright,
 )
 from tracker.smoothing.paths import Links, Paths
@@ -46,10 +47,20 @@ class Fitted:
     paths: Paths
     odds: Float[ndarray, " N"]
     """log of what each row's boxes say, given the rows before, against all being clutter."""
-    jumps: Float[ndarray, " N"]
-    """Squared Mahalanobis distance between what the rows before and from this one on say."""
+    ahead: Float[ndarray, "N d"]
+    """What the rows before say of each row."""
+    ahead_covariances: Float[ndarray, "N d d"]
     traces: Float[ndarray, " N"]
     """Of the position's covariance before the backward pass, square metres."""
+
+    @property
+    def jumps(self) -> Float[ndarray, " N"]:
+        """Squared Mahalanobis distance between what the rows before and from this one on say."""
+        paths = self.paths
+        told: ndarray = passes.jumps(
+            paths.starts, paths.states, paths.covariances, self.ahead, self.ahead_covariances
+        )
+        return told
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,7 +162,13 @@ class Smoother:
                 paths.starts, begins, information.matrices, information.vectors, rule
             )
             paths = paths.with_states(found.means, found.covariances)
-        return Fitted(paths, found.fits + information.constants, found.jumps, found.traces)
+        return Fitted(
+            paths,
+            found.fits + information.constants,
+            found.ahead,
+            found.ahead_covariances,
+            found.traces,
+        )
 
     def stated(self, paths: Paths) -> Calibration:
         """The boxes as stage 1 states them, for some paths."""
@@ -236,9 +253,7 @@ class Smoother:
             )
             half = np.maximum((expected.boxes[:, 3] - expected.boxes[:, 1]) / 2.0, 1.0)
             plain = camera.measurements.values[own.boxes] - expected.expected.values
-            whole = expected.valid & (np.abs(expected.jacobians[:, :, :3]).max(axis=2) > 0.0).all(
-                axis=1
-            )
+            whole = expected.valid & free(expected).all(axis=1)
             left = (plain - learnt.shift(c, owners[own.rows], expected)) / half[:, None]
             # a box of another posture is no witness of a person's height
             whole &= (np.abs(left) < _ODD).all(axis=1)

@@ -25,7 +25,9 @@ from tracker.trajectories import Trajectories
 STEPS = 60
 COLOUR = with_values(RunParameters(), {"single_view": "colour_phd"})
 WHOLE = sequence(crossing(STEPS), STEPS, clutter_rate=0.5)
-BOXES = RunParameters(single_view="none", fusion_method="sequential_phd")
+BOXES = RunParameters(
+    single_view="none", fusion_method="sequential_phd", smoothing_method="identities"
+)
 
 
 @pytest.fixture(autouse=True)

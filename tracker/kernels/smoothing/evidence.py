@@ -17,23 +17,50 @@ from tracker.kernels.labelled.camera_update import CameraRule
 from tracker.kernels.linear_algebra import factorise, solve
 from tracker.kernels.measurement import ExpectedBoxes
 
+_NO_SHARE = 1e-6
+"""Probability below which a box tells nothing of a path."""
+
+
+class _Room(NamedTuple):
+    """To write in while one pair is worked out."""
+
+    spread: ndarray
+    """(m, m)."""
+    lower: ndarray
+    """(m, m)."""
+    column: ndarray
+    """(m,)."""
+    solved: ndarray
+    """(m,)."""
+
 
 @kernel
-def _posture(difference: ndarray, noise: ndarray, jacobian: ndarray, covariance: ndarray) -> float:
-    """log N(z; h, R + H P Hᵀ)."""
-    size = len(difference)
-    s = noise.copy()
+def _room(size: int) -> _Room:
+    return _Room(np.empty((size, size)), np.zeros((size, size)), np.empty(size), np.empty(size))
+
+
+@kernel
+def _add_spread(jacobian: ndarray, covariance: ndarray, spread: ndarray) -> None:
+    """Add H P Hᵀ of the position."""
+    size = len(spread)
     for p in range(size):
-        for q in range(size):
+        for b in range(3):
+            half = 0.0
             for a in range(3):
-                for b in range(3):
-                    s[p, q] += jacobian[p, a] * covariance[a, b] * jacobian[q, b]
-    lower, solved = np.zeros((size, size)), np.empty(size)
-    log_determinant = factorise(s, lower)
-    solve(lower, difference, solved)
+                half += jacobian[p, a] * covariance[a, b]
+            for q in range(size):
+                spread[p, q] += half * jacobian[q, b]
+
+
+@kernel
+def _log_density(room: _Room) -> float:
+    """log N(column; 0, spread), and spread⁻¹ column in ``solved``."""
+    size = len(room.column)
+    log_determinant = factorise(room.spread, room.lower)
+    solve(room.lower, room.column, room.solved)
     total = size * math.log(2.0 * math.pi) + log_determinant
     for p in range(size):
-        total += difference[p] * solved[p]
+        total += room.column[p] * room.solved[p]
     return -0.5 * total
 
 
@@ -129,58 +156,57 @@ def add_information(
     other_expected, other_jacobians = expected.posture_values, expected.posture_jacobians
     other_drift, other_share = expected.posture_drift, expected.posture_share
     values, noises = measurements.values, measurements.noises
-    size = values.shape[1]
+    size, room = values.shape[1], _room(values.shape[1])
     kinds = 2 if len(other_expected) > 0 else 1
-    lower, column, solved = np.zeros((size, size)), np.empty(size), np.empty(size)
+    noise, chances = np.empty((2, size, size)), np.ones(2)
     halves = np.empty((3, size))
     for link in range(len(rows)):
         k, z = rows[link], boxes[link]
-        chances = np.ones(2)
-        noise = np.empty((2, size, size))
+        if shares[link] < _NO_SHARE:
+            continue
         noise[0] = noises[z]
         if len(spreads):
             noise[0] += spreads[link]
         if kinds == 2:
-            noise[1] = noises[z] + expected.posture_spreads[link]
             h = other_jacobians[link]
+            noise[1] = noises[z]
+            noise[1] += expected.posture_spreads[link]
+            _add_spread(h, other_drift, noise[1])
+            room.spread[:] = noise[0]
+            _add_spread(jacobians[link], covariances[k], room.spread)
             for p in range(size):
-                for q in range(size):
-                    for a in range(3):
-                        for b in range(3):
-                            noise[1, p, q] += h[p, a] * other_drift[a, b] * h[q, b]
-            upright = math.log(1.0 - other_share) + _posture(
-                values[z] - expected.values[link], noise[0], jacobians[link], covariances[k]
-            )
+                room.column[p] = values[z, p] - expected.values[link, p]
+            upright = math.log(1.0 - other_share) + _log_density(room)
             low = -math.inf
             if other_expected[link, 0] < math.inf:
-                low = math.log(other_share) + _posture(
-                    values[z] - other_expected[link], noise[1], h, covariances[k]
-                )
+                room.spread[:] = noise[1]
+                _add_spread(h, covariances[k], room.spread)
+                for p in range(size):
+                    room.column[p] = values[z, p] - other_expected[link, p]
+                low = math.log(other_share) + _log_density(room)
             largest = max(upright, low)
             total = math.exp(upright - largest) + math.exp(low - largest)
             chances[0] = math.exp(upright - largest) / total
             chances[1] = math.exp(low - largest) / total
         for kind in range(kinds):
             a_share = shares[link] * chances[kind]
-            if a_share < 1e-6:
+            if a_share < _NO_SHARE:
                 continue
             h = jacobians[link] if kind == 0 else other_jacobians[link]
             value = expected.values[link] if kind == 0 else other_expected[link]
             for p in range(size):
-                column[p] = values[z, p] - value[p]
+                room.column[p] = values[z, p] - value[p]
                 for a in range(3):
-                    column[p] += h[p, a] * states[k, a]
-            log_determinant = factorise(noise[kind], lower)
-            solve(lower, column, solved)
-            total = size * math.log(2.0 * math.pi) + log_determinant
-            for p in range(size):
-                total += column[p] * solved[p]
-            information.constants[k] -= 0.5 * a_share * total
+                    room.column[p] += h[p, a] * states[k, a]
+            room.spread[:] = noise[kind]
+            information.constants[k] += a_share * _log_density(room)
             for a in range(3):
                 for p in range(size):
-                    information.vectors[k, a] += a_share * h[p, a] * solved[p]
+                    information.vectors[k, a] += a_share * h[p, a] * room.solved[p]
             for a in range(3):
-                solve(lower, np.ascontiguousarray(h[:, a]), halves[a])
+                for p in range(size):
+                    room.column[p] = h[p, a]
+                solve(room.lower, room.column, halves[a])
             for a in range(3):
                 for b in range(3):
                     for p in range(size):
@@ -218,6 +244,7 @@ def share_camera(
     found_rows, found_boxes, found_shares = [0], [0], [0.0]
     found_rows.pop(), found_boxes.pop(), found_shares.pop()
     kinds = 2 if len(other_expected) > 0 else 1
+    base, room = np.empty((size, size)), _room(size)
     for step in range(len(step_starts) - 1):
         own = order[step_starts[step] : step_starts[step + 1]]
         if len(own) == 0 or camera.blind[step]:
@@ -250,18 +277,12 @@ def share_camera(
                 value = expected.values[k] if kind == 0 else other_expected[k]
                 if not value[0] < math.inf:
                     continue
-                base = np.zeros((size, size))
-                for p in range(size):
-                    for q in range(size):
-                        for a in range(3):
-                            for b in range(3):
-                                spread = covariances[k, a, b]
-                                if kind == 1:
-                                    spread += other_drift[a, b]
-                                base[p, q] += h[p, a] * spread * h[q, b]
+                base[:] = 0.0
+                _add_spread(h, covariances[k], base)
                 if kind == 0 and len(spreads):
                     base += spreads[k]
                 if kind == 1:
+                    _add_spread(h, other_drift, base)
                     base += expected.posture_spreads[k]
                 share = 1.0
                 if kinds == 2:
@@ -272,19 +293,18 @@ def share_camera(
                     for p in range(size):
                         gap = values[z, p] - value[p]
                         within = within and gap * gap <= gate * (base[p, p] + noises[z, p, p])
+                        room.column[p] = gap
                     if not within:
                         continue
-                    s = base + noises[z]
-                    lower, solved = np.zeros((size, size)), np.empty(size)
-                    log_determinant = factorise(s, lower)
-                    difference = values[z] - value
-                    solve(lower, difference, solved)
+                    for p in range(size):
+                        for q in range(size):
+                            room.spread[p, q] = base[p, q] + noises[z, p, q]
+                    log_density = _log_density(room)
                     length = 0.0
                     for p in range(size):
-                        length += difference[p] * solved[p]
+                        length += room.column[p] * room.solved[p]
                     if length > gate:
                         continue
-                    log_density = -0.5 * (length + log_determinant + size * math.log(2.0 * math.pi))
                     detected[i, j] += weights[i] * chances_here[i] * share * math.exp(log_density)
         told = belief_propagation(
             1.0 - weights * chances_here,
