@@ -67,6 +67,10 @@ class Track:
         ),
     ] = None
     """Method of stage 2."""
+    smoothing_method: Annotated[
+        str | None, arg(name="smoothing", metavar="|".join(METHODS["smoothing_method"]))
+    ] = None
+    """Method of stage 3."""
     preset: Annotated[
         str | None, arg(metavar="|".join(PRESETS), help_behavior_hint="(default: robust)")
     ] = None
@@ -101,6 +105,7 @@ class Track:
         for key, chosen in (
             ("single_view", self.single_view),
             ("fusion_method", self.fusion_method),
+            ("smoothing_method", self.smoothing_method),
         ):
             if chosen is not None:
                 changes[key] = chosen
