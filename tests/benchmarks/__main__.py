@@ -16,6 +16,7 @@ from tests.benchmarks import (
     growth,
     jpda,
     kernels,
+    library,
     live,
     page,
     pipeline,
@@ -38,6 +39,7 @@ SUITES = {
     "stage_one": stage_one.run,
     "server": server.run,
     "page": page.run,
+    "library": library.run,
 }
 
 
