@@ -328,11 +328,13 @@ class Jobs:
                 self._under_way.cancelled.set()
             self._condition.notify_all()
         if self._compiling is not None:
-            self._compiling.close()
+            self._compiling.stop()
         deadline = time.monotonic() + CLOSING_SECONDS
         for thread in (self._worker, *self._openings):
             if thread.ident is not None:
                 thread.join(timeout=max(0.0, deadline - time.monotonic()))
+        if self._compiling is not None and not self._worker.is_alive():
+            self._compiling.close()
         sys.setswitchinterval(self._switch_interval)
         reader = self._workbench.snapshot().reader
         if reader is not None:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from tests.benchmarks import (
     accuracy,
+    cold,
     growth,
     jpda,
     kernels,
@@ -30,6 +31,7 @@ from tests.benchmarks.record import chart
 
 SUITES = {
     "accuracy": accuracy.run,
+    "cold": cold.run,
     "kernels": kernels.run,
     "targets": targets.run,
     "jpda": jpda.run,
