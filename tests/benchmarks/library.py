@@ -27,6 +27,7 @@ def run(short: bool) -> Iterator[Measurement]:
                 library.keep(runs.RECORDING, runs.run(number, kept=kinds[number % 8]), budget=10**9)
             seconds = (time.perf_counter() - begin) / written
             yield Measurement("library: keep a run", 1e3 * seconds, "ms")
+        with Library(path) as library:  # what waited in its log is in the file now
             size = library.size() * RUNS / written / 1e9
             yield Measurement(
                 "library: 10,000 runs of 500 steps and 10 people", size, "GB", "≤ 2 GB"

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import sqlite3
 import time
+import zlib
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -107,7 +109,7 @@ def _save(
     """
     lost: list[tuple[str, int, str]] = []
     tracked: set[int] = set()
-    for table in ("tracks", "recordings", "runs"):
+    for table in ("results", "recordings", "runs"):
         names = [row[1] for row in new.execute(f"PRAGMA table_info({table})")]
         listed, marks = ", ".join(names), ", ".join("?" * len(names))
         for number in _numbers(old, table):
@@ -117,8 +119,9 @@ def _save(
                 ).fetchone()
                 if row is None:
                     raise ValueError("is not where the table says")
-                if table == "tracks":
-                    columns.unpack(row[1])
+                if table == "results":
+                    columns.unpack(row[3])
+                    json.loads(zlib.decompress(row[1])), json.loads(zlib.decompress(row[2]))
                     tracked.add(number)
                     if not with_tracks:
                         continue
@@ -127,9 +130,9 @@ def _save(
                 if table == "runs":
                     new.execute(_LOST_RECORDING, {"id": row[1]})
                 new.execute(f"INSERT INTO {table} ({listed}) VALUES ({marks})", row)
-            except (sqlite3.Error, ValueError, TypeError, OverflowError) as error:
+            except (sqlite3.Error, zlib.error, ValueError, TypeError, OverflowError) as error:
                 lost.append((table, number, " ".join(str(error).split())))
-    new.execute("DELETE FROM tracks WHERE run NOT IN (SELECT id FROM runs)")
+    new.execute("DELETE FROM results WHERE run NOT IN (SELECT id FROM runs)")
     return lost
 
 

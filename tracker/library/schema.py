@@ -45,7 +45,6 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
             single_view TEXT NOT NULL,
             fusion_method TEXT NOT NULL,
             changes TEXT NOT NULL,           -- JSON: the values that are not the defaults
-            parameters TEXT NOT NULL,        -- JSON: all
             seed INTEGER NOT NULL,
             version TEXT NOT NULL,           -- of the program
             code TEXT NOT NULL,              -- hash of what makes the numbers
@@ -54,7 +53,6 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
             targets INTEGER NOT NULL,        -- how many tracks
             mota REAL, idf1 REAL, hota REAL, ospa REAL, position_error REAL,
             misses INTEGER, false_positives INTEGER, id_switches INTEGER,
-            figures TEXT NOT NULL,           -- JSON: all of them; {} without a truth
             name TEXT NOT NULL DEFAULT '',
             star INTEGER NOT NULL DEFAULT 0,
             note TEXT NOT NULL DEFAULT '',
@@ -65,9 +63,11 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "CREATE INDEX runs_by_recording ON runs (recording, began)",
         "CREATE INDEX runs_by_key ON runs (key)",
         """
-        CREATE TABLE tracks (
+        CREATE TABLE results (               -- apart: a list of runs reads past none of it
             run INTEGER PRIMARY KEY REFERENCES runs (id) ON DELETE CASCADE,
-            columns BLOB NOT NULL
+            parameters BLOB NOT NULL,        -- JSON by zlib: all
+            figures BLOB NOT NULL,           -- JSON by zlib: all of them; {} without a truth
+            columns BLOB NOT NULL            -- the tracks
         ) STRICT
         """,
         f"PRAGMA application_id = {APPLICATION_ID}",

@@ -11,6 +11,7 @@ import os
 import sqlite3
 import threading
 import time
+import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -195,17 +196,13 @@ class Library:
         with self._reading() as connection:
             run = self.run(number)
             row = connection.execute(
-                "SELECT parameters, figures, columns FROM runs JOIN tracks ON run = id "
-                "WHERE id = ?",
-                (number,),
+                "SELECT parameters, figures, columns FROM results WHERE run = ?", (number,)
             ).fetchone()
             if row is None:
                 raise LibraryError(f"{self.path}: the tracks of run {number} are not there")
-            text, figures, data = row
-            values = json.loads(text)
+            values, figures = _inflated(row[0]), _inflated(row[1])
             parameters, unknown = _parameters(values)
-            kept = columns.unpack(data)
-            return Result(run, parameters, unknown, values, json.loads(figures), kept)
+            return Result(run, parameters, unknown, values, figures, columns.unpack(row[2]))
 
     def size(self) -> int:
         """Bytes on disk."""
@@ -232,7 +229,7 @@ class Library:
         Returns:
             The run's number.
         """
-        data = columns.pack(new.kept)
+        packed = (_deflated(new.parameters), _deflated(new.figures), columns.pack(new.kept))
         with self._writing() as connection:
             place = self._recording(connection, recording)
             known = connection.execute(
@@ -244,7 +241,9 @@ class Library:
                 connection.execute(
                     "UPDATE runs SET began = ?, deleted = NULL WHERE id = ?", (new.began, number)
                 )
-            connection.execute("INSERT OR REPLACE INTO tracks VALUES (?, ?)", (number, data))
+            connection.execute(
+                "INSERT OR REPLACE INTO results VALUES (?, ?, ?, ?)", (number, *packed)
+            )
             connection.execute(
                 f"DELETE FROM runs WHERE id IN (SELECT id FROM runs WHERE {_UNTOUCHED} "
                 "AND deleted IS NULL ORDER BY began DESC LIMIT -1 OFFSET ?)",
@@ -280,7 +279,7 @@ class Library:
             for number in numbers:
                 self.run(number)
                 size += connection.execute(
-                    "SELECT coalesce(sum(length(columns)), 0) FROM tracks WHERE run = ?", (number,)
+                    "SELECT coalesce(sum(length(columns)), 0) FROM results WHERE run = ?", (number,)
                 ).fetchone()[0]
                 connection.execute(
                     "UPDATE runs SET deleted = ? WHERE id = ?", (time.time(), number)
@@ -363,8 +362,6 @@ class Library:
             },
             **{name: new.figures.get(name) for name in HEADLINES},
             "changes": json.dumps(new.changes, ensure_ascii=False),
-            "parameters": json.dumps(new.parameters, ensure_ascii=False),
-            "figures": json.dumps(new.figures),
         }  # fmt: skip
         marks = ", ".join("?" * len(values))
         done = connection.execute(
@@ -397,6 +394,17 @@ class Library:
                 if self._connection.in_transaction:
                     self._connection.execute("ROLLBACK")
                 raise
+
+
+def _deflated(value: dict[str, Any]) -> bytes:
+    return zlib.compress(json.dumps(value, ensure_ascii=False).encode())
+
+
+def _inflated(data: bytes) -> dict[str, Any]:
+    try:
+        return dict(json.loads(zlib.decompress(data)))
+    except zlib.error as error:
+        raise ValueError(str(error)) from None
 
 
 def _parameters(values: dict[str, Any]) -> tuple[RunParameters, tuple[str, ...]]:

@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 
 from tests.app.conftest import Runs
-from tests.library.runs import filled
+from tests.library.runs import RECORDING, filled
+from tests.library.runs import run as made
 from tracker.library.store import Library
+from tracker.parameters import RunParameters, with_values
 
 
 @pytest.fixture
@@ -73,11 +75,9 @@ def test_runs_are_named_starred_deleted_and_taken_back(run: Runs, path: Path) ->
 
 
 def test_two_runs_are_set_against_each_other(run: Runs, path: Path) -> None:
-    with filled(path, 2) as library:
-        library._connection.execute(
-            "UPDATE runs SET mota = 0.5, parameters = "
-            "json_set(parameters, '$.fusion.clutter_rate', 4.0) WHERE id = 2"
-        )
+    values = with_values(RunParameters(), {"fusion.clutter_rate": 4.0}).model_dump(mode="json")
+    with filled(path, 1) as library:
+        library.keep(RECORDING, made(1, parameters=values, figures={"mota": 0.5}))
     told = asked(run, "diff", "1", "2", "--library", path)
     assert told["values"]["fusion.clutter_rate"][1] == 4.0
     assert len(told["values"]) == 1
@@ -114,7 +114,7 @@ def test_check_and_repair(run: Runs, path: Path) -> None:
     assert (status, out) == (0, "")
     assert "3 runs can be read, 0 complaints" in err
     with Library(path) as library:
-        library._connection.execute("UPDATE tracks SET columns = x'00' WHERE run = 2")
+        library._connection.execute("UPDATE results SET columns = x'00' WHERE run = 2")
     status, out, _ = run("library", "check", "--library", path, "--json")
     assert (status, json.loads(out)["readable_runs"]) == (1, 2)
     status, out, _ = run("library", "check", "--library", path, "--repair", "--json")
