@@ -41,7 +41,7 @@ from tracker.folders import library_file
 from tracker.parameters import ParameterError
 
 if TYPE_CHECKING:
-    from tracker.library.records import KeptRun
+    from tracker.library.records import Result
     from tracker.pipeline import Run
 
 FAILURE, USAGE, INTERRUPTED = 1, 2, 130
@@ -128,9 +128,9 @@ def _sentence(error: BaseException) -> str:
 # serve
 
 
-def _serve_run(command: OpenRun, run: KeptRun) -> int:
-    serve = Serve(run.place, port=command.port, open=command.open, library=command.library)
-    return _serve(serve, run.id)
+def _serve_run(command: OpenRun, result: Result) -> int:
+    serve = Serve(result.place, port=command.port, open=command.open, library=command.library)
+    return _serve(serve, result.run.id)
 
 
 def _serve(command: Serve, run: int | None = None) -> int:

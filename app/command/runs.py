@@ -25,13 +25,13 @@ from app.command.library_flags import (
 from app.command.terminal import CommandError, print_table, say
 from tracker.folders import library_file
 from tracker.library import KEEP, repair
-from tracker.library.records import HEADLINES, KeptRun
+from tracker.library.records import HEADLINES, KeptRun, Result
 from tracker.library.store import Library, open_library
 
 DAMAGED = 1
 
 
-def runs(command: Runs, serve: Callable[[OpenRun, KeptRun], int]) -> int:
+def runs(command: Runs, serve: Callable[[OpenRun, Result], int]) -> int:
     """Run one of the commands; returns the exit status.
 
     Args:
@@ -49,7 +49,7 @@ def runs(command: Runs, serve: Callable[[OpenRun, KeptRun], int]) -> int:
             case ShowRun():
                 _show(library, action)
             case OpenRun():
-                run = library.find(action.run)
+                result = library.result(library.find(action.run).id)
             case RenameRun():
                 run = library.find(action.run)
                 library.rename(run.id, action.name)
@@ -69,7 +69,7 @@ def runs(command: Runs, serve: Callable[[OpenRun, KeptRun], int]) -> int:
                     _print({"deleted": gone, "freed_bytes": freed})
                 else:
                     say(f"{gone} runs gone, {freed / 1e6:.1f} MB freed")
-    return serve(action, run) if isinstance(action, OpenRun) else 0
+    return serve(action, result) if isinstance(action, OpenRun) else 0
 
 
 def check(command: LibraryCommand) -> int:
@@ -112,12 +112,12 @@ def _library(command: OfLibrary) -> Library:
 
 def _list(library: Library, command: ListRuns) -> None:
     wanted = command.recording
+    folder = None if wanted is None else str(Path(wanted).absolute())
+    places = {r.id for r in library.recordings() if r.place in (wanted, folder)}
     found = [
         run
         for run in library.runs()
-        if wanted is None
-        or wanted in (run.recording_name, run.place)
-        or str(Path(wanted).absolute()) == run.place
+        if wanted is None or wanted == run.recording_name or run.recording in places
     ]
     _tell(command, found)
 
@@ -147,14 +147,20 @@ def _show(library: Library, command: ShowRun) -> None:
     result = library.result(library.find(command.run).id)
     run = result.run
     if command.json:
-        told = {**run.to_json(), "parameters": result.values, "figures": result.figures}
+        told = {
+            **run.to_json(),
+            "place": result.place,
+            "machine": result.machine,
+            "parameters": result.values,
+            "figures": result.figures,
+        }
         _print({**told, "rows": len(result.kept.tracks)})
         return
     facts = {
         "run": run.title,
-        "recording": f"{run.recording_name} ({run.place})",
+        "recording": f"{run.recording_name} ({result.place})",
         "began": time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(run.began)),
-        "computed": f"{run.steps} steps in {run.seconds:.1f} s by {run.source} on {run.machine}",
+        "computed": f"{run.steps} steps in {run.seconds:.1f} s by {run.source} on {result.machine}",
         "program": f"{run.version}, code {run.code}",
         "methods": f"{run.single_view} › {run.fusion_method}, seed {run.seed}",
         **{f"value {key}": str(value) for key, value in run.changes.items()},

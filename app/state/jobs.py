@@ -227,7 +227,7 @@ class Jobs:
             ValueError: If the recording does not fit it any more.
         """
         wanted = self.key_of(sequence, result)
-        same = wanted == result.run.key
+        same = wanted == result.key
         return run_from(sequence, result, key=wanted if same else f"{wanted}-kept-{result.run.id}")
 
     def key_of(self, sequence: Sequence, result: Result) -> str:

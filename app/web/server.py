@@ -174,7 +174,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         starting = asyncio.create_task(_start_viser(room, door, workbench))
     if settings.run is not None:
         result = keeper.library().result(settings.run)
-        opening = jobs.open(result.run.place)
+        opening = jobs.open(result.place)
         library.then_show(opening, jobs, workbench, result).add_done_callback(
             _say_failure(result.run.title)
         )

@@ -37,7 +37,7 @@ def test_a_run_comes_back_after_the_program_ended(path: Path) -> None:
 
 def test_the_newest_runs_come_first(path: Path) -> None:
     with filled(path, 3) as library:
-        assert [r.key for r in library.runs()] == ["key-2", "key-1", "key-0"]
+        assert [library.result(r.id).key for r in library.runs()] == ["key-2", "key-1", "key-0"]
         assert library.runs(recording=99) == []
 
 

@@ -45,12 +45,7 @@ class KeptRun(NamedTuple):
 
     id: int
     recording: int
-    place: str
     recording_name: str
-    key: str
-    """Of recording, parameters, seed and code."""
-    digest: str
-    """Of the recording as it was tracked."""
     began: float
     """Seconds since 1970."""
     seconds: float
@@ -61,7 +56,6 @@ class KeptRun(NamedTuple):
     seed: int
     version: str
     code: str
-    machine: str
     source: str
     targets: int
     """How many tracks."""
@@ -116,6 +110,13 @@ class Result:
     """A run as it is read back: what is needed to show it, score it and write it out."""
 
     run: KeptRun
+    place: str
+    """What opens its recording again."""
+    key: str
+    """Of recording, parameters, seed and code."""
+    digest: str
+    """Of the recording as it was tracked."""
+    machine: str
     parameters: RunParameters
     unknown: tuple[str, ...]
     """Keys of those that this version does not know or take: they are at their defaults."""

@@ -41,7 +41,6 @@ never written to."""
 
 _RUN = ", ".join(
     {
-        "place": "recordings.place",
         "recording_name": "recordings.name",
         "changes_json": "changes",
         "tags_json": "tags",
@@ -196,13 +195,20 @@ class Library:
         with self._reading() as connection:
             run = self.run(number)
             row = connection.execute(
-                "SELECT parameters, figures, columns FROM results WHERE run = ?", (number,)
+                "SELECT parameters, figures, columns, place, key, runs.digest, machine FROM runs "
+                "JOIN results ON run = runs.id JOIN recordings ON recordings.id = recording "
+                "WHERE runs.id = ?",
+                (number,),
             ).fetchone()
             if row is None:
                 raise LibraryError(f"{self.path}: the tracks of run {number} are not there")
             values, figures = _inflated(row[0]), _inflated(row[1])
             parameters, unknown = _parameters(values)
-            return Result(run, parameters, unknown, values, figures, columns.unpack(row[2]))
+            kept = columns.unpack(row[2])
+            place, key, digest, machine = row[3:]
+            return Result(
+                run, place, key, digest, machine, parameters, unknown, values, figures, kept
+            )
 
     def size(self) -> int:
         """Bytes on disk."""

@@ -184,12 +184,10 @@ async def open_run(number: int, opened: Opened, bench: Bench, jobs: Work) -> Sta
     now = bench.snapshot()
     place = "" if now.saved is None else recording_of(now.saved, now.opened_as).place
     try:
-        if place == result.run.place:
+        if place == result.place:
             jobs.show_kept(result)
         else:
-            future = asyncio.wrap_future(
-                then_show(jobs.open(result.run.place), jobs, bench, result)
-            )
+            future = asyncio.wrap_future(then_show(jobs.open(result.place), jobs, bench, result))
             try:
                 await asyncio.wait_for(asyncio.shield(future), OPENING_SECONDS)
             except TimeoutError:
@@ -212,7 +210,7 @@ def pin(number: int, opened: Opened, bench: Bench, jobs: Work) -> State:
     now = bench.snapshot()
     if now.sequence is None or now.saved is None:
         raise nothing_open()
-    if recording_of(now.saved, now.opened_as).place != result.run.place:
+    if recording_of(now.saved, now.opened_as).place != result.place:
         raise ApiError(
             409,
             "another_recording",
