@@ -73,6 +73,10 @@ class Track:
         ),
     ] = None
     """Method of stage 2."""
+    smoothing_method: Annotated[
+        str | None, arg(name="smoothing", metavar="|".join(METHODS["smoothing_method"]))
+    ] = None
+    """Method of stage 3."""
     preset: Annotated[
         str | None, arg(metavar="|".join(PRESETS), help_behavior_hint="(default: robust)")
     ] = None
@@ -83,7 +87,8 @@ class Track:
     ] = ()
     """One parameter, as in --set fusion.survival_probability=0.98; `parameters` lists the keys."""
     seed: int = 0
-    """Seed of all randomness; the same seed gives the same tracks."""
+    """Seed of all randomness; the same seed gives the same tracks, but for last digits on processors
+    without fused multiply-add."""
     cache: bool = True
     """Take up what the cameras found in an earlier run with the same values, and keep it."""
     library: LibraryFile = None
@@ -111,6 +116,7 @@ class Track:
         for key, chosen in (
             ("single_view", self.single_view),
             ("fusion_method", self.fusion_method),
+            ("smoothing_method", self.smoothing_method),
         ):
             if chosen is not None:
                 changes[key] = chosen

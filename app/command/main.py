@@ -367,9 +367,14 @@ def _parameters() -> None:
     methods = {
         "single_view": "Method of stage 1 (--single-view).",
         "fusion_method": "Method of stage 2 (--fusion).",
+        "smoothing_method": "Method of stage 3 (--smoothing).",
     }
     defaults = table.RunParameters()
-    chosen = {"fusion_method": defaults.fusion_method, "single_view": table.FOLLOWS}
+    chosen = {
+        "single_view": table.FOLLOWS,
+        "fusion_method": defaults.fusion_method,
+        "smoothing_method": defaults.smoothing_method,
+    }
     rows: list[tuple[str, ...]] = [
         (key, "", "|".join(choices), "", chosen[key], methods[key])
         for key, choices in table.METHODS.items()

@@ -65,14 +65,14 @@ def pixel_kernel(function: _F) -> _F:
     return compiled
 
 
-def compiled_later(function: _F, **options: Any) -> _F:
-    """As :func:`kernel` with options of numba's own, and not counted among the kernels."""
+def compiled_later(function: _F) -> _F:
+    """As :func:`kernel`, and not counted among the kernels."""
     before = _config.CACHE_DIR
     _config.CACHE_DIR = str(_folder_of(Path(function.__code__.co_filename)))
     try:
-        compiled = numba.njit(cache=True, nogil=True, **options)(function)
+        compiled = numba.njit(cache=True, nogil=True)(function)
     except RuntimeError:  # nowhere to write to: it is compiled at every start
-        compiled = numba.njit(nogil=True, **options)(function)
+        compiled = numba.njit(nogil=True)(function)
     finally:
         _config.CACHE_DIR = before
     return cast(_F, compiled)

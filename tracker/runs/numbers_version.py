@@ -22,8 +22,9 @@ _NO_PART = ("evaluation", "experiments", "sequences/rendering", "export.py", "li
 """What looks at results or makes recordings; a change of it changes no run."""
 
 _LATER: dict[Stage, tuple[str, ...]] = {
-    "single_view": ("fusion", "trajectories.py"),
-    "fusion": ("trajectories.py",),
+    "single_view": ("fusion", "smoothing", "kernels/smoothing", "trajectories.py"),
+    "fusion": ("smoothing", "kernels/smoothing", "trajectories.py"),
+    "smoothing": (),
     "tracks": (),
 }
 """What the rule of imports keeps out of a stage: it comes after it."""

@@ -317,6 +317,7 @@ declare namespace Server {
 	interface MethodsInfo {
 		single_view: string;
 		fusion_method: string;
+		smoothing_method: string;
 	}
 
 	/** Numbers over time: of each bucket the lowest, the highest and the mean. */
@@ -566,8 +567,8 @@ declare namespace Server {
 		command: string;
 		methods: MethodsInfo;
 		/**
-		 * Methods that cannot work on the sequence with the values chosen: by ``single_view`` or
-		 * ``fusion_method``, the sentence why by the method's name.
+		 * Methods that cannot work on the sequence with the values chosen: by ``single_view``,
+		 * ``fusion_method`` or ``smoothing_method``, the sentence why by the method's name.
 		 */
 		unfit: Record<string, Record<string, string>>;
 		/** Names of those that a person has saved. */
