@@ -17,6 +17,7 @@ from tests.benchmarks import (
     growth,
     jpda,
     kernels,
+    library,
     live,
     page,
     pipeline,
@@ -40,6 +41,7 @@ SUITES = {
     "stage_one": stage_one.run,
     "server": server.run,
     "page": page.run,
+    "library": library.run,
 }
 
 

@@ -38,6 +38,7 @@ class Server:
         if cache is not None:
             self._environment["MULTIVIEW_PHD_CACHE"] = str(cache)
             self._environment["MULTIVIEW_PHD_SETTINGS"] = str(cache / "settings")
+            self._environment["MULTIVIEW_PHD_LIBRARY"] = str(cache / "library.sqlite3")
         self.port = 0
         self.start()
         if wait:
