@@ -24,7 +24,7 @@ class PastRun:
     number: int
     """From 1 on."""
     at: str
-    """When it began: the time of day."""
+    """Time of day at which it began, as text."""
     sequence: str
     """Its name then."""
     recording: str
@@ -89,7 +89,7 @@ class History:
                 if run.state.key == state.key:
                     self._runs[index] = replace(run, state=state)
                     return
-            # one that was overtaken before it showed anything is not worth a row
+            # a run that was superseded before its first step is not worth a row
             earlier = [r for r in self._runs if r.state.state != "computing" or r.state.done]
             self._counted += 1
             changes = len(table.changed(now.parameters, now.defaults))
