@@ -17,7 +17,8 @@ from tracker.single_view.colour.likeness import Likeness, looks_of
 from tracker.single_view.protocol import SingleViewMethod, ViewResult
 
 BLOCK = 5
-"""Steps that a camera does at a time: few enough to stream, enough to pay."""
+"""Steps that a camera computes at a time: few, so that results stream; several, so that handing
+work to a thread pays."""
 
 Cancel = Callable[[], bool]
 
