@@ -1,4 +1,4 @@
-"""Every source that a docstring or a page of the manual cites is named in full where it is cited."""
+"""Every source that a docstring or a page cites is named in full where it is cited."""
 
 from __future__ import annotations
 
