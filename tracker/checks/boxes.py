@@ -9,7 +9,7 @@ import numpy as np
 
 from tracker.agreement.suggestion import LEAST_AGREEING, Suggestion, suggest
 from tracker.checks.check import Check, Remedy, absent, good, percent, warning
-from tracker.checks.reading import Reading, exchanged
+from tracker.checks.reading import Reading, exchanged, exchanges
 from tracker.checks.readings import (
     LEAST_SHARE,
     Judge,
@@ -125,7 +125,11 @@ def check_boxes(sequence: Sequence, told: BoxesTell | None) -> Iterator[Check]:
     if told is None:
         few = sum(view.detections is not None for view in sequence.views)
         why = "no camera has boxes" if not few else "fewer than two cameras have boxes at a step"
-        yield absent(name, f"{why}, so nothing says whether the calibration is right")
+        yield absent(
+            name,
+            f"{why}, so only lenses, places of the cameras and motion are checked: neither poses, "
+            "unit and axes against people, nor their size",
+        )
         return
     if told.mistaken:
         yield _mistake(sequence, told)
@@ -172,7 +176,7 @@ def _mistake(sequence: Sequence, told: BoxesTell) -> Check:
     if reading.order is not None:
         pairs = exchanged(reading.order, names)
         words.append(f"the calibrations exchanged ({pairs})")
-        remedies.append(Remedy("--swap", pairs.replace(" and ", ",")))
+        remedies += [Remedy("--swap", f"{a}={b}") for a, b in exchanges(reading.order, names)]
     shared = told.given.consensus.share
     if words:
         sentence = (
