@@ -63,7 +63,7 @@ def _import(command: Import) -> int:
     for sentence in write(settled, command.output, name, copy=command.copy):
         say(sentence)
     say(f"{facts}, written to {command.output}")
-    _print_checks(library.open_sequence(str(command.output)))
+    _print_checks(library.open_sequence(str(command.output)), settled.reading)
     return 0
 
 
@@ -127,11 +127,14 @@ def _check(command: Check) -> int:
     return _print_checks(sequence)
 
 
-def _print_checks(sequence: Any) -> int:
+def _print_checks(sequence: Any, reading: Any = None) -> int:
     """Every check in a row; status 1 where one of them warns."""
     from tracker.checks import check
+    from tracker.importing.remedies import for_import
 
     checks = check(sequence)
+    if reading is not None:
+        checks = [for_import(one, reading) for one in checks]
     rows = [(SIGNS[one.status], one.name, str(one)) for one in checks]
     rows += [("!", "opening", warning) for warning in sequence.warnings]
     print_table(("", "check", "found"), rows)

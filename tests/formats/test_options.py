@@ -10,9 +10,12 @@ import pytest
 from app.command.main import main
 from tests.formats.recorded import PLACES, detections, settled_of, toml, videos
 from tests.formats.rig import SIZE, boxes, cameras
+from tracker.checks import check
 from tracker.formats.pieces import FormatError
 from tracker.importing.gathering import gather
 from tracker.importing.options import ImportOptions
+from tracker.importing.preview import as_sequence
+from tracker.importing.remedies import for_import
 from tracker.importing.writing import write
 from tracker.sequences.reader import read_sequence
 
@@ -132,3 +135,31 @@ def test_what_cannot_be_taken_is_told(tmp_path: Path, options: ImportOptions, wo
     detections(tmp_path)
     with pytest.raises(FormatError, match=words):
         settled_of(tmp_path, options)
+
+
+@pytest.mark.parametrize(
+    ("options", "flags"),
+    [
+        (ImportOptions(pose="camera-to-world", axes="opencv"), "--pose world-to-camera"),
+        (ImportOptions(axes="opengl", pose="world-to-camera"), "--axes opencv"),
+        (ImportOptions(up="-y"), "--up z"),
+        (ImportOptions(up="x"), "--up z"),
+    ],
+)
+def test_what_was_told_wrongly_is_mended_by_the_right_flag(
+    tmp_path: Path, options: ImportOptions, flags: str
+) -> None:
+    toml(tmp_path)
+    detections(tmp_path)
+    settled = settled_of(tmp_path, options)
+    checks = [for_import(one, settled.reading) for one in check(as_sequence(settled, "told"))]
+    told = [str(remedy) for one in checks for remedy in one.remedies]
+    assert flags in told
+
+
+def test_people_smaller_than_a_hand_are_told(tmp_path: Path) -> None:
+    toml(tmp_path)
+    detections(tmp_path)
+    settled = settled_of(tmp_path, ImportOptions(unit="mm"))
+    told = [str(one) for one in check(as_sequence(settled, "told")) if one.status == "warning"]
+    assert any("nobody is as small" in words for words in told)

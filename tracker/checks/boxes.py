@@ -32,6 +32,7 @@ SCORE_THRESHOLD = 0.3
 """Boxes below it are left out."""
 
 _SMALLER, _TALLER = 0.6, 1.6  # than the target: how tall boxes may be
+_SMALLEST = 0.08  # metres: not even a head
 _TALLEST_TARGET = 4.0  # metres: who states more has not written metres
 _LEAST_INSIDE = 0.25  # of the people: with fewer in the room it is another place
 _FLOOR_OFF = 0.5  # metres
@@ -241,6 +242,13 @@ def _tilt(told: BoxesTell) -> Check:
 def _size(sequence: Sequence, told: BoxesTell) -> Check:
     height = told.given.consensus.height
     known = 2.0 * float(sequence.target_half_extents[2])
+    if height < _SMALLEST:
+        return warning(
+            "size of people",
+            f"boxes are {height:.2g} m tall in the room, nobody is as small: translations are in "
+            "a larger unit than they were taken for",
+            height=height,
+        )
     if _fits(height, known):
         return good(
             "size of people",

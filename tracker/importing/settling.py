@@ -58,6 +58,8 @@ class Settled:
     suggested: Suggestion
     """As it was found out."""
     truth: GroundTruth | None
+    calibration: str
+    """What its file was recognised as."""
     reading: Reading
     found: tuple[tuple[str, str], ...]
     """What was not in the files or had to be chosen, and why it is so."""
@@ -120,6 +122,7 @@ def settle(taken: Sequence[Taken], options: ImportOptions | None = None) -> Sett
         room,
         suggested,
         truth,
+        matched.format,
         reading,
         tuple(found),
         tuple(told),
