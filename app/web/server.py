@@ -27,6 +27,7 @@ from app.state.evaluator import Evaluator
 from app.state.history import History
 from app.state.importing.desk import Desk
 from app.state.jobs import Jobs, in_background
+from app.state.keeper import Keeper
 from app.state.presets import OwnPresets
 from app.state.recents import Recents
 from app.state.teaching import Teaching
@@ -35,6 +36,7 @@ from app.web import api, gateway, stream, teaching_routes
 from app.web.evaluation import routes as evaluation
 from app.web.gateway import Gateway
 from app.web.importing import routes as importing
+from app.web.library import routes as library
 from app.web.manual import Manual
 from app.web.pictures import foreground, likelihood_routes
 from app.web.pictures.jpegs import Pictures
@@ -46,6 +48,7 @@ from app.web.tables import tables, teaching_tables
 from app.web.views.timeline import Timelines
 from tracker import __version__
 from tracker.folders import settings_folder
+from tracker.library import KEEP
 from tracker.pipeline import Cancelled
 from tracker.runs.stage_cache import StageCache
 
@@ -66,6 +69,7 @@ ROUTERS = (
     teaching_tables.router,
     evaluation.router,
     importing.router,
+    library.router,
     stream.router,
     gateway.router,
 )
@@ -88,6 +92,12 @@ class Settings:
     with_viser: bool = True
     keep_on_disk: bool = False
     """Whether what was compiled and what the cameras found is kept for the next start."""
+    library: Path | None = None
+    """The file that keeps runs; None: they are not kept."""
+    keep: int = KEEP
+    """How many untouched runs stay in it."""
+    run: int | None = None
+    """A run of it that is shown at once, instead of a sequence."""
     say: Callable[[str], None] = lambda words: None
     """Told what somebody in front of the terminal should know."""
 
@@ -162,6 +172,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         workbench, settings_folder() / "recent.json" if kept else None
     )
     evaluator = app.state.evaluator = Evaluator(workbench)
+    keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep)
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
     told.start()
@@ -171,7 +182,13 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         door.prepare()
         # the page is served meanwhile; requests for the 3D view wait
         starting = asyncio.create_task(_start_viser(room, door, workbench))
-    if settings.sequence is not None:
+    if settings.run is not None:
+        result = keeper.library().result(settings.run)
+        opening = jobs.open(result.place)
+        library.then_show(opening, jobs, workbench, result).add_done_callback(
+            _say_failure(result.run.title)
+        )
+    elif settings.sequence is not None:
         jobs.open(settings.sequence).add_done_callback(_say_failure(settings.sequence))
     try:
         yield
@@ -183,7 +200,9 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         recents.close()
         desk.close()
         pictures.close()
-        await asyncio.gather(*(asyncio.to_thread(part.close) for part in (jobs, evaluator, room)))
+        await asyncio.gather(
+            *(asyncio.to_thread(part.close) for part in (keeper, jobs, evaluator, room))
+        )
 
 
 def _say_failure(name: str) -> Callable[..., None]:
