@@ -11,7 +11,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.web.server import Settings, create_app
-from tests.app.conftest import ADDRESS, run_is, wait_until
+from tests.app.conftest import ADDRESS, wait_until
 from tests.formats.recorded import detections, toml, videos
 
 PIECE = 4096
@@ -96,9 +96,8 @@ def test_files_that_are_sent_become_a_recording(
     assert plan["feet"]
     info = _wish(client, info, name="living room")
     client.post(f"/api/import/{info['key']}/write", json={"open": True})
-    wait_until(run_is(client, "done"))
-    state = client.get("/api/state").json()
-    assert state["sequence"]["name"] == "living room"
+    wait_until(lambda: client.get("/api/state").json()["sequence"] is not None)
+    assert client.get("/api/state").json()["sequence"]["name"] == "living room"
     assert (data / "living room/files/session/cam1.csv").is_file()
     assert sorted(path.name for path in data.iterdir()) == ["living room"]
     cards = client.get("/api/recordings").json()["recordings"]
