@@ -41,7 +41,7 @@ BUILT_IN: dict[MethodKey, tuple[str, ...]] = {
 }
 """Where the descriptions of this project's methods stand, in the order of their lists."""
 
-SHARED_GROUPS = ("foreground", "fusion")
+SHARED_GROUPS = ("pictures", "foreground", "fusion")
 """Groups of parameters that are no single method's."""
 
 FOLLOWING = ("colour_phd", "none")

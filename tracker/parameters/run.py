@@ -11,6 +11,7 @@ from tracker.parameters.definition import Params
 from tracker.parameters.foreground import ForegroundParams
 from tracker.parameters.fusion import FusionParams
 from tracker.parameters.methods import Method, MethodKey
+from tracker.parameters.pictures import PictureParams
 from tracker.parameters.registry import REGISTERED
 
 _Group = TypeVar("_Group", bound=Params)
@@ -25,6 +26,7 @@ class SharedParameters(Params):
     fusion_method: str = "multi_bernoulli"
     """Method of stage 2: how the cameras' boxes become 3D positions."""
 
+    pictures: PictureParams = PictureParams()
     foreground: ForegroundParams = ForegroundParams()
     fusion: FusionParams = FusionParams()
 
