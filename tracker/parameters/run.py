@@ -13,6 +13,7 @@ from tracker.parameters.fusion import FusionParams
 from tracker.parameters.methods import Method, MethodKey
 from tracker.parameters.pictures import PictureParams
 from tracker.parameters.registry import REGISTERED
+from tracker.parameters.smoothing import SmoothingParams
 
 _Group = TypeVar("_Group", bound=Params)
 
@@ -26,9 +27,16 @@ class SharedParameters(Params):
     fusion_method: str = "multi_bernoulli"
     """Method of stage 2: how the cameras' boxes become 3D positions."""
 
+<<<<<<< HEAD
     pictures: PictureParams = PictureParams()
+=======
+    smoothing_method: str = "none"
+    """Method of stage 3: the filter's tracks as they are, smoothed, or who is who as well."""
+
+>>>>>>> main
     foreground: ForegroundParams = ForegroundParams()
     fusion: FusionParams = FusionParams()
+    smoothing: SmoothingParams = SmoothingParams()
 
     def of(self, kind: type[_Group]) -> _Group:
         """The numbers of one group, by their class.

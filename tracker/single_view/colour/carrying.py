@@ -21,8 +21,8 @@ from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template
 from tracker.single_view.box_sizes import upright_boxes
 
-DEPTHS = 60
-"""Places along a template's ray that are tried."""
+DEPTHS = 400
+"""Places along a template's ray, a hundredth of the distance apart."""
 
 DEPTH_SPREAD = 0.12
 """Standard deviation of the logarithm of the distance that a drawn box's size tells: people
@@ -36,11 +36,14 @@ by eye, and a person is not where the ray through its middle is."""
 _SHIFT_COST = 0.5 * (_SHIFTS**2).sum(axis=1) / 0.25**2
 """That they are is less likely: their standard deviation is a quarter of a half size."""
 
+HEIGHT_SPREAD = 0.2
+"""Metres: standard deviation of the height of a body's middle above where it stands."""
+
 LARGEST_DISTANCE = 0.75
 """A box further than this from the template's colours is somebody else, or nobody in sight."""
 
 LIKELIER = 0.15
-"""Nor may more than this share of the boxes elsewhere in the picture look more like the template."""
+"""Nor may more than this share of the boxes elsewhere in the picture look more like it."""
 
 _SIGMA = 0.2
 """Spread of the colour distance along the ray, that of the filters' likelihood."""
@@ -88,10 +91,11 @@ def with_carried(
     cameras are carried over. The distance d along the ray of a template's middle is the
     most likely one of
 
-        L(d) = - Σ_c D_c(d)² / 2σ² - ln²(d / d_0) / 2τ²
+        L(d) = - Σ_c D_c(d)² / 2σ² - ln²(d / d_0) / 2τ² - h(d)² / 2σ_h²
 
     over the cameras c that see the target there; D_c is the Bhattacharyya distance of its
-    box to the template, and d_0 where the target would be as high as the template's box.
+    box to the template, d_0 is where the target would be as high as the template's box, and h
+    how far the feet of a target that is a whole body would be above the floor.
 
     Args:
         sequence: Its templates, cameras and target.
@@ -191,7 +195,19 @@ def _along_ray(
     drawn, visible = upright_boxes(camera, positions, half_extents)
     inside &= visible
     ratio = np.log(drawn[inside, 3] / box[3])
-    return positions[inside], -0.5 * (ratio / DEPTH_SPREAD) ** 2
+    likely = np.abs(ratio) <= 3.0 * DEPTH_SPREAD
+    positions = positions[inside][likely]
+    score = -0.5 * (ratio[likely] / DEPTH_SPREAD) ** 2
+    if _stands(sequence):
+        above = positions[:, 2] - (room.minimum[2] + half_extents[2])
+        score -= 0.5 * (above / HEIGHT_SPREAD) ** 2
+    return positions, score
+
+
+def _stands(sequence: Sequence) -> bool:
+    """Whether a target is a whole body, which stands on the room's floor, and not a head."""
+    height = float(sequence.room.maximum[2] - sequence.room.minimum[2])
+    return bool(4.0 * sequence.target_half_extents[2] > height)
 
 
 def _cost(distances: Float[ndarray, "*N"]) -> Float[ndarray, "*N"]:

@@ -72,7 +72,9 @@ class WorkingView:
     def points(self, full: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
         """Full pixels as working pixels."""
         reduced = (full + 0.5) * self.factors - 0.5
-        return reduced if self.turn is None else reduced @ self.turn[:, :2].T + self.turn[:, 2]
+        if self.turn is not None:
+            reduced = reduced @ self.turn[:, :2].T + self.turn[:, 2]
+        return np.asarray(reduced)
 
     def points_back(self, working: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
         """Working pixels as full pixels."""
@@ -86,9 +88,10 @@ class WorkingView:
     ) -> Float[ndarray, " 4"]:
         """The upright box of a target around which one was drawn in the camera's own picture.
 
-        Of a target with half sizes w and h that is turned by θ the bounds reach
+        A person is more an ellipse than a rectangle. Of one with half axes w and h that is
+        turned by θ the bounds reach
 
-            W = w |cos θ| + h |sin θ|,  H = w |sin θ| + h |cos θ|
+            W² = w² cos² θ + h² sin² θ,  H² = w² sin² θ + h² cos² θ
 
         which is undone with the proportions w / h of the target.
 
@@ -101,14 +104,17 @@ class WorkingView:
         width, height = box[2:] * self.factors
         if across < along:
             width, height, across, along = height, width, along, across
-        sizes = [width / (across + along / aspect), height / (across + along * aspect)]
+        sizes = [
+            width / math.hypot(across, along / aspect),
+            height / math.hypot(across, along * aspect),
+        ]
         return np.concatenate([self.points(box[None, :2])[0], sizes])
 
     def boxes_back(self, working: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
         """Boxes of upright targets as the camera's own picture has them.
 
-        Half sizes are those of the longer of the target's two axes, drawn turned: what the
-        fusion expects of a rolled camera's box is where the ends of the upright axis are.
+        Half sizes are how far the longer-reaching of the target's two axes comes, drawn turned:
+        what the fusion expects of a rolled camera's box is where the ends of the upright axis are.
         """
         centres = self.points_back(working[:, :2])
         return np.concatenate([centres, self._reach(working[:, 2:])], axis=1)
@@ -152,7 +158,7 @@ def working_view(
         parameters: How large, and from which roll on it is turned.
     """
     scale = _scale(camera, room, half_extents, parameters)
-    roll = _roll(camera, (room.minimum + room.maximum) / 2.0)
+    roll = _roll(camera)
     turned = abs(roll) > parameters.level_from and _can_turn(camera)
     if scale > _SMALLER and not turned:
         return None
@@ -164,9 +170,7 @@ def working_view(
     intrinsics = camera.intrinsics.copy()
     intrinsics[:2, :2] *= factors[:, None]
     intrinsics[:2, 2] = (intrinsics[:2, 2] + 0.5) * factors - 0.5
-    reduced = replace(
-        camera, intrinsics=intrinsics, image_size=(int(size[0]), int(size[1]))
-    )
+    reduced = replace(camera, intrinsics=intrinsics, image_size=(int(size[0]), int(size[1])))
     if not turned:
         return WorkingView(reduced, camera, factors, None, 0.0)
     return _turned(reduced, camera, factors, roll)
@@ -222,17 +226,12 @@ def _scale(
 
 def _can_turn(camera: Camera) -> bool:
     """Whether the lens is the same after a turn: of a skewed picture it is not."""
-    return abs(camera.intrinsics[0, 1]) < 1e-6 * camera.intrinsics[0, 0]
+    return bool(abs(camera.intrinsics[0, 1]) < 1e-6 * camera.intrinsics[0, 0])
 
 
-def _roll(camera: Camera, place: Float[ndarray, " 3"]) -> float:
-    """By how much what stands at a place leans to the right in the picture, radians."""
-    up = camera.rotation[:, 2]
-    here = camera.to_camera(place[None])[0]
-    if here[2] <= 0.0:
-        here = np.array([0.0, 0.0, 1.0])
-    # the derivative of x / z and y / z along the world's upright
-    lean = up[:2] - here[:2] / here[2] * up[2]
-    if np.hypot(*lean) < 0.2:  # seen from above or below, where upright is every way
+def _roll(camera: Camera) -> float:
+    """By how much what stands on the optical axis leans to the right in the picture, radians."""
+    across, down, _ = camera.rotation[:, 2]
+    if math.hypot(across, down) < 0.2:  # seen from above or below, where upright is every way
         return 0.0
-    return math.atan2(lean[0], -lean[1])
+    return math.atan2(across, -down)
