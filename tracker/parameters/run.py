@@ -27,13 +27,10 @@ class SharedParameters(Params):
     fusion_method: str = "multi_bernoulli"
     """Method of stage 2: how the cameras' boxes become 3D positions."""
 
-<<<<<<< HEAD
-    pictures: PictureParams = PictureParams()
-=======
     smoothing_method: str = "none"
     """Method of stage 3: the filter's tracks as they are, smoothed, or who is who as well."""
 
->>>>>>> main
+    pictures: PictureParams = PictureParams()
     foreground: ForegroundParams = ForegroundParams()
     fusion: FusionParams = FusionParams()
     smoothing: SmoothingParams = SmoothingParams()
