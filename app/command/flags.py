@@ -87,8 +87,8 @@ class Track:
     ] = ()
     """One parameter, as in --set fusion.survival_probability=0.98; `parameters` lists the keys."""
     seed: int = 0
-    """Seed of all randomness; the same seed gives the same tracks, but for last digits on processors
-    without fused multiply-add."""
+    """Seed of all randomness; the same seed gives the same tracks, but for the last digits on
+    processors without fused multiply-add."""
     cache: bool = True
     """Take up what the cameras found in an earlier run with the same values, and keep it."""
     library: LibraryFile = None
