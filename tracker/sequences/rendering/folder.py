@@ -27,7 +27,7 @@ from tracker.sequences.rendering.rooms import (
     RoomSpec,
 )
 from tracker.sequences.rendering.scene import Scene
-from tracker.sequences.rendering.studio import Studio, in_order
+from tracker.sequences.rendering.studio import Studio, in_order, studio_of
 
 VERSION = 3
 """Grows when the same call would give other pictures or files."""
@@ -143,7 +143,7 @@ def _write(
         progress(0, frames)
     if cancelled():
         raise RenderCancelled(spec.name)
-    studio = Studio(spec, CAMERAS[:cameras], seed)
+    studio = studio_of(spec, CAMERAS[:cameras], seed)
     visible = np.zeros((frames, len(spec.people), cameras))
     with ExitStack() as stack:
         writers = [

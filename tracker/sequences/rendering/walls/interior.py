@@ -64,6 +64,8 @@ class Lamp:
     direction: tuple[float, float, float]
     power: tuple[float, float, float]
     """Irradiance by colour that the whole lamp gives one metre below it."""
+    outdoors: bool = False
+    """Whether it lights a corridor and not the room."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +94,9 @@ class Interior:
 
     solids: list[Solid] = field(default_factory=list)
     lamps: list[Lamp] = field(default_factory=list)
+    low: tuple[float, float] = (-math.inf, -math.inf)
+    high: tuple[float, float] = (RIGHT + 0.15, FAR + 0.15)
+    """x and y beyond which there are only corridors, with little of the room's light."""
 
     def box(
         self,
@@ -222,6 +227,7 @@ def _lights(room: Interior, decor: Decor) -> None:
                 (0.0, 0.3, 0.0),
                 (0.0, 0.0, -1.0),
                 (0.80, 0.72, 0.58),
+                outdoors=True,
             )
         )
 
