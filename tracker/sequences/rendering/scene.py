@@ -53,7 +53,6 @@ class Figure:
     drawn: Bool[ndarray, " F"]
     """Whether any of the person can be in a picture."""
 
-
     def placed(self, steps: slice, lamps: Float[ndarray, "L 9"]) -> Placed:
         """The body as it stands and is lit at some steps."""
         bones = Skeleton(

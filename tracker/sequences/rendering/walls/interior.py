@@ -261,7 +261,7 @@ def _furniture(room: Interior, decor: Decor) -> None:
         room.round(CYLINDER, (1.92, -0.86, 0.76), (0.055, 0.055, 0.02), steel)
         room.round(CYLINDER, (1.92, -0.86, 0.92), (0.010, 0.010, 0.15), steel)
         room.round(CYLINDER, (1.92, -0.86, 1.10), (0.085, 0.085, 0.06), Finish("plain", "#e4d9b8"))
-    _plant(room, 1.86, 1.62, decor.seed)
+    plant(room, 1.86, 1.62, decor.seed)
     # on the walls
     frame = Finish("plain", "#2a2622")
     for number, (y, z, width, height) in enumerate(
@@ -308,7 +308,8 @@ def _armchair(room: Interior, decor: Decor) -> None:
             room.box((x, y, 0.0), (x + 0.04, y + 0.04, 0.12), legs)
 
 
-def _plant(room: Interior, x: float, y: float, seed: int) -> None:
+def plant(room: Interior, x: float, y: float, seed: int) -> None:
+    """A plant in a pot."""
     room.round(CYLINDER, (x, y, 0.16), (0.13, 0.13, 0.16), Finish("plain", "#8d8a84"))
     room.round(CYLINDER, (x, y, 0.31), (0.115, 0.115, 0.015), Finish("plain", "#2c2119"))
     rng = np.random.default_rng(seed)
