@@ -166,9 +166,9 @@ def pose(path: Path, stature: float, seed: int, sitting: Sitting | None = None) 
     for side, sign in enumerate((1.0, -1.0)):
         swing = sign * np.cos(cycle)  # this arm is back while this leg is ahead
         fidget = down * _wander(frames, seed + 4 + side, 18.0)
-        back = 0.42 * vigour * swing - 0.05 - 0.42 * down - 0.06 * fidget
+        back = 0.42 * vigour * swing - 0.05 - 0.20 * down - 0.06 * fidget
         upper = rotations[:, CHEST] @ _about_x(np.full(frames, 0.10 * sign)) @ _about_y(back)
-        bend = 0.22 + 0.18 * vigour * (1.0 - swing) + 0.75 * down + 0.15 * fidget
+        bend = 0.22 + 0.18 * vigour * (1.0 - swing) + 0.66 * down + 0.12 * fidget
         rotations[:, UPPER_ARM[side]] = upper
         rotations[:, FOREARM[side]] = upper @ _about_y(-bend)
         placed[:, UPPER_ARM[side]] = placed[:, CHEST] + _turn(

@@ -12,7 +12,7 @@ from numpy import ndarray
 
 from tracker.sequences.rendering.cast.paths import Facing
 from tracker.sequences.rendering.random_rooms.choices import Behaviour, Choices, generator
-from tracker.sequences.rendering.random_rooms.furnishing import Bed, Doorway, Furnished, Seat
+from tracker.sequences.rendering.random_rooms.shell import Bed, Doorway, Furnished, Seat
 
 _APART = 0.5
 """Metres that people keep between them, where they can."""

@@ -153,7 +153,7 @@ def choose(seed: int) -> Choices:
                                  8: 0.04}))  # fmt: skip
     stay = rng.random() < 0.45
     alone: dict[Behaviour, float] = {
-        "walks": 0.38, "stands": 0.2, "sits": 0.24, "rises": 0.12, "lies": 0.06
+        "walks": 0.38, "stands": 0.21, "sits": 0.25, "rises": 0.12, "lies": 0.04
     }  # fmt: skip
     behaviours: tuple[Behaviour, ...] = tuple(
         pick(alone) if stay or rng.random() < 0.3 else "comes and goes" for _ in range(people)

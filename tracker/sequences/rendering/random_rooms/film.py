@@ -29,13 +29,10 @@ from tracker.sequences.rendering.random_rooms.boxes import (
 )
 from tracker.sequences.rendering.random_rooms.choices import Choices, choose, generator
 from tracker.sequences.rendering.random_rooms.figures import HALF_EXTENTS, act, tracked_part
-from tracker.sequences.rendering.random_rooms.furnishing import (
-    Furnished,
-    furnish_randomly,
-    shade_lamps,
-)
+from tracker.sequences.rendering.random_rooms.furnishing import furnish_randomly
 from tracker.sequences.rendering.random_rooms.rig import drawn_by, mount
 from tracker.sequences.rendering.random_rooms.sensors import CameraFilm, record
+from tracker.sequences.rendering.random_rooms.shell import Furnished, build_shell, shade_lamps
 from tracker.sequences.rendering.random_rooms.things import things
 from tracker.sequences.rendering.random_rooms.wardrobe import dress
 from tracker.sequences.rendering.scene import Scene
@@ -116,7 +113,8 @@ def prepare(choices: Choices) -> Set:
     """Furnish, light and cast a room, and trace it empty for each camera."""
     cameras = mount(choices)
     looks = dress(choices)
-    room = furnish_randomly(choices, cameras, looks[0].shirt)
+    room = build_shell(choices, cameras, looks[0].shirt)
+    furnish_randomly(room, choices, cameras)
     if choices.clothes == "of the wall":
         looks[0] = replace(looks[0], shirt=room.accent, pattern="plain")
     figures = act(choices, direct(choices, room), looks, room.half)
