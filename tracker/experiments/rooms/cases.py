@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import multiprocessing
 import os
 import shutil
@@ -15,9 +17,12 @@ from tracker import pipeline
 from tracker.evaluation import evaluate_sequence
 from tracker.experiments.laboratory import runs
 from tracker.experiments.laboratory.pool import Desk
-from tracker.parameters import METHODS, RunParameters, method_of
+from tracker.experiments.rooms.kept import keep_row
+from tracker.parameters import METHODS, RunParameters, Stage, method_of
+from tracker.runs.numbers_version import method_version, numbers_version
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.rendering import RenderCancelled, choose, render_random
+from tracker.sequences.rendering.random_rooms import VERSION
 from tracker.sequences.sequence import Sequence
 
 NICENESS = 5
@@ -42,12 +47,17 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """A room to be measured: its seed, what is still to be run there, and where it is kept."""
+    """A room to be measured."""
 
     seed: int
-    cases: tuple[Case, ...]
+    cases: tuple[tuple[Case, str], ...]
+    """What is still to be run there, each with its key."""
     folder: Path
+    """Where it is rendered."""
     keep: bool
+    """Whether it stays there."""
+    output: Path | None
+    """Folder where each row is kept as soon as it is there."""
     steps: int | None = None
     """Only so many, for a first look."""
 
@@ -69,11 +79,20 @@ def cases() -> tuple[Case, ...]:
     return tuple(found)
 
 
+def key_of(case: Case, steps: int | None) -> str:
+    """Of what a row depends on beside the room: code, numbers, and how much of it is tracked."""
+    method = method_of("single_view", case.method)
+    stages: tuple[Stage, ...] = ("single_view", "fusion", "tracks")
+    code = [numbers_version(stage) for stage in stages]
+    values = parameters_of(case).model_dump(mode="json")
+    parts = [VERSION, code, method_version(method), values, case.templates, steps]
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
+
+
 def steps_of(item: Item) -> int:
     """What the work's advances sum to: rendering counts as one more run."""
-    count = choose(item.seed).steps
-    tracked = count if item.steps is None else min(count, item.steps)
-    return count + tracked * len(item.cases)
+    steps = choose(item.seed).steps if item.steps is None else item.steps
+    return steps * (1 + len(item.cases))
 
 
 def measure(item: Item, desk: Desk) -> list[dict[str, Any]]:
@@ -93,7 +112,7 @@ def measure(item: Item, desk: Desk) -> list[dict[str, Any]]:
     if not (item.folder / "sequence.toml").is_file():
         try:
             render_random(
-                item.seed, item.folder, detections=True, progress=rendered,
+                item.seed, item.folder, detections=True, frames=item.steps, progress=rendered,
                 cancelled=desk.cancelled,
             )  # fmt: skip
         except RenderCancelled:
@@ -101,7 +120,12 @@ def measure(item: Item, desk: Desk) -> list[dict[str, Any]]:
     try:
         sequence = read_sequence(item.folder)
         labels = choose(item.seed).causes()
-        return [_row(item, case, sequence, labels, desk) for case in item.cases]
+        rows = []
+        for case, key in item.cases:
+            row = _row(item, case, sequence, desk) | {"causes": labels, "key": key}
+            keep_row(item.output, row)
+            rows.append(row)
+        return rows
     finally:
         if not item.keep:
             shutil.rmtree(item.folder)
@@ -118,22 +142,20 @@ def parameters_of(case: Case) -> RunParameters:
     return table.with_values(RunParameters(), {"single_view": case.method})
 
 
-def _row(
-    item: Item, case: Case, sequence: Sequence, labels: dict[str, str], desk: Desk
-) -> dict[str, Any]:
+def _row(item: Item, case: Case, sequence: Sequence, desk: Desk) -> dict[str, Any]:
     if not case.templates:
         sequence = replace(sequence, templates=(), digest=f"{sequence.digest}-without-templates")
-    steps = sequence.frames if item.steps is None else min(item.steps, sequence.frames)
+    steps = sequence.frames
     row: dict[str, Any] = {"seed": item.seed, "method": case.method, "templates": case.templates}
     method = method_of("single_view", case.method)
     if method.used(parameters_of(case)).templates == "needed" and not sequence.templates:
         # nobody could be marked, so nobody is found
         nothing = {"found_share": 0.0, "false_per_step": 0.0, "idf1": 0.0}
         figures: dict[str, Any] = dict.fromkeys(FIGURES) | nothing
-        return row | figures | {"steps": steps, "seconds": None, "causes": labels}
+        return row | figures | {"steps": steps, "seconds": None}
     begin = time.perf_counter()
     run = runs.tracked(sequence, parameters_of(case), desk, seed=0, steps=steps)
     seconds = time.perf_counter() - begin
     evaluation = evaluate_sequence(sequence, run.tracks, steps=run.done)
     figures = {key: evaluation[key] for key in FIGURES}
-    return row | figures | {"steps": steps, "seconds": seconds, "causes": labels}
+    return row | figures | {"steps": steps, "seconds": seconds}

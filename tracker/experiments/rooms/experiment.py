@@ -18,9 +18,9 @@ from tracker.experiments.laboratory.experiment import (
     Unavailable,
 )
 from tracker.experiments.laboratory.pool import spread
-from tracker.experiments.rooms.cases import Case, Item, cases, measure, steps_of
+from tracker.experiments.rooms.cases import Case, Item, cases, key_of, measure, steps_of
 from tracker.experiments.rooms.causes import causes_of, worst_of
-from tracker.experiments.rooms.kept import Kept, key_of
+from tracker.experiments.rooms.kept import read_rows
 from tracker.parameters import METHODS
 from tracker.parameters.registry import FOLLOWING
 
@@ -33,10 +33,8 @@ ASKED = {True: (0.95, 0.70, 0.05, 0.3), False: (0.80, 0.45, 0.1, 0.5)}
 """With templates and without: found at least, in the median room and in nine tenths of the
 rooms; and false tracks a step at most, likewise."""
 
-QUICK_ROOMS, QUICK_STEPS = 3, 40
+QUICK_ROOMS, QUICK_STEPS = 2, 25
 _SHOWN_CAUSES = 4
-_AT_ONCE = 8
-"""Rooms between two times that what was measured is written down."""
 
 
 def run(context: Context) -> Result:
@@ -45,45 +43,20 @@ def run(context: Context) -> Result:
     count = QUICK_ROOMS if context.quick else context.rooms.count
     steps = QUICK_STEPS if context.quick else None
     seeds = range(context.rooms.first, context.rooms.first + count)
-    kept = Kept(context.output)
     keys = {case: key_of(case, steps) for case in chosen}
-    missing = {
-        seed: tuple(case for case in chosen if kept.get(seed, keys[case]) is None) for seed in seeds
-    }
+    rows = read_rows(context.output)
     with tempfile.TemporaryDirectory(prefix="random-rooms-") as scratch:
         keep = context.rooms.keep and context.output is not None
         place = context.output / "rooms" if keep and context.output is not None else Path(scratch)
-        items = [
-            Item(seed, some, place / f"{seed}", keep, steps)
-            for seed, some in missing.items()
-            if some
-        ]
-        total, before = sum(steps_of(item) for item in items), 0
-        for first in range(0, len(items), _AT_ONCE):
-            some = items[first : first + _AT_ONCE]
-            part = _Part(context, before, total)
-            own = sum(steps_of(item) for item in some)
-            for item, rows in zip(
-                some, spread(measure, some, part.context, words="", steps=own), strict=True
-            ):
-                for case, row in zip(item.cases, rows, strict=True):
-                    kept.add(row, keys[case])
-            before += own
-    found = {
-        case: [row for seed in seeds if (row := kept.get(seed, keys[case])) is not None]
-        for case in chosen
-    }
-    return _summed_up(found, seeds)
-
-
-class _Part:
-    """The context of some of the rooms: progress is that of all."""
-
-    def __init__(self, context: Context, before: int, total: int) -> None:
-        def told(_: str, done: int, __: int) -> None:
-            context.told("random rooms", min(before + done, total), total)
-
-        self.context = Context(processes=context.processes, told=told, cancelled=context.cancelled)
+        items = []
+        for seed in seeds:
+            missing = tuple((c, key) for c, key in keys.items() if (seed, key) not in rows)
+            if missing:
+                items.append(Item(seed, missing, place / f"{seed}", keep, context.output, steps))
+        total = sum(steps_of(item) for item in items)
+        for some in spread(measure, items, context, words="random rooms", steps=total):
+            rows |= {(row["seed"], row["key"]): row for row in some}
+    return _summed_up({c: [rows[seed, key] for seed in seeds] for c, key in keys.items()}, seeds)
 
 
 def _chosen(context: Context) -> tuple[Case, ...]:
@@ -136,7 +109,9 @@ def _summed_up(found: dict[Case, list[dict[str, Any]]], seeds: range) -> Result:
                 }
                 for c in causes
             ],
-            "rooms": [{k: v for k, v in row.items() if k not in ("causes", "key")} for row in rows],
+            "rooms": [{k: v for k, v in row.items() if k not in ("causes", "key")}
+                for row in rows
+            ],
         }  # fmt: skip
     settings = EvaluationSettings()
     notes.append(

@@ -48,7 +48,7 @@ def direct(choices: Choices, room: Furnished) -> list[Script]:
     rng = generator(choices.seed, 4)
     times = np.arange(0.0, choices.duration + 1e-9, 1.0 / _SAMPLES)
     seats, beds = list(room.seats), list(room.beds)
-    rng.shuffle(seats)  # type: ignore[arg-type]
+    rng.shuffle(seats)
     order = sorted(
         range(choices.people),
         key=lambda n: ("lies", "sits", "rises", "stands", "walks", "comes and goes").index(

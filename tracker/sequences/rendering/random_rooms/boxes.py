@@ -110,7 +110,7 @@ def write_detections(path: Path, choices: Choices, number: int, camera: Camera, 
     sizes = boxes[np.isfinite(boxes[..., 0])][:, 2:]
     rows: list[tuple[int, ndarray, float]] = []
     false: list[tuple[int, ndarray]] = []
-    for step in range(choices.steps):
+    for step in range(len(boxes)):
         kept: list[ndarray] = []
         for person in np.argsort(-np.nan_to_num(shares[step])):
             box, share = boxes[step, person], shares[step, person]

@@ -130,7 +130,7 @@ def _centres(choices: Choices, poses: Poses, script: Script) -> Float[ndarray, "
     """The middle of what is tracked."""
     trunk = (poses.joints[:, PELVIS] + poses.joints[:, HEAD]) / 2.0
     if script.bed is not None:
-        return trunk
+        return np.asarray(trunk)
     if choices.target == "head and torso":
         return np.column_stack([trunk[:, :2], poses.top - HALF_EXTENTS["head and torso"][2]])
     # from the floor to the crown, of who sits too

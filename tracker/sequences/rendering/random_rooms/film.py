@@ -71,6 +71,7 @@ def render_random(
     folder: Path,
     *,
     detections: bool = False,
+    frames: int | None = None,
     progress: Callable[[int, int], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> Choices:
@@ -85,6 +86,7 @@ def render_random(
         seed: 0 or more.
         folder: Where to write; an existing sequence folder there is replaced.
         detections: Write the boxes that a detector would find, too.
+        frames: Number of steps from the beginning, all by default.
         progress: Called with the steps done and the number of steps.
         cancelled: Asked now and then; rendering stops when it says so.
 
@@ -92,19 +94,22 @@ def render_random(
         What is in the room.
 
     Raises:
-        ValueError: If the seed is negative.
+        ValueError: If the seed is negative, or the room has not so many steps.
         FileExistsError: If ``folder`` exists and is not a sequence folder.
         RenderCancelled: If ``cancelled`` said so.
     """
     choices = choose(seed)
+    count = choices.steps if frames is None else frames
+    if not 1 <= count <= choices.steps:
+        raise ValueError(f"frames must be 1 … {choices.steps} in random room {seed}, got {frames}")
     asked = cancelled or (lambda: False)
     with whole_folder(folder) as work:
         if progress is not None:
-            progress(0, choices.steps)
+            progress(0, count)
         if asked():
             raise RenderCancelled(f"random room {seed}")
         filmed = prepare(choices)
-        corners, visible = _shoot(filmed, work, progress, asked)
+        corners, visible = _shoot(filmed, work, count, progress, asked)
         _write(filmed, work, corners, visible, detections)
     return choices
 
@@ -145,11 +150,11 @@ def _empty(tracer: Tracer, camera: Camera) -> Background:
 
 
 def _shoot(
-    filmed: Set, work: Path, progress: Callable[[int, int], None] | None,
+    filmed: Set, work: Path, steps: int, progress: Callable[[int, int], None] | None,
     cancelled: Callable[[], bool],
 ) -> tuple[Float[ndarray, "F P C 4"], Float[ndarray, "F P C"]]:  # fmt: skip
     """Draw and write the videos; the people's uncut corners and visible shares."""
-    choices, steps = filmed.choices, filmed.choices.steps
+    choices = filmed.choices
     corners = np.full((steps, choices.people, choices.cameras, 4), np.nan)
     visible = np.zeros((steps, choices.people, choices.cameras))
     with ExitStack() as stack:
@@ -193,7 +198,8 @@ def _write(filmed: Set, work: Path, corners: ndarray, visible: ndarray, detectio
     names = [camera.name for camera in cameras]
     figures = filmed.studio.scene.figures
     seen = seen_by(cameras, corners, visible)
-    inside = np.stack([figure.inside for figure in figures], axis=1)
+    steps = len(visible)
+    inside = np.stack([figure.inside[:steps] for figure in figures], axis=1)
     valid = certain(seen)
     # a calibration has its origin anywhere
     rng = generator(choices.seed, 7)
@@ -223,7 +229,7 @@ def _write(filmed: Set, work: Path, corners: ndarray, visible: ndarray, detectio
         name=f"random-{choices.seed}",
         description=_sentence(choices),
         fps=choices.fps,
-        frames=choices.steps,
+        frames=steps,
         minimum=np.array([-half[0], -half[1], 0.0]) + origin,
         maximum=np.array([half[0], half[1], round(max(2.0, tallest + _HEADROOM), 2)]) + origin,
         entrances=entrances if choices.entrances else (),

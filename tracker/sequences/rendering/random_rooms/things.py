@@ -155,7 +155,10 @@ def _screen(choices: Choices, room: Furnished, rng: np.random.Generator) -> Scre
 
 
 def _plant(choices: Choices, place: tuple[float, float], rng: np.random.Generator) -> Plant:
-    vertices, normals, triangles, phases = [], [], [], []
+    vertices: list[ndarray] = []
+    normals: list[ndarray] = []
+    triangles: list[ndarray] = []
+    phases: list[ndarray] = []
     for number in range(46):
         yaw = 2.4 * number + float(rng.uniform(-0.3, 0.3))
         rise = 0.42 + 0.018 * number + float(rng.uniform(-0.04, 0.04))
@@ -171,7 +174,7 @@ def _plant(choices: Choices, place: tuple[float, float], rng: np.random.Generato
         up /= np.linalg.norm(up)
         for sign in (1.0, -1.0):  # both faces of a leaf
             faces = np.array([[0, 2, 1], [1, 2, 4], [1, 4, 3], [3, 4, 5]])
-            start = sum(len(part) for part in vertices)
+            start = 6 * len(vertices)  # of the leaves so far
             first = leaf[faces[0]]
             outward = np.cross(first[1] - first[0], first[2] - first[0]) @ (sign * up) > 0.0
             triangles.append((faces if outward else faces[:, ::-1]) + start)
