@@ -40,8 +40,17 @@ PANEL_WIDTH = 276
 OWN_VALUES = "own values"
 """What the values are while they are no preset's, as on the page."""
 
-STAGES: dict[Stage, str] = {"single_view": "Single view", "fusion": "Fusion", "tracks": "Tracks"}
-METHOD_STAGE: dict[MethodKey, Stage] = {"single_view": "single_view", "fusion_method": "fusion"}
+STAGES: dict[Stage, str] = {
+    "single_view": "Single view",
+    "fusion": "Fusion",
+    "smoothing": "Smoothing",
+    "tracks": "Tracks",
+}
+METHOD_STAGE: dict[MethodKey, Stage] = {
+    "single_view": "single_view",
+    "fusion_method": "fusion",
+    "smoothing_method": "smoothing",
+}
 
 UNFIT = " · not here"
 """Behind the name of a method that cannot work on the open sequence, as on the page."""

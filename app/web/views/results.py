@@ -26,7 +26,9 @@ def state_of(snapshot: Snapshot) -> models.State:
         changed=list(table.changed(parameters, snapshot.defaults)),
         command=command_line(snapshot),
         methods=models.MethodsInfo(
-            single_view=parameters.single_view, fusion_method=parameters.fusion_method
+            single_view=parameters.single_view,
+            fusion_method=parameters.fusion_method,
+            smoothing_method=parameters.smoothing_method,
         ),
         unfit={str(key): names for key, names in snapshot.unfit.items()},
         presets=list(snapshot.presets),

@@ -33,7 +33,7 @@ from tracker.sequences.rendering.writing import (
     whole_folder,
 )
 
-VERSION = 3
+VERSION = 4
 """Grows when the same call would give other pictures or files."""
 VISIBILITY_FILE = "visibility.csv"
 _QUALITY = 82
