@@ -1,4 +1,4 @@
-"""The boxes of an outside detector: how far to trust them, and which contradict the room."""
+"""The boxes of an outside detector: their measurement noise, and which contradict the room."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Detected:
 
 
 class DetectorBoxes:
-    """The ``detections`` of one camera, with the trust that the parameters state."""
+    """The ``detections`` of one camera, with the measurement noise that the parameters state."""
 
     def __init__(
         self, sequence: Sequence, camera_index: int, parameters: DetectionBoxParams
