@@ -25,6 +25,7 @@ from app.models.requests import (
     StreamSeek,
     StreamSelect,
     ThemeChange,
+    TrailChanges,
     ViewChange,
 )
 from app.models.state import (
@@ -44,6 +45,7 @@ from app.models.state import (
     State,
     TargetInfo,
     TeachingInfo,
+    TrailInfo,
     ViserInfo,
 )
 from app.models.step import (
@@ -122,6 +124,8 @@ __all__ = [
     "Timeline",
     "Track",
     "TrackLife",
+    "TrailChanges",
+    "TrailInfo",
     "Truth",
     "Vector",
     "ViewChange",

@@ -175,6 +175,13 @@ async def set_layers(wish: models.LayerChanges, bench: Bench) -> models.State:
     return results.state_of(bench.snapshot())
 
 
+@router.patch("/trail")
+async def set_trail(wish: models.TrailChanges, bench: Bench) -> models.State:
+    """Draw trails longer or shorter, fading or not."""
+    bench.set_trail(wish.seconds, wish.fades)
+    return results.state_of(bench.snapshot())
+
+
 @router.post("/view")
 async def view(wish: models.ViewChange, bench: Bench) -> models.State:
     """Look through a camera in 3D, from above, or freely again."""
@@ -213,6 +220,7 @@ async def step(
     bench: Bench,
     samples: Annotated[bool, Query(description="With each camera's samples.")] = False,
     trails: Annotated[bool, Query(description="With the tracks' ways in the pictures.")] = False,
+    seconds: Annotated[float, Query(ge=0.5, le=600.0, description="How far back.")] = 4.0,
 ) -> models.Step:
     """One step of the shown run: what each camera found, the targets, the truth."""
     snapshot = bench.snapshot()
@@ -226,7 +234,9 @@ async def step(
             f"There is no step {step}: {sequence.name} has 0 … {sequence.frames - 1}.",
             field="step",
         )
-    return steps.step_of(sequence, snapshot.run, step, with_samples=samples, with_trails=trails)
+    return steps.step_of(
+        sequence, snapshot.run, step, with_samples=samples, trails=seconds if trails else 0.0
+    )
 
 
 @router.get("/timeline")

@@ -40,6 +40,13 @@ export function mountControls({ store, actions, press }) {
 		for (const [index, name] of ["undo", "redo"].entries())
 			for (const button of all(`[data-command=${name}]`)) button.disabled = !undoable[index];
 	});
+	store.watch(["loupe", "realTime", "follow"], (state) => {
+		for (const [name, key] of /** @type {const} */ ([
+			["loupe", "loupe"],
+			["real-time", "realTime"],
+		]))
+			for (const button of all(`[data-command=${name}]`)) button.ariaPressed = String(state[key]);
+	});
 	document.addEventListener("keydown", press);
 	// A click leaves the focus where it was, so that Space goes on meaning play; only the 3D view,
 	// which keeps all keys to itself while it has the focus, gives it back.
