@@ -12,6 +12,7 @@ from app.models.base import (
     Vector,
 )
 from app.models.requests import (
+    CurveRequest,
     LayerChanges,
     OpenRequest,
     ParameterChanges,
@@ -81,6 +82,7 @@ __all__ = [
     "CameraTrack",
     "CameraTruth",
     "Counts",
+    "CurveRequest",
     "EntranceInfo",
     "Estimate",
     "Feeding",

@@ -51,6 +51,12 @@ class TrailChanges(Model):
     """Whether they are fainter the older they are."""
 
 
+class CurveRequest(Model):
+    """Compute what some parameters would change."""
+
+    keys: list[str] = Field(max_length=40)
+
+
 class LayerChanges(Model):
     """Layers of the 3D view, by name."""
 

@@ -12,6 +12,7 @@ from fastapi import APIRouter, Query, Request, Response
 from app import models
 from app.errors import ApiError, sentence
 from app.state.history import History
+from app.state.sensitivity import Sensitivity
 from app.state.teaching import Teaching
 from app.web.dependencies import (
     ERRORS,
@@ -151,6 +152,17 @@ async def use_again(request: Request, number: int, bench: Bench) -> models.State
     history: History = request.app.state.history
     teaching: Teaching = request.app.state.teaching
     history.use_again(number, teaching.restore)
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/sensitivity")
+async def compute_curves(request: Request, wish: models.CurveRequest, bench: Bench) -> models.State:
+    """Compute in the background what some parameters would change, until somebody works.
+
+    ``GET /api/tables/changes`` and the 3D view's panel show it.
+    """
+    sensitivity: Sensitivity = request.app.state.sensitivity
+    sensitivity.ask(wish.keys)
     return results.state_of(bench.snapshot())
 
 

@@ -27,6 +27,7 @@ from app.state.evaluator import Evaluator
 from app.state.history import History
 from app.state.jobs import Jobs, in_background
 from app.state.presets import OwnPresets
+from app.state.sensitivity import Sensitivity
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench
 from app.web import api, gateway, stream, teaching_routes
@@ -152,11 +153,12 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         workbench, settings.data, settings_folder() / "unsaved" if kept else None
     )
     evaluator = app.state.evaluator = Evaluator(workbench)
+    sensitivity = app.state.sensitivity = Sensitivity(workbench, settings.seed)
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
     told.start()
     opening_step.follow(workbench)
-    room = _Room(workbench, teaching)
+    room = _Room(workbench, teaching, sensitivity)
     if settings.with_viser:
         door.prepare()
         # the page is served meanwhile; requests for the 3D view wait
@@ -171,7 +173,9 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         told.stop()
         teaching.close()
         pictures.close()
-        await asyncio.gather(*(asyncio.to_thread(part.close) for part in (jobs, evaluator, room)))
+        await asyncio.gather(
+            *(asyncio.to_thread(part.close) for part in (jobs, evaluator, sensitivity, room))
+        )
 
 
 def _say_failure(name: str) -> Callable[..., None]:
@@ -199,8 +203,9 @@ async def _start_viser(room: _Room, door: Gateway, workbench: Workbench) -> None
 class _Room:
     """viser's server with what is in it."""
 
-    def __init__(self, workbench: Workbench, teaching: Teaching) -> None:
+    def __init__(self, workbench: Workbench, teaching: Teaching, sensitivity: Sensitivity) -> None:
         self._workbench = workbench
+        self._sensitivity = sensitivity
         self._teaching = teaching
         self._parts: list[Callable[[], object]] = []
 
@@ -214,7 +219,7 @@ class _Room:
         self._parts.append(server.stop)
         self._parts.append(Scene(server, self._workbench).close)
         self._parts.append(RoomEditing(server, self._workbench, self._teaching).close)
-        self._parts.append(Controls(server, self._workbench).close)
+        self._parts.append(Controls(server, self._workbench, self._sensitivity).close)
         return server
 
     def close(self) -> None:

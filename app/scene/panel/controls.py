@@ -18,7 +18,7 @@ import viser
 
 from app.scene import style
 from app.scene.keys import hotkeys
-from app.scene.panel import finding
+from app.scene.panel import curves, finding
 from app.scene.panel.sliders import (
     Scale,
     hint_text,
@@ -29,6 +29,7 @@ from app.scene.panel.sliders import (
 )
 from app.scene.panel.topics import TOPICS, Topic, topic_of
 from app.scene.worker import LatestWorker
+from app.state.sensitivity import Sensitivity
 from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
 from tracker import parameters as table
@@ -44,6 +45,9 @@ OWN_VALUES = "own values"
 METHODS: dict[MethodKey, str] = {"single_view": "Single view", "fusion_method": "Fusion"}
 """The words of the two choices of a method."""
 
+MOST_CURVES = 12
+"""Computed at one request."""
+
 UNFIT = " · not here"
 """Behind the name of a method that cannot work on the open sequence, as on the page."""
 
@@ -58,13 +62,20 @@ Input = (
 class Controls:
     """viser's panel, kept equal to the workbench's parameters, and the other way round."""
 
-    def __init__(self, server: viser.ViserServer, workbench: Workbench) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        workbench: Workbench,
+        sensitivity: Sensitivity | None = None,
+    ) -> None:
         """Make the panel and follow the workbench from now on.
 
         Args:
             server: Its panel belongs to this object.
             workbench: Whose parameters.
+            sensitivity: Tells what parameters would change; without it nothing is offered.
         """
+        self._sensitivity = sensitivity
         self._server = server
         self._workbench = workbench
         self._inputs: dict[str, Any] = {}
@@ -110,6 +121,9 @@ class Controls:
                         handle.visible = False
                         self._copies.setdefault(parameter.key, []).append(handle)
                         self._hear(parameter.key, handle)
+        self._curves: Any = None
+        if sensitivity is not None:
+            self._offer_curves(sensitivity)
         self._topics: dict[Topic, viser.GuiFolderHandle] = {}
         for topic in TOPICS:
             self._make_topic(topic)
@@ -160,6 +174,38 @@ class Controls:
         self._worker.close()
 
     # making the panel
+
+    def _offer_curves(self, sensitivity: Sensitivity) -> None:
+        """A button under what is listed, and where the curves are written."""
+        for folder, copy in ((self._essentials, 0), (self._found, -1)):
+            with folder:
+                button = self._server.gui.add_button(
+                    "What would each change?",
+                    hint="Runs the recording with a few other values of each parameter listed "
+                    "here, in the background, until somebody works again.",
+                )
+            button.on_click(partial(self._ask_curves, copy))
+        self._curves = self._server.gui.add_html("")
+        sensitivity.subscribe(lambda: self._worker.ask("refresh"))
+
+    def _ask_curves(self, copy: int, _: object) -> None:
+        assert self._sensitivity is not None
+        keys = [key for key, copies in self._copies.items() if copies[copy].visible]
+        self._sensitivity.ask(keys[:MOST_CURVES])
+
+    def _show_curves(self, parameters: RunParameters) -> None:
+        if self._sensitivity is None:
+            return
+        content = curves.style_of(
+            (
+                curve,
+                table.value(parameters, key),
+                [h._impl.uuid for h in (self._inputs[key], *self._copies.get(key, ()))],
+            )
+            for key, curve in self._sensitivity.curves().items()
+        )
+        if self._curves.content != content:
+            self._curves.content = content
 
     def _make_topic(self, topic: Topic) -> None:
         parameters = [p for p in table.PARAMETERS.values() if topic_of(p) == topic]
@@ -313,6 +359,7 @@ class Controls:
             self._reset_all.visible = bool(changed)
             self._show_presets(snapshot)
             self._values.content = self._value_style(parameters, changed)
+            self._show_curves(parameters)
         self._server.flush()
 
     def _show_found(self, shown: set[str], changed: set[str]) -> None:

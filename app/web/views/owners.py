@@ -49,7 +49,7 @@ def tell_owners(message: models.Step, sequence: Sequence, run: Run, step: int) -
         )
         best = shares.argmax(axis=1) if feeding else np.zeros(len(shares), dtype=np.int64)
         owned = shares.max(axis=1, initial=0.0) >= SAME
-        for i in np.flatnonzero(owned):
+        for i in np.flatnonzero(owned).tolist():
             camera.measurements[i].track = feeding[best[i]][0]
         free = np.flatnonzero(~owned)
         if not len(free) or not len(states):

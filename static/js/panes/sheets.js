@@ -116,6 +116,7 @@ export function mountSheets({ store, actions }) {
 		palette.close();
 		one.run();
 	}
+	store.on(["timeline", "sequences"], () => palette.open && offer());
 	input.addEventListener("input", () => {
 		at = 0;
 		offer();
