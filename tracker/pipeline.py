@@ -1,4 +1,4 @@
-"""Sequence + parameters → run: the three stages, step by step, with progress and cancel."""
+"""Sequence + parameters → run: stage after stage, with progress and cancel."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 
-from tracker import fusion
+from tracker import fusion, smoothing
 from tracker import trajectories as tracks_stage
 from tracker.parameters import RunParameters, Stage
 from tracker.runs.fitting import default_parameters
 from tracker.runs.run import Cancelled, Progress, Run, stage_keys
 from tracker.runs.single_views import Cancel, SingleViews
-from tracker.runs.stage_cache import FusionColumn, StageCache, ViewColumn
+from tracker.runs.stage_cache import FusionColumn, StageCache, TrackColumn, ViewColumn
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.trajectories import Bounds, Trajectories
@@ -39,7 +39,11 @@ def compute(
     cancelled: Cancel = lambda: False,
     thread_begins: Callable[[], None] = lambda: None,
 ) -> Run:
-    """Run the three stages over a sequence.
+    """Run the stages over a sequence.
+
+    Step by step the run has what the filter says of the people, in ``tracks`` and ``filtered``
+    alike. When all steps are there, the smoothing looks at them together, and its people take
+    the place of the filter's in ``tracks``; ``on_progress`` is told of both.
 
     Args:
         sequence: What to track in.
@@ -74,6 +78,7 @@ def compute(
     sound = False
     try:
         _fuse(run, total, reader, telling, cancelled, thread_begins)
+        _smooth(run, total, telling, cancelled)
         sound = True
     except Cancelled:
         sound = True
@@ -101,10 +106,10 @@ class _Telling:
         self._first = len(run.fused)
         self._begin = self._last_told = time.perf_counter()
         self._preparing = 0.0
-        self._ids: dict[int, int] = {}
+        self.ids: dict[int, int] = {}
         self._stage: Stage = "single_view"
         if len(run.views) >= total:
-            self._stage = "fusion" if len(run.fused) < total else "tracks"
+            self._stage = "fusion" if len(run.fused) < total else _last_stage(run)
 
     def after_step(self) -> None:
         """Tell if it is time."""
@@ -118,8 +123,8 @@ class _Telling:
         """Make the tracks of all steps that are fused, and tell."""
         run = self._run
         if run.done < len(run.fused):
-            run.tracks = tracks_stage.concatenate(
-                [run.tracks, self._extract()], len(run.sequence.views)
+            run.tracks = run.filtered = tracks_stage.concatenate(
+                [run.filtered, self._extract()], len(run.sequence.views)
             )
             run.done = len(run.fused)
         if self._on_progress is not None:
@@ -137,13 +142,9 @@ class _Telling:
             cameras=len(run.sequence.views),
             extraction_threshold=p.extraction_threshold,
             rule=p.extraction if used.reads_number("fusion", "extraction") else "components",
-            bounds=Bounds(
-                run.sequence.room,
-                p.room_margin,
-                float(run.sequence.target_half_extents[2]) / 2.0,
-            ),
+            bounds=_bounds(run),
             first_frame=run.done,
-            ids=self._ids,
+            ids=self.ids,
         )
 
 
@@ -179,6 +180,44 @@ def _fuse(
     telling.now()
 
 
+def _last_stage(run: Run) -> Stage:
+    """What is left of a run that is fused."""
+    there = run.parameters.smoothing_method == "none" or run.smoothed is not None
+    return "tracks" if there else "smoothing"
+
+
+def _smooth(run: Run, total: int, telling: _Telling, cancelled: Cancel) -> None:
+    """Put the smoothed people in the place of the filter's."""
+    if run.parameters.smoothing_method == "none" or run.tracks is not run.filtered:
+        return
+
+    def check() -> None:
+        if cancelled():
+            raise Cancelled
+
+    check()
+    if run.smoothed is None:
+        method = smoothing.create(run.sequence, run.parameters)
+        run.smoothed = method.smooth(run.views[:total], run.fused[:total], check)
+        if run.smoothed is None:
+            return
+    run.tracks = smoothing.tracks_of(
+        run.smoothed,
+        run.fused,
+        telling.ids,
+        extraction_threshold=run.parameters.fusion.extraction_threshold,
+        bounds=_bounds(run),
+        near=2.0 * float(run.sequence.target_half_extents[:2].mean()),
+    )
+    telling.now()
+
+
+def _bounds(run: Run) -> Bounds:
+    """Where people are reported."""
+    below = float(run.sequence.target_half_extents[2]) / 2.0
+    return Bounds(run.sequence.room, run.parameters.fusion.room_margin, below)
+
+
 def _adopt(run: Run, previous: Run | None) -> None:
     """Take over the columns of an earlier run whose keys agree."""
     if previous is None:
@@ -188,6 +227,8 @@ def _adopt(run: Run, previous: Run | None) -> None:
         run.costly = previous.costly
     if previous.keys["fusion"] == run.keys["fusion"]:
         run.fused, run.fusion_state = list(previous.fused), previous.fusion_state
+    if previous.keys["smoothing"] == run.keys["smoothing"] and previous.complete:
+        run.smoothed = previous.smoothed
 
 
 def _take(run: Run, cache: StageCache) -> None:
@@ -200,9 +241,12 @@ def _take(run: Run, cache: StageCache) -> None:
     fused = cache.fusion(run.keys["fusion"])
     if fused is not None and len(fused.steps) > len(run.fused):
         run.fused, run.fusion_state = list(fused.steps), fused.state
-    tracks = cache.tracks(run.key)
-    if tracks is not None and len(run.fused) == frames:
-        run.tracks, run.done = tracks, frames
+    if len(run.fused) < frames:
+        return
+    run.smoothed = run.smoothed or cache.smoothed(run.keys["smoothing"])
+    found = cache.tracks(run.key)
+    if found is not None and _last_stage(run) == "tracks":
+        run.tracks, run.filtered, run.done = found.tracks, found.filtered, frames
 
 
 def _keep(run: Run, cache: StageCache, *, fused: bool) -> None:
@@ -214,4 +258,7 @@ def _keep(run: Run, cache: StageCache, *, fused: bool) -> None:
     if fused and run.fused:
         cache.keep_fusion(run.keys["fusion"], FusionColumn(run.fused, run.fusion_state))
     if fused and run.complete:
-        cache.keep_tracks(run.key, run.tracks)
+        if run.smoothed is not None:
+            cache.keep_smoothed(run.keys["smoothing"], run.smoothed)
+        if _last_stage(run) == "tracks":
+            cache.keep_tracks(run.key, TrackColumn(run.tracks, run.filtered))

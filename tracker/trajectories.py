@@ -1,4 +1,4 @@
-"""The labelled result of a run, by columns: stage 3."""
+"""The labelled result of a run, by columns."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ class Trajectories:
     seen: Bool[ndarray, "N C"]
     """Whether a box of each camera fed the target at this step; none: it is coasting."""
     components: Int[ndarray, " N"]
-    """Index of the component in the step's posterior."""
+    """Index of the component in the step's posterior; -1 where smoothed tracks have none."""
     labels: Int[ndarray, " N"]
-    """The component's label, of which the id is the short form."""
+    """The component's label, of which the filter's id is the short form; -1 for none."""
 
     def __len__(self) -> int:
         return len(self.frames)

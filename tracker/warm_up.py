@@ -104,7 +104,12 @@ def _ways(half: str) -> Iterable[RunParameters]:
         for fusion_method in _own("fusion_method")
     )
     if half == HALVES[0]:
-        return chain([RunParameters(single_view="none")], of_fusions)
+        of_smoothings = (
+            RunParameters(single_view=single_view, smoothing_method=smoothing_method)
+            for single_view in FOLLOWING
+            for smoothing_method in _own("smoothing_method")
+        )
+        return chain(of_smoothings, of_fusions)
     boxes = RunParameters(single_view="detection_phd", fusion_method="sequential_phd")
     return chain([boxes], of_views)
 

@@ -14,7 +14,9 @@ from typing import Annotated, Any, Literal
 import tyro
 from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subcommand
 
+from app.command.library_flags import LibraryCommand, LibraryFile, Runs
 from tracker import parameters as table
+from tracker.library import KEEP
 from tracker.parameters import FOLLOWS, METHODS, PRESETS, Parameter, ParameterError
 
 DEFAULT_SEQUENCE = "room44-3p"
@@ -42,6 +44,10 @@ class Serve:
     """Open the page in a browser; by default where there is a screen."""
     data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None
     """Folder whose folders are sequences that can be chosen on the page."""
+    library: LibraryFile = None
+    """The file that finished runs are kept in."""
+    keep: Annotated[int, arg(metavar="INT")] = KEEP
+    """Kept runs without star, name, note and tags that stay, the newest ones; 0 keeps none."""
 
 
 @dataclass
@@ -67,6 +73,10 @@ class Track:
         ),
     ] = None
     """Method of stage 2."""
+    smoothing_method: Annotated[
+        str | None, arg(name="smoothing", metavar="|".join(METHODS["smoothing_method"]))
+    ] = None
+    """Method of stage 3."""
     preset: Annotated[
         str | None, arg(metavar="|".join(PRESETS), help_behavior_hint="(default: robust)")
     ] = None
@@ -77,9 +87,14 @@ class Track:
     ] = ()
     """One parameter, as in --set fusion.survival_probability=0.98; `parameters` lists the keys."""
     seed: int = 0
-    """Seed of all randomness; the same seed gives the same tracks."""
+    """Seed of all randomness; the same seed gives the same tracks, but for last digits on processors
+    without fused multiply-add."""
     cache: bool = True
     """Take up what the cameras found in an earlier run with the same values, and keep it."""
+    library: LibraryFile = None
+    """The file that finished runs are kept in."""
+    keep: Annotated[int, arg(metavar="INT")] = KEEP
+    """Kept runs without star, name, note and tags that stay, the newest ones; 0 keeps none."""
 
     def changes(self) -> dict[str, Any]:
         """The values asked for, by key: preset, then ``--set``, then flags.
@@ -101,6 +116,7 @@ class Track:
         for key, chosen in (
             ("single_view", self.single_view),
             ("fusion_method", self.fusion_method),
+            ("smoothing_method", self.smoothing_method),
         ):
             if chosen is not None:
                 changes[key] = chosen
@@ -351,6 +367,8 @@ Arguments = (
     | Sequences
     | Render
     | Parameters
+    | Runs
+    | LibraryCommand
 )
 
 
@@ -373,6 +391,8 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         | Annotated[Sequences, subcommand("sequences")]
         | Annotated[Render, subcommand("render")]
         | Annotated[Parameters, subcommand("parameters")]
+        | Annotated[Runs, subcommand("runs")]
+        | Annotated[LibraryCommand, subcommand("library")]
     )
     parsed: Arguments = tyro.cli(
         commands,

@@ -75,6 +75,7 @@ class MethodsInfo(Model):
 
     single_view: str
     fusion_method: str
+    smoothing_method: str
 
 
 class RunInfo(Model):
@@ -90,6 +91,10 @@ class RunInfo(Model):
     message: str
     """The stage that takes the time."""
     error: str | None
+    kept: int | None
+    """Its number in the library that it was taken from; what the cameras found is not there."""
+    stands_for: str
+    """The key that a computation would have, where older code made what is shown; else empty."""
 
 
 class PinnedInfo(Model):
@@ -146,8 +151,8 @@ class State(Model):
     """The command that computes the same in a terminal; empty while nothing is open."""
     methods: MethodsInfo
     unfit: dict[str, dict[str, str]]
-    """Methods that cannot work on the sequence with the values chosen: by ``single_view`` or
-    ``fusion_method``, the sentence why by the method's name."""
+    """Methods that cannot work on the sequence with the values chosen: by ``single_view``,
+    ``fusion_method`` or ``smoothing_method``, the sentence why by the method's name."""
     presets: list[str]
     """Names of those that a person has saved."""
     preset: str | None

@@ -14,6 +14,7 @@ from app.state.scores import Scored
 from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
 from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
+from tracker.trajectories import Trajectories
 
 logger = logging.getLogger("app")
 
@@ -43,7 +44,9 @@ class Evaluator:
         self._newest: tuple[str, bool] = ("", False)
         self._newest_since = 0.0
         self._failed: set[tuple[str, int]] = set()
-        self._beginnings: OrderedDict[tuple[str, int], Evaluation] = OrderedDict()
+        self._beginnings: OrderedDict[tuple[str, int], tuple[Trajectories, Evaluation]] = (
+            OrderedDict()
+        )
         self._unsubscribe = workbench.subscribe(self._on_change)
         self._thread = threading.Thread(target=self._work, name="evaluation", daemon=True)
         self._thread.start()
@@ -62,11 +65,11 @@ class Evaluator:
             return scored.evaluation
         key = (scored.key, steps)
         with self._condition:
-            known = self._beginnings.get(key)
-        if known is None:
+            tracks, known = self._beginnings.get(key, (None, None))
+        if known is None or tracks is not scored.tracks:
             known = self._score(replace(scored, steps=steps))
             with self._condition:
-                self._beginnings[key] = known
+                self._beginnings[key] = scored.tracks, known
                 while len(self._beginnings) > KEPT:
                     self._beginnings.popitem(last=False)
         return known
@@ -96,6 +99,7 @@ class Evaluator:
         if run is not None and run.done:
             scored, shown = Scored.of(run), scores.shown
             is_new = shown is None or (shown.key, shown.steps) != (scored.key, scored.steps)
+            is_new = is_new or (shown is not None and shown.tracks is not scored.tracks)
             if is_new and (scored.key, scored.steps) not in self._failed:
                 over = scored.complete or snapshot.run_state.state != "computing"
                 if self._newest != (scored.key, over):

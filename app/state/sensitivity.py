@@ -96,6 +96,8 @@ class Sensitivity:
         self._cancelled = threading.Event()
         self._closed = False
         self._curves: dict[tuple[str, str], Curve] = {}
+        self._last: Run | None = None
+        """Stages are taken from it where the shown run is not finished."""
         self._listeners: list[Callable[[], None]] = []
         self._unsubscribe = workbench.subscribe(self._on_change)
         self._thread = threading.Thread(target=self._work, name="sensitivity", daemon=True)
@@ -163,6 +165,7 @@ class Sensitivity:
         with self._condition:
             if change == "sequence":
                 self._curves.clear()
+                self._last = None
             if self._wanted:
                 self._wanted = []
                 self._cancelled.set()
@@ -233,20 +236,16 @@ class Sensitivity:
                 parameters,
                 seed=self._seed,
                 reader=now.reader,
-                previous=_whole(now.run),
+                previous=now.run if now.run is not None and now.run.complete else self._last,
                 cancelled=cancelled.is_set,
                 thread_begins=be_nice,
             )
         except ValueError as error:
             logger.info("%s", sentence(error))
             return None
+        self._last = run
         if sequence.ground_truth is None:
             return float(len(set(run.tracks.ids.tolist())))
         evaluation = evaluate_sequence(sequence, run.tracks, self._settings)
         figures = {figure.definition.key: figure.value for figure in evaluation.figures}
         return figures["mota"]
-
-
-def _whole(run: Run | None) -> Run | None:
-    """The shown run where it is finished: of one that grows nothing is taken."""
-    return run if run is not None and run.complete else None

@@ -22,6 +22,8 @@ def command_line(snapshot: Snapshot) -> str:
         return ""
     words = ["multiview-phd", "track", _named(sequence), "-o", "tracks.csv"]
     words += ["--single-view", parameters.single_view, "--fusion", parameters.fusion_method]
+    if parameters.smoothing_method != snapshot.defaults.smoothing_method:
+        words += ["--smoothing", parameters.smoothing_method]
     for key, value in table.changed(parameters, snapshot.defaults).items():
         if key not in table.METHODS:
             words += ["--set", f"{key}={_written(value)}"]

@@ -26,6 +26,7 @@ from app.state.compiling import Compiling
 from app.state.evaluator import Evaluator
 from app.state.history import History
 from app.state.jobs import Jobs, in_background
+from app.state.keeper import Keeper
 from app.state.presets import OwnPresets
 from app.state.sensitivity import Sensitivity
 from app.state.teaching import Teaching
@@ -33,6 +34,7 @@ from app.state.workbench import Workbench
 from app.web import api, gateway, stream, teaching_routes
 from app.web.evaluation import routes as evaluation
 from app.web.gateway import Gateway
+from app.web.library import routes as library
 from app.web.manual import Manual
 from app.web.pictures import foreground, likelihood_routes
 from app.web.pictures.jpegs import Pictures
@@ -44,6 +46,7 @@ from app.web.tables import tables, teaching_tables
 from app.web.views.timeline import Timelines
 from tracker import __version__
 from tracker.folders import settings_folder
+from tracker.library import KEEP
 from tracker.pipeline import Cancelled
 from tracker.runs.stage_cache import StageCache
 
@@ -63,6 +66,7 @@ ROUTERS = (
     teaching_routes.router,
     teaching_tables.router,
     evaluation.router,
+    library.router,
     stream.router,
     gateway.router,
 )
@@ -85,6 +89,12 @@ class Settings:
     with_viser: bool = True
     keep_on_disk: bool = False
     """Whether what was compiled and what the cameras found is kept for the next start."""
+    library: Path | None = None
+    """The file that keeps runs; None: they are not kept."""
+    keep: int = KEEP
+    """How many untouched runs stay in it."""
+    run: int | None = None
+    """A run of it that is shown at once, instead of a sequence."""
     say: Callable[[str], None] = lambda words: None
     """Told what somebody in front of the terminal should know."""
 
@@ -154,6 +164,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     )
     evaluator = app.state.evaluator = Evaluator(workbench)
     sensitivity = app.state.sensitivity = Sensitivity(workbench, settings.seed)
+    keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep)
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
     told.start()
@@ -163,7 +174,13 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         door.prepare()
         # the page is served meanwhile; requests for the 3D view wait
         starting = asyncio.create_task(_start_viser(room, door, workbench))
-    if settings.sequence is not None:
+    if settings.run is not None:
+        result = keeper.library().result(settings.run)
+        opening = jobs.open(result.place)
+        library.then_show(opening, jobs, workbench, result).add_done_callback(
+            _say_failure(result.run.title)
+        )
+    elif settings.sequence is not None:
         jobs.open(settings.sequence).add_done_callback(_say_failure(settings.sequence))
     try:
         yield
@@ -174,7 +191,10 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         teaching.close()
         pictures.close()
         await asyncio.gather(
-            *(asyncio.to_thread(part.close) for part in (jobs, evaluator, sensitivity, room))
+            *(
+                asyncio.to_thread(part.close)
+                for part in (keeper, jobs, evaluator, sensitivity, room)
+            )
         )
 
 

@@ -47,7 +47,7 @@ class _Page:
         self.wake = asyncio.Event()
         self.wake.set()
         self.told_step: tuple[Any, ...] = ()
-        self.told_timeline: tuple[str, str, int] = ("", "", 0)
+        self.told_timeline: tuple[str, str, int, bool] = ("", "", 0, False)
         self.told_evaluation: tuple[str, int] | None = None
         self.due: set[str] = set()
         """Kinds of message that are held back for a moment."""
@@ -253,11 +253,13 @@ def _remind(page: _Page) -> None:
     page.wake.set()
 
 
-def _shown(snapshot: Snapshot) -> tuple[str, str, int]:
-    """What a timeline shows: of another sequence, run or length it is another."""
+def _shown(snapshot: Snapshot) -> tuple[str, str, int, bool]:
+    """What a timeline shows: of another sequence, run or length, or smoothed, it is
+    another."""
     run = snapshot.run
-    key, done = (run.key, run.done) if run is not None else ("", 0)
-    return snapshot.sequence_key, key, done
+    if run is None:
+        return snapshot.sequence_key, "", 0, False
+    return snapshot.sequence_key, run.key, run.done, run.smoothed is not None
 
 
 def _with_type(kind: str, message: models.Model) -> str:

@@ -15,6 +15,10 @@ _BOXES = ("none", "detection_phd")
 """The single-view methods that start from boxes; ``jpda`` can, and all others need pictures."""
 
 
+_LATER = ("fusion.", "smoothing")
+"""What the keys of values begin with that stage 1 does not depend on."""
+
+
 @dataclass(frozen=True, slots=True)
 class Combination:
     """One way to run: a single-view method with its values, then a fusion with its own."""
@@ -32,6 +36,7 @@ class Combination:
             RunParameters(),
             {
                 **PRESETS[self.preset],
+                "smoothing_method": "none",
                 "single_view": self.single_view,
                 "fusion_method": self.fusion_method,
                 **dict(self.changes),
@@ -41,13 +46,13 @@ class Combination:
     @property
     def view_name(self) -> str:
         """What stage 1 is called: combinations of the same name share it."""
-        own = [f"{key}={new}" for key, new in self.changes if not key.startswith("fusion.")]
+        own = [f"{key}={new}" for key, new in self.changes if not key.startswith(_LATER)]
         return " ".join([self.preset, self.single_view, *own])
 
     @property
     def name(self) -> str:
         """What the whole is called."""
-        own = [f"{key}={new}" for key, new in self.changes if key.startswith("fusion.")]
+        own = [f"{key}={new}" for key, new in self.changes if key.startswith(_LATER)]
         return " ".join([self.view_name, self.fusion_method, *own])
 
 
@@ -63,7 +68,13 @@ def combinations(sequence: Sequence) -> list[Combination]:
 
 def alternatives(sequence: Sequence) -> list[Combination]:
     """Every value of every choice that the defaults do not take, one at a time."""
-    found = []
+    found = [
+        Combination("robust", single_view, fusion_method, (*changes, ("smoothing_method", method)))
+        for single_view, changes in _reading(sequence, "smoothing")
+        for fusion_method in METHODS["fusion_method"]
+        for method in METHODS["smoothing_method"]
+        if method != "none"
+    ]
     for key, parameter in PARAMETERS.items():
         values: tuple[Any, ...] = parameter.choices if parameter.kind == "choice" else ()
         if parameter.kind == "bool":
@@ -72,12 +83,15 @@ def alternatives(sequence: Sequence) -> list[Combination]:
             if new != parameter.default and _possible(sequence, key, new):
                 for single_view, changes in _reading(sequence, parameter.group):
                     for fusion_method in _asking(parameter.group):
+                        own = dict(changes)
+                        if parameter.group == "smoothing":
+                            own["smoothing_method"] = "identities"
                         found.append(
                             Combination(
                                 "robust",
                                 single_view,
                                 fusion_method,
-                                tuple({**dict(changes), key: new}.items()),
+                                tuple({**own, key: new}.items()),
                             )
                         )
     return list(dict.fromkeys(found))
@@ -111,7 +125,7 @@ def _fusions(preset: str) -> tuple[str, ...]:
 def _reading(sequence: Sequence, group: str) -> Iterator[tuple[str, tuple[tuple[str, Any], ...]]]:
     """The single-view methods that a group of parameters matters to."""
     possible = dict(_single_views(sequence))
-    if group == "fusion":
+    if group in ("fusion", "smoothing"):
         names = ("none",) if sequence.has_detections else ("colour_phd",)
     elif group == "foreground":
         names = ("colour_phd", "jpda", "association_matrix")

@@ -23,9 +23,9 @@ FILE = RECORDS / "sweeps.json"
 
 ROOM, FIRST, FRAMES = "room44-3p", 360, 600
 """Steps of a rendered room in which three people walk about."""
-STEPS = {"single_view": 90, "fusion": 400, "tracks": 400}
+STEPS = {"single_view": 90, "fusion": 400, "smoothing": 400, "tracks": 400}
 """That are run, by the stage of the parameter."""
-VALUES = {"single_view": 4, "fusion": 6, "tracks": 6}
+VALUES = {"single_view": 4, "fusion": 6, "smoothing": 6, "tracks": 6}
 """Values over the range, beside the default."""
 
 FIGURES = {"found_share": 4, "false_per_step": 4, "position_error": 4}
@@ -105,7 +105,9 @@ def _piece(group: str, data: Path) -> tuple[str, Sequence]:
 def _base(group: str, parameter: Parameter) -> dict[str, Any]:
     """The method that reads a group, and what else must be chosen for a value to matter."""
     changes: dict[str, Any] = {"fusion_method": "multi_bernoulli"}
-    if group in ("fusion", "foreground"):
+    if group == "smoothing":
+        changes["smoothing_method"] = "identities"
+    if group in ("fusion", "foreground", "smoothing"):
         changes["single_view"] = "colour_phd"
     else:
         changes["single_view"] = next(

@@ -13,7 +13,8 @@ from tracker.parameters import GROUPS, METHODS, PARAMETERS, Parameter, RunParame
 STAGES = {
     "single_view": "Stage 1, single view",
     "fusion": "Stage 2, fusion",
-    "tracks": "Stage 3, tracks",
+    "smoothing": "Stage 3, smoothing",
+    "tracks": "Stage 4, tracks",
 }
 
 INTRODUCTION = """# Tuning: what each parameter does

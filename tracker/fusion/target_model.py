@@ -189,8 +189,14 @@ class TargetModel:
             view: Boxes and how far each is to be trusted.
             factor: On the standard deviations.
         """
+        return self.measured_boxes(view.boxes, view.sigmas, factor)
+
+    def measured_boxes(
+        self, boxes: Float[ndarray, "M 4"], sigmas: Float[ndarray, "M 4"], factor: float
+    ) -> Measurements:
+        """As :meth:`measured`, of boxes and their standard deviations, pixels."""
         return measurement.measured_boxes(
-            np.ascontiguousarray(view.boxes, dtype=float),
-            np.ascontiguousarray((factor * view.sigmas) ** 2, dtype=float),
+            np.ascontiguousarray(boxes, dtype=float),
+            np.ascontiguousarray((factor * sigmas) ** 2, dtype=float),
             *self.transforms,
         )

@@ -218,3 +218,22 @@ def hide(
                 strongest = effect
                 hidden_by[j] = labels[other]
     return Hidden(result, hidden_by)
+
+
+@kernel
+def alone(boxes: ndarray, starts: ndarray) -> ndarray:
+    """Which of a camera's boxes (B, 4), centre and half sizes, touch no other of their step.
+
+    Args:
+        starts: (T + 1,), where each step's boxes begin, and the end.
+    """
+    result = np.ones(len(boxes), dtype=np.bool_)
+    for step in range(len(starts) - 1):
+        for i in range(starts[step], starts[step + 1]):
+            for j in range(starts[step], i):
+                across = abs(boxes[i, 0] - boxes[j, 0]) < boxes[i, 2] + boxes[j, 2]
+                down = abs(boxes[i, 1] - boxes[j, 1]) < boxes[i, 3] + boxes[j, 3]
+                if across and down:
+                    result[i] = False
+                    result[j] = False
+    return result

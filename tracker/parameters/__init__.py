@@ -22,6 +22,7 @@ from tracker.parameters.fusion import FusionParams
 from tracker.parameters.jpda import JpdaParams
 from tracker.parameters.methods import Method, MethodKey, Reads, Uses
 from tracker.parameters.pseudo_particle import PseudoParticleParams
+from tracker.parameters.smoothing import SmoothingParams
 
 if TYPE_CHECKING:
     from tracker.parameters.changing import (
@@ -65,6 +66,7 @@ __all__ = [
     "PseudoParticleParams",
     "Reads",
     "RunParameters",
+    "SmoothingParams",
     "Stage",
     "Uses",
     "changed",

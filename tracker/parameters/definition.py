@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-Stage = Literal["single_view", "fusion", "tracks"]
+Stage = Literal["single_view", "fusion", "smoothing", "tracks"]
 
 NO_CONDITION: Mapping[str, tuple[Any, ...]] = MappingProxyType({})
 

@@ -1,6 +1,6 @@
 """What a method is to everybody else: its name, what it uses, and how it is made.
 
-A method of stage 1 or 2 is described once, by a :class:`Method`. From the descriptions
+A method of stage 1, 2 or 3 is described once, by a :class:`Method`. From the descriptions
 come the choices of the command line and of the page, the parameters that are shown and
 that a result depends on, and whether a method can work on a recording. Those of this
 project and those of other packages are registered alike: see
@@ -19,8 +19,8 @@ from tracker.parameters.definition import Params
 if TYPE_CHECKING:
     from tracker.parameters.run import RunParameters
 
-MethodKey = Literal["single_view", "fusion_method"]
-"""The parameter that chooses the method of stage 1, or that of stage 2."""
+MethodKey = Literal["single_view", "fusion_method", "smoothing_method"]
+"""The parameter that chooses the method of stage 1, of stage 2, or of stage 3."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ class Uses:
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """One method of stage 1 or stage 2.
+    """One method of stage 1, 2 or 3.
 
     Args:
         name: By which it is chosen; a word in snake_case.
@@ -69,7 +69,8 @@ class Method:
             camera_index, parameters, reader)`` and takes a
             :class:`~tracker.single_view.protocol.SingleViewMethod`; stage 2 with
             ``(sequence, parameters)`` and takes a
-            :class:`~tracker.fusion.protocol.FusionMethod`. ``parameters`` are those of the
+            :class:`~tracker.fusion.protocol.FusionMethod`; stage 3 with the same and takes a
+            :class:`~tracker.smoothing.protocol.SmoothingMethod`. ``parameters`` are those of the
             run, where its own are found by :meth:`RunParameters.of`.
         uses: What it uses, or a function that tells it of the values chosen. Whatever is
             left out here is shown to nobody and must change no result.

@@ -13,6 +13,7 @@ from tracker.parameters.table import METHODS, PARAMETERS
 CHOSEN_BY: dict[Stage, MethodKey] = {
     "single_view": "single_view",
     "fusion": "fusion_method",
+    "smoothing": "smoothing_method",
     "tracks": "fusion_method",
 }
 """The parameter that chooses the method which a stage's numbers are for."""

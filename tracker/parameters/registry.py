@@ -6,7 +6,8 @@ A package adds a method by an entry point that names a
     [project.entry-points."multiview_phd.single_view"]
     my_tracker = "my_package.my_module:METHOD"
 
-or ``multiview_phd.fusion`` for a method of stage 2. Its own parameters, a subclass of
+``multiview_phd.fusion`` for a method of stage 2 or ``multiview_phd.smoothing`` for one of
+stage 3. Its own parameters, a subclass of
 :class:`~tracker.parameters.definition.Params`, then have sliders and flags like all others.
 """
 
@@ -22,6 +23,7 @@ from tracker.parameters.methods import Method, MethodKey
 ENTRY_POINTS: dict[MethodKey, str] = {
     "single_view": "multiview_phd.single_view",
     "fusion_method": "multiview_phd.fusion",
+    "smoothing_method": "multiview_phd.smoothing",
 }
 """The groups of entry points of other packages."""
 
@@ -38,10 +40,15 @@ BUILT_IN: dict[MethodKey, tuple[str, ...]] = {
         "tracker.parameters.fusion:SEQUENTIAL_PHD",
         "tracker.parameters.fusion:MULTI_BERNOULLI",
     ),
+    "smoothing_method": (
+        "tracker.parameters.smoothing:NONE",
+        "tracker.parameters.smoothing:POSITIONS",
+        "tracker.parameters.smoothing:IDENTITIES",
+    ),
 }
 """Where the descriptions of this project's methods stand, in the order of their lists."""
 
-SHARED_GROUPS = ("foreground", "fusion")
+SHARED_GROUPS = ("foreground", "fusion", "smoothing")
 """Groups of parameters that are no single method's."""
 
 FOLLOWING = ("colour_phd", "none")

@@ -12,6 +12,7 @@ from tracker.parameters.foreground import ForegroundParams
 from tracker.parameters.fusion import FusionParams
 from tracker.parameters.methods import Method, MethodKey
 from tracker.parameters.registry import REGISTERED
+from tracker.parameters.smoothing import SmoothingParams
 
 _Group = TypeVar("_Group", bound=Params)
 
@@ -25,8 +26,12 @@ class SharedParameters(Params):
     fusion_method: str = "multi_bernoulli"
     """Method of stage 2: how the cameras' boxes become 3D positions."""
 
+    smoothing_method: str = "none"
+    """Method of stage 3: the filter's tracks as they are, smoothed, or who is who as well."""
+
     foreground: ForegroundParams = ForegroundParams()
     fusion: FusionParams = FusionParams()
+    smoothing: SmoothingParams = SmoothingParams()
 
     def of(self, kind: type[_Group]) -> _Group:
         """The numbers of one group, by their class.

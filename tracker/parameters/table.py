@@ -44,6 +44,9 @@ class Parameter:
 
 def _group_stage(group: str) -> Stage:
     fused = (method.own_group for method in REGISTERED["fusion_method"].values())
+    smoothed = (method.own_group for method in REGISTERED["smoothing_method"].values())
+    if group == "smoothing" or group in smoothed:
+        return "smoothing"
     return "fusion" if group == "fusion" or group in fused else "single_view"
 
 
@@ -109,13 +112,14 @@ GROUPS: dict[str, str] = {name: (model.__doc__ or "").strip() for name, model in
 METHODS: dict[MethodKey, tuple[str, ...]] = {
     key: tuple(methods) for key, methods in REGISTERED.items()
 }
-"""The methods that can be chosen for stage 1 and stage 2."""
+"""The methods that can be chosen for stages 1, 2 and 3."""
 
 PRESETS: dict[str, dict[str, Any]] = {
     "robust": {},
     "published": {
         **{key: p.published for key, p in PARAMETERS.items() if p.published is not None},
         "fusion_method": "sequential_phd",
+        "smoothing_method": "none",
     },
 }
 """Named sets of values, each against the defaults: ``robust`` is the defaults themselves."""

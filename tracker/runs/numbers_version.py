@@ -18,12 +18,13 @@ from tracker.parameters.registry import ORIGINS
 
 _ROOT = Path(__file__).resolve().parents[1]
 
-_NO_PART = ("evaluation", "experiments", "sequences/rendering", "export.py")
+_NO_PART = ("evaluation", "experiments", "sequences/rendering", "export.py", "library", "writing")
 """What looks at results or makes recordings; a change of it changes no run."""
 
 _LATER: dict[Stage, tuple[str, ...]] = {
-    "single_view": ("fusion", "trajectories.py"),
-    "fusion": ("trajectories.py",),
+    "single_view": ("fusion", "smoothing", "kernels/smoothing", "trajectories.py"),
+    "fusion": ("smoothing", "kernels/smoothing", "trajectories.py"),
+    "smoothing": (),
     "tracks": (),
 }
 """What the rule of imports keeps out of a stage: it comes after it."""

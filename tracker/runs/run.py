@@ -13,6 +13,7 @@ from tracker.parameters.reading import CHOSEN_BY
 from tracker.runs.numbers_version import method_version, numbers_version
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
+from tracker.smoothing import Smoothed
 from tracker.trajectories import Trajectories
 
 
@@ -51,7 +52,7 @@ class Progress:
 
 @dataclass(eq=False)
 class Run:
-    """One run: the columns of the three stages, filled step by step from step 0.
+    """One run: the columns of its stages, filled step by step from step 0.
 
     One thread appends; any thread may read what is below :attr:`done`.
     """
@@ -66,9 +67,14 @@ class Run:
     fused: list[FusionResult] = field(default_factory=list)
     """Stage 2 of each step."""
     tracks: Trajectories = field(init=False)
-    """Stage 3 of the steps below :attr:`done`."""
+    """The people of the steps below :attr:`done`: those of the filter while it runs, and the
+    smoothed ones in their place once :attr:`smoothed` is there."""
+    filtered: Trajectories = field(init=False)
+    """The people as the filter alone has them, which is what a live system would see."""
+    smoothed: Smoothed | None = None
+    """Stage 3 of all steps that were asked for; None until then, or where it is switched off."""
     done: int = 0
-    """Steps whose three stages are ready."""
+    """Steps whose people are there, be it the filter's."""
     view_states: tuple[Any, ...] | None = None
     """State of stage 1, one a camera, after the last step of :attr:`views`; None where that is
     the last of the sequence."""
@@ -78,7 +84,7 @@ class Run:
     """State of stage 2 after the last step of :attr:`fused`."""
 
     def __post_init__(self) -> None:
-        self.tracks = Trajectories.empty(len(self.sequence.views))
+        self.tracks = self.filtered = Trajectories.empty(len(self.sequence.views))
 
     @property
     def key(self) -> str:
@@ -96,7 +102,7 @@ def stage_keys(sequence: Sequence, parameters: RunParameters, seed: int) -> dict
     parameters of the stage itself and of those before it."""
     keys: dict[Stage, str] = {}
     values: list[Any] = [sequence.digest, seed]
-    stages: tuple[Stage, ...] = ("single_view", "fusion", "tracks")
+    stages: tuple[Stage, ...] = ("single_view", "fusion", "smoothing", "tracks")
     for stage in stages:
         method = parameters.method(CHOSEN_BY[stage])
         values += [numbers_version(stage), method_version(method), stage_values(parameters, stage)]

@@ -13,7 +13,7 @@ import numpy as np
 from tracker import single_view
 from tracker.runs.run import Cancelled, Run
 from tracker.sequences.frames import Picture, Pictures
-from tracker.single_view.colour.likeness import Likeness
+from tracker.single_view.colour.likeness import Likeness, looks_of
 from tracker.single_view.protocol import SingleViewMethod, ViewResult
 
 BLOCK = 5
@@ -132,6 +132,8 @@ class _CameraWorker:
             if picture is not None and self._likeness is not None:
                 likenesses = self._likeness.of_boxes(picture, result.boxes)
                 result = replace(result, likenesses=likenesses)
+            if picture is not None:
+                result = replace(result, looks=looks_of(picture, result.boxes))
             done.append((result, self._state))
             self._frame += 1
         return done

@@ -20,6 +20,7 @@ from tracker.fusion.protocol import FusionResult
 from tracker.parameters import Stage
 from tracker.runs.stage_files import StageFiles
 from tracker.single_view.protocol import ViewResult
+from tracker.smoothing import Smoothed
 from tracker.trajectories import Trajectories
 
 MEMORY_BYTES = 512 << 20
@@ -49,6 +50,15 @@ class FusionColumn:
 
     steps: Sequence[FusionResult]
     state: Any
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackColumn:
+    """The people of a run, of all steps."""
+
+    tracks: Trajectories
+    filtered: Trajectories
+    """As the filter alone has them; the same ones where nothing is smoothed."""
 
 
 class StageCache:
@@ -102,9 +112,14 @@ class StageCache:
         column: FusionColumn | None = self._get("fusion", key)
         return column
 
-    def tracks(self, key: str) -> Trajectories | None:
+    def smoothed(self, key: str) -> Smoothed | None:
         """Stage 3 with this key, of all steps."""
-        tracks: Trajectories | None = self._get("tracks", key)
+        smoothed: Smoothed | None = self._get("smoothing", key)
+        return smoothed
+
+    def tracks(self, key: str) -> TrackColumn | None:
+        """The people of a run with this key, of all steps."""
+        tracks: TrackColumn | None = self._get("tracks", key)
         return tracks
 
     def keep_views(self, key: str, column: ViewColumn, *, complete: bool) -> None:
@@ -122,8 +137,13 @@ class StageCache:
         if before is None or len(before.steps) < len(column.steps):
             self._put("fusion", key, column)
 
-    def keep_tracks(self, key: str, tracks: Trajectories) -> None:
+    def keep_smoothed(self, key: str, smoothed: Smoothed) -> None:
         """Keep stage 3 of all steps."""
+        if self._get("smoothing", key) is None:
+            self._put("smoothing", key, smoothed)
+
+    def keep_tracks(self, key: str, tracks: TrackColumn) -> None:
+        """Keep the people of all steps."""
         if self._get("tracks", key) is None:
             self._put("tracks", key, tracks)
 
@@ -148,9 +168,9 @@ class StageCache:
                     self._used -= self._kept.pop(name)[1]
 
 
-def weigh(column: ViewColumn | FusionColumn | Trajectories) -> int:
+def weigh(column: ViewColumn | FusionColumn | Smoothed | TrackColumn) -> int:
     """Bytes of memory, by some of the steps."""
-    if isinstance(column, Trajectories):
+    if isinstance(column, Smoothed | TrackColumn):
         return _weight(column, set())
     every = max(1, len(column.steps) // _SAMPLED)
     sampled = [_weight(step, set()) for step in column.steps[::every]]

@@ -56,7 +56,7 @@ class DetectorBoxes:
             p.depth_sigmas * sigmas[:, 3] / boxes[:, 3],
         )
         plausible = meets(sequence.room, nearest, farthest, p.room_tolerance)
-        self._found = Detected(boxes, scores, sigmas, plausible)
+        self._found = Detected(_within(boxes, view.camera), scores, sigmas, plausible)
         """Of all steps: the judgement of a box asks for no other."""
 
     def at(self, frame: int) -> Detected:
@@ -66,6 +66,22 @@ class DetectorBoxes:
         return Detected(
             found.boxes[rows], found.scores[rows], found.sigmas[rows], found.plausible[rows]
         )
+
+
+def _within(boxes: Float[ndarray, "N 4"], camera: Camera) -> Float[ndarray, "N 4"]:
+    """The boxes with top and bottom inside the picture, as the measurement model expects them.
+
+    Some detectors and annotations draw a whole person also where the picture ends; what
+    lies wholly outside is left as it is.
+    """
+    last = camera.image_size[1] - 1.0
+    top = np.clip(boxes[:, 1] - boxes[:, 3], 0.0, last)
+    bottom = np.clip(boxes[:, 1] + boxes[:, 3], 0.0, last)
+    inside = bottom > top
+    within = boxes.copy()
+    within[inside, 1] = ((top + bottom) / 2.0)[inside]
+    within[inside, 3] = ((bottom - top) / 2.0)[inside]
+    return within
 
 
 def trust(boxes: Float[ndarray, "N 4"], parameters: DetectionBoxParams) -> Float[ndarray, "N 4"]:

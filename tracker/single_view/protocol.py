@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Float, Float16, Int, UInt8
 from numpy import ndarray
 
 EventKind = Literal["new", "vanished", "returned", "occluded", "merged", "split"]
@@ -62,6 +62,9 @@ class ViewResult:
     """Probability that the colours of each box are those of each of P people with templates,
     if they are one's; (0, 0) where there was no picture, or fewer than two have templates. A
     method leaves it: :mod:`tracker.single_view.colour.likeness` tells it of all."""
+    looks: Float16[ndarray, "N A"] = field(default_factory=lambda: np.zeros((0, 0), np.float16))
+    """What each box looks like, as a unit vector: the root of its colour histogram where the
+    method is given pictures; (0, 0) where there is nothing to see of it."""
     blind: bool = False
     """Whether the camera had no frame at this step, and so says nothing of who is there."""
 

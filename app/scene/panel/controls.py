@@ -42,8 +42,12 @@ PANEL_WIDTH = 276
 OWN_VALUES = "own values"
 """What the values are while they are no preset's, as on the page."""
 
-METHODS: dict[MethodKey, str] = {"single_view": "Single view", "fusion_method": "Fusion"}
-"""The words of the two choices of a method."""
+METHODS: dict[MethodKey, str] = {
+    "single_view": "Single view",
+    "fusion_method": "Fusion",
+    "smoothing_method": "Smoothing",
+}
+"""The words of the choices of a method."""
 
 MOST_CURVES = 12
 """Computed at one request."""

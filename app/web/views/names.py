@@ -41,6 +41,8 @@ class Names:
                 for track, component in zip(
                     tracks.ids[rows].tolist(), tracks.components[rows].tolist(), strict=True
                 ):
+                    if component < 0:  # whom the smoothing alone found
+                        continue
                     source = int(fused.sources[camera, component])
                     if 0 <= source < len(view.likenesses):
                         share = float(fused.source_weights[camera, component])

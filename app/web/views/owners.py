@@ -38,8 +38,10 @@ def tell_owners(message: models.Step, sequence: Sequence, run: Run, step: int) -
     target = TargetModel(sequence.target_half_extents, p.measurement, p.update, p.posture_share, p)
     tracks, posterior = run.tracks, run.fused[step].posterior
     rows = tracks.at(step)
-    states = posterior.means[tracks.components[rows]]
-    covariances = posterior.covariances[tracks.components[rows]]
+    # the filter knew nothing of whom the smoothing alone found
+    known = tracks.components[rows] >= 0
+    components, ids = tracks.components[rows][known], tracks.ids[rows][known]
+    states, covariances = posterior.means[components], posterior.covariances[components]
     for index, (camera, view) in enumerate(zip(message.cameras, run.views[step], strict=True)):
         if not len(view.measurements):
             continue
@@ -64,7 +66,7 @@ def tell_owners(message: models.Step, sequence: Sequence, run: Run, step: int) -
         for i, row in zip(free.tolist(), distances, strict=True):
             nearest = int(row.argmin())
             if np.isfinite(row[nearest]):
-                camera.measurements[i].nearest = int(tracks.ids[rows][nearest])
+                camera.measurements[i].nearest = int(ids[nearest])
                 camera.measurements[i].sigmas = round(float(row[nearest]), 2)
 
 

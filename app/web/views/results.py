@@ -27,7 +27,9 @@ def state_of(snapshot: Snapshot) -> models.State:
         shown=table.shown_keys(parameters),
         command=command_line(snapshot),
         methods=models.MethodsInfo(
-            single_view=parameters.single_view, fusion_method=parameters.fusion_method
+            single_view=parameters.single_view,
+            fusion_method=parameters.fusion_method,
+            smoothing_method=parameters.smoothing_method,
         ),
         unfit={str(key): names for key, names in snapshot.unfit.items()},
         presets=list(snapshot.presets),

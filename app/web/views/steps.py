@@ -143,7 +143,7 @@ def _add_tracks(message: models.Step, sequence: Sequence, run: Run, step: int) -
     ids, positions = tracks.ids[rows].tolist(), tracks.positions[rows]
     components, seen = tracks.components[rows], tracks.seen[rows]
     # those in front are named by the label of their component, tracks by their id
-    id_of_label = dict(zip(fused.posterior.labels[components].tolist(), ids, strict=True))
+    id_of_label = dict(zip(tracks.labels[rows].tolist(), ids, strict=True))
     message.tracks = [
         models.Track(
             id=ids[i],
@@ -161,12 +161,15 @@ def _add_tracks(message: models.Step, sequence: Sequence, run: Run, step: int) -
         given = _corner_boxes(run.views[step][index].boxes)
         for i, component in enumerate(components.tolist()):
             whole = bool(np.isfinite(boxes[i]).all())
-            probability = float(fused.detection_probabilities[index, component])
-            hidden_by = id_of_label.get(int(fused.hidden_by[index, component]))
+            # the filter knew nothing of whom the smoothing alone found
+            unknown = component < 0
+            probability = 0.0 if unknown else float(fused.detection_probabilities[index, component])
+            hider = -1 if unknown else int(fused.hidden_by[index, component])
+            hidden_by = id_of_label.get(hider) if hider >= 0 else None
             reason: models.Reason | None = None
             if not visible[i]:
                 reason = "out of view" if whole else "behind camera"
-            elif hidden_by is None and probability < WORTH_A_REASON * nominal:
+            elif hidden_by is None and not unknown and probability < WORTH_A_REASON * nominal:
                 reason = "near the edge"
             camera.tracks.append(
                 models.CameraTrack(
@@ -174,8 +177,10 @@ def _add_tracks(message: models.Step, sequence: Sequence, run: Run, step: int) -
                     box=_box(boxes[i]) if whole else None,
                     seen=bool(seen[i, index]),
                     detection_probability=round(probability, 4),
-                    source=int(fused.sources[index, component]),
-                    fed_by=_feeding(run.views[step][index], given, fused, index, component),
+                    source=-1 if unknown else int(fused.sources[index, component]),
+                    fed_by=None
+                    if unknown
+                    else _feeding(run.views[step][index], given, fused, index, component),
                     hidden_by=hidden_by,
                     visible=bool(visible[i]),
                     reason=reason,

@@ -158,10 +158,12 @@ class Timelines:
         self._cardinality: list[float] = []
         self._deviation: list[float] = []
         self._names = Names()
-        self._counted: tuple[int, _Spans, Int[ndarray, " D"]] | None = None
+        self._counted: tuple[Trajectories, int, _Spans, Int[ndarray, " D"]] | None = None
         self._sequence: Sequence | None = None
         self._truth: Int[ndarray, " S"] | None = None
-        self._alike: tuple[tuple[str, str, int], dict[int, int]] = (("", "", 0), {})
+        self._alike: tuple[tuple[str, str, int], Trajectories | None, dict[int, int]] = (
+            ("", "", 0), None, {},
+        )  # fmt: skip
 
     def of(
         self, sequence: Sequence, run: Run | None, window: Window, pinned: Scored | None = None
@@ -195,13 +197,14 @@ class Timelines:
                 self._cardinality.append(result.posterior.cardinality)
                 weights = result.posterior.weights
                 self._deviation.append(deviation(weights, run.parameters.fusion_method))
-            if self._counted is None or self._counted[0] != done:
-                frames = run.tracks.frames
-                frames = frames[: int(np.searchsorted(frames, done))]
-                self._counted = (
-                    done, _Spans.of(run.tracks, done), np.bincount(frames, minlength=done)
+            tracks, counted = run.tracks, self._counted
+            # the smoothed tracks take the place of the filter's of as many steps
+            if counted is None or counted[0] is not tracks or counted[1] != done:
+                frames = tracks.frames[: int(np.searchsorted(tracks.frames, done))]
+                self._counted = counted = (
+                    tracks, done, _Spans.of(tracks, done), np.bincount(frames, minlength=done)
                 )  # fmt: skip
-            _, spans, count = self._counted
+            _, _, spans, count = counted
             shortest = math.ceil(LONG_MISS * sequence.fps)
             lives, left_out = _lives(spans, window, shortest)
             events = _events(spans, done, shortest)
@@ -235,9 +238,10 @@ class Timelines:
             return None
         done = min(run.done, pinned.steps)
         key = (pinned.key, run.key, done)
-        if key != self._alike[0]:
-            self._alike = (key, alike(pinned.tracks, run.tracks, done))
-        like = self._alike[1]
+        tracks = run.tracks
+        if key != self._alike[0] or self._alike[1] is not tracks:
+            self._alike = (key, tracks, alike(pinned.tracks, tracks, done))
+        like = self._alike[2]
         spans = _Spans.of(pinned.tracks, pinned.steps)
         lives, _ = _lives(spans, window, math.ceil(LONG_MISS * sequence.fps))
         count = np.bincount(pinned.tracks.frames, minlength=pinned.steps)[: pinned.steps]
@@ -248,6 +252,12 @@ class Timelines:
                 models.PinnedLife(**life.model_dump(), like=like.get(life.id)) for life in lives
             ],
         )
+
+
+def lives_of(tracks: Trajectories, done: int, fps: float, window: Window) -> list[models.TrackLife]:
+    """The lives of tracks by themselves, without a run, as the window shows them."""
+    lives, _ = _lives(_Spans.of(tracks, done), window, math.ceil(LONG_MISS * fps))
+    return lives
 
 
 def _truth_counts(sequence: Sequence) -> Int[ndarray, " S"] | None:

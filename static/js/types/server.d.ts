@@ -81,6 +81,14 @@ declare namespace Server {
 		valid: boolean;
 	}
 
+	/** A value that is not the recording's default. */
+	interface ChangeInfo {
+		key: string;
+		symbol: string;
+		default: string;
+		value: string;
+	}
+
 	/** One side of a comparison. */
 	interface ComparedRun {
 		run: string;
@@ -106,6 +114,19 @@ declare namespace Server {
 		low: number[];
 		high: number[];
 		mean: number[];
+	}
+
+	/** Where a track went, seen from above. */
+	interface Course {
+		id: number;
+		/** x and y in metres, a few a second. */
+		points: [number, number][];
+	}
+
+	/** What was deleted. */
+	interface Deleted {
+		runs: number[];
+		bytes: number;
 	}
 
 	/** One figure of two runs: A the reference, B the shown run. */
@@ -238,6 +259,54 @@ declare namespace Server {
 		help: string;
 	}
 
+	/** A run in the library. */
+	interface KeptRunInfo {
+		id: number;
+		recording: number;
+		recording_name: string;
+		/** Seconds since 1970. */
+		began: number;
+		seconds: number;
+		steps: number;
+		steps_per_second: number;
+		single_view: string;
+		fusion_method: string;
+		changes: ChangeInfo[];
+		seed: number;
+		version: string;
+		/** Whether another version of the program made it: computing it again may give other tracks. */
+		older_code: boolean;
+		source: string;
+		targets: number;
+		mota: number | null;
+		idf1: number | null;
+		hota: number | null;
+		ospa: number | null;
+		position_error: number | null;
+		misses: number | null;
+		false_positives: number | null;
+		id_switches: number | null;
+		name: string;
+		star: boolean;
+		note: string;
+		tags: string[];
+	}
+
+	/** The runs of one recording, the newest first. */
+	interface KeptRuns {
+		runs: KeptRunInfo[];
+	}
+
+	/** The library. */
+	interface LibraryInfo {
+		file: string;
+		bytes: number;
+		/** Why nothing is kept and nothing listed but what can be opened. */
+		error: string | null;
+		read_only: boolean;
+		recordings: RecordingInfo[];
+	}
+
 	/** A peak or detection that the camera's filter was given. */
 	interface Measurement {
 		box: [number, number, number, number];
@@ -254,6 +323,7 @@ declare namespace Server {
 	interface MethodsInfo {
 		single_view: string;
 		fusion_method: string;
+		smoothing_method: string;
 	}
 
 	/** Numbers over time: of each bucket the lowest, the highest and the mean. */
@@ -368,6 +438,38 @@ declare namespace Server {
 		tracks: PinnedLife[];
 	}
 
+	/** A run in small. */
+	interface Preview {
+		run: KeptRunInfo;
+		frames: number;
+		tracks: TrackLife[];
+		/** Targets at each of equally many steps, their mean. */
+		people: number[];
+		courses: Course[];
+	}
+
+	/** A recording of which runs are kept, or that can be opened. */
+	interface RecordingInfo {
+		/** Null where it was never opened: it has no runs. */
+		id: number | null;
+		/** What opens it. */
+		place: string;
+		name: string;
+		kind: "rendered" | "folder";
+		cameras: number;
+		frames: number;
+		fps: number;
+		boxes_only: boolean;
+		/** Of its truth; null without one. */
+		people: number | null;
+		/** Seconds since 1970. */
+		opened: number | null;
+		runs: number;
+		has_thumbnail: boolean;
+		/** Why it cannot be opened now. */
+		missing: string | null;
+	}
+
 	/** The volume that people are tracked in. */
 	interface RoomInfo {
 		min: [number, number, number];
@@ -387,6 +489,10 @@ declare namespace Server {
 		/** The stage that takes the time. */
 		message: string;
 		error: string | null;
+		/** Its number in the library that it was taken from; what the cameras found is not there. */
+		kept: number | null;
+		/** The key that a computation would have, where older code made what is shown; else empty. */
+		stands_for: string;
 	}
 
 	/** Every parameter, method and preset. */
@@ -471,8 +577,8 @@ declare namespace Server {
 		command: string;
 		methods: MethodsInfo;
 		/**
-		 * Methods that cannot work on the sequence with the values chosen: by ``single_view`` or
-		 * ``fusion_method``, the sentence why by the method's name.
+		 * Methods that cannot work on the sequence with the values chosen: by ``single_view``,
+		 * ``fusion_method`` or ``smoothing_method``, the sentence why by the method's name.
 		 */
 		unfit: Record<string, Record<string, string>>;
 		/** Names of those that a person has saved. */

@@ -39,7 +39,7 @@ def curves(bench: Workbench) -> Iterator[Sensitivity]:
 
 
 def until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + 20.0
+    end = time.monotonic() + 60.0
     while not condition():
         assert time.monotonic() < end
         time.sleep(0.01)

@@ -30,7 +30,7 @@ from tracker.runs.fitting import default_parameters, unfit_methods
 from tracker.runs.run import Run
 from tracker.sequences.sequence import Sequence
 
-STAGES = ("single_view", "fusion", "tracks")
+STAGES = ("single_view", "fusion", "smoothing", "tracks")
 CONDITIONS = sorted({key for p in PARAMETERS.values() for key in p.when})
 """The parameters on which it depends whether others have an effect."""
 
@@ -44,10 +44,14 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Sequence:
 def every_choice() -> Iterator[dict[str, Any]]:
     """Each pair of methods with the defaults and as published, and with every other value of
     what decides on others."""
-    for single_view, fusion_method in product(*METHODS.values()):
+    pairs = product(METHODS["single_view"], METHODS["fusion_method"])
+    for single_view, fusion_method in pairs:
         chosen = {"single_view": single_view, "fusion_method": fusion_method}
         yield chosen
         yield {**PRESETS["published"], **chosen}
+        if single_view == "none":
+            for smoothing in METHODS["smoothing_method"]:
+                yield {**chosen, "smoothing_method": smoothing}
         for key in CONDITIONS:
             parameter = PARAMETERS[key]
             others = parameter.choices or (True, False)
@@ -71,7 +75,8 @@ def named(choice: dict[str, Any]) -> str:
     """For the list of tests."""
     own = [f"{k}={v}" for k, v in choice.items() if k not in METHODS]
     words = own if len(own) < 3 else ["published"]
-    return " ".join([choice["single_view"], choice["fusion_method"], *words])
+    methods = [choice[key] for key in METHODS if key in choice]
+    return " ".join([*methods, *words])
 
 
 @pytest.mark.parametrize("choice", CHOICES, ids=named)
@@ -168,6 +173,9 @@ def test_every_file_of_a_method_is_registered() -> None:
             text = path.read_text()
             if "def start(self)" in text and "def step(" in text and "Protocol" not in text:
                 found.add(".".join(path.relative_to(root.parent).with_suffix("").parts))
+    for path in (root / "smoothing").rglob("*.py"):
+        if "    def smooth(\n" in path.read_text():
+            found.add(".".join(path.relative_to(root.parent).with_suffix("").parts))
     assert found == loaded
 
 
@@ -181,7 +189,7 @@ def without(recording: Sequence, what: str) -> Sequence:
 
 def test_a_method_that_cannot_work_is_known_with_the_reason(recording: Sequence) -> None:
     defaults = RunParameters()
-    assert unfit_methods(recording, defaults) == {"single_view": {}, "fusion_method": {}}
+    assert unfit_methods(recording, defaults) == {key: {} for key in METHODS}
     dark = unfit_methods(without(recording, "pictures"), defaults)["single_view"]
     assert set(dark) == {"colour_phd", "jpda", "pseudo_particle", "association_matrix"}
     assert dark["jpda"] == (

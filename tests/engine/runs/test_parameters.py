@@ -26,7 +26,7 @@ from tracker.parameters import (
     with_values,
 )
 
-STAGES: tuple[Stage, ...] = ("single_view", "fusion", "tracks")
+STAGES: tuple[Stage, ...] = ("single_view", "fusion", "smoothing", "tracks")
 DEFAULTS = RunParameters()
 
 every_parameter = pytest.mark.parametrize("parameter", PARAMETERS.values(), ids=lambda p: p.key)
@@ -80,8 +80,8 @@ def test_every_group_says_what_it_is_for() -> None:
 
 def test_every_value_belongs_to_exactly_one_stage() -> None:
     covered: set[str] = set()
-    for single_view, fusion_method, model in product(*METHODS.values(), ("learnt", "adaptive")):
-        methods = {"single_view": single_view, "fusion_method": fusion_method}
+    for *chosen, model in product(*METHODS.values(), ("learnt", "adaptive")):
+        methods = dict(zip(METHODS, chosen, strict=True))
         parameters = with_values(DEFAULTS, {**methods, "foreground.model": model})
         keys = [key for stage in STAGES for key in stage_values(parameters, stage)]
         assert len(keys) == len(set(keys))

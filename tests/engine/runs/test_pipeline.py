@@ -25,7 +25,9 @@ from tracker.trajectories import Trajectories
 STEPS = 60
 COLOUR = with_values(RunParameters(), {"single_view": "colour_phd"})
 WHOLE = sequence(crossing(STEPS), STEPS, clutter_rate=0.5)
-BOXES = RunParameters(single_view="none", fusion_method="sequential_phd")
+BOXES = RunParameters(
+    single_view="none", fusion_method="sequential_phd", smoothing_method="identities"
+)
 
 
 @pytest.fixture(autouse=True)
@@ -135,9 +137,9 @@ def test_a_run_may_be_stopped_and_resumed_many_times() -> None:
 
 def test_what_was_seen_of_a_stopped_run_is_the_beginning_of_the_whole() -> None:
     partial, whole = stopped(BOXES, 30), compute(WHOLE, BOXES)
-    rows = whole.tracks.frames < partial.done
+    rows = whole.filtered.frames < partial.done
     for name in Trajectories.__slots__:
-        assert_array_equal(getattr(partial.tracks, name), getattr(whole.tracks, name)[rows])
+        assert_array_equal(getattr(partial.tracks, name), getattr(whole.filtered, name)[rows])
     assert not partial.complete
 
 
@@ -150,7 +152,7 @@ def test_a_changed_extraction_threshold_reruns_no_filter() -> None:
     assert all(a is b for a, b in zip(second.fused, first.fused, strict=True))
     assert all(a is b for a, b in zip(second.views, first.views, strict=True))
     assert_same(second, compute(whole, parameters))
-    assert len(second.tracks) >= len(first.tracks) + 10
+    assert len(second.filtered) >= len(first.filtered) + 10
 
 
 def test_a_changed_fusion_reuses_the_views() -> None:
@@ -297,12 +299,14 @@ def test_one_step_is_a_sequence_too() -> None:
 def test_the_keys_follow_the_stages() -> None:
     keys = stage_keys(WHOLE, BOXES, 0)
     tracks = stage_keys(WHOLE, changed(extraction_threshold=0.7), 0)
+    smoothing = stage_keys(WHOLE, with_values(BOXES, {"smoothing.reach": 0.5}), 0)
     fusion = stage_keys(WHOLE, changed(clutter_rate=2.0), 0)
     views = stage_keys(WHOLE, with_values(BOXES, {"detection_boxes.size_sigma": 0.3}), 0)
     seed = stage_keys(WHOLE, BOXES, 1)
     digest = stage_keys(replace(WHOLE, digest="other"), BOXES, 0)
     for other, same in (
-        (tracks, {"single_view", "fusion"}),
+        (tracks, {"single_view", "fusion", "smoothing"}),
+        (smoothing, {"single_view", "fusion"}),
         (fusion, {"single_view"}),
         (views, set()),
         (seed, set()),
@@ -340,3 +344,55 @@ def test_a_method_that_does_not_fit_the_sequence_is_told_by_camera() -> None:
     views = (WHOLE.views[0], replace(WHOLE.views[1], detections=None), WHOLE.views[2])
     with pytest.raises(ValueError, match='camera "right" of synthetic has no detections'):
         compute(replace(WHOLE, views=views), BOXES)
+
+
+def test_the_filters_people_are_told_first_and_the_smoothed_ones_take_their_place() -> None:
+    told: list[tuple[int, bool, Trajectories]] = []
+
+    def on_progress(run: Run, progress: Progress) -> None:
+        told.append((progress.done, run.smoothed is not None, run.tracks))
+
+    run = compute(WHOLE, BOXES, on_progress=on_progress)
+    plain = compute(WHOLE, with_values(BOXES, {"smoothing_method": "none"}))
+    assert [done for done, _, _ in told] == sorted(done for done, _, _ in told)
+    before = [tracks for done, smoothed, tracks in told if done == STEPS and not smoothed]
+    assert_same_tracks(before[-1], plain.tracks)
+    assert told[-1][1]
+    assert told[-1][2] is run.tracks
+    assert_same_tracks(run.filtered, plain.tracks)
+    assert plain.filtered is plain.tracks
+    assert plain.smoothed is None
+    assert run.smoothed is not None
+    assert set(run.tracks.ids.tolist()) <= set(run.filtered.ids.tolist())
+
+
+def test_another_smoothing_reruns_no_filter() -> None:
+    first = compute(WHOLE, BOXES)
+    parameters = with_values(BOXES, {"smoothing_method": "positions"})
+    second = compute(WHOLE, parameters, previous=first)
+    assert all(a is b for a, b in zip(second.fused, first.fused, strict=True))
+    assert second.smoothed is not first.smoothed
+    assert_same(second, compute(WHOLE, parameters))
+    threshold = compute(WHOLE, changed(extraction_threshold=0.7), previous=first)
+    assert threshold.smoothed is first.smoothed
+
+
+def test_a_stop_while_it_smooths_keeps_what_the_filter_found() -> None:
+    cache, asked = StageCache(), 0
+
+    def cancelled() -> bool:
+        return smoothing_begun
+
+    smoothing_begun = False
+
+    def on_progress(run: Run, progress: Progress) -> None:
+        nonlocal smoothing_begun, asked
+        if progress.done == STEPS:
+            smoothing_begun = True
+            asked += 1
+
+    with pytest.raises(Cancelled):
+        compute(WHOLE, BOXES, cache=cache, on_progress=on_progress, cancelled=cancelled)
+    assert asked
+    again = compute(WHOLE, BOXES, cache=cache)
+    assert_same(again, compute(WHOLE, BOXES))

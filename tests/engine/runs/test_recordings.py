@@ -159,3 +159,27 @@ def test_heads_on_real_video_over_five_seeds(data_folder: Path) -> None:
     assert mean("position_error") <= 0.1
     assert mean("false_per_step") <= 0.1
     assert mean("idf1") >= 0.75
+
+
+@pytest.mark.parametrize(
+    ("name", "gate", "mota", "idf1", "error"),
+    [
+        ("cmc1", 1.0, 0.997, 0.998, 0.09),
+        ("cmc2", 1.0, 0.99, 0.995, 0.11),
+        ("av163-seq45-3p-1111-points", 0.5, 0.999, 0.999, 0.012),
+        ("wildtrack-points-300", 1.0, 0.88, 0.83, 0.08),
+    ],
+)
+def test_hindsight_makes_boxes_better(
+    data_folder: Path, name: str, gate: float, mota: float, idf1: float, error: float
+) -> None:
+    sequence = read_sequence(data_folder / name)
+    settled = with_values(parameters("multi_bernoulli"), {"smoothing_method": "identities"})
+    run = pipeline.compute(sequence, settled)
+    found = scored(sequence, run, gate)
+    assert number(found, "mota") >= mota
+    assert number(found, "idf1") >= idf1
+    assert number(found, "position_error") <= error
+    alone = evaluate_sequence(sequence, run.filtered, EvaluationSettings(gate=gate))
+    assert number(found, "mota") >= number(alone, "mota") - 0.002
+    assert number(found, "idf1") >= number(alone, "idf1") - 0.002

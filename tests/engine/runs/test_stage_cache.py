@@ -17,7 +17,7 @@ from tracker.parameters import RunParameters, with_values
 from tracker.pipeline import Cancelled, Run, compute, stage_keys
 from tracker.runs import numbers_version, stage_cache
 from tracker.runs.numbers_version import numbers_version as version_of
-from tracker.runs.stage_cache import FusionColumn, StageCache, ViewColumn, weigh
+from tracker.runs.stage_cache import FusionColumn, StageCache, TrackColumn, ViewColumn, weigh
 from tracker.runs.stage_files import StageFiles
 from tracker.sequences.reader import read_sequence
 
@@ -193,7 +193,8 @@ def test_weights_are_about_what_the_arrays_take() -> None:
         )
     )  # fmt: skip
     assert exact < weigh(FusionColumn(run.fused, None)) < 5 * exact
-    assert weigh(run.tracks) >= run.tracks.positions.nbytes
+    column = TrackColumn(run.tracks, run.filtered)
+    assert weigh(column) >= run.tracks.positions.nbytes + run.filtered.positions.nbytes
     assert weigh(FusionColumn([], None)) == 0
 
 
@@ -254,7 +255,7 @@ def test_other_code_has_other_keys(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     shutil.copytree(root, copy, ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(numbers_version, "_ROOT", copy)
     uncached = version_of.__wrapped__
-    stages = ("single_view", "fusion", "tracks")
+    stages = ("single_view", "fusion", "smoothing", "tracks")
 
     def versions() -> dict[str, str]:
         return {stage: uncached(stage) for stage in stages}
@@ -264,8 +265,9 @@ def test_other_code_has_other_keys(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     for name, later in (
         ("single_view/colour_phd.py", set(stages)),
         ("kernels/kalman.py", set(stages)),
-        ("fusion/model.py", {"fusion", "tracks"}),
-        ("trajectories.py", {"tracks"}),
+        ("fusion/model.py", {"fusion", "smoothing", "tracks"}),
+        ("smoothing/stage.py", {"smoothing", "tracks"}),
+        ("trajectories.py", {"smoothing", "tracks"}),
         ("evaluation/ospa.py", set()),
         ("sequences/rendering/walls/paint.py", set()),
     ):
@@ -288,7 +290,9 @@ def test_the_keys_hold_the_version(monkeypatch: pytest.MonkeyPatch) -> None:
         run_module, "numbers_version", lambda stage: "x" if stage == "fusion" else version_of(stage)
     )
     after = stage_keys(WHOLE, BOXES, 0)
-    assert {stage for stage in before if before[stage] != after[stage]} == {"fusion", "tracks"}
+    assert {stage for stage in before if before[stage] != after[stage]} == {
+        "fusion", "smoothing", "tracks",
+    }  # fmt: skip
 
 
 def test_nothing_is_kept_without_a_cache(monkeypatch: pytest.MonkeyPatch) -> None:

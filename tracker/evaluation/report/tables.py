@@ -203,7 +203,7 @@ def _defaults(sequence: Sequence) -> RunParameters:
 
 def _changed_table(parameters: RunParameters, defaults: RunParameters) -> str:
     used: dict[str, Any] = {key: table.value(parameters, key) for key in METHODS}
-    for stage in ("single_view", "fusion", "tracks"):
+    for stage in ("single_view", "fusion", "smoothing", "tracks"):
         used |= table.stage_values(parameters, stage)
     changed = table.changed(parameters, defaults)
     rows, group = [], ""

@@ -5,13 +5,13 @@ from __future__ import annotations
 import logging
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Float16, Int, UInt8, UInt16
 from numpy import ndarray
 from scipy.special import softmax
 
 from tracker import colour
 from tracker.boxes import Boxes
-from tracker.colour import ColourModel
+from tracker.colour import ColourModel, ColourSpaceName
 from tracker.parameters import ColourPhdParams
 from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
@@ -62,17 +62,45 @@ class Likeness:
             boxes: Centre and half sizes, pixels; equal probabilities outside the picture.
         """
         people = len(self._model.names)
-        height, width = picture.shape[:2]
-        low = np.floor(np.clip(Boxes(boxes).low - 1.0, 0.0, [width, height]))
-        high = np.ceil(np.clip(Boxes(boxes).high + 2.0, 0.0, [width, height]))
         told = np.full((len(boxes), people), 1.0 / people)
-        inside = np.flatnonzero((high > low).all(axis=1))
+        inside, bins, corner = _covered(picture, boxes, self._model.space)
         if not len(inside):
             return told
-        # only what the boxes cover is looked at: they are few and the picture may be large
-        left, top = low[inside].min(axis=0).astype(int)
-        right, bottom = high[inside].max(axis=0).astype(int)
-        bins = colour.bin_map(picture[top:bottom, left:right], self._model.space)
-        distances = self._model.distances(bins, boxes[inside] - [left, top, 0.0, 0.0])
+        distances = self._model.distances(bins, boxes[inside] - corner)
         told[inside] = softmax(-0.5 * (distances / _NUMBERS.likelihood_sigma) ** 2, axis=1)
         return told
+
+
+def looks_of(
+    picture: UInt8[ndarray, "h w 3"], boxes: Float[ndarray, "N 4"]
+) -> Float16[ndarray, "N A"]:
+    """The root of each box's colour histogram: a unit vector, 0 outside the picture.
+
+    The product of two is the Bhattacharyya coefficient of their histograms.
+    """
+    space, kernel = _NUMBERS.colour_space, _NUMBERS.histogram_kernel
+    roots = np.zeros((len(boxes), colour.BINS[space]), dtype=np.float16)
+    inside, bins, corner = _covered(picture, boxes, space)
+    if len(inside):
+        roots[inside] = np.sqrt(colour.histograms(bins, boxes[inside] - corner, space, kernel))
+    return roots
+
+
+def _covered(
+    picture: UInt8[ndarray, "h w 3"], boxes: Float[ndarray, "N 4"], space: ColourSpaceName
+) -> tuple[Int[ndarray, " K"], UInt16[ndarray, "h2 w2"], Float[ndarray, " 4"]]:
+    """Which boxes lie in the picture, the histogram bins of what they cover together, and what
+    is taken off a box to have it there.
+
+    Boxes are few and the picture may be large: the rest of it is not looked at.
+    """
+    height, width = picture.shape[:2]
+    low = np.floor(np.clip(Boxes(boxes).low - 1.0, 0.0, [width, height]))
+    high = np.ceil(np.clip(Boxes(boxes).high + 2.0, 0.0, [width, height]))
+    inside = np.flatnonzero((high > low).all(axis=1))
+    if not len(inside):
+        return inside, np.zeros((0, 0), dtype=np.uint16), np.zeros(4)
+    left, top = low[inside].min(axis=0).astype(int)
+    right, bottom = high[inside].max(axis=0).astype(int)
+    bins = colour.bin_map(picture[top:bottom, left:right], space)
+    return inside, bins, np.array([left, top, 0.0, 0.0])

@@ -1,0 +1,171 @@
+"""The joining of pieces: exact against all ways, and what cuts and pairs say."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from numpy import ndarray
+from numpy.testing import assert_allclose
+
+from tracker.filters.models import Motion
+from tracker.kernels.smoothing.presence import Habits, presence
+from tracker.parameters import FusionParams
+from tracker.smoothing.joining import chains, join
+from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.pieces import contested, cut, motion_pairs
+
+
+def worth_of(
+    following: tuple[int, ...], used: tuple[bool, ...], numbers: dict[str, ndarray], gain: ndarray
+) -> float:
+    """The objective, -inf for what is no set of chains."""
+    total = 0.0
+    followed = [j for j in following if j >= 0]
+    if len(set(followed)) < len(followed):
+        return -np.inf
+    for i, (j, there) in enumerate(zip(following, used, strict=True)):
+        if not there:
+            if j >= 0 or i in followed:
+                return -np.inf
+            continue
+        total += numbers["worths"][i]
+        total += gain[i, j] if j >= 0 else numbers["deaths"][i]
+        if i not in followed:
+            total += numbers["births"][i]
+        if j >= 0 and not used[j]:
+            return -np.inf
+    return total
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_best_of_all_ways_to_join_a_few_pieces(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(1, 5))
+    numbers = {
+        "worths": rng.normal(2.0, 6.0, count),
+        "births": rng.normal(-4.0, 1.0, count),
+        "deaths": rng.normal(-4.0, 1.0, count),
+    }
+    gain = np.where(
+        np.triu(rng.random((count, count)) < 0.7, 1), rng.normal(-3.0, 5.0, (count, count)), -np.inf
+    )
+    earlier, later = np.nonzero(np.isfinite(gain))
+    following, used = join(
+        numbers["worths"], numbers["births"], numbers["deaths"], earlier, later,
+        gain[earlier, later],
+    )  # fmt: skip
+    best = max(
+        worth_of(one, there, numbers, gain)
+        for one in itertools.product(range(-1, count), repeat=count)
+        for there in itertools.product((False, True), repeat=count)
+    )
+    found = worth_of(tuple(following.tolist()), tuple(used.tolist()), numbers, gain)
+    assert found == pytest.approx(best, abs=1e-9)
+    assert (
+        sorted(k for chain in chains(following, used) for k in chain)
+        == np.flatnonzero(used).tolist()
+    )
+
+
+def test_nothing_to_join() -> None:
+    nothing = np.zeros(0)
+    none = np.zeros(0, dtype=np.int64)
+    following, used = join(nothing, nothing, nothing, none, none, nothing)
+    assert len(following) == len(used) == 0
+    assert chains(following, used) == []
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_when_somebody_was_there_is_the_best_of_all_sequences(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    count, stay, enter, change = 8, -0.05, -1.0, -2.0
+    votes = rng.normal(0.0, 2.0, count)
+    end = count - 1 if seed % 2 else count + 5
+
+    def score(there: tuple[bool, ...]) -> float:
+        if not any(there):
+            return 0.0
+        here = np.flatnonzero(there)
+        first, last = here[0], here[-1]
+        total = enter + votes[here].sum() + (enter if last < end else 0.0)
+        for k in range(first + 1, last + 1):
+            total += change if there[k] != there[k - 1] else stay if there[k] else 0.0
+        return float(total)
+
+    ways = {there: score(there) for there in itertools.product((False, True), repeat=count)}
+    best = max(ways, key=lambda there: ways[there])
+    chances, odds = presence(
+        np.array([0, count]), np.array([count - 1]), votes, Habits(stay, enter, change), end
+    )
+    assert (chances > 0.5).tolist() == list(best)
+    assert odds[0] == pytest.approx(max(v for there, v in ways.items() if any(there)))
+    for k in range(count):
+        here = max(v for there, v in ways.items() if there[k])
+        away = max(v for there, v in ways.items() if not there[k])
+        assert chances[k] == pytest.approx(1.0 / (1.0 + np.exp(away - here)))
+
+
+def straight(label: int, first: int, begin: float, count: int, side: float = 0.0) -> Paths:
+    """Somebody who walks along x at 1 m/s, seen well at every step of 0.1 s."""
+    states = np.zeros((count, 6))
+    states[:, 0] = begin + 0.1 * np.arange(count)
+    states[:, 1], states[:, 2], states[:, 3] = side, 1.0, 1.0
+    covariances = np.tile(np.diag([1e-3, 1e-3, 1e-3, 0.01, 0.01, 0.01]), (count, 1, 1))
+    return Paths.of([label], [first], [states], [covariances], 6)
+
+
+def together(*paths: Paths) -> Paths:
+    return Paths.of(
+        [int(one.labels[0]) for one in paths],
+        [int(one.firsts[0]) for one in paths],
+        [one.states for one in paths],
+        [one.covariances for one in paths],
+        6,
+    )
+
+
+def test_the_motion_prefers_who_goes_on_as_he_went() -> None:
+    # two people side by side; after a gap one is where the first must be, the other beside
+    paths = together(
+        straight(1, 0, 0.0, 10),
+        straight(2, 0, 0.0, 10, side=1.0),
+        straight(3, 14, 1.4, 10),
+        straight(4, 14, 1.4, 10, side=1.0),
+    )
+    prior = np.diag([100.0] * 3 + [0.49] * 3)
+    motion = Motion.of(FusionParams(), 0.1)
+    found = motion_pairs(paths, motion, prior, 0.0, longest=20, fastest=0.3)
+    gain = {(i, j): g for i, j, g in zip(found.earlier, found.later, found.gains, strict=True)}
+    assert gain[0, 2] > gain[0, 3] + 3.0
+    assert gain[1, 3] > gain[1, 2] + 3.0
+    assert found.gaps.tolist() == [5] * len(found.gaps)
+    near = motion_pairs(paths, motion, prior, 0.0, longest=4, fastest=0.3)
+    assert len(near.gains) == 0
+
+
+def test_boxes_that_are_as_well_anothers_are_contested() -> None:
+    paths = together(straight(1, 0, 0.0, 2), straight(2, 0, 0.0, 2, side=0.2))
+    links = Links(
+        np.zeros(4, dtype=np.int64),
+        np.array([0, 2, 1, 3]),
+        np.array([0, 0, 1, 2]),
+        np.array([0.5, 0.5, 1.0, 1.0]),
+    )
+    assert_allclose(contested(paths, links), [1.0, 0.0, 1.0, 0.0])
+    uneven = Links(links.cameras, links.rows, links.boxes, np.array([0.8, 0.2, 1.0, 1.0]))
+    assert_allclose(contested(paths, uneven), [0.25, 0.0, 1.0, 0.0])
+
+
+def test_a_cut_leaves_the_clear_rows_where_they_were() -> None:
+    paths = together(straight(1, 3, 0.0, 6), straight(2, 0, 0.0, 3))
+    clear = np.array([True, True, False, True, True, True, True, True, True])
+    breaks = np.zeros(9, dtype=bool)
+    breaks[5] = True
+    pieces, kept = cut(paths, clear, breaks)
+    assert pieces.labels.tolist() == [1, 1, 1, 2]
+    assert pieces.firsts.tolist() == [3, 6, 8, 0]
+    assert np.diff(pieces.starts).tolist() == [2, 2, 1, 3]
+    assert_allclose(pieces.states, paths.states[kept])
+    assert pieces.steps.tolist() == paths.steps[kept].tolist()

@@ -1,0 +1,284 @@
+"""Forward and backward over whole paths, compiled: Kalman filter and Rauch-Tung-Striebel pass.
+
+[RTS65] Rauch, Tung, Striebel, "Maximum likelihood estimates of linear dynamic systems",
+AIAA Journal 3(8), 1965.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy import ndarray
+
+from tracker.kernels.compilation import kernel
+from tracker.kernels.linear_algebra import factorise, solve
+
+
+class PathMotion(NamedTuple):
+    """How a person moves, and what is known of him at first."""
+
+    transition: ndarray
+    """F (d, d)."""
+    noise: ndarray
+    """Q (d, d)."""
+    prior: ndarray
+    """(d, d), covariance of a first state."""
+
+
+class SmoothedRows(NamedTuple):
+    """N rows of paths after both passes."""
+
+    means: ndarray
+    """(N, d)."""
+    covariances: ndarray
+    """(N, d, d)."""
+    fits: ndarray
+    """(N,), log ∫ N(p; m, P) L(p) dp of each row, by the boxes of the rows before."""
+    traces: ndarray
+    """(N,), of the position's covariance by the rows before and this one."""
+    ahead: ndarray
+    """m⁻ (N, d), what the rows before say of each row."""
+    ahead_covariances: ndarray
+    """P⁻ (N, d, d)."""
+
+
+class _Room(NamedTuple):
+    """To write in while one row is worked out."""
+
+    inverse: ndarray
+    """(3, 3)."""
+    told: ndarray
+    """(3, 3), (I + Y P_pp)⁻¹ Y."""
+    side: ndarray
+    """(d, 3), P_p."""
+    half: ndarray
+    """(d, d)."""
+    lower: ndarray
+    """(d, d)."""
+
+
+@kernel
+def _carry(
+    mean: ndarray,
+    covariance: ndarray,
+    motion: PathMotion,
+    half: ndarray,
+    ahead: ndarray,
+    ahead_covariance: ndarray,
+) -> None:
+    """m⁻ = F m and P⁻ = F P Fᵀ + Q, into the last two; F P stays in ``half``."""
+    transition, d = motion.transition, len(mean)
+    for a in range(d):
+        ahead[a] = 0.0
+        for b in range(d):
+            half[a, b] = 0.0
+        for r in range(d):
+            if transition[a, r] != 0.0:  # most are
+                ahead[a] += transition[a, r] * mean[r]
+                for b in range(d):
+                    half[a, b] += transition[a, r] * covariance[r, b]
+    for a in range(d):
+        for b in range(a + 1):
+            total = motion.noise[a, b]
+            for r in range(d):
+                total += half[a, r] * transition[b, r]
+            ahead_covariance[a, b] = total
+            ahead_covariance[b, a] = total
+
+
+@kernel
+def _inverse(matrix: ndarray, inverse: ndarray) -> float:
+    """The inverse of a 3 × 3 matrix, by its cofactors, and its determinant."""
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        for p in range(3):
+            q, r = (p + 1) % 3, (p + 2) % 3
+            inverse[p, a] = matrix[b, q] * matrix[c, r] - matrix[b, r] * matrix[c, q]
+    determinant = 0.0
+    for p in range(3):
+        determinant += matrix[0, p] * inverse[p, 0]
+    for a in range(3):
+        for p in range(3):
+            inverse[p, a] /= determinant
+    return determinant
+
+
+@kernel
+def _update(y: ndarray, v: ndarray, mean: ndarray, covariance: ndarray, room: _Room) -> float:
+    """Mean and covariance by what a row's boxes say, in place.
+
+    Returns:
+        log ∫ N(x; m, P) exp(vᵀx − ½ xᵀYx) dx, by the matrix determinant lemma.
+    """
+    inverse, told, side, half, _ = room
+    d = len(mean)
+    for a in range(d):
+        for b in range(3):
+            side[a, b] = covariance[a, b]
+    for a in range(3):
+        for b in range(3):
+            told[a, b] = 1.0 if a == b else 0.0
+            for r in range(3):
+                told[a, b] += y[a, r] * side[r, b]
+    determinant = _inverse(told, inverse)
+    for a in range(3):
+        for b in range(3):
+            told[a, b] = 0.0
+            for r in range(3):
+                told[a, b] += inverse[a, r] * y[r, b]
+    for a in range(d):
+        for b in range(3):
+            half[a, b] = 0.0
+            for r in range(3):
+                half[a, b] += side[a, r] * told[r, b]
+    for a in range(d):
+        for b in range(a + 1):
+            total = 0.5 * (covariance[a, b] + covariance[b, a])
+            for r in range(3):
+                total -= 0.5 * (half[a, r] * side[b, r] + half[b, r] * side[a, r])
+            covariance[a, b] = total
+            covariance[b, a] = total
+    fixed, found = 0.0, 0.0
+    for a in range(3):
+        told[0, a] = v[a]
+        fixed += mean[a] * v[a]
+        for b in range(3):
+            told[0, a] -= y[a, b] * mean[b]
+            fixed -= 0.5 * mean[a] * y[a, b] * mean[b]
+    for a in range(3):
+        for b in range(3):
+            found += 0.5 * told[0, a] * covariance[a, b] * told[0, b]
+    for a in range(d):
+        for b in range(3):
+            mean[a] += covariance[a, b] * told[0, b]
+    return fixed + found - 0.5 * math.log(max(determinant, 1e-300))
+
+
+@kernel
+def _look_back(
+    mean: ndarray,
+    covariance: ndarray,
+    later: ndarray,
+    later_covariance: ndarray,
+    ahead: ndarray,
+    ahead_covariance: ndarray,
+    transition: ndarray,
+    room: _Room,
+) -> None:
+    """Mean and covariance by what the row after says of the rows behind it ([RTS65]), in place.
+
+    G = P Fᵀ (P⁻)⁻¹,   m += G (m_after − m⁻),   P += G (P_after − P⁻) Gᵀ
+    """
+    half, lower, d = room.half, room.lower, len(mean)
+    factorise(ahead_covariance, lower)
+    gain = np.empty((d, d))
+    crossing = np.empty(d)
+    for a in range(d):
+        for b in range(d):
+            crossing[b] = 0.0
+            for r in range(d):
+                if transition[b, r] != 0.0:
+                    crossing[b] += transition[b, r] * covariance[r, a]
+        solve(lower, crossing, gain[a])
+    for a in range(d):
+        for b in range(d):
+            mean[a] += gain[a, b] * (later[b] - ahead[b])
+            half[a, b] = 0.0
+            for r in range(d):
+                half[a, b] += gain[a, r] * (later_covariance[r, b] - ahead_covariance[r, b])
+    for a in range(d):
+        for b in range(a + 1):
+            total = covariance[a, b]
+            for r in range(d):
+                total += half[a, r] * gain[b, r]
+            covariance[a, b] = total
+            covariance[b, a] = total
+
+
+@kernel
+def smooth_paths(
+    starts: ndarray,
+    begins: ndarray,
+    information: ndarray,
+    vectors: ndarray,
+    motion: PathMotion,
+) -> SmoothedRows:
+    """The states of paths given all their boxes ([RTS65]), and how well these fit.
+
+    A row's boxes say of its position p what log L(p) = yᵀp − ½ pᵀ Y p says, whatever their
+    number: with the predicted N(m, P) the filter takes them as
+
+        P⁺ = P − P_p (I + Y P_pp)⁻¹ Y P_pᵀ,   m⁺ = m + P⁺_p (y − Y m_p)
+
+    which needs no inverse of Y: one camera alone may say nothing of depth.
+
+    Args:
+        starts: (n + 1,), where each path's rows begin, and the end.
+        begins: (n, d), mean of each path's first state.
+        information: Y (N, 3, 3), one a row.
+        vectors: y (N, 3).
+        motion: Of all.
+    """
+    rows, d = len(information), len(motion.transition)
+    means, covariances = np.empty((rows, d)), np.empty((rows, d, d))
+    ahead, ahead_covariances = np.empty((rows, d)), np.empty((rows, d, d))
+    fits, traces = np.zeros(rows), np.empty(rows)
+    room = _Room(
+        np.empty((3, 3)), np.empty((3, 3)), np.empty((d, 3)), np.empty((d, d)), np.zeros((d, d))
+    )
+    for path in range(len(starts) - 1):
+        first, last = starts[path], starts[path + 1]
+        for k in range(first, last):
+            if k == first:
+                ahead[k], ahead_covariances[k] = begins[path], motion.prior
+            else:
+                _carry(
+                    means[k - 1], covariances[k - 1], motion, room.half,
+                    ahead[k], ahead_covariances[k],
+                )  # fmt: skip
+            means[k], covariances[k] = ahead[k], ahead_covariances[k]
+            y = information[k]
+            if y[0, 0] + y[1, 1] + y[2, 2] > 0.0:
+                fits[k] = _update(y, vectors[k], means[k], covariances[k], room)
+            traces[k] = covariances[k, 0, 0] + covariances[k, 1, 1] + covariances[k, 2, 2]
+        for k in range(last - 2, first - 1, -1):
+            _look_back(
+                means[k], covariances[k], means[k + 1], covariances[k + 1],
+                ahead[k + 1], ahead_covariances[k + 1], motion.transition, room,
+            )  # fmt: skip
+    return SmoothedRows(means, covariances, fits, traces, ahead, ahead_covariances)
+
+
+@kernel
+def jumps(
+    starts: ndarray,
+    means: ndarray,
+    covariances: ndarray,
+    ahead: ndarray,
+    ahead_covariances: ndarray,
+) -> ndarray:
+    """Squared Mahalanobis distance between what the rows before and those from this one on say.
+
+    What is learnt from behind is P⁻ (P⁻ − P)⁻¹ P⁻, where anything is.
+
+    Args:
+        starts: (n + 1,), where each path's rows begin, and the end.
+        means: m (N, d), as the next three of :class:`SmoothedRows`.
+        covariances: P (N, d, d).
+        ahead: m⁻ (N, d).
+        ahead_covariances: P⁻ (N, d, d).
+
+    Returns:
+        (N,), 0 at each path's first row.
+    """
+    found = np.zeros(len(means))
+    for path in range(len(starts) - 1):
+        for k in range(starts[path] + 1, starts[path + 1]):
+            offset = means[k] - ahead[k]
+            lost = ahead_covariances[k] - covariances[k]
+            d = len(offset)
+            ridge = 1e-9 * np.trace(ahead_covariances[k]) / d
+            found[k] = max(offset @ np.linalg.solve(lost + ridge * np.eye(d), offset), 0.0)
+    return found

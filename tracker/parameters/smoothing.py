@@ -1,0 +1,72 @@
+"""Numbers of the smoothing over the whole recording."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from tracker.parameters.definition import Params, ui
+from tracker.parameters.methods import Method, Reads, Uses
+
+
+class SmoothingParams(Params):
+    """Tracks settled with hindsight, over all steps: places, ends, gaps, who is who."""
+
+    iterations: Annotated[int, Field(ge=1, le=10), ui("n", step=1)] = 2
+    """How often boxes are shared out anew by the smoothed tracks, and the tracks fitted to them."""
+
+    learning: Annotated[bool, ui("s, b, f")] = True
+    """Whether people's heights, the cameras' offsets and their noise are learnt on the way."""
+
+    memory: Annotated[float, Field(ge=0.05, le=10.0), ui("τ_z", unit="s", step=0.05, log=True)] = (
+        0.25
+    )
+    """Time within which boxes and misses of a camera repeat each other rather than tell anew."""
+
+    change: Annotated[float, Field(ge=0.0, le=20.0), ui("c", step=0.5)] = 4.0
+    """Log odds against a person's going away within a track, and against his coming back."""
+
+    reach: Annotated[float, Field(ge=0.0, le=10.0), ui("t_e", unit="s", step=0.1)] = 1.0
+    """How far beyond its first and last box a track looks for more."""
+
+    doubt: Annotated[float, Field(ge=0.05, le=1.0), ui("d", step=0.05)] = 0.6
+    """Identities: a track is cut where so great a share of its boxes may as well be another's."""
+
+    jump: Annotated[float, Field(ge=5.0, le=1000.0), ui("J", step=5.0, log=True)] = 40.0
+    """Identities: squared Mahalanobis distance of past and future from which a track is cut."""
+
+    gap: Annotated[float, Field(ge=0.1, le=30.0), ui("t_g", unit="s", step=0.1)] = 1.0
+    """Identities: a track is cut where nobody saw it for longer."""
+
+    longest: Annotated[float, Field(ge=0.1, le=60.0), ui("t_j", unit="s", step=0.5)] = 2.0
+    """Identities: pieces are joined by motion over gaps up to this; over longer ones by looks."""
+
+    keeping: Annotated[float, Field(ge=0.0, le=20.0), ui("k", step=0.5)] = 2.0
+    """Identities: log odds with which the filter's own label holds two of its pieces together."""
+
+    appearance: Annotated[float, Field(ge=0.0, le=5.0), ui("α", step=0.1)] = 1.0
+    """Identities: weight of what people look like; 0 leaves it out."""
+
+
+_IDENTITIES_ONLY = frozenset({"doubt", "jump", "gap", "longest", "keeping", "appearance"})
+
+NONE = Method(
+    name="none",
+    help="The filter's tracks as they are: what a live system would see.",
+    made_by="tracker.smoothing.protocol:NoSmoothing",
+)
+
+POSITIONS = Method(
+    name="positions",
+    help="Each track of the filter, smoothed over its whole life.",
+    made_by="tracker.smoothing.stage:Positions",
+    uses=Uses(reads=(Reads("smoothing", without=_IDENTITIES_ONLY),)),
+)
+
+IDENTITIES = Method(
+    name="identities",
+    help="Smoothed, and who is who settled over the whole recording.",
+    made_by="tracker.smoothing.stage:Identities",
+    uses=Uses(reads=(Reads("smoothing"),)),
+)

@@ -1,0 +1,10 @@
+"""Stage 3: the filter's tracks with hindsight: places, ends, gaps, and who is who.
+
+The methods are registered in :mod:`tracker.parameters.registry`.
+"""
+
+from tracker.smoothing.protocol import SmoothingMethod, create
+from tracker.smoothing.result import Decision, DecisionKind, Smoothed
+from tracker.smoothing.tracks import tracks_of
+
+__all__ = ["Decision", "DecisionKind", "Smoothed", "SmoothingMethod", "create", "tracks_of"]

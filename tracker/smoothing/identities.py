@@ -1,0 +1,375 @@
+"""Who is who over the whole recording: tracks cut where it was a draw, and joined again.
+
+The tracks of the filter are cut where its association marginals were near a draw, where past
+and future contradict each other, and where nobody saw them for long. What is left are pieces
+that are surely one person's; all of them together are joined at the least cost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Many
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+from scipy.special import logsumexp
+
+from tracker.fusion import visibility
+from tracker.kernels.smoothing import evidence
+from tracker.parameters import SmoothingParams
+from tracker.smoothing import joining, pieces
+from tracker.smoothing.appearance import Appearance
+from tracker.smoothing.lifetimes import independence, lifetimes, misses
+from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.pieces import Pairs
+from tracker.smoothing.result import Decision
+from tracker.smoothing.smoother import Fitted, Shared, Smoother
+
+_FED = 0.3
+"""Boxes, of all cameras together, from which a row counts as seen."""
+
+_AROUND = 0.2
+"""Seconds around a jump that belong to neither side."""
+
+_SHORTEST = 0.4
+"""Seconds of a piece that stands for itself; a shorter one, beside longer ones, is left out."""
+
+_FASTEST = 3.0
+"""Metres a second that nobody in a room exceeds for long."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Settled:
+    """Pieces joined into the tracks of people."""
+
+    paths: Paths
+    links: Links
+    origins: Int[ndarray, " n"]
+    """The path before the cuts of which each has most."""
+    decisions: list[Decision]
+
+
+def settle(
+    smoother: Smoother,
+    fitted: Fitted,
+    shared: Shared,
+    contested: Float[ndarray, " N"],
+    parameters: SmoothingParams,
+    looks: Many[Float[ndarray, "B A"]] | None,
+) -> Settled:
+    """Cut and join.
+
+    Args:
+        smoother: The models.
+        fitted: The filter's tracks, fitted to their boxes.
+        shared: Whose box each is.
+        contested: By which share each row's boxes were as well another's, as the filter ran.
+        parameters: When to cut, and what holds together.
+        looks: A unit vector for each box of each camera; None where there is none.
+    """
+    cut, kept, reasons = _cut(smoother, fitted, shared, contested, parameters)
+    links = pieces.moved(shared.links, kept, len(fitted.paths.states))
+    refitted = smoother.fit(cut, links)
+    own = Shared(links, shared.chances[:, kept], shared.missed[:, kept], shared.hidden_by[:, kept])
+    worths, births, deaths = _odds(smoother, refitted, own, parameters)
+    pairs, stays = _pairs(smoother, refitted.paths, links, births, deaths, parameters, looks)
+    following, used = joining.join(worths, births, deaths, pairs.earlier, pairs.later, pairs.gains)
+    chains = joining.chains(following, used)
+    labels = _labels(cut, chains)
+    decisions = [*_cuts(cut, fitted.paths, kept, reasons, chains, labels)]
+    decisions += _joins(cut, pairs, births, deaths, chains, labels, stays)
+    paths, rows = _chained(refitted.paths, chains, labels)
+    lengths = np.diff(cut.starts)
+    origins = [
+        _most(fitted.paths.owners[kept[cut.starts[chain]]], lengths[chain]) for chain in chains
+    ]
+    links = pieces.moved_to(links, rows)
+    return Settled(paths, links, np.array(origins, dtype=np.int64), decisions)
+
+
+def _cut(
+    smoother: Smoother,
+    fitted: Fitted,
+    shared: Shared,
+    contested: Float[ndarray, " N"],
+    p: SmoothingParams,
+) -> tuple[Paths, Int[ndarray, " M"], Int[ndarray, " N"]]:
+    """The pieces, the row that each of their rows was, and why each row was left out: 0 for not,
+    1 contested, 2 jump, 3 away or not seen."""
+    step_time, paths = smoother.model.step_time, fitted.paths
+    rows = len(paths.states)
+    there, _ = lifetimes(smoother, paths, shared, p)
+    reasons = np.zeros(rows, dtype=np.int64)
+    fed = np.bincount(shared.links.rows, shared.links.shares, rows) > _FED
+    gaps = _long_gaps(paths, fed, round(p.gap / step_time))
+    reasons[gaps | (there < 0.5)] = 3
+    around = round(_AROUND / step_time)
+    # where boxes err alike for a while, past and future contradict each other by less than it seems
+    jumps = np.flatnonzero(fitted.jumps * independence(step_time, p.memory) > p.jump)
+    owners = paths.owners
+    for offset in range(-around, around):
+        near = np.clip(jumps + offset, 0, rows - 1)
+        near = near[owners[near] == owners[jumps]]
+        reasons[near] = 2
+    reasons[contested >= p.doubt] = 1
+    breaks = np.zeros(rows, dtype=bool)
+    breaks[jumps] = True
+    clear = _between(paths, fed & (reasons == 0)) & (reasons == 0)
+    cut, kept = pieces.cut(paths, clear, breaks)
+    # a short piece says little of who it is; where it is all there is it stays
+    lengths = np.diff(cut.starts)
+    of = owners[kept[cut.starts[:-1]]]
+    longest = np.zeros(len(paths.labels), dtype=np.int64)
+    np.maximum.at(longest, of, lengths)
+    shortest = round(_SHORTEST / step_time)
+    short = (lengths < shortest) & (longest[of] >= shortest)
+    clear[kept[np.repeat(short, lengths)]] = False
+    cut, kept = pieces.cut(paths, clear, breaks)
+    return cut, kept, reasons
+
+
+def _long_gaps(paths: Paths, fed: Bool[ndarray, " N"], longest: int) -> Bool[ndarray, " N"]:
+    """The rows of those runs without a box that are longer than ``longest`` steps."""
+    owners = paths.owners
+    change = np.ones(len(fed), dtype=bool)
+    change[1:] = (fed[1:] != fed[:-1]) | (owners[1:] != owners[:-1])
+    run = np.cumsum(change) - 1
+    lengths = np.bincount(run)
+    return np.asarray(~fed & (lengths[run] > longest)) if len(fed) else fed
+
+
+def _between(paths: Paths, seen: Bool[ndarray, " N"]) -> Bool[ndarray, " N"]:
+    """The rows from the first to the last seen one of each path."""
+    rows, owners = np.arange(len(seen)), paths.owners
+    first = np.full(len(paths.labels), len(seen))
+    last = np.full(len(paths.labels), -1)
+    np.minimum.at(first, owners[seen], rows[seen])
+    np.maximum.at(last, owners[seen], rows[seen])
+    return np.asarray((rows >= first[owners]) & (rows <= last[owners]))
+
+
+def _odds(
+    smoother: Smoother, fitted: Fitted, shared: Shared, parameters: SmoothingParams
+) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"], Float[ndarray, " n"]]:
+    """Of each piece: the log odds of its boxes against clutter, of its birth and of its death."""
+    p, step_time, paths = smoother.parameters, smoother.model.step_time, fitted.paths
+    count = len(paths.labels)
+    survival, death = _survival(smoother)
+    rows = fitted.odds + independence(step_time, parameters.memory) * misses(shared) + survival
+    worths = np.bincount(paths.owners, rows, count) + smoother.log_place
+    births = np.full(count, np.log(p.birth_rate * step_time))
+    deaths = np.where(paths.lasts >= smoother.frames - 1, 0.0, death)
+    return worths, births, deaths
+
+
+def _survival(smoother: Smoother) -> tuple[float, float]:
+    """log p_S and log(1 − p_S)."""
+    survival = min(smoother.parameters.survival_probability, 1.0 - 1e-6)
+    return float(np.log(survival)), float(np.log1p(-survival))
+
+
+def _pairs(
+    smoother: Smoother,
+    paths: Paths,
+    links: Links,
+    births: Float[ndarray, " n"],
+    deaths: Float[ndarray, " n"],
+    p: SmoothingParams,
+    looks: Many[Float[ndarray, "B A"]] | None,
+) -> tuple[Pairs, Float[ndarray, " n"]]:
+    """Every pair that may be one person, with its gain, and what a piece gains that begins anew.
+
+    Two pieces may be joined by their motion over a short gap; over a longer one by their looks,
+    as somebody of those who left and is back; and by the label that the filter gave both.
+    """
+    step_time, count = smoother.model.step_time, len(paths.labels)
+    survival, death = _survival(smoother)
+    anew = births + death
+    motion = pieces.motion_pairs(
+        paths,
+        smoother.model.motion,
+        smoother.prior,
+        smoother.log_place,
+        longest=max(round(p.longest / step_time), 1),
+        fastest=_FASTEST * step_time,
+    )
+    gains = np.full((count, count), -np.inf)
+    gains[motion.earlier, motion.later] = (
+        motion.gains + motion.gaps * survival + _seen_empty(smoother, paths, motion, p.memory)
+    )
+    if p.appearance > 0.0 and looks is not None and looks[0].shape[1]:
+        alike = Appearance(paths, links, smoother.cameras, looks, step_time)
+        before = paths.lasts[:, None] < paths.firsts[None, :]
+        gone = np.maximum(before.sum(axis=0), 1)
+        earlier, later = np.nonzero(before)
+        ratio, known = alike.log_ratio(earlier, later)
+        earlier, later, ratio = earlier[known], later[known], ratio[known]
+        back = anew[later] - np.log(gone[later])
+        gains[earlier, later] = np.maximum(gains[earlier, later], back) + p.appearance * ratio
+    one = np.flatnonzero(paths.labels[1:] == paths.labels[:-1])
+    gains[one, one + 1] = np.maximum(gains[one, one + 1], anew[one + 1]) + p.keeping
+    earlier, later = np.nonzero(np.isfinite(gains))
+    gaps = paths.firsts[later] - paths.lasts[earlier]
+    return Pairs(earlier, later, gaps, gains[earlier, later]), anew
+
+
+def _seen_empty(
+    smoother: Smoother, paths: Paths, pairs: Pairs, memory: float
+) -> Float[ndarray, " P"]:
+    """What the cameras say of the ways between the pieces of each pair: at most 0.
+
+    A camera that looks at the straight way in between and has no box there speaks against
+    somebody; one that has a box, his or of who hides him, says nothing.
+    """
+    inner = pairs.gaps - 1
+    told = np.zeros(len(inner))
+    pair = np.repeat(np.arange(len(inner)), inner)
+    step = np.arange(len(pair)) - np.repeat(np.cumsum(inner) - inner, inner) + 1
+    begin = paths.states[paths.starts[1:][pairs.earlier] - 1][pair]
+    end = paths.states[paths.starts[:-1][pairs.later]][pair]
+    share = (step / pairs.gaps[pair])[:, None]
+    states = begin * (1.0 - share) + end * share
+    spread = np.zeros((len(pair), states.shape[1], states.shape[1]))
+    steps = paths.lasts[pairs.earlier][pair] + step
+    model, p = smoother.model, smoother.parameters
+    for c, camera in enumerate(smoother.cameras):
+        expected = model.target.expected(model.cameras[c], states, spread)
+        chances = p.detection_probability * visibility.inside_probability(
+            model.cameras[c], expected, spread, soft=p.edge == "soft"
+        )
+        chances = np.where(camera.blind[steps], 0.0, chances)
+        against = evidence.seen_empty(
+            expected.boxes, expected.valid, chances, steps, camera.starts, camera.boxes
+        )
+        told += np.bincount(pair, against, len(inner))
+    return told * independence(model.step_time, memory)
+
+
+def _most(names: ndarray, weights: ndarray) -> int:
+    """The name with most weight, of equal ones the smallest."""
+    values, which = np.unique(names, return_inverse=True)
+    return int(values[np.argmax(np.bincount(which, weights))])
+
+
+def _labels(cut: Paths, chains: list[list[int]]) -> list[int]:
+    """A label for each chain: that of most of its rows, where no other chain has more of it."""
+    lengths = np.diff(cut.starts)
+    votes: list[tuple[int, int, int]] = []
+    for number, chain in enumerate(chains):
+        names, which = np.unique(cut.labels[chain], return_inverse=True)
+        counts = np.bincount(which, lengths[chain])
+        votes += [
+            (-int(count), int(name), number) for name, count in zip(names, counts, strict=True)
+        ]
+    labels = [-1] * len(chains)
+    taken: set[int] = set()
+    for _, name, number in sorted(votes):
+        if labels[number] < 0 and name not in taken:
+            labels[number] = name
+            taken.add(name)
+    free = int(cut.labels.max(initial=0)) + 1
+    for number, label in enumerate(labels):
+        if label < 0:
+            labels[number], free = free, free + 1
+    return labels
+
+
+def _chained(
+    cut: Paths, chains: list[list[int]], labels: list[int]
+) -> tuple[Paths, Int[ndarray, " M"]]:
+    """The chains as paths, drawn straight through their gaps, and each row's place in them."""
+    dimension = cut.states.shape[1]
+    steps, place = cut.steps, np.full(len(cut.states), -1, dtype=np.int64)
+    firsts, states, covariances, begin = [], [], [], 0
+    for chain in chains:
+        rows = np.concatenate([np.arange(cut.starts[k], cut.starts[k + 1]) for k in chain])
+        own = steps[rows]
+        every = np.arange(own[0], own[-1] + 1)
+        states.append(
+            np.stack([np.interp(every, own, cut.states[rows, a]) for a in range(dimension)], axis=1)
+        )
+        spread = np.tile(np.eye(dimension), (len(every), 1, 1))
+        spread[own - own[0]] = cut.covariances[rows]
+        covariances.append(spread)
+        firsts.append(int(own[0]))
+        place[rows] = begin + own - own[0]
+        begin += len(every)
+    return Paths.of(labels, firsts, states, covariances, dimension), place
+
+
+_REASONS = {
+    0: "past and future do not fit",
+    1: "whose boxes these are was near a draw",
+    2: "past and future do not fit",
+    3: "nobody saw it, or it was not there",
+}
+
+
+def _cuts(
+    cut: Paths,
+    before: Paths,
+    kept: Int[ndarray, " M"],
+    reasons: Int[ndarray, " N"],
+    chains: list[list[int]],
+    labels: list[int],
+) -> list[Decision]:
+    """The cuts after which a track did not go on as the filter had it."""
+    chain_of = {piece: number for number, chain in enumerate(chains) for piece in chain}
+    found = []
+    for piece in range(len(cut.labels) - 1):
+        one, other = chain_of.get(piece), chain_of.get(piece + 1)
+        if cut.labels[piece] != cut.labels[piece + 1] or one is None or one == other:
+            continue
+        last, first = kept[cut.starts[piece + 1] - 1], kept[cut.starts[piece + 1]]
+        why = int(np.max(reasons[last + 1 : first], initial=0))
+        if (reasons[last + 1 : first] == 1).any():
+            why = 1
+        step = int(before.steps[first])
+        found.append(
+            Decision("cut", step, labels[one], int(cut.labels[piece]), 1.0, 0.0, _REASONS[why])
+        )
+    return found
+
+
+def _joins(
+    cut: Paths,
+    pairs: Pairs,
+    births: Float[ndarray, " n"],
+    deaths: Float[ndarray, " n"],
+    chains: list[list[int]],
+    labels: list[int],
+    anew: Float[ndarray, " n"],
+) -> list[Decision]:
+    """The joins of what the filter held for two people, with the odds against the best other."""
+    gain = {
+        (i, j): g
+        for i, j, g in zip(
+            pairs.earlier.tolist(), pairs.later.tolist(), pairs.gains.tolist(), strict=True
+        )
+    }
+    by_later: dict[int, list[float]] = {}
+    for (_, j), g in gain.items():
+        by_later.setdefault(j, []).append(g)
+    found = []
+    for chain, label in zip(chains, labels, strict=True):
+        for i, j in pairwise(chain):
+            if cut.labels[i] == cut.labels[j]:
+                continue
+            every = np.array([*by_later[j], anew[j]])
+            chances = np.exp(every - logsumexp(every))
+            own = float(np.exp(gain[i, j] - logsumexp(every)))
+            rest = np.delete(chances, int(np.argmin(np.abs(every - gain[i, j]))))
+            found.append(
+                Decision(
+                    "joined",
+                    int(cut.firsts[j]),
+                    label,
+                    int(cut.labels[j] if cut.labels[j] != label else cut.labels[i]),
+                    own,
+                    float(rest.max(initial=0.0)),
+                    "one person goes on" if cut.firsts[j] - cut.lasts[i] < 2 else "one person",
+                )
+            )
+    return found

@@ -1,0 +1,99 @@
+"""When people were there: whose track begins and ends where, and who was nobody."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.kernels.smoothing.presence import Habits, presence
+from tracker.parameters import SmoothingParams
+from tracker.smoothing.paths import Paths
+from tracker.smoothing.smoother import Shared, Smoother
+
+_AWAY_FROM_BOXES = 0.3
+"""Existence with which a row beyond a path's ends competes for boxes."""
+
+
+_ENTER = 0.5
+"""Log odds against a track's coming and against its leaving: the filter has found it already."""
+
+
+def independence(step_time: float, memory: float) -> float:
+    """The share of a step's evidence that is new: pictures of one moment agree, right or wrong."""
+    return min(step_time / memory, 1.0)
+
+
+def misses(shared: Shared) -> Float[ndarray, " N"]:
+    """log of what the cameras that should have seen each row and did not say: at most 0."""
+    blind = np.log1p(-np.minimum(shared.chances, 1.0 - 1e-6))
+    return np.asarray((shared.missed * blind).sum(axis=0))
+
+
+def lifetimes(
+    smoother: Smoother, paths: Paths, shared: Shared, parameters: SmoothingParams
+) -> tuple[Float[ndarray, " N"], Float[ndarray, " n"]]:
+    """The probability at each row that somebody was there, and each path's odds in its whole life.
+
+    A camera that shows the person votes for him with as much as it would against him if it
+    showed nothing, log 1/(1 − p_D): a false box that stays is no better witness than a miss.
+
+    Returns:
+        (N,) probabilities; (n,) log odds of a person at some step against nobody.
+    """
+    p = smoother.parameters
+    hit = -np.log1p(-min(p.detection_probability, 1.0 - 1e-6))
+    votes = hit * np.bincount(shared.links.rows, shared.links.shares, len(paths.states))
+    weight = independence(smoother.model.step_time, parameters.memory)
+    survival = min(p.survival_probability, 1.0 - 1e-9)
+    found = presence(
+        paths.starts,
+        paths.lasts,
+        weight * (votes + misses(shared)),
+        Habits(float(np.log(survival)), -_ENTER, -parameters.change),
+        smoother.frames - 1,
+    )
+    return found.probabilities, found.odds
+
+
+def extended(smoother: Smoother, paths: Paths, steps: int) -> tuple[Paths, Float[ndarray, " N"]]:
+    """The paths with more steps at both ends, where the motion model takes them.
+
+    Returns:
+        The longer paths, and with which existence each row may ask for boxes.
+    """
+    motion = smoother.model.motion
+    backward = motion.transition.copy()
+    backward[:3, 3:] *= -1.0  # the same process, seen from behind
+    states, covariances, firsts, existences = [], [], [], []
+    for i, (begin, end) in enumerate(zip(paths.starts, paths.starts[1:], strict=False)):
+        before = min(steps, int(paths.firsts[i]))
+        after = min(steps, smoother.frames - 1 - int(paths.lasts[i]))
+        head = _carried(
+            paths.states[begin], paths.covariances[begin], backward, motion.noise, before
+        )
+        tail = _carried(
+            paths.states[end - 1], paths.covariances[end - 1], motion.transition, motion.noise,
+            after,
+        )  # fmt: skip
+        states.append(np.concatenate([head[0][::-1], paths.states[begin:end], tail[0]]))
+        covariances.append(np.concatenate([head[1][::-1], paths.covariances[begin:end], tail[1]]))
+        firsts.append(int(paths.firsts[i]) - before)
+        own = np.full(len(states[-1]), _AWAY_FROM_BOXES)
+        own[before : before + end - begin] = 1.0
+        existences.append(own)
+    longer = Paths.of(paths.labels.tolist(), firsts, states, covariances, motion.dimension)
+    return longer, np.concatenate([np.zeros(0), *existences])
+
+
+def _carried(
+    state: ndarray, covariance: ndarray, transition: ndarray, noise: ndarray, steps: int
+) -> tuple[ndarray, ndarray]:
+    """(steps, d) states and (steps, d, d) covariances of a state carried on."""
+    states = np.empty((steps, len(state)))
+    covariances = np.empty((steps, len(state), len(state)))
+    for k in range(steps):
+        state = transition @ state
+        covariance = transition @ covariance @ transition.T + noise
+        states[k], covariances[k] = state, covariance
+    return states, covariances

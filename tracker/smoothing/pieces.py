@@ -1,0 +1,171 @@
+"""Tracks cut into pieces where it is a draw whose boxes are whose, and what joins them again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+
+from tracker.filters.models import Motion
+from tracker.smoothing.paths import Links, Paths
+
+
+def contested(paths: Paths, links: Links) -> Float[ndarray, " N"]:
+    """By which share the boxes of each row may as well be another path's.
+
+        Σ_z min(a_i(z), max_{j≠i} a_j(z)) / Σ_z a_i(z)
+
+    over the boxes z of all cameras with association probabilities a: 0 where they are nobody
+    else's, 1 where they are somebody else's just as well.
+    """
+    rows = len(paths.states)
+    own = np.bincount(links.rows, links.shares, rows)
+    if not len(links.rows):
+        return np.zeros(rows)
+    order = np.lexsort((-links.shares, links.boxes, links.cameras))
+    camera, box, share = links.cameras[order], links.boxes[order], links.shares[order]
+    first = np.ones(len(order), dtype=bool)
+    first[1:] = (np.diff(camera) != 0) | (np.diff(box) != 0)
+    leader = np.maximum.accumulate(np.where(first, np.arange(len(order)), 0))
+    follows = np.zeros(len(order))
+    second = np.flatnonzero(~first & (leader == np.arange(len(order)) - 1))
+    follows[leader[second]] = share[second]
+    rival = np.where(first, follows[leader], share[leader])
+    lost = np.bincount(links.rows[order], np.minimum(share, rival), rows)
+    return np.asarray(np.where(own > 0.0, lost / np.maximum(own, 1e-12), 0.0))
+
+
+def cut(
+    paths: Paths, clear: Bool[ndarray, " N"], breaks: Bool[ndarray, " N"]
+) -> tuple[Paths, Int[ndarray, " M"]]:
+    """The runs of clear rows as paths of their own, and which row each of their rows was.
+
+    Args:
+        paths: What is cut.
+        clear: Rows that are kept.
+        breaks: Rows before which a path is cut even where both sides are clear.
+    """
+    kept = np.flatnonzero(clear)
+    owners = paths.owners[kept]
+    begins = np.ones(len(kept), dtype=bool)
+    begins[1:] = (np.diff(kept) > 1) | (np.diff(owners) != 0) | breaks[kept[1:]]
+    firsts = np.flatnonzero(begins)
+    starts = np.append(firsts, len(kept)).astype(np.int64)
+    return (
+        Paths(
+            paths.labels[owners[firsts]],
+            paths.steps[kept[firsts]],
+            starts,
+            paths.states[kept],
+            paths.covariances[kept],
+        ),
+        kept,
+    )
+
+
+def moved(links: Links, kept: Int[ndarray, " M"], rows: int) -> Links:
+    """The links of rows that were kept, by their new rows."""
+    place = np.full(rows, -1, dtype=np.int64)
+    place[kept] = np.arange(len(kept))
+    return moved_to(links, place)
+
+
+def moved_to(links: Links, place: Int[ndarray, " N"]) -> Links:
+    """The links of rows that have a new place, -1 for none, by that place."""
+    new = place[links.rows]
+    chosen = links.take(new >= 0)
+    return Links(chosen.cameras, new[new >= 0], chosen.boxes, chosen.shares)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pairs:
+    """P pairs of pieces that may be one person's, the first before the second."""
+
+    earlier: Int[ndarray, " P"]
+    later: Int[ndarray, " P"]
+    gaps: Int[ndarray, " P"]
+    """Steps from the end of the one to the beginning of the other, at least 1."""
+    gains: Float[ndarray, " P"]
+    """log of how much better the second fits as the first's continuation than anywhere."""
+
+
+def motion_pairs(
+    pieces: Paths,
+    motion: Motion,
+    prior: Float[ndarray, "d d"],
+    log_place: float,
+    *,
+    longest: int,
+    fastest: float,
+) -> Pairs:
+    """The pairs that the motion allows, with the motion's log odds.
+
+    With Λ, η the information that the boxes of the later piece hold of its first state, and
+    N(a, A) the earlier one's last state predicted over the gap,
+
+        gain = log ∫ N(x; a, A) e^{ηᵀx − ½ xᵀΛx} dx − log ∫ p_0(x) e^{ηᵀx − ½ xᵀΛx} dx
+
+    with the density p_0 of a newcomer: anywhere in the room, at a newcomer's speed.
+
+    Args:
+        pieces: Each fitted to its own boxes alone.
+        motion: Of the fusion.
+        prior: Covariance of a first state in the fit.
+        log_place: What turns its density into that of the room.
+        longest: Steps of the longest gap.
+        fastest: Metres a step that nobody exceeds.
+    """
+    ends, begins = pieces.starts[1:] - 1, pieces.starts[:-1]
+    lasts, firsts = pieces.lasts, pieces.firsts
+    order = np.argsort(firsts, kind="stable")
+    low = np.searchsorted(firsts[order], lasts, side="right")
+    high = np.searchsorted(firsts[order], lasts + longest, side="right")
+    earlier = np.repeat(np.arange(len(lasts)), high - low)
+    offset = np.arange(len(earlier)) - np.repeat(np.cumsum(high - low) - (high - low), high - low)
+    later = order[np.repeat(low, high - low) + offset] if len(earlier) else earlier
+    gaps = firsts[later] - lasts[earlier]
+    way = pieces.states[begins[later], :3] - pieces.states[ends[earlier], :3]
+    near = np.linalg.norm(way, axis=1) <= 1.0 + fastest * gaps
+    earlier, later, gaps = earlier[near], later[near], gaps[near]
+    # F^k, and the noise that k steps add
+    d = motion.dimension
+    most = int(gaps.max(initial=1))
+    transitions, noises = np.empty((most + 1, d, d)), np.zeros((most + 1, d, d))
+    transitions[0] = np.eye(d)
+    for k in range(most):
+        transitions[k + 1] = motion.transition @ transitions[k]
+        noises[k + 1] = motion.transition @ noises[k] @ motion.transition.T + motion.noise
+    f = transitions[gaps]
+    a = np.einsum("pij,pj->pi", f, pieces.states[ends[earlier]])
+    spread = f @ pieces.covariances[ends[earlier]] @ f.transpose(0, 2, 1) + noises[gaps]
+    inverse = np.linalg.inv(pieces.covariances[begins])
+    origin = np.linalg.inv(prior)
+    information = inverse - origin
+    centre = pieces.states[begins].copy()
+    centre[:, 3:] = 0.0
+    vectors = np.einsum("pij,pj->pi", inverse, pieces.states[begins]) - centre @ origin
+    newcomer = _log_integral(centre, np.broadcast_to(prior, inverse.shape), information, vectors)
+    gains = (
+        _log_integral(a, spread, information[later], vectors[later]) - newcomer[later] - log_place
+    )
+    return Pairs(earlier, later, gaps, gains)
+
+
+def _log_integral(
+    means: Float[ndarray, "P d"],
+    covariances: Float[ndarray, "P d d"],
+    information: Float[ndarray, "P d d"],
+    vectors: Float[ndarray, "P d"],
+) -> Float[ndarray, " P"]:
+    """log ∫ N(x; m, P) e^{ηᵀx − ½ xᵀΛx} dx."""
+    if not len(means):
+        return np.zeros(0)
+    bracket = np.eye(means.shape[1]) + information @ covariances
+    told = vectors - np.einsum("pij,pj->pi", information, means)
+    shift = np.einsum("pij,pj->pi", covariances, np.linalg.solve(bracket, told[..., None])[..., 0])
+    _, log_determinant = np.linalg.slogdet(bracket)
+    fixed = np.einsum("pi,pi->p", means, vectors)
+    fixed -= 0.5 * np.einsum("pi,pij,pj->p", means, information, means)
+    return np.asarray(fixed + 0.5 * np.einsum("pi,pi->p", told, shift) - 0.5 * log_determinant)

@@ -1,0 +1,39 @@
+"""All boxes of a recording as measurements, camera by camera."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Many
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+
+from tracker.fusion.target_model import TargetModel
+from tracker.kernels.gating import Measurements
+from tracker.single_view.protocol import ViewResult
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraBoxes:
+    """The B boxes of one camera, step after step."""
+
+    starts: Int[ndarray, " T1"]
+    """Where each step's boxes begin, and the end."""
+    blind: Bool[ndarray, " T"]
+    """Whether the camera had no frame."""
+    measurements: Measurements
+    """Of the target model, pixels and squared pixels."""
+    boxes: Float[ndarray, "B 4"]
+    """Centre and half sizes, pixels."""
+
+    @staticmethod
+    def of(views: Many[ViewResult], model: TargetModel, factor: float) -> CameraBoxes:
+        """Those of all steps; the standard deviations times ``factor``."""
+        counts = [len(view.boxes) for view in views]
+        boxes = np.concatenate([np.zeros((0, 4)), *(view.boxes for view in views)])
+        sigmas = np.concatenate([np.zeros((0, 4)), *(view.sigmas for view in views)])
+        measurements = model.measured_boxes(boxes, sigmas, factor)
+        blind = np.array([view.blind for view in views], dtype=bool)
+        starts = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
+        return CameraBoxes(starts, blind, measurements, boxes)

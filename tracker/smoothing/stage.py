@@ -1,0 +1,181 @@
+"""Stage 3: the filter's tracks with hindsight, over all steps of a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Sequence as Many
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker import trajectories
+from tracker.fusion.model import CONFIRMED
+from tracker.fusion.protocol import FusionResult
+from tracker.parameters import RunParameters, SmoothingParams
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.protocol import ViewResult
+from tracker.smoothing import identities, lifetimes, pieces, reading
+from tracker.smoothing.calibration import Calibration
+from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.result import Decision, Smoothed
+from tracker.smoothing.smoother import Fitted, Shared, Smoother
+
+_SEEN = 0.5
+"""Association probability from which a camera counts as seeing a person."""
+
+
+class Positions:
+    """Each track of the filter, smoothed over its whole life.
+
+    It is fitted to its boxes, and the boxes are shared out anew by where the tracks lie; gaps
+    are filled from both sides, ends cut where the evidence ends, and beginnings drawn back to
+    the first box.
+    """
+
+    def __init__(self, sequence: Sequence, parameters: RunParameters) -> None:
+        """Prepare for one sequence.
+
+        Args:
+            sequence: Cameras and room.
+            parameters: Of the fusion, whose models are used, and of the smoothing.
+        """
+        self._sequence = sequence
+        self._parameters = parameters
+
+    def smooth(
+        self,
+        views: Many[tuple[ViewResult, ...]],
+        fused: Many[FusionResult],
+        check: Callable[[], None] = lambda: None,
+    ) -> Smoothed:
+        """The tracks of some steps from step 0 on, each by the boxes of all of them."""
+        p = self._parameters.smoothing
+        smoother = Smoother(self._sequence, self._parameters.fusion, views)
+        dimension, cameras = smoother.model.motion.dimension, len(smoother.cameras)
+        tracks = trajectories.extract(fused, cameras=cameras, extraction_threshold=CONFIRMED)
+        if not len(tracks):
+            return Smoothed.empty(dimension, cameras)
+        paths = reading.read_paths(fused, tracks, dimension)
+        links = reading.read_links(fused, paths, smoother.cameras)
+        check()
+        paths, links, learnt, decisions = self._named(smoother, paths, links, views, check)
+        fitted, shared, learnt = _settled(smoother, paths, links, p, learnt, check)
+        return _finished(smoother, fitted, shared, learnt, p, decisions)
+
+    def _named(
+        self,
+        smoother: Smoother,
+        paths: Paths,
+        links: Links,
+        views: Many[tuple[ViewResult, ...]],
+        check: Callable[[], None],
+    ) -> tuple[Paths, Links, Calibration | None, list[Decision]]:
+        """The tracks of people, and what was learnt on the way: here the filter's own."""
+        return paths, links, None, []
+
+
+class Identities(Positions):
+    """Smoothed, and who is who settled: tracks cut where it was a draw, and joined at once."""
+
+    def _named(
+        self,
+        smoother: Smoother,
+        paths: Paths,
+        links: Links,
+        views: Many[tuple[ViewResult, ...]],
+        check: Callable[[], None],
+    ) -> tuple[Paths, Links, Calibration | None, list[Decision]]:
+        p = self._parameters.smoothing
+        contested = pieces.contested(paths, links)
+        fitted, shared, learnt = _settled(smoother, paths, links, p, None, check)
+        looks = _looks(views) if p.appearance > 0.0 else None
+        found = identities.settle(smoother, fitted, shared, contested, p, looks)
+        check()
+        return found.paths, found.links, learnt.of_people(found.origins), found.decisions
+
+
+def _settled(
+    smoother: Smoother,
+    paths: Paths,
+    links: Links,
+    p: SmoothingParams,
+    learnt: Calibration | None,
+    check: Callable[[], None],
+) -> tuple[Fitted, Shared, Calibration]:
+    """Tracks fitted to their boxes, boxes shared out by the tracks, in turns."""
+    learnt = learnt or smoother.stated(paths)
+    fitted = smoother.fit(paths, links, 2, learnt)
+    shared = smoother.share(fitted.paths, None, learnt)
+    for _ in range(p.iterations):
+        check()
+        if p.learning:
+            learnt = smoother.learn(fitted.paths, shared.links, learnt)
+        fitted = smoother.fit(fitted.paths, shared.links, 1, learnt)
+        shared = smoother.share(fitted.paths, None, learnt)
+    return fitted, shared, learnt
+
+
+def _finished(
+    smoother: Smoother,
+    fitted: Fitted,
+    shared: Shared,
+    learnt: Calibration,
+    p: SmoothingParams,
+    decisions: list[Decision],
+) -> Smoothed:
+    """The tracks with their ends settled, and what is nobody left out."""
+    longer, existences = lifetimes.extended(
+        smoother, fitted.paths, round(p.reach / smoother.model.step_time)
+    )
+    shared = smoother.share(longer, existences, learnt)
+    fitted = smoother.fit(longer, shared.links, 1, learnt)
+    shared = smoother.share(fitted.paths, existences, learnt)
+    there, odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
+    paths, owners = fitted.paths, fitted.paths.owners
+    somebody = odds > 0.0
+    removed = [
+        Decision(
+            "removed",
+            int(paths.firsts[path]),
+            int(paths.labels[path]),
+            int(paths.labels[path]),
+            float(1.0 / (1.0 + np.exp(min(odds[path], 600.0)))),
+            float(1.0 / (1.0 + np.exp(-max(odds[path], -600.0)))),
+            "over its whole life it is likelier nobody",
+        )
+        for path in np.flatnonzero(~somebody)
+    ]
+    links = shared.links
+    seen = np.zeros((len(there), len(smoother.cameras)), dtype=bool)
+    sure = links.shares > _SEEN
+    seen[links.rows[sure], links.cameras[sure]] = True
+    rows = np.flatnonzero(somebody[owners])
+    rows = rows[np.lexsort((paths.labels[owners[rows]], paths.steps[rows]))]
+    return Smoothed(
+        paths.steps[rows],
+        paths.labels[owners[rows]],
+        paths.states[rows],
+        paths.covariances[rows],
+        there[rows],
+        seen[rows],
+        tuple(sorted([*decisions, *removed], key=lambda one: (one.step, one.label))),
+        learnt,
+    )
+
+
+def _looks(views: Many[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B A"]] | None:
+    """A unit vector for each box of each camera, 0 where it has none; None where nobody has."""
+    sizes = {view.looks.shape[1] for step in views for view in step if view.looks.shape[1]}
+    if len(sizes) != 1:
+        return None
+    size = sizes.pop()
+    return [
+        np.concatenate(
+            [
+                step[c].looks if step[c].looks.shape[1] else np.zeros((len(step[c].boxes), size))
+                for step in views
+            ]
+        )
+        for c in range(len(views[0]))
+    ]

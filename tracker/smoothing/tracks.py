@@ -1,0 +1,83 @@
+"""The smoothed tracks as the run reports them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Many
+
+import numpy as np
+from jaxtyping import Int
+from numpy import ndarray
+
+from tracker.fusion.protocol import FusionResult
+from tracker.smoothing.result import Smoothed
+from tracker.trajectories import Bounds, Trajectories
+
+
+def tracks_of(
+    smoothed: Smoothed,
+    fused: Many[FusionResult],
+    ids: dict[int, int],
+    *,
+    extraction_threshold: float,
+    bounds: Bounds,
+    near: float,
+) -> Trajectories:
+    """The people of each step whose existence is above the threshold, inside the room.
+
+    Args:
+        smoothed: All steps.
+        fused: Stage 2 of each step, for the component that stands for each person.
+        ids: Label → id as the filter reported them; labels that it never reported get the
+            next numbers.
+        extraction_threshold: As ``bounds``, of :func:`tracker.trajectories.extract`.
+        near: Metres within which a component of the filter's posterior is the person's.
+    """
+    chosen = smoothed.existences > extraction_threshold
+    chosen &= bounds.contain(smoothed.means[:, :3])
+    rows = np.flatnonzero(chosen)
+    known = dict(ids)
+    for label in smoothed.labels[rows].tolist():
+        known.setdefault(label, max(known.values(), default=0) + 1)
+    numbers = np.array([known[label] for label in smoothed.labels[rows].tolist()], dtype=np.int64)
+    rows = rows[np.lexsort((numbers, smoothed.frames[rows]))]
+    numbers = np.array([known[label] for label in smoothed.labels[rows].tolist()], dtype=np.int64)
+    components, labels = _components(smoothed, rows, fused, near)
+    variances = np.diagonal(smoothed.covariances[rows], axis1=1, axis2=2)[:, :3]
+    return Trajectories(
+        frames=smoothed.frames[rows],
+        ids=numbers,
+        positions=smoothed.means[rows, :3],
+        existences=smoothed.existences[rows],
+        sigmas=np.sqrt(variances),
+        seen=smoothed.seen[rows],
+        components=components,
+        labels=labels,
+    )
+
+
+def _components(
+    smoothed: Smoothed, rows: Int[ndarray, " R"], fused: Many[FusionResult], near: float
+) -> tuple[Int[ndarray, " R"], Int[ndarray, " R"]]:
+    """The nearest component of the step's posterior and its label, -1 where none is near."""
+    components = np.full(len(rows), -1, dtype=np.int64)
+    labels = np.full(len(rows), -1, dtype=np.int64)
+    frames = smoothed.frames[rows]
+    bounds = np.searchsorted(frames, np.arange(len(fused) + 1))
+    for step, result in enumerate(fused):
+        own = slice(int(bounds[step]), int(bounds[step + 1]))
+        sure = np.flatnonzero(result.posterior.weights > _FAINT)
+        if own.stop == own.start or not len(sure):
+            continue
+        gaps = smoothed.means[rows[own], None, :3] - result.posterior.means[None, sure, :3]
+        distances = (gaps**2).sum(axis=2)
+        best = distances.argmin(axis=1)
+        good = distances[np.arange(len(best)), best] <= near * near
+        # one component stands for one person: for the nearest of those who are near it
+        closest = distances.argmin(axis=0)[best] == np.arange(len(best))
+        components[own] = np.where(good & closest, sure[best], -1)
+        labels[own] = np.where(good & closest, result.posterior.labels[sure[best]], -1)
+    return components, labels
+
+
+_FAINT = 0.05
+"""Weight below which a component stands for nobody."""
