@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from tests.browser.access.test_accessibility import found
 from tests.browser.conftest import opened
 from tests.browser.serving import Server
 from tests.browser.walkers import write_walkers
@@ -172,3 +173,25 @@ def test_a_foreign_recording_is_dropped_and_tracked(
     sheet.get_by_role("button", name="Import and track").click()
     server.wait(lambda now: now["sequence"]["name"].startswith("pose2sim-multi"))
     assert server.wait_for_run()["run"]["done"] == 100
+
+
+def test_nothing_serious_stands_in_the_way_of_anybody(page: Page, files: Path) -> None:
+    page.emulate_media(reduced_motion="reduce")  # colours are judged when they have come to rest
+    page.keyboard.press("Control+o")
+    expect(page.locator(".rec").first).to_be_visible()
+    states = {"start": found(page)}
+    drop(page, files)
+    settled(page)
+    for theme in ("light", "dark"):
+        page.locator("html").evaluate(f"page => {{ page.dataset.theme = '{theme}' }}")
+        states[theme] = found(page)
+    assert {name: list_ for name, list_ in states.items() if list_} == {}
+    sheet = page.locator("dialog.opener")
+    for size in ((1280, 720), (1440, 900), (1920, 1080)):
+        page.set_viewport_size({"width": size[0], "height": size[1]})
+        wider = sheet.evaluate(
+            """sheet => [...sheet.querySelectorAll("button, .lab, h2, h3, input, .in-body, .rf")]
+                .filter((part) => part.scrollWidth > part.clientWidth + 1 && part.clientWidth)
+                .map((part) => part.outerHTML.slice(0, 120))"""
+        )
+        assert wider == [], size
