@@ -127,6 +127,15 @@ class Teaching:
 
         self._edit(move)
 
+    def set_target(self, half_extents: tuple[float, float, float]) -> None:
+        """Say how large a person is: half width, depth and height, metres.
+
+        Raises:
+            SequenceError: If it has no size.
+        """
+        half = [round(float(value), METRE_DIGITS + 1) for value in half_extents]
+        self._edit(lambda values: values["target"].update(half_extents=half))
+
     def add_entrance(self, position: tuple[float, float, float] | None = None) -> None:
         """Add an entrance, in the middle of the room where no place is given."""
         room = self._sequence().room
