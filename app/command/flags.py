@@ -213,9 +213,12 @@ class Import:
     ] = None
     """Axes of a camera: y down and z ahead, or y up and z back."""
     boxes: Annotated[
-        Literal["ltwh", "xyxy", "cxcywh"] | None, arg(help_behavior_hint="(default: found out)")
+        Literal["ltwh", "xyxy", "cxcywh", "ltwh-normalised", "xyxy-normalised", "cxcywh-normalised"]
+        | None,
+        arg(help_behavior_hint="(default: found out)"),
     ] = None
-    """What the four numbers of a box are: left, top and size; two corners; centre and size."""
+    """What the four numbers of a box are: left, top and size; two corners; centre and size; in
+    pixels, or normalised: as parts of the picture's width and height."""
     first_index: Annotated[int | None, arg(help_behavior_hint="(default: found out)")] = None
     """Number of the first frame in boxes and truth, 0 or 1."""
     fps: Annotated[float | None, arg(help_behavior_hint="(default: the videos')")] = None
@@ -225,6 +228,11 @@ class Import:
         arg(metavar="NAME=FILE", help_behavior_hint="(repeatable)"),
     ] = ()
     """Video, folder of pictures or boxes of a camera, where names do not tell."""
+    swap: Annotated[
+        UseAppendAction[tuple[str, ...]],
+        arg(metavar="NAME=NAME", help_behavior_hint="(repeatable)"),
+    ] = ()
+    """Two cameras whose calibrations are each other's; exchanged in the order given."""
 
 
 @dataclass
