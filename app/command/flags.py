@@ -104,8 +104,8 @@ class Track:
     ] = ()
     """One parameter, as in --set fusion.survival_probability=0.98; `parameters` lists the keys."""
     seed: int = 0
-    """Seed of all randomness; the same seed gives the same tracks, but for last digits on processors
-    without fused multiply-add."""
+    """Seed of all randomness; the same seed gives the same tracks, but for the last digits on
+    processors without fused multiply-add."""
     detector: Annotated[Path | None, arg(metavar="MODEL", help_behavior_hint="(optional)")] = None
     """A detection network of your own, as ONNX: the method onnx_detector runs it on pictures."""
     cache: bool = True
