@@ -4,6 +4,7 @@ import { mountSide } from "./inspector/side.js";
 import { mountTeach } from "./inspector/teach.js";
 import { mountCameras } from "./panes/cameras.js";
 import { mountControls, pressed } from "./panes/controls.js";
+import { mountKeep } from "./panes/keep.js";
 import { mountLayout } from "./panes/layout.js";
 import { mountNotes } from "./panes/notes.js";
 import { mountSheets } from "./panes/sheets.js";
@@ -66,6 +67,7 @@ mountTimeline(one(".time"), context);
 mountTeach(one(".mosaic"), context);
 mountSheets(context);
 mountLayout(context);
+mountKeep(context);
 mountControls(context);
 
 // Also for a click inside the 3D view, which the server hears of first.

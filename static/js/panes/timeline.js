@@ -364,6 +364,7 @@ export function mountTimeline(root, context) {
 		}, 200);
 	});
 	listLanes();
+	addEventListener("panes", draw);
 	new ResizeObserver(resize).observe(plot);
 	resize();
 }
