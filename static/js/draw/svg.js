@@ -38,24 +38,22 @@ export function svgBrush(real) {
 		const down = now.textBaseline === "middle" ? ' dy="0.35em"' : "";
 		return `x="${x(at)}" y="${y(up)}" style="font:${escaped(now.font)}"${anchor ? ` text-anchor="${anchor}"` : ""}${down}`;
 	};
+	/** What the drawing code calls.  @type {Record<string, (...values: any[]) => any>} */
 	const acts = {
-		marks,
 		save: () => stack.push({ ...now }),
 		restore: () => Object.assign(now, stack.pop()),
 		setTransform() {},
 		clearRect() {},
-		translate: (/** @type {number} */ dx, /** @type {number} */ dy) => {
+		translate: (dx, dy) => {
 			now.ox += dx;
 			now.oy += dy;
 		},
 		beginPath: () => (path = ""),
-		moveTo: (/** @type {number} */ a, /** @type {number} */ b) => (path += `M${x(a)} ${y(b)}`),
-		lineTo: (/** @type {number} */ a, /** @type {number} */ b) =>
-			(path += `${path ? "L" : "M"}${x(a)} ${y(b)}`),
-		rect: (/** @type {number[]} */ ...[a, b, w, h]) =>
-			(path += `M${x(a)} ${y(b)}h${short(w)}v${short(h)}h${short(-w)}z`),
-		arc: (/** @type {number[]} */ ...[a, b, r]) => acts.ellipse(a, b, r, r, 0),
-		ellipse: (/** @type {number[]} */ ...[a, b, rx, ry, turn]) => {
+		moveTo: (a, b) => (path += `M${x(a)} ${y(b)}`),
+		lineTo: (a, b) => (path += `${path ? "L" : "M"}${x(a)} ${y(b)}`),
+		rect: (...[a, b, w, h]) => (path += `M${x(a)} ${y(b)}h${short(w)}v${short(h)}h${short(-w)}z`),
+		arc: (...[a, b, r]) => acts.ellipse(a, b, r, r, 0),
+		ellipse: (...[a, b, rx, ry, turn]) => {
 			const [dx, dy] = [rx * Math.cos(turn), rx * Math.sin(turn)];
 			const half = `A${short(rx)} ${short(ry)} ${short((turn * 180) / Math.PI)} 0 1 `;
 			path += `M${x(a - dx)} ${y(b - dy)}${half}${x(a + dx)} ${y(b + dy)}${half}${x(a - dx)} ${y(b - dy)}`;
@@ -66,21 +64,20 @@ export function svgBrush(real) {
 		},
 		fill: () => mark("path", `d="${path}" ${inked("fill", now.fillStyle)}`),
 		stroke: () => path && mark("path", `d="${path}" ${lined()}`),
-		fillRect: (/** @type {number[]} */ ...[a, b, w, h]) =>
+		fillRect: (...[a, b, w, h]) =>
 			mark(
 				"rect",
 				`x="${x(a)}" y="${y(b)}" width="${short(w)}" height="${short(h)}" ${inked("fill", now.fillStyle)}`,
 			),
-		fillText: (/** @type {string} */ word, /** @type {number} */ a, /** @type {number} */ b) =>
+		fillText: (word, a, b) =>
 			mark("text", `${written(word, a, b)} ${inked("fill", now.fillStyle)}`, escaped(word)),
-		strokeText: (/** @type {string} */ word, /** @type {number} */ a, /** @type {number} */ b) =>
-			mark("text", `${written(word, a, b)} ${lined()}`, escaped(word)),
-		setLineDash: (/** @type {number[]} */ dash) => (now.dash = dash),
-		measureText: (/** @type {string} */ word) => {
+		strokeText: (word, a, b) => mark("text", `${written(word, a, b)} ${lined()}`, escaped(word)),
+		setLineDash: (dash) => (now.dash = dash),
+		measureText: (word) => {
 			real.font = now.font;
 			return real.measureText(word);
 		},
-		drawImage: (/** @type {ImageBitmap} */ image, /** @type {number[]} */ ...[a, b, w, h]) => {
+		drawImage: (image, ...[a, b, w, h]) => {
 			const copy = document.createElement("canvas");
 			Object.assign(copy, { width: image.width, height: image.height });
 			copy.getContext("2d")?.drawImage(image, 0, 0);
@@ -92,7 +89,7 @@ export function svgBrush(real) {
 	};
 	/** @type {any} */
 	const brush = new Proxy(acts, {
-		get: (_, name) => acts[/** @type {keyof typeof acts} */ (name)] ?? now[String(name)],
+		get: (_, name) => acts[String(name)] ?? (name === "marks" ? marks : now[String(name)]),
 		set: (_, name, value) => ((now[String(name)] = value), true),
 	});
 	return brush;
