@@ -2,6 +2,7 @@
 import { one } from "./elements/dom.js";
 import { mountSide } from "./inspector/side.js";
 import { mountTeach } from "./inspector/teach.js";
+import { mountOpening } from "./opening/sheet.js";
 import { mountCameras } from "./panes/cameras.js";
 import { mountControls, pressed } from "./panes/controls.js";
 import { mountKeep } from "./panes/keep.js";
@@ -66,6 +67,7 @@ mountSide(one(".side"), context);
 mountTimeline(one(".time"), context);
 mountTeach(one(".mosaic"), context);
 mountSheets(context);
+mountOpening(context);
 mountLayout(context);
 mountKeep(context);
 mountControls(context);
