@@ -5,6 +5,7 @@ import { mountTeach } from "./inspector/teach.js";
 import { mountOpening } from "./opening/sheet.js";
 import { mountCameras } from "./panes/cameras.js";
 import { mountControls, pressed } from "./panes/controls.js";
+import { mountKeep } from "./panes/keep.js";
 import { mountLayout } from "./panes/layout.js";
 import { mountNotes } from "./panes/notes.js";
 import { mountSheets } from "./panes/sheets.js";
@@ -68,6 +69,7 @@ mountTeach(one(".mosaic"), context);
 mountSheets(context);
 mountOpening(context);
 mountLayout(context);
+mountKeep(context);
 mountControls(context);
 
 // Also for a click inside the 3D view, which the server hears of first.
