@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 import tyro
 from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subcommand
 
-from app.command.library_flags import LibraryCommand, LibraryFile, Runs
+from app.command.library_flags import FormatName, LibraryCommand, LibraryFile, Runs
 from tracker import parameters as table
 from tracker.library import KEEP
 from tracker.parameters import FOLLOWS, METHODS, PRESETS, Parameter, ParameterError
@@ -52,13 +52,15 @@ class Serve:
 
 @dataclass
 class Track:
-    """Track the people of a sequence and write their tracks as CSV."""
+    """Track the people of a sequence and write their tracks, as CSV or in another form."""
 
     sequence: Annotated[
         Positional[str], arg(metavar="SEQUENCE", help="A built-in room's name or a folder.")
     ]
     output: Annotated[Path, arg(aliases=["-o"])]
     """The file to write. It appears when it is complete."""
+    format: FormatName = None
+    """Its form; `runs export` lists them."""
     single_view: Annotated[
         str | None,
         arg(metavar="|".join(METHODS["single_view"]), help_behavior_hint=f"({FOLLOWS})"),

@@ -223,13 +223,17 @@ def _track(command: Track) -> None:
     _check_seed(command.seed)
     _check_keep(command.keep)
     output = command.output
-    if output.is_dir():
+    from tracker.writing.registry import format_of, save
+    from tracker.writing.written import Options, Written
+
+    form = format_of(output, command.format)
+    if output.is_dir() and not form.folder:
         raise CommandError(f"--output {output}: expected a file to write, found a folder")
     if not output.parent.is_dir():
         raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
 
     from app.state.compiling import Compiling
-    from tracker import export, pipeline
+    from tracker import pipeline
     from tracker.checks import check
     from tracker.runs.outcome import why_no_tracks
     from tracker.runs.stage_cache import StageCache
@@ -237,6 +241,7 @@ def _track(command: Track) -> None:
 
     with Bar("rendering", "frame") as rendering:
         sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    form.check(sequence)
     for sentence in sequence.warnings:
         say(sentence)
     for found in check(sequence, quick=True):
@@ -261,7 +266,9 @@ def _track(command: Track) -> None:
             on_progress=told,
         )
     seconds = time.perf_counter() - begin
-    export.save_tracks_csv(output, sequence, run.tracks, parameters, command.seed)
+    with Bar("writing", "step") as writing:
+        written = Written(sequence, run.tracks, parameters, command.seed)
+        save(output, form, written, Options(progress=writing.at))
     targets = len(set(run.tracks.ids.tolist()))
     kept = "" if "single_view" in stages else "; stage 1 was kept from an earlier run"
     say(

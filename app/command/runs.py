@@ -13,6 +13,7 @@ from app.command.library_flags import (
     CollectRuns,
     DeleteRuns,
     DiffRuns,
+    ExportRun,
     LibraryCommand,
     ListRuns,
     OfLibrary,
@@ -22,7 +23,7 @@ from app.command.library_flags import (
     ShowRun,
     StarRun,
 )
-from app.command.terminal import CommandError, print_table, say
+from app.command.terminal import Bar, CommandError, print_table, say
 from tracker.folders import library_file
 from tracker.library import KEEP, repair
 from tracker.library.records import HEADLINES, KeptRun, Result
@@ -50,6 +51,8 @@ def runs(command: Runs, serve: Callable[[OpenRun, Result], int]) -> int:
                 _show(library, action)
             case OpenRun():
                 result = library.result(library.find(action.run).id)
+            case ExportRun():
+                _export(library, action)
             case RenameRun():
                 run = library.find(action.run)
                 library.rename(run.id, action.name)
@@ -171,6 +174,26 @@ def _show(library: Library, command: ShowRun) -> None:
         "note": run.note,
     }
     print_table(("what", "value"), list(facts.items()))
+
+
+def _export(library: Library, command: ExportRun) -> None:
+    from tracker.sequences import library as sequences
+    from tracker.writing.registry import format_of, save
+    from tracker.writing.written import Options, Written
+
+    form = format_of(command.output, command.format)
+    result = library.result(library.find(command.run).id)
+    with Bar("rendering", "frame") as rendering:
+        sequence = sequences.open_sequence(result.place, progress=rendering.at)
+    done = None if result.run.steps >= sequence.frames else result.run.steps
+    written = Written(sequence, result.kept.tracks, result.parameters, result.run.seed, done)
+    with Bar("writing", "step") as writing:
+        options = Options(command.first, command.last, command.speed, writing.at)
+        save(command.output, form, written, options)
+    if command.json:
+        _print({"run": result.run.id, "format": form.name, "file": str(command.output)})
+    else:
+        say(f"{result.run.title} as {form.word}, written to {command.output}")
 
 
 def _delete(library: Library, command: DeleteRuns) -> None:
