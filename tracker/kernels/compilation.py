@@ -35,6 +35,7 @@ from numba.core import event
 from numba.core.compiler_lock import global_compiler_lock
 
 from tracker.folders import cache_folder
+from tracker.kernels import checked_cache
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -71,6 +72,8 @@ def compiled_later(function: _F) -> _F:
     _config.CACHE_DIR = str(_folder_of(Path(function.__code__.co_filename)))
     try:
         compiled = numba.njit(cache=True, nogil=True)(function)
+        if not _config.DISABLE_JIT:
+            checked_cache.check_files_of(compiled)
     except RuntimeError:  # nowhere to write to: it is compiled at every start
         compiled = numba.njit(nogil=True)(function)
     finally:
@@ -213,7 +216,7 @@ def _imported(source: bytes) -> tuple[str, ...]:
 
 
 def _digest(files: Iterable[Path]) -> str:
-    digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version} checked".encode())
     for file in sorted(files):
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()[:16]
