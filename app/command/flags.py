@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 import tyro
 from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subcommand
 
-from app.command.library_flags import FormatName, LibraryCommand, LibraryFile, Runs
+from app.command.library_flags import Bundle, FormatName, LibraryCommand, LibraryFile, Runs
 from tracker import parameters as table
 from tracker.library import KEEP
 from tracker.parameters import FOLLOWS, METHODS, PRESETS, Parameter, ParameterError
@@ -34,7 +34,8 @@ class Serve:
     """Start the workbench and serve its page on this machine."""
 
     sequence: Annotated[
-        Positional[str], arg(metavar="[SEQUENCE]", help="A built-in room's name or a folder.")
+        Positional[str],
+        arg(metavar="[SEQUENCE]", help="A built-in room's name, a folder, or a bundle (.zip)."),
     ] = DEFAULT_SEQUENCE
     host: str = "127.0.0.1"
     """Address to listen on. Anything but this machine's own lets others change what you see."""
@@ -89,8 +90,8 @@ class Track:
     ] = ()
     """One parameter, as in --set fusion.survival_probability=0.98; `parameters` lists the keys."""
     seed: int = 0
-    """Seed of all randomness; the same seed gives the same tracks, but for last digits on processors
-    without fused multiply-add."""
+    """Seed of all randomness; the same seed gives the same tracks, but for last digits on
+    processors without fused multiply-add."""
     cache: bool = True
     """Take up what the cameras found in an earlier run with the same values, and keep it."""
     library: LibraryFile = None
@@ -370,6 +371,7 @@ Arguments = (
     | Render
     | Parameters
     | Runs
+    | Bundle
     | LibraryCommand
 )
 
@@ -394,6 +396,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         | Annotated[Render, subcommand("render")]
         | Annotated[Parameters, subcommand("parameters")]
         | Annotated[Runs, subcommand("runs")]
+        | Annotated[Bundle, subcommand("bundle")]
         | Annotated[LibraryCommand, subcommand("library")]
     )
     parsed: Arguments = tyro.cli(

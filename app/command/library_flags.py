@@ -146,6 +146,17 @@ class Runs:
 
 
 @dataclass
+class Bundle(OfLibrary):
+    """Put a kept run into one ZIP file that `serve FILE.zip` shows on any machine, read only."""
+
+    run: Annotated[Positional[str], _RUN]
+    output: Annotated[Path, arg(aliases=["-o"], metavar="FILE.zip")]
+    """The file to write. It appears when it is complete."""
+    videos: FlagCreatePairsOff[bool] = False
+    """Take small videos along."""
+
+
+@dataclass
 class LibraryCommand(OfLibrary):
     """Look through the file that keeps runs, and repair it."""
 

@@ -10,9 +10,11 @@ import errno
 import os
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,7 +36,7 @@ from app.command.flags import (
     parse,
     show,
 )
-from app.command.library_flags import LibraryCommand, OpenRun, Runs
+from app.command.library_flags import Bundle, LibraryCommand, OpenRun, Runs
 from app.command.terminal import Bar, CommandError, check_data, print_table, say
 from tracker import parameters as table
 from tracker.folders import library_file
@@ -102,6 +104,10 @@ def _run(command: Arguments) -> int:
             from app.command.runs import runs
 
             return runs(command, _serve_run)
+        case Bundle():
+            from app.command.runs import bundle
+
+            bundle(command)
         case LibraryCommand():
             from app.command.runs import check
 
@@ -133,7 +139,17 @@ def _serve_run(command: OpenRun, result: Result) -> int:
     return _serve(serve, result.run.id)
 
 
-def _serve(command: Serve, run: int | None = None) -> int:
+def _serve_bundle(command: Serve) -> int:
+    from tracker.library.bundle import unpack_bundle
+
+    with tempfile.TemporaryDirectory(prefix="multiview-phd-bundle-") as folder:
+        result = unpack_bundle(Path(command.sequence), Path(folder))
+        return _serve(replace(command, sequence=result.place, keep=0), result)
+
+
+def _serve(command: Serve, run: int | Result | None = None) -> int:
+    if run is None and command.sequence.lower().endswith(".zip"):
+        return _serve_bundle(command)
     if not 0 <= command.port <= 65535:
         raise ParameterError(
             "--port", f"expected 0 (any that is free) to 65535, got {command.port}"
@@ -143,6 +159,7 @@ def _serve(command: Serve, run: int | None = None) -> int:
     from app.state.jobs import locate
     from app.web import server
     from app.web.security import is_loopback
+    from tracker.library.records import Result
     from tracker.sequences import library, rendering
 
     place = locate(command.sequence, command.data)
@@ -170,7 +187,7 @@ def _serve(command: Serve, run: int | None = None) -> int:
             sequence=command.sequence,
             data=command.data,
             keep_on_disk=True,
-            library=command.library or library_file(),
+            library=None if isinstance(run, Result) else command.library or library_file(),
             keep=command.keep,
             run=run,
             say=say,

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from app.command.library_flags import (
+    Bundle,
     CollectRuns,
     DeleteRuns,
     DiffRuns,
@@ -73,6 +74,32 @@ def runs(command: Runs, serve: Callable[[OpenRun, Result], int]) -> int:
                 else:
                     say(f"{gone} runs gone, {freed / 1e6:.1f} MB freed")
     return serve(action, result) if isinstance(action, OpenRun) else 0
+
+
+def bundle(command: Bundle) -> None:
+    """Write a kept run as one ZIP file.
+
+    Raises:
+        LibraryError: If the library, or the run, is not as it must be.
+    """
+    from tracker.library.bundle import write_bundle
+    from tracker.sequences import library as sequences
+
+    output = command.output
+    if output.suffix.lower() != ".zip":
+        raise CommandError(f"--output {output}: expected the name of a .zip file")
+    if not output.absolute().parent.is_dir():
+        raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
+    with _library(command) as library:
+        result = library.result(library.find(command.run).id)
+    with Bar("rendering", "frame") as rendering:
+        sequence = sequences.open_sequence(result.place, progress=rendering.at)
+    write_bundle(output, result, sequence, videos=command.videos)
+    size = output.stat().st_size
+    if command.json:
+        _print({"run": result.run.id, "file": str(output), "bytes": size})
+    else:
+        say(f"{result.run.title}, {size / 1e6:.1f} MB, written to {output}")
 
 
 def check(command: LibraryCommand) -> int:

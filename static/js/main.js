@@ -2,6 +2,7 @@
 import { one } from "./elements/dom.js";
 import { mountSide } from "./inspector/side.js";
 import { mountTeach } from "./inspector/teach.js";
+import { mountLibrary } from "./library/library.js";
 import { mountCameras } from "./panes/cameras.js";
 import { mountControls, pressed } from "./panes/controls.js";
 import { mountLayout } from "./panes/layout.js";
@@ -64,6 +65,7 @@ mountCameras(one(".cams"), context);
 mountSide(one(".side"), context);
 mountTimeline(one(".time"), context);
 mountTeach(one(".mosaic"), context);
+mountLibrary(one(".lib"), context);
 mountSheets(context);
 mountLayout(context);
 mountControls(context);
