@@ -358,23 +358,31 @@ def _sequences(command: Sequences) -> None:
 def _render(command: Render) -> None:
     from tracker.sequences import rendering
 
-    if command.name not in rendering.ROOMS:
+    if len(command.places) != (2 if command.random is None else 1):
+        wanted = "NAME FOLDER" if command.random is None else "FOLDER alone with --random"
+        found = " ".join(command.places) or "nothing"
+        raise ParameterError("[NAME] FOLDER", f"expected {wanted}, got {found}")
+    folder = Path(command.places[-1])
+    name = f"random room {command.random}" if command.random is not None else command.places[0]
+    if command.random is None and name not in rendering.ROOMS:
         known = ", ".join(rendering.ROOMS)
-        raise ParameterError("NAME", f"expected one of {known}, got {command.name!r}")
+        raise ParameterError("NAME", f"expected one of {known}, got {name!r}")
     _check_seed(command.seed)
+    if command.random is not None:
+        _check_seed(command.random, "--random")
     if command.cameras not in (2, 3):
         raise ParameterError("--cameras", f"expected 2 or 3, got {command.cameras}")
-    if command.folder.exists():
-        raise CommandError(f"{command.folder} exists; name a folder that does not")
+    if folder.exists():
+        raise CommandError(f"{folder} exists; name a folder that does not")
+    cameras = command.cameras
     with Bar("rendering", "frame") as bar:
-        rendering.render(
-            command.name,
-            command.folder,
-            cameras=command.cameras,
-            seed=command.seed,
-            progress=bar.at,
-        )
-    say(f"{command.name} with {command.cameras} cameras, written to {command.folder}")
+        if command.random is not None:
+            cameras = rendering.render_random(
+                command.random, folder, detections=command.detections, progress=bar.at
+            ).cameras
+        else:
+            rendering.render(name, folder, cameras=cameras, seed=command.seed, progress=bar.at)
+    say(f"{name} with {cameras} cameras, written to {folder}")
 
 
 def _check_keep(keep: int) -> None:
@@ -382,9 +390,9 @@ def _check_keep(keep: int) -> None:
         raise ParameterError("--keep", f"expected a whole number from 0, got {keep}")
 
 
-def _check_seed(seed: int) -> None:
+def _check_seed(seed: int, flag: str = "--seed") -> None:
     if seed < 0:
-        raise ParameterError("--seed", f"expected a whole number from 0, got {seed}")
+        raise ParameterError(flag, f"expected a whole number from 0, got {seed}")
 
 
 def _parameters() -> None:

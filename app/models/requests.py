@@ -42,6 +42,21 @@ class PresetName(Model):
     name: str = Field(max_length=4096)
 
 
+class TrailChanges(Model):
+    """How trails are drawn, in 3D and in pictures."""
+
+    seconds: float | None = Field(None, ge=0.5, le=600.0)
+    """How far back they go."""
+    fades: bool | None = None
+    """Whether they are fainter the older they are."""
+
+
+class CurveRequest(Model):
+    """Compute what some parameters would change."""
+
+    keys: list[str] = Field(max_length=40)
+
+
 class LayerChanges(Model):
     """Layers of the 3D view, by name."""
 

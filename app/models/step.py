@@ -14,6 +14,12 @@ class Measurement(Model):
 
     box: Box
     score: float
+    track: int | None = None
+    """Id of the track that it feeds; null where it is nobody's."""
+    nearest: int | None = None
+    """Of one that is nobody's: the track that it is nearest to."""
+    sigmas: float | None = None
+    """And how far that is, in standard deviations of where its box is expected."""
 
 
 class Estimate(Model):

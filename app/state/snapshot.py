@@ -43,6 +43,16 @@ CLAMPED_ORIGIN = "viser"
 
 
 @dataclass(frozen=True, slots=True)
+class Trail:
+    """How the ways of people are drawn, in 3D and in pictures."""
+
+    seconds: float = 4.0
+    """How far back they go."""
+    fades: bool = True
+    """Whether they are fainter the older they are."""
+
+
+@dataclass(frozen=True, slots=True)
 class RunState:
     """How far the run is that the parameters ask for."""
 
@@ -128,6 +138,7 @@ class Snapshot:
         # the truth is in the pictures at first: in 3D twice as many boxes hide the people
         default_factory=lambda: MappingProxyType({name: name != "truth" for name in LAYERS})
     )
+    trail: Trail = Trail()
     view: View = None
     flies: bool = True
     """Whether the 3D view moves to another, or is there at once: somebody wants less motion."""

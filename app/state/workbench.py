@@ -29,6 +29,7 @@ from app.state.snapshot import (
     Presets,
     RunState,
     Snapshot,
+    Trail,
     View,
     clamp,
 )
@@ -175,6 +176,16 @@ class Workbench:
             layers = {**now.layers, **{k: bool(v) for k, v in changes.items()}}
             if layers != now.layers:
                 self._put("layers", layers=MappingProxyType(layers))
+
+    def set_trail(self, seconds: float | None = None, fades: bool | None = None) -> None:
+        """Draw trails longer or shorter, seconds, fading or not; None leaves it as it is."""
+        with self._edit() as now:
+            trail = Trail(
+                now.trail.seconds if seconds is None else seconds,
+                now.trail.fades if fades is None else fades,
+            )
+            if trail != now.trail:
+                self._put("layers", trail=trail)
 
     def pin(self) -> bool:
         """Pin the shown run, to set others against it; whether it was a finished one."""

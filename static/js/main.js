@@ -3,6 +3,7 @@ import { one } from "./elements/dom.js";
 import { mountSide } from "./inspector/side.js";
 import { mountTeach } from "./inspector/teach.js";
 import { mountLibrary } from "./library/library.js";
+import { mountOpening } from "./opening/sheet.js";
 import { mountCameras } from "./panes/cameras.js";
 import { mountControls, pressed } from "./panes/controls.js";
 import { mountLayout } from "./panes/layout.js";
@@ -67,6 +68,7 @@ mountTimeline(one(".time"), context);
 mountTeach(one(".mosaic"), context);
 mountLibrary(one(".lib"), context);
 mountSheets(context);
+mountOpening(context);
 mountLayout(context);
 mountControls(context);
 
