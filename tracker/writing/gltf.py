@@ -142,7 +142,9 @@ def _material(name: str, colour: tuple[int, int, int]) -> dict[str, Any]:
 
 def _box(buffer: _Buffer, half: ndarray) -> dict[str, Any]:
     """A box around the origin, each face with its own normal."""
-    points, normals, faces = [], [], []
+    points: list[ndarray] = []
+    normals: list[ndarray] = []
+    faces: list[int] = []
     for axis in range(3):
         for sign in (-1.0, 1.0):
             normal = np.zeros(3)

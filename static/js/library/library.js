@@ -1,9 +1,7 @@
 /** The place Library: recordings, the runs of one, and one run in small. */
-import { fill, h, icon } from "../elements/dom.js";
-import { getJson, sendJson } from "../state/api.js";
-import { compare } from "./compare.js";
+import { fill, h, icon, one } from "../elements/dom.js";
+import { getJson, request } from "../state/api.js";
 import { exportMenu } from "./exports.js";
-import { mountPreview } from "./preview.js";
 import { runsTable } from "./runs.js";
 import { factsOf, has, many, size, titleOf, when } from "./words.js";
 
@@ -55,7 +53,7 @@ export function mountLibrary(root, { store, actions }) {
 	const undo = h("button", { class: "btn", "data-key": "Ctrl Z", onclick: takeBack }, "Undo");
 	const side = h(
 		"button",
-		{ class: "btn box", onclick: () => compare(ofChosen()) },
+		{ class: "btn box", onclick: () => void compare() },
 		icon("i-swap"),
 		"Compare",
 	);
@@ -90,10 +88,12 @@ export function mountLibrary(root, { store, actions }) {
 		undo,
 	);
 	const small = h("section", { class: "pane pv", "aria-label": "The run" });
-	const preview = mountPreview(small, {
-		open: (run) => void open(run),
-		pin: (run) => void pin(run),
-		note: (run, note) => void change(run, { note }),
+	const head = h("div", { class: "pane-head" });
+	const body = h("div", { class: "pv-body" });
+	small.append(head, body);
+	body.addEventListener("change", ({ target }) => {
+		const run = focusedRun();
+		if (run) void change(run, { note: /** @type {HTMLInputElement} */ (target).value });
 	});
 	fill(
 		root,
@@ -121,6 +121,7 @@ export function mountLibrary(root, { store, actions }) {
 		small,
 	);
 
+	const focusedRun = () => runs.find(({ id }) => id === focused);
 	const ofChosen = () => runs.filter(({ id }) => chosen.has(id));
 
 	/** @param {Server.RecordingInfo} one */
@@ -259,11 +260,35 @@ export function mountLibrary(root, { store, actions }) {
 	async function focus(id) {
 		focused = id;
 		show();
-		if (id === null) return preview.show(null, "A run that is chosen is shown here in small.");
-		const told = await getJson(`/api/library/runs/${id}`).catch((error) => error);
+		const run = focusedRun();
+		if (!run) {
+			fill(head);
+			return fill(body, h("p", { class: "blank" }, "A run that is chosen is shown here in small."));
+		}
+		const facts = [when(run.began), many(run.targets, "track")];
+		if (run.seconds) facts.push(`computed in ${run.seconds.toFixed(run.seconds < 9.5 ? 1 : 0)} s`);
+		fill(
+			head,
+			h("h2", { class: "pane-title" }, titleOf(run)),
+			h("span", { class: "sub" }, facts.join(" · ")),
+			h("span", { class: "grow" }),
+			h("button", { class: "btn main", onclick: () => void open(run) }, "Open in Tune"),
+			h("button", { class: "btn box", onclick: () => void pin(run) }, "Pin as A"),
+		);
+		const answer = await request(`/api/library/runs/${id}/drawn`).catch((error) => error);
+		const text = answer instanceof Error ? "" : await answer.text();
 		if (id !== focused) return;
-		if (told instanceof Error) preview.show(null, told.message);
-		else preview.show(told);
+		if (text) body.innerHTML = text;
+		else fill(body, h("p", { class: "blank" }, answer.message));
+	}
+
+	async function compare() {
+		const dialog = /** @type {any} */ (one(".compare"));
+		const numbers = ofChosen().map(({ id }) => `runs=${id}`);
+		const answer = await request(`/api/library/compared?${numbers.join("&")}`);
+		dialog.innerHTML = await answer.text();
+		dialog.onclick = () => dialog.close();
+		dialog.showModal();
 	}
 
 	/** @param {number} id */
@@ -319,7 +344,7 @@ export function mountLibrary(root, { store, actions }) {
 
 	/** Have a name written in the run's row. */
 	function rename() {
-		const run = runs.find(({ id }) => id === focused);
+		const run = focusedRun();
 		const cell = root.querySelector(`tr[data-run="${focused}"] td:nth-child(2)`);
 		if (!run || !cell) return;
 		const field = h("input", { class: "field", value: run.name, "aria-label": "Name of the run" });
@@ -342,12 +367,12 @@ export function mountLibrary(root, { store, actions }) {
 	/** What a key does here. @type {Record<string, () => void>} */
 	const KEYS = {
 		Enter: () => {
-			const run = runs.find(({ id }) => id === focused);
+			const run = focusedRun();
 			if (run) void open(run);
 		},
 		" ": () => focused !== null && tick(focused),
 		s: () => {
-			const run = runs.find(({ id }) => id === focused);
+			const run = focusedRun();
 			if (run) void change(run, { star: !run.star });
 		},
 		F2: rename,
@@ -408,7 +433,5 @@ export function mountLibrary(root, { store, actions }) {
 	store.on(["place"], ({ place }) => {
 		if (place === "library") void refresh();
 	});
-	store.on(["theme"], () => requestAnimationFrame(preview.draw));
-	preview.show(null);
 	show();
 }

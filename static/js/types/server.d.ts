@@ -456,7 +456,8 @@ declare namespace Server {
 		fusion_method: string;
 		changes: ChangeInfo[];
 		seed: number;
-		version: string;
+		/** Its version. */
+		program: string;
 		/** Whether another version of the program made it: computing it again may give other tracks. */
 		older_code: boolean;
 		source: string;

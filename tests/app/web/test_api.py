@@ -401,6 +401,8 @@ def test_every_route_is_documented(client: TestClient) -> None:
         ("GET", "/api/library/thumbnail/{recording}.jpg"),
         ("GET", "/api/library/recordings/{recording}/runs"),
         ("GET", "/api/library/runs/{number}"),
+        ("GET", "/api/library/runs/{number}/drawn"),
+        ("GET", "/api/library/compared"),
         ("PATCH", "/api/library/runs/{number}"),
         ("POST", "/api/library/runs/{number}/open"),
         ("POST", "/api/library/runs/{number}/pin"),

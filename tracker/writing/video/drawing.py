@@ -160,7 +160,8 @@ class Mosaic:
         width, height = self._cell
         scale = min((width - 24) / (high[0] - low[0]), (height - 24) / (high[1] - low[1]))
         middle = (low + high) / 2.0
-        return (points - middle) * [scale, -scale] + [width / 2.0, height / 2.0]
+        pixels: ndarray = (points - middle) * [scale, -scale] + [width / 2.0, height / 2.0]
+        return pixels
 
     def _draw_still(self) -> UInt8[ndarray, "h w 3"]:
         width, height = self.size

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import closing
+from collections.abc import Generator
+from contextlib import ExitStack, closing
 from fractions import Fraction
 from pathlib import Path
 
@@ -42,21 +42,19 @@ def write(path: Path, written: Written, options: Options) -> None:
         stream.width, stream.height = mosaic.size
         stream.pix_fmt = "yuv420p"
         stream.codec_context.thread_type = "AUTO"
-        with FrameReader(written.sequence) as reader:
-            walks = [closing(_walk(reader, k, first)) for k in range(len(written.sequence.views))]
-            pictures = [walk.__enter__() for walk in walks]
-            try:
-                for step in range(first, last + 1):
-                    options.at(step - first, total)
-                    drawn = mosaic.draw(step, [next(walk, None) for walk in pictures])
-                    frame = av.VideoFrame.from_ndarray(drawn, format="bgr24")
-                    file.mux(stream.encode(frame))
-            finally:
-                for walk in walks:
-                    walk.__exit__(None, None, None)
+        with ExitStack() as stack:
+            reader = stack.enter_context(FrameReader(written.sequence))
+            walks = [
+                stack.enter_context(closing(_walk(reader, camera, first)))
+                for camera in range(len(written.sequence.views))
+            ]
+            for step in range(first, last + 1):
+                options.at(step - first, total)
+                drawn = mosaic.draw(step, [next(walk, None) for walk in walks])
+                file.mux(stream.encode(av.VideoFrame.from_ndarray(drawn, format="bgr24")))
         file.mux(stream.encode())
     options.at(total, total)
 
 
-def _walk(reader: FrameReader, camera: int, first: int) -> Iterator[Picture | None]:
+def _walk(reader: FrameReader, camera: int, first: int) -> Generator[Picture | None, None, None]:
     yield from reader.iterate(camera, first)
