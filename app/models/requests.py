@@ -102,14 +102,14 @@ class StreamSelect(SelectChange):
 
 
 class StreamMotion(Model):
-    """From the page over the socket: what its person wishes of movement."""
+    """From the page over the socket: whether its browser asks for reduced motion."""
 
     type: Literal["motion"]
     flies: bool
-    """False: another view in 3D is there at once, however it was chosen."""
+    """Whether the 3D view may animate a change of viewpoint; false for reduced motion."""
 
 
 class StreamPing(Model):
-    """From the page over the socket: is anybody there?"""
+    """From the page over the socket: asks for a ``pong``, which shows that the server answers."""
 
     type: Literal["ping"]

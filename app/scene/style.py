@@ -76,10 +76,10 @@ box-sizing: border-box; white-space: nowrap; font-variant-numeric: tabular-nums;
 
 
 def symbols(indices: dict[str, tuple[str, str]]) -> str:
-    """Style that writes what stands low behind a symbol, and the unit after it.
+    """Style that writes the subscript of a symbol, and the unit after it.
 
     Args:
-        indices: Index and unit, by the input's id.
+        indices: Subscript and unit, by the input's id.
     """
     rules = []
     for uuid, (index, unit) in indices.items():

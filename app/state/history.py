@@ -28,7 +28,7 @@ class PastRun:
     number: int
     """From 1 on."""
     at: str
-    """When it began: the time of day."""
+    """Time of day at which it began, as text."""
     sequence: str
     """Its name then."""
     recording: str
@@ -97,7 +97,7 @@ class History:
                 if run.state.key == state.key:
                     self._runs[index] = replace(run, state=state)
                     return
-            # one that was overtaken before it showed anything is not worth a row
+            # a run that was superseded before its first step is not worth a row
             earlier = [r for r in self._runs if r.state.state != "computing" or r.state.done]
             moved, asked = frozenset[str](), time.monotonic()
             if earlier and earlier[0].recording == now.sequence_key:

@@ -202,7 +202,7 @@ class Workbench:
                 self._put("pinned", scores=now.scores.pin(Scored.of(run)))
 
     def unpin(self) -> None:
-        """Nothing is pinned any more."""
+        """Pin nothing any more."""
         with self._edit() as now:
             if now.scores.pinned is not None:
                 self._put("pinned", scores=replace(now.scores, pinned=None))
@@ -228,7 +228,7 @@ class Workbench:
                 self._put("view", view=view)
 
     def set_flies(self, flies: bool) -> None:
-        """Have the 3D view move to another view, or be there at once."""
+        """Have changes of the 3D view animated, or not (reduced motion)."""
         with self._edit() as now:
             if flies != now.flies:
                 self._put("view", flies=flies)

@@ -282,8 +282,8 @@ def bind(host: str, port: int) -> sockets.socket:
     family, _, _, _, address = sockets.getaddrinfo(
         host, port, type=sockets.SOCK_STREAM, flags=sockets.AI_PASSIVE
     )[0]
-    # asyncio switches off the collecting of small packets (40 ms of waiting for each answer)
-    # only on sockets that say they are TCP
+    # asyncio switches Nagle's algorithm off only on sockets that say they are TCP; with it each
+    # small answer waits for the browser's delayed acknowledgement, some 40 ms
     listener = sockets.socket(family, sockets.SOCK_STREAM, sockets.IPPROTO_TCP)
     try:
         listener.setsockopt(sockets.SOL_SOCKET, sockets.SO_REUSEADDR, 1)

@@ -50,7 +50,7 @@ class Window:
 
     @staticmethod
     def of(frames: int, first: int = 0, last: int | None = None, buckets: int = BUCKETS) -> Window:
-        """The buckets of the steps ``first`` … ``last``, as far as the sequence goes.
+        """The buckets of the steps ``first`` … ``last``, cut off at the sequence's end.
 
         Buckets begin at multiples of their size, so that a view that moves sideways shows
         the same values again.
@@ -59,7 +59,7 @@ class Window:
         first = max(0, min(first, end))
         stride = max(1, -(-(end - first) // buckets))
         while (end - first // stride * stride) > buckets * stride:
-            stride += 1  # the cut bucket in front was one too many
+            stride += 1  # beginning inside a bucket takes one bucket more
         return Window(first // stride * stride, end, stride)
 
     def starts(self, done: int) -> Int[ndarray, " B"]:

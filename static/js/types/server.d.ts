@@ -66,13 +66,13 @@ declare namespace Server {
 		id: number;
 		/** Reprojected; null where a part is behind the camera. */
 		box: [number, number, number, number] | null;
-		/** Whether one of the camera's boxes fed it at this step. */
+		/** Whether one of the camera's boxes is associated with it at this step. */
 		seen: boolean;
 		detection_probability: number;
-		/** Index of the box that fed it among what the camera gave the fusion, -1 for none. */
+		/** Index of the associated box among those that the camera gave the fusion, -1 for none. */
 		source: number;
 		fed_by: Feeding | null;
-		/** Id of the target in front of it. */
+		/** Id of the target that occludes it; null for none. */
 		hidden_by: number | null;
 		visible: boolean;
 		/** Why it is not, or hardly, visible. */
@@ -245,12 +245,12 @@ declare namespace Server {
 		error: string | null;
 	}
 
-	/** The box that fed a track, as the camera gave it to the fusion. */
+	/** The box associated with a track, as the single-view stage gave it to the fusion. */
 	interface Feeding {
 		box: [number, number, number, number];
 		/** Its weight, existence or detector's score. */
 		weight: number;
-		/** Probability that it is this track's. */
+		/** Association probability: that this track made the box, 0 … 1. */
 		share: number;
 	}
 
