@@ -75,6 +75,7 @@ class Jobs:
         workbench: Workbench,
         *,
         data: Path | None = None,
+        detector: Path | None = None,
         seed: int = 0,
         cache: StageCache | None = None,
         compiling: Compiling | None = None,
@@ -85,6 +86,7 @@ class Jobs:
         Args:
             workbench: Whom to serve.
             data: Its folders are sequences by name.
+            detector: A network that may be run on the pictures of all of them.
             seed: Of all runs.
             cache: Where columns of runs are kept; in memory only, if none is given.
             compiling: Whom to wait for before the first run;
@@ -93,6 +95,7 @@ class Jobs:
         """
         self._workbench = workbench
         self._data = data
+        self._detector = detector
         self._seed = seed
         self._condition = threading.Condition()
         self._wanted: _Wanted | None = None
@@ -154,6 +157,7 @@ class Jobs:
                 progress=partial(progress, "rendering"),
                 cancelled=cancelled.is_set,
             )
+            sequence = library.with_detector(sequence, self._detector)
             parameters = RunParameters()
             if self._computes:  # else neither pictures nor boxes are needed
                 parameters = pipeline.default_parameters(sequence)

@@ -142,7 +142,7 @@ def _people(people: Sequence[float]) -> str:
         f"{at},{most - count:g}" for k, count in enumerate(people) for at in (k, k + 1)
     )
     return (
-        f'<div class="count"><span>People<br><span class="q">0–{most:.0f}</span></span>'
+        f'<div class="crowd"><span>People<br><span class="q">0–{most:.0f}</span></span>'
         f'<svg viewBox="0 0 {max(1, len(people))} {most:g}" preserveAspectRatio="none" role="img" '
         f'aria-label="People over time, at most {most:.0f}"><polyline points="{points}"/></svg>'
         "</div>"
