@@ -70,6 +70,7 @@ mountLayout(context);
 mountKeep(context);
 mountControls(context);
 // What nobody sees at first is read when the page is there.
+void import("./library/library.js").then(({ mountLibrary }) => mountLibrary(one(".lib"), context));
 void import("./opening/sheet.js").then(({ mountOpening }) => mountOpening(context));
 
 // Also for a click inside the 3D view, which the server hears of first.

@@ -90,8 +90,10 @@ def kept_of(run: Run) -> KeptTracks:
     probabilities = np.zeros(tracks.seen.shape)
     for step in range(run.done):
         rows = tracks.at(step)
+        components = tracks.components[rows]
+        own = components >= 0  # what was put into a gap has none
         known = run.fused[step].detection_probabilities
-        probabilities[rows] = known[:, tracks.components[rows]].T
+        probabilities[rows][own] = known[:, components[own]].T
     return KeptTracks(tracks, probabilities)
 
 
