@@ -4,7 +4,8 @@ import { prepare, stroke, trace } from "../draw/canvas.js";
 
 /** Opacity of the floor by how many cameras see it. */
 const TINTS = [0, 0.1, 0.2, 0.33, 0.48];
-const LENGTH = 0.7;
+/** How long a camera is in the plan: metres, and at least so many pixels. */
+const LENGTH = [0.7, 18];
 const NEAR = 12;
 
 /** @typedef {{axis: 0 | 1, end: 0 | 1}} Face */
@@ -33,6 +34,7 @@ function drawPlan(canvas, info, room) {
 	const [wide, high] = [plan.width * plan.cell, plan.height * plan.cell];
 	const k = Math.min((width - 8) / wide, (height - 8) / high);
 	const [left, bottom] = [(width - k * wide) / 2, (height + k * high) / 2];
+	const length = Math.max(LENGTH[0], LENGTH[1] / k);
 	const at = (/** @type {number} */ x, /** @type {number} */ y) => [
 		left + (x - plan.x) * k,
 		bottom - (y - plan.y) * k,
@@ -56,7 +58,7 @@ function drawPlan(canvas, info, room) {
 	g.textBaseline = "bottom";
 	plan.cameras.forEach(([x, y, way, half], index) => {
 		const ends = [-half, half].map((turn) =>
-			at(x + LENGTH * Math.cos(way + turn), y + LENGTH * Math.sin(way + turn)),
+			at(x + length * Math.cos(way + turn), y + length * Math.sin(way + turn)),
 		);
 		trace(g, [at(x, y), ...ends, at(x, y)]);
 		g.fillStyle = faded(card, 0.8);

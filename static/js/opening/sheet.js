@@ -258,11 +258,15 @@ export function mountOpening({ store, actions }) {
 	// The layer lies over the 3D view, which would swallow what is dropped on it.
 	const carries = (/** @type {DragEvent} */ { dataTransfer }) =>
 		dataTransfer?.types.includes("Files");
-	addEventListener("dragenter", (event) => {
+	const cover = (/** @type {DragEvent} */ event) => {
 		if (!carries(event)) return;
 		(dialog.open ? dialog : document.body).append(layer);
 		layer.hidden = false;
-	});
+	};
+	addEventListener("dragenter", cover);
+	// Whoever comes in over the 3D view is first heard of there.
+	const frame = one("iframe");
+	frame.addEventListener("load", () => frame.contentWindow?.addEventListener("dragenter", cover));
 	addEventListener("dragover", (event) => carries(event) && event.preventDefault());
 	layer.addEventListener("dragleave", () => (layer.hidden = true));
 	addEventListener("drop", (event) => {
