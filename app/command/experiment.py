@@ -104,14 +104,14 @@ class _Bars:
         self.close()
 
     def told(self, words: str, done: int, total: int) -> None:
-        """So far; other words begin another bar."""
+        """Show how much is done; other words begin another bar."""
         if self._bar is None or words != self._words:
             self.close()
             self._words, self._bar = words, Bar(words, "step")
         self._bar.at(done, total)
 
     def close(self) -> None:
-        """Nothing is being done."""
+        """Remove the bar."""
         if self._bar is not None:
             self._bar.__exit__()
             self._bar = None

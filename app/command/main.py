@@ -54,12 +54,12 @@ def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit status."""
     try:
         status = _run(parse(arguments))
-        sys.stdout.flush()  # at the interpreter's end nobody could hear that the reader is gone
+        sys.stdout.flush()  # a pipe that is closed raises here, where it is caught, not at exit
         return status
     except ParameterError as error:
         say(str(error))
         return USAGE
-    except BrokenPipeError:  # whoever read our output has enough
+    except BrokenPipeError:  # the reader of our output closed its end, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except (Exception, KeyboardInterrupt) as error:
@@ -110,7 +110,7 @@ def _run(command: Arguments) -> int:
 
 
 def _is_interruption(error: BaseException | None) -> bool:
-    """Whether Ctrl-C is behind it: one heard inside a compiled kernel comes out as its failure."""
+    """Whether Ctrl-C caused an exception: inside a compiled kernel it is raised as another one."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__
     return error is not None

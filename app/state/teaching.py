@@ -32,7 +32,7 @@ KEPT_STATES = 500
 """Rooms and templates that can be gone back to."""
 
 PIXEL_DIGITS, METRE_DIGITS = 1, 3
-"""Digits that a drawn box and a dragged place are given."""
+"""Decimals to which a drawn box (pixels) and a dragged place (metres) are rounded."""
 
 LEAST_BOX = 4.0
 """Pixels of a template's side: what is smaller has no colours to speak of."""
