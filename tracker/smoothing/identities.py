@@ -48,6 +48,8 @@ class Settled:
     links: Links
     origins: Int[ndarray, " n"]
     """The path before the cuts of which each has most."""
+    had: Bool[ndarray, " N"]
+    """The rows of pieces: the others are of the gaps between them."""
     decisions: list[Decision]
 
 
@@ -86,7 +88,9 @@ def settle(
         _most(fitted.paths.owners[kept[cut.starts[chain]]], lengths[chain]) for chain in chains
     ]
     links = pieces.moved_to(links, rows)
-    return Settled(paths, links, np.array(origins, dtype=np.int64), decisions)
+    had = np.zeros(len(paths.states), dtype=bool)
+    had[rows[rows >= 0]] = True
+    return Settled(paths, links, np.array(origins, dtype=np.int64), had, decisions)
 
 
 def _cut(

@@ -11,11 +11,12 @@ from tracker.parameters import SmoothingParams
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Shared, Smoother
 
-_AWAY_FROM_BOXES = 0.3
-"""Existence with which a row beyond a path's ends competes for boxes."""
+UNSURE = 0.3
+"""Existence with which a row beyond a path's ends, or within its gaps, competes for boxes."""
 
 
-_ENTER = 0.5
+import os
+_ENTER = float(os.environ.get("ENTER","0.5"))
 """Log odds against a track's coming and against its leaving: the filter has found it already."""
 
 
@@ -79,7 +80,7 @@ def extended(smoother: Smoother, paths: Paths, steps: int) -> tuple[Paths, Float
         states.append(np.concatenate([head[0][::-1], paths.states[begin:end], tail[0]]))
         covariances.append(np.concatenate([head[1][::-1], paths.covariances[begin:end], tail[1]]))
         firsts.append(int(paths.firsts[i]) - before)
-        own = np.full(len(states[-1]), _AWAY_FROM_BOXES)
+        own = np.full(len(states[-1]), UNSURE)
         own[before : before + end - begin] = 1.0
         existences.append(own)
     longer = Paths.of(paths.labels.tolist(), firsts, states, covariances, motion.dimension)
