@@ -15,11 +15,6 @@ UNSURE = 0.3
 """Existence with which a row beyond a path's ends, or within its gaps, competes for boxes."""
 
 
-import os
-_ENTER = float(os.environ.get("ENTER","0.5"))
-"""Log odds against a track's coming and against its leaving: the filter has found it already."""
-
-
 def independence(step_time: float, memory: float) -> float:
     """The share of a step's evidence that is new: pictures of one moment agree, right or wrong."""
     return min(step_time / memory, 1.0)
@@ -47,11 +42,15 @@ def lifetimes(
     votes = hit * np.bincount(shared.links.rows, shared.links.shares, len(paths.states))
     weight = independence(smoother.model.step_time, parameters.memory)
     survival = min(p.survival_probability, 1.0 - 1e-9)
+    # within the time in which the evidence tells anew; a recording seen backwards is the same
+    steps = 1.0 / weight
+    come = float(np.log(min(p.birth_rate * steps * smoother.model.step_time, 1.0)))
+    leave = float(np.log1p(-(survival**steps)))
     found = presence(
         paths.starts,
-        paths.lasts,
+        paths.firsts,
         weight * (votes + misses(shared)),
-        Habits(float(np.log(survival)), -_ENTER, -parameters.change),
+        Habits(float(np.log(survival)), (come + leave) / 2.0, -parameters.change),
         smoother.frames - 1,
     )
     return found.probabilities, found.odds

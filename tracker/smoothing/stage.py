@@ -96,7 +96,7 @@ class Identities(Positions):
         contested = pieces.contested(paths, links)
         fitted, shared, learnt = _settled(smoother, paths, existences, links, p, None, check)
         looks = _looks(views) if p.appearance > 0.0 else None
-        found = identities.settle(smoother, fitted, shared, contested, p, looks)
+        found = identities.settle(smoother, fitted, shared, contested, existences == 1.0, p, looks)
         check()
         learnt = learnt.of_people(found.origins)
         existences = np.where(found.had, 1.0, lifetimes.UNSURE)
@@ -143,6 +143,7 @@ def _finished(
     shared = smoother.share(fitted.paths, existences, learnt)
     there, odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
     import os
+
     for _ in range(int(os.environ.get("MF", "0"))):
         shared = smoother.share(fitted.paths, there, learnt)
         there, odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
