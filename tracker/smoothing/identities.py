@@ -125,8 +125,8 @@ def _cut(
     reasons = np.zeros(rows, dtype=np.int64)
     fed = np.bincount(shared.links.rows, shared.links.shares, rows) > _FED
     longest = round(p.gap / step_time)
-    gaps = _long_gaps(paths, fed, longest) | _long_gaps(paths, had, longest)
-    reasons[gaps | (there < 0.5)] = 3
+    away = _long_gaps(paths, fed, longest) | (there < 0.5)
+    reasons[away | _not_bridged(paths, had, away, longest)] = 3
     around = round(_AROUND / step_time)
     # where boxes err alike for a while, past and future contradict each other by less than it seems
     jumps = np.flatnonzero(fitted.jumps * independence(step_time, p.memory) > p.jump)
@@ -152,14 +152,27 @@ def _cut(
     return cut, kept, reasons
 
 
+def _runs(paths: Paths, flags: Bool[ndarray, " N"]) -> Int[ndarray, " N"]:
+    """The number of the run of equal flags of one path that each row is in."""
+    change = np.ones(len(flags), dtype=bool)
+    change[1:] = (flags[1:] != flags[:-1]) | (np.diff(paths.owners) != 0)
+    return np.asarray(np.cumsum(change) - 1)
+
+
 def _long_gaps(paths: Paths, fed: Bool[ndarray, " N"], longest: int) -> Bool[ndarray, " N"]:
     """The rows of those runs without a box that are longer than ``longest`` steps."""
-    owners = paths.owners
-    change = np.ones(len(fed), dtype=bool)
-    change[1:] = (fed[1:] != fed[:-1]) | (owners[1:] != owners[:-1])
-    run = np.cumsum(change) - 1
-    lengths = np.bincount(run)
-    return np.asarray(~fed & (lengths[run] > longest)) if len(fed) else fed
+    run = _runs(paths, fed)
+    return np.asarray(~fed & (np.bincount(run)[run] > longest)) if len(fed) else fed
+
+
+def _not_bridged(
+    paths: Paths, had: Bool[ndarray, " N"], away: Bool[ndarray, " N"], longest: int
+) -> Bool[ndarray, " N"]:
+    """The rows of the filter's long gaps that the boxes do not lead through from end to end: what
+    it lost and went on only for a while may have gone on as another track."""
+    gaps = _long_gaps(paths, had, longest)
+    run = _runs(paths, had)
+    return np.asarray(gaps & (np.bincount(run, away & gaps)[run] > 0.0)) if len(had) else gaps
 
 
 def _between(paths: Paths, seen: Bool[ndarray, " N"]) -> Bool[ndarray, " N"]:

@@ -50,7 +50,7 @@ def lifetimes(
         paths.starts,
         paths.firsts,
         weight * (votes + misses(shared)),
-        Habits(float(np.log(survival)), (come + leave) / 2.0, -parameters.change),
+        Habits(float(np.log(survival)), (come + leave) / 4.0, -parameters.change),
         smoother.frames - 1,
     )
     return found.probabilities, found.odds
