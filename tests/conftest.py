@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import signal
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -24,6 +26,11 @@ settings.load_profile("repeatable")
 
 # a shell starts what runs in the background deaf to Ctrl-C, and so is all that it starts
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+# no test ever writes to the library of whoever runs it
+_LIBRARY = tempfile.TemporaryDirectory(prefix="multiview-phd-library-")
+os.environ["MULTIVIEW_PHD_LIBRARY"] = str(Path(_LIBRARY.name) / "library.sqlite3")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -6,6 +6,8 @@ import os
 import sys
 from pathlib import Path
 
+import platformdirs
+
 
 def cache_folder() -> Path:
     """``$MULTIVIEW_PHD_CACHE``, else the platform's place for caches.
@@ -42,3 +44,11 @@ def settings_folder() -> Path:
         given = Path(os.environ.get("XDG_CONFIG_HOME", ""))
         base = given if given.is_absolute() else Path.home() / ".config"
     return base / "multiview-phd"
+
+
+def library_file() -> Path:
+    """``$MULTIVIEW_PHD_LIBRARY``, else ``library.sqlite3`` in the platform's place for data."""
+    own = os.environ.get("MULTIVIEW_PHD_LIBRARY")
+    if own:
+        return Path(own).expanduser().absolute()
+    return platformdirs.user_data_path("multiview-phd", appauthor=False) / "library.sqlite3"

@@ -14,7 +14,9 @@ from typing import Annotated, Any, Literal
 import tyro
 from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subcommand
 
+from app.command.library_flags import LibraryCommand, LibraryFile, Runs
 from tracker import parameters as table
+from tracker.library import KEEP
 from tracker.parameters import FOLLOWS, METHODS, PRESETS, Parameter, ParameterError
 
 DEFAULT_SEQUENCE = "room44-3p"
@@ -42,6 +44,10 @@ class Serve:
     """Open the page in a browser; by default where there is a screen."""
     data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None
     """Folder whose folders are sequences that can be chosen on the page."""
+    library: LibraryFile = None
+    """The file that finished runs are kept in."""
+    keep: Annotated[int, arg(metavar="INT")] = KEEP
+    """Kept runs without star, name, note and tags that stay, the newest ones; 0 keeps none."""
 
 
 @dataclass
@@ -81,9 +87,14 @@ class Track:
     ] = ()
     """One parameter, as in --set fusion.survival_probability=0.98; `parameters` lists the keys."""
     seed: int = 0
-    """Seed of all randomness; the same seed gives the same tracks."""
+    """Seed of all randomness; the same seed gives the same tracks, but for last digits on processors
+    without fused multiply-add."""
     cache: bool = True
     """Take up what the cameras found in an earlier run with the same values, and keep it."""
+    library: LibraryFile = None
+    """The file that finished runs are kept in."""
+    keep: Annotated[int, arg(metavar="INT")] = KEEP
+    """Kept runs without star, name, note and tags that stay, the newest ones; 0 keeps none."""
 
     def changes(self) -> dict[str, Any]:
         """The values asked for, by key: preset, then ``--set``, then flags.
@@ -191,9 +202,12 @@ class Import:
     ] = None
     """Axes of a camera: y down and z ahead, or y up and z back."""
     boxes: Annotated[
-        Literal["ltwh", "xyxy", "cxcywh"] | None, arg(help_behavior_hint="(default: found out)")
+        Literal["ltwh", "xyxy", "cxcywh", "ltwh-normalised", "xyxy-normalised", "cxcywh-normalised"]
+        | None,
+        arg(help_behavior_hint="(default: found out)"),
     ] = None
-    """What the four numbers of a box are: left, top and size; two corners; centre and size."""
+    """What the four numbers of a box are: left, top and size; two corners; centre and size; in
+    pixels, or normalised: as parts of the picture's width and height."""
     first_index: Annotated[int | None, arg(help_behavior_hint="(default: found out)")] = None
     """Number of the first frame in boxes and truth, 0 or 1."""
     fps: Annotated[float | None, arg(help_behavior_hint="(default: the videos')")] = None
@@ -203,6 +217,11 @@ class Import:
         arg(metavar="NAME=FILE", help_behavior_hint="(repeatable)"),
     ] = ()
     """Video, folder of pictures or boxes of a camera, where names do not tell."""
+    swap: Annotated[
+        UseAppendAction[tuple[str, ...]],
+        arg(metavar="NAME=NAME", help_behavior_hint="(repeatable)"),
+    ] = ()
+    """Two cameras whose calibrations are each other's; exchanged in the order given."""
 
 
 @dataclass
@@ -356,6 +375,8 @@ Arguments = (
     | Sequences
     | Render
     | Parameters
+    | Runs
+    | LibraryCommand
 )
 
 
@@ -378,6 +399,8 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         | Annotated[Sequences, subcommand("sequences")]
         | Annotated[Render, subcommand("render")]
         | Annotated[Parameters, subcommand("parameters")]
+        | Annotated[Runs, subcommand("runs")]
+        | Annotated[LibraryCommand, subcommand("library")]
     )
     parsed: Arguments = tyro.cli(
         commands,

@@ -14,7 +14,7 @@ import threading
 import time
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from app.command.flags import (
     Arguments,
@@ -34,9 +34,15 @@ from app.command.flags import (
     parse,
     show,
 )
+from app.command.library_flags import LibraryCommand, OpenRun, Runs
 from app.command.terminal import Bar, CommandError, check_data, print_table, say
 from tracker import parameters as table
+from tracker.folders import library_file
 from tracker.parameters import ParameterError
+
+if TYPE_CHECKING:
+    from tracker.library.records import Result
+    from tracker.pipeline import Run
 
 FAILURE, USAGE, INTERRUPTED = 1, 2, 130
 
@@ -92,6 +98,14 @@ def _run(command: Arguments) -> int:
             _render(command)
         case Parameters():
             _parameters()
+        case Runs():
+            from app.command.runs import runs
+
+            return runs(command, _serve_run)
+        case LibraryCommand():
+            from app.command.runs import check
+
+            return check(command)
     return 0
 
 
@@ -114,12 +128,18 @@ def _sentence(error: BaseException) -> str:
 # serve
 
 
-def _serve(command: Serve) -> int:
+def _serve_run(command: OpenRun, result: Result) -> int:
+    serve = Serve(result.place, port=command.port, open=command.open, library=command.library)
+    return _serve(serve, result.run.id)
+
+
+def _serve(command: Serve, run: int | None = None) -> int:
     if not 0 <= command.port <= 65535:
         raise ParameterError(
             "--port", f"expected 0 (any that is free) to 65535, got {command.port}"
         )
     check_data(command.data)
+    _check_keep(command.keep)
     from app.state.jobs import locate
     from app.web import server
     from app.web.security import is_loopback
@@ -150,6 +170,9 @@ def _serve(command: Serve) -> int:
             sequence=command.sequence,
             data=command.data,
             keep_on_disk=True,
+            library=command.library or library_file(),
+            keep=command.keep,
+            run=run,
             say=say,
         )
     )
@@ -198,6 +221,7 @@ def _track(command: Track) -> None:
     changes = command.changes()
     table.with_values(table.RunParameters(), changes)  # wrong usage shows before any work
     _check_seed(command.seed)
+    _check_keep(command.keep)
     output = command.output
     if output.is_dir():
         raise CommandError(f"--output {output}: expected a file to write, found a folder")
@@ -219,7 +243,7 @@ def _track(command: Track) -> None:
         if found.status == "warning" and str(found) not in sequence.warnings:
             say(str(found))
     parameters = table.with_values(pipeline.default_parameters(sequence), changes)
-    begin = time.perf_counter()
+    begin, began = time.perf_counter(), time.time()
     stages: set[table.Stage] = set()
 
     def told(_: pipeline.Run, progress: pipeline.Progress) -> None:
@@ -246,6 +270,28 @@ def _track(command: Track) -> None:
     )
     if (reason := why_no_tracks(run)) is not None:
         say(reason)
+    if command.keep:
+        _keep(command, run, began, seconds)
+
+
+def _keep(command: Track, run: Run, began: float, seconds: float) -> None:
+    """Put a finished run into the library; where that cannot be used, say so and go on."""
+    from tracker.evaluation import evaluate_sequence
+    from tracker.library.errors import LibraryError
+    from tracker.library.keeping import recording_of, run_of, thumbnail_of
+    from tracker.library.store import open_library
+
+    sequence = run.sequence
+    try:
+        with open_library(command.library or library_file()) as library:
+            evaluation = None
+            if sequence.ground_truth is not None:
+                evaluation = evaluate_sequence(sequence, run.tracks)
+            new = run_of(run, source="track", began=began, seconds=seconds, evaluation=evaluation)
+            recording = recording_of(sequence, command.sequence, thumbnail_of(sequence))
+            library.keep(recording, new, command.keep)
+    except LibraryError as error:
+        say(f"the run was not kept: {error}")
 
 
 # the rest
@@ -305,6 +351,11 @@ def _render(command: Render) -> None:
             progress=bar.at,
         )
     say(f"{command.name} with {command.cameras} cameras, written to {command.folder}")
+
+
+def _check_keep(keep: int) -> None:
+    if keep < 0:
+        raise ParameterError("--keep", f"expected a whole number from 0, got {keep}")
 
 
 def _check_seed(seed: int) -> None:

@@ -91,6 +91,10 @@ class RunInfo(Model):
     message: str
     """The stage that takes the time."""
     error: str | None
+    kept: int | None
+    """Its number in the library that it was taken from; what the cameras found is not there."""
+    stands_for: str
+    """The key that a computation would have, where older code made what is shown; else empty."""
 
 
 class PinnedInfo(Model):

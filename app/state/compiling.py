@@ -61,13 +61,21 @@ class Compiling:
         while not cancelled() and not self._ready.wait(_LOOKS_SECONDS):
             told(*max(self._counts.values(), default=(0, 0)))
 
-    def close(self) -> None:
-        """Stop; what was compiled stays."""
+    def stop(self) -> None:
+        """End the processes; what was compiled stays.
+
+        A run that is under way goes on as plain Python: to compile what is still missing would
+        keep it, and with it the program, for a minute.
+        """
         self._closed = True
-        compilation.no_longer_compiling()
         self._ready.set()
         for process in self._processes.values():
             process.terminate()
+
+    def close(self) -> None:
+        """Stop; from now on each kernel is compiled where it is first needed."""
+        self.stop()
+        compilation.no_longer_compiling()
 
     def _follow(self) -> None:
         readers = [
@@ -79,12 +87,13 @@ class Compiling:
         for reader in readers:
             reader.join()
         statuses = [process.wait() for process in self._processes.values()]
-        compilation.no_longer_compiling()
         if not any(statuses):
             compilation.mark_compiled()
             self._say("the kernels are compiled")
         elif not self._closed:
             logger.warning("compiling ended with status %s", max(statuses, key=abs))
+        if not self._closed:
+            compilation.no_longer_compiling()
         self._ready.set()
 
     def _read(self, half: str, process: subprocess.Popen[str]) -> None:
@@ -97,3 +106,5 @@ class Compiling:
                 elif len(words) == 2:
                     self._counts[half] = int(words[0]), int(words[1])
                     compilation.news_of_compiling()
+        if process.wait() != 0:  # it will not say that it is ready
+            self._ready.set()

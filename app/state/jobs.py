@@ -23,10 +23,13 @@ from app.state.compiling import WORDS, Compiling
 from app.state.snapshot import Change, Opening, Snapshot
 from app.state.workbench import Workbench
 from tracker import pipeline
+from tracker.library.keeping import run_from
+from tracker.library.records import Result
 from tracker.pipeline import Cancelled, Progress, Run
 from tracker.runs.stage_cache import StageCache
 from tracker.sequences import library
 from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
 
 logger = logging.getLogger("app")
 
@@ -197,6 +200,40 @@ class Jobs:
         """Go on with a run that was cancelled or failed."""
         self._ask(again=True)
 
+    def show_kept(self, result: Result) -> None:
+        """Show a run of the library, of the open recording, instead of computing one.
+
+        Where this code and this recording would give other tracks, it is another run than the
+        one that a computation gives.
+
+        Raises:
+            ValueError: If the recording does not fit it any more.
+        """
+        with self._condition:
+            snapshot = self._workbench.snapshot()
+            if snapshot.sequence is None:
+                raise ValueError("no recording is open")
+            run = self.kept_run(snapshot.sequence, result)
+            wanted = self.key_of(snapshot.sequence, result)
+            if self._under_way is not None:
+                self._under_way.cancelled.set()
+            self._wanted = None
+            self._workbench.show_kept(run, result.run.id, "" if run.key == wanted else wanted)
+
+    def kept_run(self, sequence: Sequence, result: Result) -> Run:
+        """A run of the library to set others against, known by a key of its own.
+
+        Raises:
+            ValueError: If the recording does not fit it any more.
+        """
+        wanted = self.key_of(sequence, result)
+        same = wanted == result.key
+        return run_from(sequence, result, key=wanted if same else f"{wanted}-kept-{result.run.id}")
+
+    def key_of(self, sequence: Sequence, result: Result) -> str:
+        """The key that a computation with a kept run's values would have now."""
+        return pipeline.stage_keys(sequence, result.parameters, self._seed)["tracks"]
+
     def cancel(self) -> None:
         """Stop the run under way; its steps stay shown."""
         with self._condition:
@@ -218,7 +255,9 @@ class Jobs:
             newest = self._wanted or self._under_way
             if newest is not None and newest.key == key and not newest.cancelled.is_set():
                 return  # it is under way already
-            if newest is None and key == snapshot.run_state.key and not again:
+            shown = (snapshot.run_state.key, snapshot.run_state.stands_for)
+            idle = newest is None or newest.cancelled.is_set()
+            if idle and key in shown and not again:
                 return  # it is there already, or was stopped on purpose
             if self._under_way is not None:
                 self._under_way.cancelled.set()
@@ -289,11 +328,13 @@ class Jobs:
                 self._under_way.cancelled.set()
             self._condition.notify_all()
         if self._compiling is not None:
-            self._compiling.close()
+            self._compiling.stop()
         deadline = time.monotonic() + CLOSING_SECONDS
         for thread in (self._worker, *self._openings):
             if thread.ident is not None:
                 thread.join(timeout=max(0.0, deadline - time.monotonic()))
+        if self._compiling is not None and not self._worker.is_alive():
+            self._compiling.close()
         sys.setswitchinterval(self._switch_interval)
         reader = self._workbench.snapshot().reader
         if reader is not None:

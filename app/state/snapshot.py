@@ -55,6 +55,10 @@ class RunState:
     seconds_left: float | None = None
     message: str = ""
     error: str | None = None
+    kept: int | None = None
+    """Its number in the library that it was taken from; what the cameras found is not there."""
+    stands_for: str = ""
+    """The key that a computation with these values would have, where older code made this one."""
 
 
 @dataclass(frozen=True, slots=True)

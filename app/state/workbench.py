@@ -184,6 +184,12 @@ class Workbench:
             self._put("pinned", scores=now.scores.pin(Scored.of(now.run)))
             return True
 
+    def pin_kept(self, run: Run) -> None:
+        """Pin a run of the library, of the open recording, beside the one that is shown."""
+        with self._edit() as now:
+            if now.sequence is not None and run.sequence is now.sequence:
+                self._put("pinned", scores=now.scores.pin(Scored.of(run)))
+
     def unpin(self) -> None:
         """Nothing is pinned any more."""
         with self._edit() as now:
@@ -373,6 +379,29 @@ class Workbench:
                 self._last_good = run
             state = replace(now.run_state, state=phase, seconds_left=None, message="", error=error)
             self._put("run", run=run, run_state=state)
+
+    def show_kept(self, run: Run, number: int, stands_for: str = "") -> None:
+        """Show a run of the library with its parameters, in one change.
+
+        Args:
+            run: Its tracks; of the open recording.
+            number: Its number in the library.
+            stands_for: The key that a computation with its values would have, if another.
+        """
+        with self._edit() as now:
+            if now.sequence is None or run.sequence is not now.sequence:
+                return
+            state = RunState(
+                key=run.key,
+                state="done",
+                done=run.done,
+                total=now.sequence.frames,
+                kept=number,
+                stands_for=stands_for,
+            )
+            self._last_good = run
+            self._put("run", run=run, run_state=state, parameters=run.parameters)
+            self._pending.append("parameters")
 
     def scored(self, scored: Scored) -> None:
         """A run was scored against the truth."""

@@ -25,13 +25,18 @@ from app.state import opening_step
 from app.state.compiling import Compiling
 from app.state.evaluator import Evaluator
 from app.state.history import History
+from app.state.importing.desk import Desk
 from app.state.jobs import Jobs, in_background
+from app.state.keeper import Keeper
 from app.state.presets import OwnPresets
+from app.state.recents import Recents
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench
 from app.web import api, gateway, stream, teaching_routes
 from app.web.evaluation import routes as evaluation
 from app.web.gateway import Gateway
+from app.web.importing import routes as importing
+from app.web.library import routes as library
 from app.web.manual import Manual
 from app.web.pictures import foreground, likelihood_routes
 from app.web.pictures.jpegs import Pictures
@@ -43,6 +48,7 @@ from app.web.tables import tables, teaching_tables
 from app.web.views.timeline import Timelines
 from tracker import __version__
 from tracker.folders import settings_folder
+from tracker.library import KEEP
 from tracker.pipeline import Cancelled
 from tracker.runs.stage_cache import StageCache
 
@@ -62,6 +68,8 @@ ROUTERS = (
     teaching_routes.router,
     teaching_tables.router,
     evaluation.router,
+    importing.router,
+    library.router,
     stream.router,
     gateway.router,
 )
@@ -84,6 +92,12 @@ class Settings:
     with_viser: bool = True
     keep_on_disk: bool = False
     """Whether what was compiled and what the cameras found is kept for the next start."""
+    library: Path | None = None
+    """The file that keeps runs; None: they are not kept."""
+    keep: int = KEEP
+    """How many untouched runs stay in it."""
+    run: int | None = None
+    """A run of it that is shown at once, instead of a sequence."""
     say: Callable[[str], None] = lambda words: None
     """Told what somebody in front of the terminal should know."""
 
@@ -151,7 +165,14 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     teaching = app.state.teaching = Teaching(
         workbench, settings.data, settings_folder() / "unsaved" if kept else None
     )
+    given = Path(settings.sequence or "").expanduser()
+    roots = [given] if settings.sequence and given.is_dir() else []
+    desk = app.state.desk = Desk(settings.data, roots)
+    recents = app.state.recents = Recents(
+        workbench, settings_folder() / "recent.json" if kept else None
+    )
     evaluator = app.state.evaluator = Evaluator(workbench)
+    keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep)
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
     told.start()
@@ -161,7 +182,13 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         door.prepare()
         # the page is served meanwhile; requests for the 3D view wait
         starting = asyncio.create_task(_start_viser(room, door, workbench))
-    if settings.sequence is not None:
+    if settings.run is not None:
+        result = keeper.library().result(settings.run)
+        opening = jobs.open(result.place)
+        library.then_show(opening, jobs, workbench, result).add_done_callback(
+            _say_failure(result.run.title)
+        )
+    elif settings.sequence is not None:
         jobs.open(settings.sequence).add_done_callback(_say_failure(settings.sequence))
     try:
         yield
@@ -170,8 +197,12 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
             await asyncio.gather(starting, return_exceptions=True)
         told.stop()
         teaching.close()
+        recents.close()
+        desk.close()
         pictures.close()
-        await asyncio.gather(*(asyncio.to_thread(part.close) for part in (jobs, evaluator, room)))
+        await asyncio.gather(
+            *(asyncio.to_thread(part.close) for part in (keeper, jobs, evaluator, room))
+        )
 
 
 def _say_failure(name: str) -> Callable[..., None]:

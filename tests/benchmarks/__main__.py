@@ -13,9 +13,11 @@ from pathlib import Path
 
 from tests.benchmarks import (
     accuracy,
+    cold,
     growth,
     jpda,
     kernels,
+    library,
     live,
     page,
     pipeline,
@@ -29,6 +31,7 @@ from tests.benchmarks.record import chart
 
 SUITES = {
     "accuracy": accuracy.run,
+    "cold": cold.run,
     "kernels": kernels.run,
     "targets": targets.run,
     "jpda": jpda.run,
@@ -38,6 +41,7 @@ SUITES = {
     "stage_one": stage_one.run,
     "server": server.run,
     "page": page.run,
+    "library": library.run,
 }
 
 

@@ -19,16 +19,26 @@ from tracker.kernels.compilation import kernel_folder
 class Server:
     """`multiview-phd serve` as a person starts it, on a free port."""
 
-    def __init__(self, sequence: Path | str, cache: Path | None, *, wait: bool = True) -> None:
-        """Start it on a sequence, with a cache folder of its own or the person's."""
+    def __init__(
+        self,
+        sequence: Path | str,
+        cache: Path | None,
+        *,
+        kernels: Path | None = None,
+        wait: bool = True,
+    ) -> None:
+        """Start it on a sequence, with a cache folder of its own or the person's.
+
+        Kernels are those of the machine, whatever the cache folder, unless a folder is given.
+        """
         self.folder = sequence
         self._arguments = [str(sequence), "--no-open"]
         self._environment = dict(os.environ)
-        # kernels are those of the machine, whatever the cache folder
-        self._environment["NUMBA_CACHE_DIR"] = str(kernel_folder())
+        self._environment["NUMBA_CACHE_DIR"] = str(kernels or kernel_folder())
         if cache is not None:
             self._environment["MULTIVIEW_PHD_CACHE"] = str(cache)
             self._environment["MULTIVIEW_PHD_SETTINGS"] = str(cache / "settings")
+            self._environment["MULTIVIEW_PHD_LIBRARY"] = str(cache / "library.sqlite3")
         self.port = 0
         self.start()
         if wait:

@@ -2,7 +2,8 @@
 
 ``--record`` first runs experiments (all that are named, or every one) and keeps their tables,
 from which alone the page of results is made; ``--sweeps`` runs short pieces over values of
-parameters, and keeps what the pictures of the page of tuning show.
+parameters, and keeps what the pictures of the page of tuning show; ``--machines`` exchanges what
+differs between machines, one thing at a time.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import sys
 from pathlib import Path
 
 from tests.conftest import DATA
-from tests.manual import results, sweeps
+from tests.manual import machines, results, sweeps
 from tests.manual.places import ROOT, made_pages
 from tracker.experiments import EXPERIMENTS
 
@@ -23,13 +24,16 @@ def main() -> int:
     parser.add_argument(
         "--record", nargs="*", metavar="EXPERIMENT", choices=[*EXPERIMENTS, []], default=None
     )
-    parser.add_argument("--sweeps", nargs="*", metavar="GROUP", default=None)
+    parser.add_argument("--sweeps", nargs="*", metavar="GROUP|KEY", default=None)
+    parser.add_argument("--machines", action="store_true")
     parser.add_argument("--data", type=Path, default=DATA, help="folder of the real recordings")
     arguments = parser.parse_args()
     if arguments.record is not None:
         results.record(arguments.record or list(EXPERIMENTS), arguments.data)
     if arguments.sweeps is not None:
         sweeps.record(arguments.sweeps, arguments.data)
+    if arguments.machines:
+        machines.record()
     for path, make in made_pages().items():
         text = make()
         if not path.is_file() or path.read_text(encoding="utf-8") != text:

@@ -9,6 +9,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from tests.manual import machines
 from tests.manual.places import RECORDS, ROOT, between
 from tracker.experiments import EXPERIMENTS
 
@@ -89,6 +90,7 @@ def page() -> str:
         parts += [f"## {document['experiment']}", "", f"> {document['claim']}", ""]
         parts += [_table(document["table"]), ""]
         parts += [f"{note}\n" for note in document["notes"]]
+    parts.append(machines.section())
     return "\n".join(parts).rstrip() + "\n"
 
 

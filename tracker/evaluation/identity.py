@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int
 from numpy import ndarray
-from scipy.optimize import linear_sum_assignment
 
+from tracker.assignment import linear_sum_assignment
 from tracker.evaluation.matching import Comparison
 
 

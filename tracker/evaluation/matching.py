@@ -36,8 +36,8 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
-from scipy.optimize import linear_sum_assignment
 
+from tracker.assignment import linear_sum_assignment
 from tracker.evaluation.settings import Distance
 from tracker.sequences.sequence import GroundTruth
 

@@ -15,10 +15,10 @@ import cv2
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
-from scipy.optimize import linear_sum_assignment
 
 from tracker import parameters as table
 from tracker import single_view
+from tracker.assignment import linear_sum_assignment
 from tracker.boxes import Boxes
 from tracker.evaluation.figures import number
 from tracker.evaluation.matching import assign

@@ -16,7 +16,6 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 from numpy import ndarray
-from scipy.optimize import isotonic_regression
 
 from tracker.foreground.segmentation import Segmentation
 from tracker.kernels.pictures import images
@@ -111,6 +110,8 @@ def tone_curve(
         source: A picture of the background alone; its levels make the groups.
         target: Of the same size and view.
     """
+    from scipy import optimize  # slow to import, and a server starts without it
+
     height, width = source.shape[:2]
     stride = max(1, int(np.sqrt(height * width / SAMPLED_PIXELS)))
     few = source[::stride, ::stride].reshape(-1, 3)
@@ -126,7 +127,7 @@ def tone_curve(
             curve[0, :, channel] = levels
             continue
         centres = found.sums[channel, used] / total[used]
-        rising = isotonic_regression(found.medians[channel, used], weights=total[used]).x
+        rising = optimize.isotonic_regression(found.medians[channel, used], weights=total[used]).x
         mapped = levels + np.interp(levels, centres, rising - centres)
         curve[0, :, channel] = np.clip(np.rint(mapped), 0, 255)
     return curve

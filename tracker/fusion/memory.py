@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
-from scipy.optimize import linear_sum_assignment
 
+from tracker.assignment import linear_sum_assignment
 from tracker.filters import gaussian_mixture
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.model import CONFIRMED, FusionModel

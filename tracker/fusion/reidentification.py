@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
-from scipy.optimize import linear_sum_assignment
 
+from tracker.assignment import linear_sum_assignment
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.model import CONFIRMED
 from tracker.fusion.protocol import Associations

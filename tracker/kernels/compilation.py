@@ -35,6 +35,7 @@ from numba.core import event
 from numba.core.compiler_lock import global_compiler_lock
 
 from tracker.folders import cache_folder
+from tracker.kernels import checked_cache
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -65,14 +66,16 @@ def pixel_kernel(function: _F) -> _F:
     return compiled
 
 
-def compiled_later(function: _F, **options: Any) -> _F:
-    """As :func:`kernel` with options of numba's own, and not counted among the kernels."""
+def compiled_later(function: _F) -> _F:
+    """As :func:`kernel`, and not counted among the kernels."""
     before = _config.CACHE_DIR
     _config.CACHE_DIR = str(_folder_of(Path(function.__code__.co_filename)))
     try:
-        compiled = numba.njit(cache=True, nogil=True, **options)(function)
+        compiled = numba.njit(cache=True, nogil=True)(function)
+        if not _config.DISABLE_JIT:
+            checked_cache.check_files_of(compiled)
     except RuntimeError:  # nowhere to write to: it is compiled at every start
-        compiled = numba.njit(nogil=True, **options)(function)
+        compiled = numba.njit(nogil=True)(function)
     finally:
         _config.CACHE_DIR = before
     return cast(_F, compiled)
@@ -213,7 +216,7 @@ def _imported(source: bytes) -> tuple[str, ...]:
 
 
 def _digest(files: Iterable[Path]) -> str:
-    digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version} checked".encode())
     for file in sorted(files):
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()[:16]

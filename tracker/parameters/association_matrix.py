@@ -130,6 +130,9 @@ METHOD = Method(
     name="association_matrix",
     help="Tracks of foreground objects by decision matrices.",
     made_by="tracker.single_view.association_matrix.method:AssociationMatrix",
-    uses=Uses(pictures=True, reads=(Reads("association_matrix"), Reads("foreground"))),
+    uses=Uses(
+        pictures=True,
+        reads=(Reads("association_matrix"), Reads("pictures"), Reads("foreground")),
+    ),
     parameters=AssociationMatrixParams,
 )

@@ -53,6 +53,10 @@ class ColourPeakParams(Params):
     ] = 3.0
     """The likelihood falls by exp(-b · share of foreground above and beside the box)."""
 
+    carry_templates: Annotated[bool, ui("q_c", published=False)] = True
+    """Whether a camera without a template of a person gets one from where the others' templates
+    and the calibration say that the person is."""
+
     samples: Annotated[int, Field(ge=20, le=5000), ui("S", unit="1/(camera·step)", log=True)] = 400
     """Boxes that are compared with the templates."""
 
@@ -170,7 +174,7 @@ class ColourPhdParams(ColourPeakParams):
 def _uses(parameters: RunParameters) -> Uses:
     asked = parameters.of(ColourPhdParams).asks_foreground
     foreground = parameters.foreground.read_by_colours if asked else ()
-    reads = (Reads("colour_phd"), *foreground)
+    reads = (Reads("colour_phd"), Reads("pictures"), *foreground)
     return Uses(pictures=True, templates="needed", reads=reads)
 
 

@@ -224,9 +224,10 @@ def _uses(parameters: RunParameters) -> Uses:
     if source == "detections":
         return Uses(detections=True, reads=(own, Reads("detection_boxes")))
     if source == "foreground":
-        return Uses(pictures=True, reads=(own, Reads("foreground")))
+        return Uses(pictures=True, reads=(own, Reads("pictures"), Reads("foreground")))
     # without a single template the foreground's boxes are taken instead
-    reads = (own, Reads("foreground"), Reads("colour_phd", only=ColourPeakParams))
+    colours = Reads("colour_phd", only=ColourPeakParams)
+    reads = (own, Reads("pictures"), Reads("foreground"), colours)
     return Uses(pictures=True, templates="if there", reads=reads)
 
 

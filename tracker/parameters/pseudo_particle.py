@@ -200,7 +200,7 @@ class PseudoParticleParams(Params):
 def _uses(parameters: RunParameters) -> Uses:
     asked = parameters.of(PseudoParticleParams).asks_foreground
     foreground = parameters.foreground.read_by_colours if asked else ()
-    reads = (Reads("pseudo_particle"), *foreground)
+    reads = (Reads("pseudo_particle"), Reads("pictures"), *foreground)
     return Uses(pictures=True, templates="needed", reads=reads)
 
 

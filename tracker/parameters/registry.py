@@ -48,7 +48,7 @@ BUILT_IN: dict[MethodKey, tuple[str, ...]] = {
 }
 """Where the descriptions of this project's methods stand, in the order of their lists."""
 
-SHARED_GROUPS = ("foreground", "fusion", "smoothing")
+SHARED_GROUPS = ("pictures", "foreground", "fusion", "smoothing")
 """Groups of parameters that are no single method's."""
 
 FOLLOWING = ("colour_phd", "none")

@@ -11,6 +11,7 @@ from tracker.parameters.definition import Params
 from tracker.parameters.foreground import ForegroundParams
 from tracker.parameters.fusion import FusionParams
 from tracker.parameters.methods import Method, MethodKey
+from tracker.parameters.pictures import PictureParams
 from tracker.parameters.registry import REGISTERED
 from tracker.parameters.smoothing import SmoothingParams
 
@@ -29,6 +30,7 @@ class SharedParameters(Params):
     smoothing_method: str = "none"
     """Method of stage 3: the filter's tracks as they are, smoothed, or who is who as well."""
 
+    pictures: PictureParams = PictureParams()
     foreground: ForegroundParams = ForegroundParams()
     fusion: FusionParams = FusionParams()
     smoothing: SmoothingParams = SmoothingParams()

@@ -15,6 +15,7 @@ from tracker.runs.run import Cancelled, Run
 from tracker.sequences.frames import Picture, Pictures
 from tracker.single_view.colour.likeness import Likeness, looks_of
 from tracker.single_view.protocol import SingleViewMethod, ViewResult
+from tracker.single_view.working.sequence import Working
 
 BLOCK = 5
 """Steps that a camera does at a time: few enough to stream, enough to pay."""
@@ -45,7 +46,8 @@ class SingleViews:
         self._run = run
         self._cancelled = cancelled
         self._stopped = False
-        self._reader = _StoppingReader(reader, self._is_stopped)
+        stopping = _StoppingReader(reader, self._is_stopped)
+        self._working = Working.of(run.sequence, run.parameters, stopping)
         self._pools = [
             ThreadPoolExecutor(1, f"single-view-{view.camera.name}", thread_begins)
             for view in run.sequence.views
@@ -85,11 +87,15 @@ class SingleViews:
     def _prepare(self, camera: int) -> _CameraWorker:
         run = self._run
         method = single_view.create(
-            run.parameters.single_view, run.sequence, camera, run.parameters, self._reader
+            run.parameters.single_view,
+            self._working.sequence,
+            camera,
+            run.parameters,
+            self._working.reader,
         )
         run.costly = run.costly or _looks_at_pictures(run)
         state = run.view_states[camera] if run.view_states is not None else method.start()
-        return _CameraWorker(method, state, camera, run, self._reader, self._is_stopped)
+        return _CameraWorker(method, state, camera, run, self._working, self._is_stopped)
 
 
 class _CameraWorker:
@@ -101,9 +107,10 @@ class _CameraWorker:
         state: Any,
         camera: int,
         run: Run,
-        reader: Pictures,
+        working: Working,
         stopped: Cancel,
     ) -> None:
+        self._working = working
         self._method = method
         self._state = state
         self._camera = camera
@@ -113,8 +120,8 @@ class _CameraWorker:
         self._seed = run.seed
         self._stopped = stopped
         looks = _looks_at_pictures(run)
-        self._pictures = reader.iterate(camera, self._frame) if looks else None
-        self._likeness = Likeness.of(run.sequence, reader) if looks else None
+        self._pictures = working.reader.iterate(camera, self._frame) if looks else None
+        self._likeness = Likeness.of(working.sequence, working.reader) if looks else None
 
     def block(self, steps: int) -> list[tuple[ViewResult, Any]]:
         """The next few steps: result and state of each; none at the end."""
@@ -134,7 +141,7 @@ class _CameraWorker:
                 result = replace(result, likenesses=likenesses)
             if picture is not None:
                 result = replace(result, looks=looks_of(picture, result.boxes))
-            done.append((result, self._state))
+            done.append((self._working.back(self._camera, result), self._state))
             self._frame += 1
         return done
 

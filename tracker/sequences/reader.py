@@ -166,6 +166,14 @@ def _parse(folder: Path, text: str) -> Fields:
         if place == "end of document":
             place = f"line {len(text.splitlines())}"
         raise SequenceError(f"{where}, {place}: is not valid TOML: {problem.lower()}") from None
+    except RecursionError:
+        raise SequenceError(
+            f"{where}: expected tables and lists a few levels deep, found hundreds; remove them"
+        ) from None
+    except ValueError:  # of a whole number with thousands of digits
+        raise SequenceError(
+            f"{where}: expected numbers of at most 18 digits, found one with thousands; shorten it"
+        ) from None
     version = values.get("format", FORMAT)
     if version != FORMAT:
         raise SequenceError(

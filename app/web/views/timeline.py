@@ -228,6 +228,12 @@ class Timelines:
         )
 
 
+def lives_of(tracks: Trajectories, done: int, fps: float, window: Window) -> list[models.TrackLife]:
+    """The lives of tracks by themselves, without a run, as the window shows them."""
+    lives, _ = _lives(_Spans.of(tracks, done), window, math.ceil(LONG_MISS * fps))
+    return lives
+
+
 def _truth_counts(sequence: Sequence) -> Int[ndarray, " S"] | None:
     truth = sequence.ground_truth
     if truth is None:

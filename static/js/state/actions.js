@@ -285,6 +285,7 @@ export function createActions({ store, seek, send, receive }) {
 		},
 		// what the dialogs and the timeline put in place of these when they are there
 		help() {},
+		openSheet() {},
 		palette() {},
 		zoom() {},
 	};

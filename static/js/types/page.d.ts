@@ -124,6 +124,9 @@ type Scores = {
 	reference: Server.EvaluationSeries | null;
 };
 
+/** A file that somebody dropped or chose; its path from the dropped folder. */
+type Dropped = { path: string; file: File };
+
 type PaneName = "view" | "cams" | "side" | "time";
 
 interface Command {
@@ -172,6 +175,7 @@ interface Actions {
 	toggleLayer2d: (layer: string) => void;
 	toggleLayer3d: (layer: string) => void;
 	open: (name: string) => Promise<any>;
+	openSheet: () => void;
 	change: (changes: Record<string, any>) => Promise<any>;
 	reset: (...keys: string[]) => void;
 	preset: (name: string) => void;

@@ -3,6 +3,15 @@
  * Steps are 0-based; boxes are `[left, top, width, height]` in pixels; positions are metres.
  */
 declare namespace Server {
+	/** An import that was begun, or a recording that needs none. */
+	interface Begun {
+		draft: ImportInfo | null;
+		/** Number of the first of the files that were announced. */
+		first: number;
+		/** The folder of a recording that is one already. */
+		recording: string;
+	}
+
 	/** Something that happened to people in a camera's picture, as its method tells it. */
 	interface CameraEvent {
 		kind: "new" | "vanished" | "returned" | "occluded" | "merged" | "split";
@@ -81,6 +90,14 @@ declare namespace Server {
 		valid: boolean;
 	}
 
+	/** A value that is not the recording's default. */
+	interface ChangeInfo {
+		key: string;
+		symbol: string;
+		default: string;
+		value: string;
+	}
+
 	/** One side of a comparison. */
 	interface ComparedRun {
 		run: string;
@@ -106,6 +123,19 @@ declare namespace Server {
 		low: number[];
 		high: number[];
 		mean: number[];
+	}
+
+	/** Where a track went, seen from above. */
+	interface Course {
+		id: number;
+		/** x and y in metres, a few a second. */
+		points: [number, number][];
+	}
+
+	/** What was deleted. */
+	interface Deleted {
+		runs: number[];
+		bytes: number;
 	}
 
 	/** One figure of two runs: A the reference, B the shown run. */
@@ -238,6 +268,201 @@ declare namespace Server {
 		help: string;
 	}
 
+	/** An import on its way. */
+	interface ImportInfo {
+		key: string;
+		version: number;
+		phase: "uploading" | "reading" | "settled" | "failed" | "writing" | "written";
+		busy: boolean;
+		/** What is being looked into. */
+		under_way: string;
+		error: string;
+		wish: ImportWish;
+		/** Bytes. */
+		received: number;
+		bytes: number;
+		files: ImportedFile[];
+		/** Labels of pictures and boxes that a camera may be given. */
+		offered: string[];
+		/** Whether the files were sent by a page. */
+		uploaded: boolean;
+		home: string;
+		/** Bytes on the disk of the recordings. */
+		free: number;
+		fps: number;
+		frames: number;
+		unit: string;
+		up: string;
+		pose: string;
+		axes: string;
+		room: [[number, number, number], [number, number, number]] | null;
+		suggested: [[number, number, number], [number, number, number]] | null;
+		half_extents: [number, number, number] | null;
+		suggested_half_extents: [number, number, number] | null;
+		/** People in the truth; 0 where there is none. */
+		truth: number;
+		/** Whether every camera has boxes. */
+		has_boxes: boolean;
+		found: [string, string][];
+		told: string[];
+		cameras: ImportedCamera[];
+		checks: ImportedCheck[];
+		pairs: ImportedPair[];
+		plan: ImportedPlan | null;
+		/** Where it was written. */
+		folder: string;
+		/** The sheet that shows all this, as HTML. */
+		sheet: string;
+	}
+
+	/** What somebody knows better than the files; null and empty: as it was found out. */
+	interface ImportWish {
+		name: string;
+		unit: "m" | "cm" | "mm" | null;
+		up: "x" | "y" | "z" | "-x" | "-y" | "-z" | null;
+		pose: "world-to-camera" | "camera-to-world" | null;
+		axes: "opencv" | "opengl" | null;
+		boxes: "ltwh" | "xyxy" | "cxcywh" | null;
+		normalised: boolean | null;
+		first_index: 0 | 1 | null;
+		fps: number | null;
+		swap: [string, string][];
+		left_out: string[];
+		/** By the camera's name in the calibration. */
+		names: Record<string, string>;
+		/** Seconds that are added to the time of every frame, by camera. */
+		offsets: Record<string, number>;
+		/** A camera, and the label of a file that is its. */
+		files: [string, string][];
+		room: [[number, number, number], [number, number, number]] | null;
+		half_extents: [number, number, number] | null;
+		/** Whether what lies elsewhere on the disk is copied, not linked. */
+		copy_files: boolean;
+	}
+
+	/** A camera with what belongs to it. */
+	interface ImportedCamera {
+		/** Its name in the calibration. */
+		key: string;
+		name: string;
+		/** Name of the file, or of the folder of pictures; empty where there is none. */
+		video: string;
+		frames: number;
+		fps: number;
+		width: number;
+		height: number;
+		/** What the calibration's file was recognised as. */
+		calibration: string;
+		detections: string;
+		boxes_format: string;
+		boxes_per_step: number;
+		/** As it is wished. */
+		seconds_late: number;
+		/** As it was found, beyond what is wished. */
+		offset: ImportedOffset | null;
+	}
+
+	/** A check, and what mends it. */
+	interface ImportedCheck {
+		name: string;
+		status: "good" | "warning" | "absent";
+		sentence: string;
+		/** As the command line has it; empty where there is none. */
+		remedy: string;
+		/** The wish that mends it; null where nothing here does. */
+		mend: ImportWish | null;
+	}
+
+	/** A file, or a series of numbered ones, and what it was taken for. */
+	interface ImportedFile {
+		label: string;
+		format: string;
+		complaint: string;
+	}
+
+	/** How late a camera is against the others, as it is now. */
+	interface ImportedOffset {
+		steps: number;
+		seconds: number;
+		sharpness: number;
+		sure: boolean;
+		/** Steps that were tried. */
+		offsets: number[];
+		/** Of each; null where too little is left to compare. */
+		agreement: (number | null)[];
+	}
+
+	/** How well the boxes of two cameras meet. */
+	interface ImportedPair {
+		first: string;
+		second: string;
+		share: number;
+		pixels: number | null;
+		odd: boolean;
+	}
+
+	/** The room from above, metres. */
+	interface ImportedPlan {
+		x: number;
+		y: number;
+		cell: number;
+		width: number;
+		height: number;
+		/** How many cameras see the floor, by cell, rows along y. */
+		seen: number[];
+		/** x, y, direction and half the angle across, radians. */
+		cameras: [number, number, number, number][];
+		feet: [number, number][];
+	}
+
+	/** A run in the library. */
+	interface KeptRunInfo {
+		id: number;
+		recording: number;
+		recording_name: string;
+		/** Seconds since 1970. */
+		began: number;
+		seconds: number;
+		steps: number;
+		steps_per_second: number;
+		single_view: string;
+		fusion_method: string;
+		changes: ChangeInfo[];
+		seed: number;
+		version: string;
+		/** Whether another version of the program made it: computing it again may give other tracks. */
+		older_code: boolean;
+		source: string;
+		targets: number;
+		mota: number | null;
+		idf1: number | null;
+		hota: number | null;
+		ospa: number | null;
+		position_error: number | null;
+		misses: number | null;
+		false_positives: number | null;
+		id_switches: number | null;
+		name: string;
+		star: boolean;
+		note: string;
+		tags: string[];
+	}
+
+	/** The runs of one recording, the newest first. */
+	interface KeptRuns {
+		runs: KeptRunInfo[];
+	}
+
+	/** The library. */
+	interface LibraryInfo {
+		file: string;
+		bytes: number;
+		/** Why nothing is kept and nothing listed but what can be opened. */
+		error: string | null;
+		read_only: boolean;
+		recordings: RecordingInfo[];
+	}
+
 	/** A peak or detection that the camera's filter was given. */
 	interface Measurement {
 		box: [number, number, number, number];
@@ -361,6 +586,68 @@ declare namespace Server {
 		tracks: PinnedLife[];
 	}
 
+	/** A run in small. */
+	interface Preview {
+		run: KeptRunInfo;
+		frames: number;
+		tracks: TrackLife[];
+		/** Targets at each of equally many steps, their mean. */
+		people: number[];
+		courses: Course[];
+	}
+
+	/** A recording that can be opened. */
+	interface RecordingCard {
+		name: string;
+		/** What opens it. */
+		opens: string;
+		kind: "recent" | "folder" | "rendered";
+		description: string;
+		cameras: number;
+		frames: number;
+		/** 0 where it is not known before it is opened. */
+		fps: number;
+		/** Seconds since 1970; 0 where it never was. */
+		opened: number;
+		/** Address of its picture; empty where there is none yet. */
+		picture: string;
+	}
+
+	/** A recording of which runs are kept, or that can be opened. */
+	interface RecordingInfo {
+		/** Null where it was never opened: it has no runs. */
+		id: number | null;
+		/** What opens it. */
+		place: string;
+		name: string;
+		kind: "rendered" | "folder";
+		cameras: number;
+		frames: number;
+		fps: number;
+		boxes_only: boolean;
+		/** Of its truth; null without one. */
+		people: number | null;
+		/** Seconds since 1970. */
+		opened: number | null;
+		runs: number;
+		has_thumbnail: boolean;
+		/** Why it cannot be opened now. */
+		missing: string | null;
+	}
+
+	/** What can be opened at once, and what can be imported from the disk. */
+	interface Recordings {
+		recordings: RecordingCard[];
+		/** Below the data folder, that are no recordings yet. */
+		folders: string[];
+		/** Where recordings go. */
+		data: string;
+		/** Bytes on that disk. */
+		free: number;
+		/** The sheet that shows them, as HTML. */
+		sheet: string;
+	}
+
 	/** The volume that people are tracked in. */
 	interface RoomInfo {
 		min: [number, number, number];
@@ -380,6 +667,10 @@ declare namespace Server {
 		/** The stage that takes the time. */
 		message: string;
 		error: string | null;
+		/** Its number in the library that it was taken from; what the cameras found is not there. */
+		kept: number | null;
+		/** The key that a computation would have, where older code made what is shown; else empty. */
+		stands_for: string;
 	}
 
 	/** Every parameter, method and preset. */

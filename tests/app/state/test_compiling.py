@@ -76,6 +76,21 @@ def test_a_sequence_is_shown_at_once_and_run_when_its_loops_over_pixels_are_ther
         assert process.wait(10.0) != 0, "what goes on for the other methods ends with the workbench"
 
 
+def test_a_run_that_is_under_way_at_the_end_does_not_begin_to_compile(
+    uncompiled: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    instead(monkeypatch, SLOW)
+    worker = Compiling()
+    assert len(worker._processes) == 2
+    worker.stop()
+    for process in worker._processes.values():
+        assert process.wait(10.0) != 0
+    wait_until(lambda: not any("compiling" in each.name for each in threading.enumerate()))
+    assert compilation._Elsewhere.compiles, "what runs as plain Python does so to its end"
+    worker.close()
+    assert not compilation._Elsewhere.compiles, "the next one compiles what it needs"
+
+
 def test_where_everything_is_compiled_nothing_starts(monkeypatch: pytest.MonkeyPatch) -> None:
     def never(*_: object, **__: object) -> None:
         raise AssertionError
@@ -99,7 +114,20 @@ def test_nobody_waits_for_a_process_that_failed(
     instead(monkeypatch, code)
     worker = Compiling()
     worker.wait(lambda done, total: None, lambda: False)
-    assert "compiling ended with status" in caplog.text
+    wait_until(lambda: "compiling ended with status" in caplog.text)
+
+
+def test_nobody_waits_for_the_other_process_where_the_first_one_failed(
+    uncompiled: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    instead(
+        monkeypatch, "import sys, time; time.sleep(30.0 if sys.argv[-1] != 'first' else 0); 1 / 0"
+    )
+    worker = Compiling()
+    begin = time.monotonic()
+    worker.wait(lambda done, total: None, lambda: False)
+    assert time.monotonic() - begin < 15.0
+    worker.close()
 
 
 def test_nobody_waits_where_no_process_can_be_started(

@@ -163,13 +163,14 @@ def test_black_and_white_frames_show_nobody(
             assert len(result.boxes) == 0
 
 
-def test_a_frozen_camera_sees_nobody_new(one_person: Sequence) -> None:
-    view = one_person.views[0]
-    frozen = replace(one_person, views=(replace(view, images=(view.images[0],) * STEPS),))
-    frozen = with_templates(frozen, Template("p", "left", 3, np.array([100.0, 100.0, 20.0, 30.0])))
+def test_in_a_frozen_picture_who_was_taught_is_found_and_nobody_else(one_person: Sequence) -> None:
+    view, step = one_person.views[0], one_person.templates[0].frame
+    frozen = replace(one_person, views=(replace(view, images=(view.images[step],) * STEPS),))
     with FrameReader(frozen) as reader:
-        results = run(method_of(frozen, reader), reader, 5)
-    assert all(len(result.boxes) == 0 for result in results)
+        results = run(method_of(frozen, reader), reader, 10)
+    assert [len(result.boxes) for result in results[2:]] == [1] * 8
+    there = true_boxes(one_person, step)[0]
+    assert max(off(there, result.boxes) for result in results[2:]) < 0.6
 
 
 def test_targets_of_a_pixel(tmp_path_factory: pytest.TempPathFactory) -> None:

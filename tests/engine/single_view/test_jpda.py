@@ -384,8 +384,8 @@ def test_only_what_the_source_reads_counts() -> None:
         values = stage_values(with_values(RunParameters(), chosen), "single_view")
         return {key.split(".")[0] for key in values}
 
-    assert groups("foreground") == {"single_view", "jpda", "foreground"}
-    assert groups("colour") == {"single_view", "jpda", "foreground", "colour_phd"}
+    assert groups("foreground") == {"single_view", "jpda", "pictures", "foreground"}
+    assert groups("colour") == {"single_view", "jpda", "pictures", "foreground", "colour_phd"}
     assert groups("detections") == {"single_view", "jpda", "detection_boxes"}
     chosen = {"single_view": "jpda", "jpda.measurements": "colour"}
     read = stage_values(with_values(RunParameters(), chosen), "single_view")

@@ -29,7 +29,7 @@ from tracker.sequences.rendering.rooms import (
 from tracker.sequences.rendering.scene import Scene
 from tracker.sequences.rendering.studio import Studio, in_order
 
-VERSION = 3
+VERSION = 4
 """Grows when the same call would give other pictures or files."""
 VISIBILITY_FILE = "visibility.csv"
 _QUALITY = 82

@@ -22,8 +22,12 @@ NOBODY = 255
 
 
 def kernel(function: _F) -> _F:
-    """Compile on the first call, keep the machine code on disk, release the interpreter."""
-    return compiled_later(function, fastmath={"contract", "arcp", "nsz"})
+    """Compile on the first call, keep the machine code on disk, release the interpreter.
+
+    Every operation is rounded as written: products and sums drawn together where a processor can
+    (``fastmath``) gave other pictures on other machines, and one of them other tracks.
+    """
+    return compiled_later(function)
 
 
 class Surface(NamedTuple):

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
-from scipy.optimize import linear_sum_assignment
 
+from tracker.assignment import linear_sum_assignment
 from tracker.blobs import Blobs
 from tracker.parameters import AssociationMatrixParams
 from tracker.single_view.association_matrix import decision_matrices

@@ -19,7 +19,9 @@ from tracker.parameters import ForegroundParams
 from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
+from tracker.single_view.colour.carrying import with_carried
 from tracker.single_view.colour.templates import read_templates
+from tracker.single_view.colour.trust import template_trust
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,6 +60,7 @@ class Appearance:
         histogram_kernel: KernelName,
         size_jitter: float,
         foreground: ForegroundParams | None,
+        carry_templates: bool = False,
     ) -> None:
         """Read the templates and learn the background.
 
@@ -69,6 +72,7 @@ class Appearance:
             histogram_kernel: How the pixels of a box count.
             size_jitter: Relative spread of drawn boxes around the size of a target there.
             foreground: Numbers of the foreground model; None where none is needed.
+            carry_templates: Whether cameras without a template of a person get one carried over.
 
         Raises:
             ValueError: If there are no pictures or templates, or a template cannot be read.
@@ -79,6 +83,8 @@ class Appearance:
                 f'camera "{view.camera.name}" of {sequence.name} has no pictures; give it a video '
                 "or images in sequence.toml, or choose single_view none to use its detections"
             )
+        if carry_templates:
+            sequence = with_carried(sequence, colour_space, histogram_kernel, reader)
         self.model = read_templates(sequence, colour_space, histogram_kernel, reader)
         camera, room, half_extents = view.camera, sequence.room, sequence.target_half_extents
         # no parameter has a say in it, so that a moved slider does not wait for it again
@@ -96,6 +102,11 @@ class Appearance:
         self._foreground: ForegroundModel | None = None
         if foreground is not None:
             self._foreground = learn(sequence, camera_index, reader, foreground)
+        self.trust = np.ones(len(self.model.names))
+        """How far the foreground is to be believed about each person, 0 … 1."""
+        if foreground is not None and self._foreground is not None:
+            trust = template_trust(sequence, camera_index, reader, foreground)
+            self.trust = np.array([trust[name] for name in self.model.names])
 
     def start(self) -> Any:
         """The state of the foreground model before the first picture."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
 from tracker import mean_shift
@@ -69,6 +69,7 @@ class PeakFinder:
             histogram_kernel=p.histogram_kernel,
             size_jitter=p.size_jitter,
             foreground=foreground if p.asks_foreground else None,
+            carry_templates=p.carry_templates,
         )
 
     @property
@@ -132,7 +133,11 @@ class PeakFinder:
         everywhere = round(p.samples * p.foreground_samples)
         if intensity.size == 0 and p.foreground_samples > 0.0:
             everywhere = p.samples
-        parts = [self._appearance.draw_on_foreground(everywhere, scene, rng)]
+        on_foreground = round(everywhere * float(self._appearance.trust.mean()))
+        parts = [
+            self._appearance.draw_on_foreground(on_foreground, scene, rng),
+            self._appearance.draw_anywhere(everywhere - on_foreground, rng),
+        ]
         count = p.samples - everywhere
         if intensity.size and count:
             chosen = rng.choice(
@@ -149,7 +154,9 @@ class PeakFinder:
         """Log-likelihood and distance D of each box for each person, and share of foreground."""
         p = self._parameters
         distances = self._appearance.distances(scene, boxes)
+        trust = self._appearance.trust[None, :]
         if not p.peaks_per_person:
+            trust = trust.min(axis=1, keepdims=True)
             distances = distances.min(axis=1, keepdims=True)
         scores = -0.5 * (distances / p.likelihood_sigma) ** 2
         factors, inside = self._appearance.shape_scores(
@@ -158,7 +165,14 @@ class PeakFinder:
             inside_weight=p.foreground_weight,
             around_weight=p.surroundings_weight,
         )
-        return scores + factors[:, None], distances, inside
+        return scores + trust * factors[:, None], distances, inside
+
+    def _trusted(self, person: Int[ndarray, " N"]) -> Float[ndarray, " N"]:
+        """How far the foreground is believed about each person of some boxes."""
+        trust = self._appearance.trust
+        if not self._parameters.peaks_per_person:
+            trust = np.full(1, trust.min())
+        return np.asarray(trust[person])
 
     def _climb(
         self, samples: Float[ndarray, "S 4"], scores: Float[ndarray, "S G"]
@@ -190,7 +204,7 @@ class PeakFinder:
         best, nearest, person = scores.max(axis=1), distances.min(axis=1), scores.argmax(axis=1)
         good = best >= -0.5 * (p.acceptance_distance / p.likelihood_sigma) ** 2
         if scene.mask is not None:
-            good &= inside >= p.acceptance_foreground
+            good &= inside >= p.acceptance_foreground * self._trusted(person)
         kept: list[int] = []
         for i in np.argsort(-best, kind="stable"):
             apart = (candidates[kept, :2] - candidates[i, :2]) / candidates[kept, 2:]

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
-from scipy.optimize import linear_sum_assignment
+
+from tracker.assignment import linear_sum_assignment
 
 UNREACHED = 1e6
 """Instead of −ln β, where it is 0; more than those of all others together."""

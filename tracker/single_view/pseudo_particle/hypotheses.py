@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
-from scipy.optimize import linear_sum_assignment
 from scipy.special import logsumexp
 
+from tracker.assignment import linear_sum_assignment
 from tracker.single_view.pseudo_particle.track_management import Targets
 
 

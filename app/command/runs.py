@@ -1,0 +1,242 @@
+"""``runs`` and ``library``: what is kept of runs, in a terminal."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from app.command.library_flags import (
+    CollectRuns,
+    DeleteRuns,
+    DiffRuns,
+    LibraryCommand,
+    ListRuns,
+    OfLibrary,
+    OpenRun,
+    RenameRun,
+    Runs,
+    ShowRun,
+    StarRun,
+)
+from app.command.terminal import CommandError, print_table, say
+from tracker.folders import library_file
+from tracker.library import KEEP, repair
+from tracker.library.records import HEADLINES, KeptRun, Result
+from tracker.library.store import Library, open_library
+
+DAMAGED = 1
+
+
+def runs(command: Runs, serve: Callable[[OpenRun, Result], int]) -> int:
+    """Run one of the commands; returns the exit status.
+
+    Args:
+        command: Which.
+        serve: Starts the workbench with a run.
+
+    Raises:
+        LibraryError: If the library, or the run, is not as it must be.
+    """
+    action = command.action
+    with _library(action) as library:
+        match action:
+            case ListRuns():
+                _list(library, action)
+            case ShowRun():
+                _show(library, action)
+            case OpenRun():
+                result = library.result(library.find(action.run).id)
+            case RenameRun():
+                run = library.find(action.run)
+                library.rename(run.id, action.name)
+                _tell(action, [library.run(run.id)])
+            case StarRun():
+                numbers = [library.find(text).id for text in action.runs]
+                for number in numbers:
+                    library.star(number, not action.off)
+                _tell(action, [library.run(number) for number in numbers])
+            case DeleteRuns():
+                _delete(library, action)
+            case DiffRuns():
+                _diff(library, action)
+            case CollectRuns():
+                gone, freed = library.collect(KEEP if action.keep is None else action.keep)
+                if action.json:
+                    _print({"deleted": gone, "freed_bytes": freed})
+                else:
+                    say(f"{gone} runs gone, {freed / 1e6:.1f} MB freed")
+    return serve(action, result) if isinstance(action, OpenRun) else 0
+
+
+def check(command: LibraryCommand) -> int:
+    """Check the library, and repair it where that is asked for; returns the exit status.
+
+    Raises:
+        LibraryError: If the file is none, or nothing of it can be read.
+    """
+    path = command.library or library_file()
+    found = repair.check(path)
+    told: dict[str, Any] = {
+        "file": str(path),
+        "complaints": list(found.complaints),
+        "readable_runs": found.runs,
+    }
+    if not command.json:
+        for complaint in found.complaints:
+            sys.stdout.write(f"{complaint}\n")
+        say(f"{path}: {found.runs} runs can be read, {len(found.complaints)} complaints")
+    status = DAMAGED if found.complaints else 0
+    if command.repair and found.complaints:
+        aside, saved, lost = repair.repair(path)
+        told |= {"copy": str(aside), "saved_runs": saved, "lost_rows": lost}
+        status = 0
+        if not command.json:
+            say(f"{saved} runs saved, {lost} rows lost; the damaged file is kept as {aside}")
+    if command.json:
+        _print(told)
+    return status
+
+
+def _library(command: OfLibrary) -> Library:
+    path: Path = command.library or library_file()
+    if not path.exists():
+        raise CommandError(
+            f"{path}: there is no library yet; it is made when `track` or the page ends a run"
+        )
+    return open_library(path)
+
+
+def _list(library: Library, command: ListRuns) -> None:
+    wanted = command.recording
+    folder = None if wanted is None else str(Path(wanted).absolute())
+    places = {r.id for r in library.recordings() if r.place in (wanted, folder)}
+    found = [
+        run
+        for run in library.runs()
+        if wanted is None or wanted == run.recording_name or run.recording in places
+    ]
+    _tell(command, found)
+
+
+def _tell(command: OfLibrary, found: list[KeptRun]) -> None:
+    if command.json:
+        _print([run.to_json() for run in found])
+        return
+    print_table(
+        (">run", "", "name", "recording", "began", "methods", "differs", ">MOTA", ">IDF1",
+         ">HOTA", ">OSPA", ">tracks", "note"),
+        [
+            (
+                str(run.id), "*" if run.star else "", run.name, run.recording_name,
+                time.strftime("%Y-%m-%d %H:%M", time.localtime(run.began)),
+                f"{run.single_view} › {run.fusion_method}",
+                str(len(run.changes)),
+                *(_number(value) for value in (run.mota, run.idf1, run.hota, run.ospa)),
+                str(run.targets), run.note,
+            )
+            for run in found
+        ],
+    )  # fmt: skip
+
+
+def _show(library: Library, command: ShowRun) -> None:
+    result = library.result(library.find(command.run).id)
+    run = result.run
+    if command.json:
+        told = {
+            **run.to_json(),
+            "place": result.place,
+            "machine": result.machine,
+            "parameters": result.values,
+            "figures": result.figures,
+        }
+        _print({**told, "rows": len(result.kept.tracks)})
+        return
+    facts = {
+        "run": run.title,
+        "recording": f"{run.recording_name} ({result.place})",
+        "began": time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(run.began)),
+        "computed": f"{run.steps} steps in {run.seconds:.1f} s by {run.source} on {result.machine}",
+        "program": f"{run.version}, code {run.code}",
+        "methods": f"{run.single_view} › {run.fusion_method}, seed {run.seed}",
+        **{f"value {key}": str(value) for key, value in run.changes.items()},
+        "tracks": str(run.targets),
+        **{key: _number(value) for key, value in result.figures.items()},
+        "star": "yes" if run.star else "no",
+        "tags": ", ".join(run.tags),
+        "note": run.note,
+    }
+    print_table(("what", "value"), list(facts.items()))
+
+
+def _delete(library: Library, command: DeleteRuns) -> None:
+    if command.undo:
+        unknown = [text for text in command.runs if not text.isdecimal()]
+        if unknown:
+            raise CommandError(f"--undo: expected the numbers of runs, got {unknown[0]!r}")
+        numbers = [int(text) for text in command.runs]
+        library.take_back(numbers)
+        _tell(command, [library.run(number) for number in numbers])
+        return
+    numbers = [library.find(text).id for text in command.runs]
+    size = library.delete(numbers)
+    if command.json:
+        _print({"deleted": numbers, "bytes": size})
+        return
+    listed = " ".join(map(str, numbers))
+    say(f"{len(numbers)} runs deleted, {size / 1e6:.1f} MB; `runs delete --undo {listed}` "
+        "takes them back")  # fmt: skip
+
+
+def _diff(library: Library, command: DiffRuns) -> None:
+    a, b = (library.result(library.find(text).id) for text in (command.first, command.second))
+    told = difference(a.run, a.values, b.run, b.values)
+    if command.json:
+        _print({"first": a.run.id, "second": b.run.id, **told})
+        return
+    print_table(
+        ("what", a.run.title, b.run.title),
+        [(key, str(first), str(second)) for key, (first, second) in told["values"].items()]
+        + [
+            (key, _number(first), _number(second))
+            for key, (first, second) in told["figures"].items()
+        ],
+    )
+
+
+def difference(
+    a: KeptRun, values_a: dict[str, Any], b: KeptRun, values_b: dict[str, Any]
+) -> dict[str, dict[str, tuple[Any, Any]]]:
+    """What differs between two runs: values by key, and the headline figures."""
+    flat_a, flat_b = _flat(values_a), _flat(values_b)
+    facts = ("recording_name", "seed", "version", "code")
+    values = {name: (getattr(a, name), getattr(b, name)) for name in facts}
+    values |= {key: (flat_a.get(key), flat_b.get(key)) for key in {**flat_a, **flat_b}}
+    return {
+        "values": {key: pair for key, pair in values.items() if pair[0] != pair[1]},
+        "figures": {name: (getattr(a, name), getattr(b, name)) for name in (*HEADLINES, "targets")},
+    }
+
+
+def _flat(values: dict[str, Any]) -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for group, value in values.items():
+        if isinstance(value, dict):
+            flat |= {f"{group}.{name}": one for name, one in value.items()}
+        else:
+            flat[group] = value
+    return flat
+
+
+def _number(value: float | int | None) -> str:
+    if value is None:
+        return "–"
+    return f"{value:.3f}" if isinstance(value, float) else str(value)
+
+
+def _print(value: Any) -> None:
+    sys.stdout.write(json.dumps(value, allow_nan=False, ensure_ascii=False) + "\n")

@@ -1,0 +1,273 @@
+"""The HTTP routes of the library."""
+
+from __future__ import annotations
+
+import asyncio
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Request, Response
+
+from app.errors import ApiError, sentence
+from app.models import State
+from app.state.keeper import Keeper
+from app.web.dependencies import ERRORS, Bench, Work, nothing_open
+from app.web.library import models, preview
+from app.web.views import results
+from tracker import parameters as table
+from tracker.library.errors import LibraryError
+from tracker.library.keeping import code_version, recording_of
+from tracker.library.records import KeptRun, Recording, Result
+from tracker.library.store import Library
+from tracker.sequences import library as sequences
+from tracker.sequences.reader import FILE
+
+OPENING_SECONDS = 1.0
+"""How long a request to open waits, so that what fails at once is told in the answer."""
+
+router = APIRouter(prefix="/api/library", responses=ERRORS)
+
+
+def _keeper(request: Request) -> Keeper:
+    keeper: Keeper = request.app.state.keeper
+    return keeper
+
+
+Kept = Annotated[Keeper, Depends(_keeper)]
+
+
+def no_library(error: LibraryError) -> ApiError:
+    """The answer where the library, or the run, is not as it must be."""
+    return ApiError(409, "no_library", f"{sentence(error)}.")
+
+
+def _library(keeper: Kept) -> Library:
+    try:
+        return keeper.library()
+    except LibraryError as error:
+        raise no_library(error) from None
+
+
+Opened = Annotated[Library, Depends(_library)]
+
+
+@router.get("")
+def library(request: Request, keeper: Kept) -> models.LibraryInfo:
+    """The recordings that were opened or can be, and how much is kept."""
+    data: Path | None = request.app.state.settings.data
+    known: list[Recording] = []
+    size, error, read_only = 0, None, False
+    try:
+        opened = keeper.library()
+        known, size, read_only = opened.recordings(), opened.size(), opened.read_only
+    except LibraryError as failure:
+        error = sentence(failure)
+    told = [_recording(recording) for recording in known]
+    places = {recording.place for recording in told}
+    for entry in sequences.available(data):
+        place = entry.name if entry.kind == "rendered" else str(entry.folder.absolute())
+        if place not in places:
+            told.append(
+                models.RecordingInfo(
+                    id=None, place=place, name=entry.name, kind=entry.kind,
+                    cameras=entry.cameras, frames=entry.frames, fps=0.0, boxes_only=False,
+                    people=None, opened=None, runs=0, has_thumbnail=False, missing=entry.error,
+                )
+            )  # fmt: skip
+    return models.LibraryInfo(
+        file=str(keeper.path or ""), bytes=size, error=error, read_only=read_only, recordings=told
+    )
+
+
+def _recording(recording: Recording) -> models.RecordingInfo:
+    missing = None
+    if recording.kind == "folder" and not (Path(recording.place) / FILE).is_file():
+        missing = f"there is no {FILE} in {recording.place} any more"
+    return models.RecordingInfo(
+        id=recording.id,
+        place=recording.place,
+        name=recording.name,
+        kind="rendered" if recording.kind == "rendered" else "folder",
+        cameras=recording.cameras,
+        frames=recording.frames,
+        fps=recording.fps,
+        boxes_only=not recording.has_pictures,
+        people=recording.people,
+        opened=recording.opened,
+        runs=recording.runs,
+        has_thumbnail=bool(recording.has_pictures),
+        missing=missing,
+    )
+
+
+@router.get(
+    "/thumbnail/{recording}.jpg",
+    response_class=Response,
+    responses={200: {"content": {"image/jpeg": {}}, "description": "The picture."}},
+)
+def thumbnail(recording: int, opened: Opened) -> Response:
+    """A recording in one picture."""
+    try:
+        picture = opened.thumbnail(recording)
+    except LibraryError as error:
+        raise no_library(error) from None
+    if picture is None:
+        raise ApiError(404, "no_picture", f"Recording {recording} has no picture.")
+    return Response(picture, media_type="image/jpeg", headers={"cache-control": "max-age=60"})
+
+
+@router.get("/recordings/{recording}/runs")
+def runs(recording: int, opened: Opened) -> models.KeptRuns:
+    """The kept runs of a recording, the newest first."""
+    try:
+        return models.KeptRuns(runs=[_info(run) for run in opened.runs(recording)])
+    except LibraryError as error:
+        raise no_library(error) from None
+
+
+@router.get("/runs/{number}")
+def run(number: int, opened: Opened) -> models.Preview:
+    """One kept run in small: its facts, lanes, people and ways from above."""
+    result = _result(opened, number)
+    fps = next((r.fps for r in opened.recordings() if r.id == result.run.recording), 25.0)
+    tracks = result.kept.tracks
+    return models.Preview(
+        run=_info(result.run),
+        frames=result.run.steps,
+        tracks=preview.lanes(tracks, result.run.steps, fps),
+        people=preview.people(tracks, result.run.steps),
+        courses=preview.courses(tracks, fps),
+    )
+
+
+@router.patch("/runs/{number}")
+def change(number: int, wish: models.RunChanges, opened: Opened) -> models.KeptRunInfo:
+    """Name, star, note and tag a run."""
+    try:
+        if wish.name is not None:
+            opened.rename(number, wish.name)
+        if wish.star is not None:
+            opened.star(number, wish.star)
+        if wish.note is not None:
+            opened.note(number, wish.note)
+        if wish.tags is not None:
+            opened.tag(number, wish.tags)
+        return _info(opened.run(number))
+    except LibraryError as error:
+        raise no_library(error) from None
+
+
+@router.post("/delete")
+def delete(wish: models.RunNumbers, opened: Opened) -> models.Deleted:
+    """Delete runs; they can be taken back for a day."""
+    try:
+        return models.Deleted(runs=wish.runs, bytes=opened.delete(wish.runs))
+    except LibraryError as error:
+        raise no_library(error) from None
+
+
+@router.post("/take-back")
+def take_back(wish: models.RunNumbers, opened: Opened) -> models.Deleted:
+    """Have deleted runs again."""
+    try:
+        opened.take_back(wish.runs)
+    except LibraryError as error:
+        raise no_library(error) from None
+    return models.Deleted(runs=wish.runs, bytes=0)
+
+
+@router.post("/runs/{number}/open")
+async def open_run(number: int, opened: Opened, bench: Bench, jobs: Work) -> State:
+    """Show a run as it was: its tracks at once; its recording is opened first where it is not."""
+    result = await asyncio.to_thread(_result, opened, number)
+    now = bench.snapshot()
+    place = "" if now.saved is None else recording_of(now.saved, now.opened_as).place
+    try:
+        if place == result.place:
+            jobs.show_kept(result)
+        else:
+            future = asyncio.wrap_future(then_show(jobs.open(result.place), jobs, bench, result))
+            try:
+                await asyncio.wait_for(asyncio.shield(future), OPENING_SECONDS)
+            except TimeoutError:
+                future.add_done_callback(lambda done: done.cancelled() or done.exception())
+    except (ValueError, OSError) as error:
+        raise ApiError(
+            422,
+            "cannot_open",
+            sentence(error),
+            field="number",
+            hint="What was open still is; its tracks can be exported all the same.",
+        ) from None
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/runs/{number}/pin")
+def pin(number: int, opened: Opened, bench: Bench, jobs: Work) -> State:
+    """Pin a kept run of the open recording: others are compared with it."""
+    result = _result(opened, number)
+    now = bench.snapshot()
+    if now.sequence is None or now.saved is None:
+        raise nothing_open()
+    if recording_of(now.saved, now.opened_as).place != result.place:
+        raise ApiError(
+            409,
+            "another_recording",
+            f"Run {number} is of {result.run.recording_name}, and {now.sequence.name} is open.",
+            hint="Open one of its recording's runs first.",
+        )
+    try:
+        bench.pin_kept(jobs.kept_run(now.sequence, result))
+    except ValueError as error:
+        raise ApiError(422, "cannot_open", sentence(error), field="number") from None
+    return results.state_of(bench.snapshot())
+
+
+def then_show(opening: Future[None], jobs: Work, bench: Bench, result: Result) -> Future[None]:
+    """Done when a run is shown, once its recording is open; what keeps it from that is told."""
+    shown: Future[None] = Future()
+
+    def show(opened: Future[None]) -> None:
+        error = opened.exception()
+        try:
+            if error is None:
+                jobs.show_kept(result)
+        except ValueError as failure:
+            bench.notify("error", f"{result.run.title} cannot be shown: {sentence(failure)}")
+            error = failure
+        if error is None:
+            shown.set_result(None)
+        else:
+            shown.set_exception(error)
+
+    opening.add_done_callback(show)
+    return shown
+
+
+def _result(opened: Library, number: int) -> Result:
+    try:
+        return opened.result(number)
+    except LibraryError as error:
+        raise no_library(error) from None
+
+
+def _info(run: KeptRun) -> models.KeptRunInfo:
+    changes = []
+    for key, value in run.changes.items():
+        parameter = table.PARAMETERS.get(key)
+        changes.append(
+            models.ChangeInfo(
+                key=key,
+                symbol=parameter.symbol if parameter is not None else key,
+                default=_text(parameter.default) if parameter is not None else "",
+                value=_text(value),
+            )
+        )
+    return models.run_info(run, changes, run.code != code_version())
+
+
+def _text(value: object) -> str:
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    return f"{value:g}" if isinstance(value, float) else str(value)

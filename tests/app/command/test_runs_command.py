@@ -1,0 +1,125 @@
+"""``runs`` and ``library`` in a terminal."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.app.conftest import Runs
+from tests.library.runs import RECORDING, filled
+from tests.library.runs import run as made
+from tracker.library.store import Library
+from tracker.parameters import RunParameters, with_values
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "library.sqlite3"
+
+
+def asked(run: Runs, *arguments: object) -> list | dict:
+    status, out, err = run("runs", *arguments, "--json")
+    assert status == 0, err
+    told: list | dict = json.loads(out)
+    return told
+
+
+def test_track_keeps_its_run(run: Runs, crossing: Path, path: Path, tmp_path: Path) -> None:
+    line = ["track", crossing, "-o", tmp_path / "tracks.csv", "--library", path]
+    line += ["--set", "fusion.clutter_rate=1.5"]
+    assert run(*line)[0] == 0
+    (listed,) = asked(run, "list", "--library", path)
+    assert listed["changes"] == {"fusion.clutter_rate": 1.5}
+    assert (listed["source"], listed["steps"]) == ("track", 120)
+    _, out, _ = run("evaluate", crossing, tmp_path / "tracks.csv", "--json")
+    figures = {f["key"]: f["value"] for f in json.loads(out)["figures"]}
+    assert listed["mota"] == pytest.approx(figures["mota"], abs=1e-3)  # the file is rounded
+    told = asked(run, "show", str(listed["id"]), "--library", path)
+    assert told["figures"]["mota"] == listed["mota"]
+    assert told["parameters"]["fusion"]["clutter_rate"] == 1.5
+
+
+def test_keep_0_keeps_nothing(run: Runs, crossing: Path, path: Path, tmp_path: Path) -> None:
+    line = ["track", crossing, "-o", tmp_path / "tracks.csv", "--library", path]
+    assert run(*line, "--keep", "0")[0] == 0
+    assert not path.exists()
+    assert run(*line, "--keep", "-1")[0] == 2
+
+
+def test_a_damaged_library_does_not_keep_track_from_its_work(
+    run: Runs, crossing: Path, path: Path, tmp_path: Path
+) -> None:
+    path.write_bytes(b"something else " * 100)
+    output = tmp_path / "tracks.csv"
+    status, _, err = run("track", crossing, "-o", output, "--library", path)
+    assert status == 0
+    assert output.is_file()
+    assert "the run was not kept: " in err
+    assert "damaged" in err
+
+
+def test_runs_are_named_starred_deleted_and_taken_back(run: Runs, path: Path) -> None:
+    filled(path, 3).close()
+    at = ("--library", path)
+    assert asked(run, "rename", "2", "base line", *at)[0]["name"] == "base line"
+    assert asked(run, "star", "base line", "3", *at)[1]["star"] is True
+    assert asked(run, "star", "3", "--off", *at)[0]["star"] is False
+    assert asked(run, "delete", "base line", *at)["deleted"] == [2]
+    assert [r["id"] for r in asked(run, "list", *at)] == [3, 1]
+    assert asked(run, "delete", "--undo", "2", *at)[0]["id"] == 2
+    assert asked(run, "gc", "--keep", "1", *at)["deleted"] == 1
+    assert [r["id"] for r in asked(run, "list", *at)] == [3, 2]
+    assert asked(run, "list", "--recording", "nowhere", *at) == []
+
+
+def test_two_runs_are_set_against_each_other(run: Runs, path: Path) -> None:
+    values = with_values(RunParameters(), {"fusion.clutter_rate": 4.0}).model_dump(mode="json")
+    with filled(path, 1) as library:
+        library.keep(RECORDING, made(1, parameters=values, figures={"mota": 0.5}))
+    told = asked(run, "diff", "1", "2", "--library", path)
+    assert told["values"]["fusion.clutter_rate"][1] == 4.0
+    assert len(told["values"]) == 1
+    assert told["figures"]["mota"] == [0.9, 0.5]
+    status, out, _ = run("runs", "diff", "1", "2", "--library", path)
+    assert status == 0
+    assert "fusion.clutter_rate" in out
+
+
+def test_a_person_reads_a_table(run: Runs, path: Path) -> None:
+    filled(path, 2).close()
+    status, out, _ = run("runs", "list", "--library", path)
+    assert status == 0
+    head, first, _ = out.splitlines()
+    assert head.split()[:2] == ["run", "name"]
+    assert "colour_phd › multi_bernoulli" in first
+    status, out, _ = run("runs", "show", "1", "--library", path)
+    assert "value fusion.clutter_rate" in out
+
+
+def test_what_is_not_there_is_a_sentence(run: Runs, path: Path) -> None:
+    status, _, err = run("runs", "list", "--library", path)
+    assert status == 1
+    assert "no library yet" in err
+    filled(path, 1).close()
+    status, _, err = run("runs", "show", "baseline", "--library", path)
+    assert status == 1
+    assert "expected one run called 'baseline', found none" in err
+
+
+def test_check_and_repair(run: Runs, path: Path) -> None:
+    filled(path, 3).close()
+    status, out, err = run("library", "check", "--library", path)
+    assert (status, out) == (0, "")
+    assert "3 runs can be read, 0 complaints" in err
+    with Library(path) as library:
+        library._connection.execute("UPDATE results SET columns = x'00' WHERE run = 2")
+    status, out, _ = run("library", "check", "--library", path, "--json")
+    assert (status, json.loads(out)["readable_runs"]) == (1, 2)
+    status, out, _ = run("library", "check", "--library", path, "--repair", "--json")
+    told = json.loads(out)
+    assert (status, told["saved_runs"]) == (0, 2)
+    assert Path(told["copy"]).is_file()
+    assert [r["id"] for r in asked(run, "list", "--library", path)] == [3, 1]
+    assert run("library", "check", "--library", path)[0] == 0

@@ -1,0 +1,189 @@
+"""The library through the routes: runs are kept by themselves, shown again, named and deleted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+
+from app.web.server import Settings, create_app
+from tests.app.conftest import ADDRESS, is_evaluated, run_is, wait_until
+from tracker.library.store import Library
+
+P_D = "fusion.detection_probability"
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "library.sqlite3"
+
+
+def application(data: Path, path: Path | None, sequence: str | None = "crossing") -> TestClient:
+    settings = Settings(sequence=sequence, data=data, with_viser=False, library=path)
+    return TestClient(create_app(settings), base_url=ADDRESS)
+
+
+@pytest.fixture
+def kept(data: Path, path: Path) -> Iterator[TestClient]:
+    """The application with two kept runs of ``crossing``: the default, and p_D 0.8, shown."""
+    with application(data, path) as client:
+        wait_until(lambda: len(runs_of(client)) == 1)
+        client.patch("/api/parameters", json={"changes": {P_D: 0.8}})
+        wait_until(lambda: len(runs_of(client)) == 2)
+        yield client
+
+
+def runs_of(client: TestClient, name: str = "crossing") -> list[dict]:
+    listed = client.get("/api/library").json()["recordings"]
+    known = [r["id"] for r in listed if r["name"] == name and r["id"] is not None]
+    return client.get(f"/api/library/recordings/{known[0]}/runs").json()["runs"] if known else []
+
+
+def test_finished_runs_are_kept_with_their_figures(kept: TestClient) -> None:
+    changed, default = runs_of(kept)
+    assert default["changes"] == []
+    assert [(c["key"], c["value"]) for c in changed["changes"]] == [(P_D, "0.8")]
+    evaluation = kept.get("/api/evaluation").json()
+    figures = {figure["name"]: figure["value"] for figure in evaluation["figures"]}
+    assert changed["mota"] == figures["mota"]
+    assert changed["source"] == "page"
+    assert not changed["older_code"]
+    listed = kept.get("/api/library").json()
+    (recording,) = [r for r in listed["recordings"] if r["name"] == "crossing"]
+    assert (recording["runs"], recording["people"], recording["boxes_only"]) == (2, 2, True)
+    # what was never opened can be opened from there all the same
+    (never,) = [r for r in listed["recordings"] if r["name"] == "numbers"]
+    assert (never["id"], never["runs"]) == (None, 0)
+
+
+def test_a_kept_run_is_shown_as_it_was_and_nothing_is_computed(kept: TestClient) -> None:
+    before = kept.get("/api/export/tracks.csv").text
+    steps = [kept.get(f"/api/step/{step}").json() for step in (10, 60, 119)]
+    changed, default = runs_of(kept)
+    kept.post(f"/api/library/runs/{default['id']}/open")
+    state = kept.post(f"/api/library/runs/{changed['id']}/open").json()
+    assert (state["run"]["state"], state["run"]["kept"]) == ("done", changed["id"])
+    assert state["parameters"][P_D] == 0.8
+    assert kept.get("/api/export/tracks.csv").text == before
+    for then in steps:
+        now = kept.get(f"/api/step/{then['step']}").json()
+        assert [t["position"] for t in now["tracks"]] == [t["position"] for t in then["tracks"]]
+        for camera_then, camera in zip(then["cameras"], now["cameras"], strict=True):
+            assert [t["box"] for t in camera["tracks"]] == [t["box"] for t in camera_then["tracks"]]
+            for a, b in zip(camera_then["tracks"], camera["tracks"], strict=True):
+                probabilities = (a["detection_probability"], b["detection_probability"])
+                assert probabilities[0] == pytest.approx(probabilities[1], abs=1e-3)
+        assert now["cameras"][0]["measurements"] == []
+    wait_until(is_evaluated(kept))
+    assert len(runs_of(kept)) == 2  # it is not kept again
+
+
+def test_what_the_cameras_found_comes_back_by_computing_again(kept: TestClient) -> None:
+    changed, _ = runs_of(kept)
+    kept.post(f"/api/library/runs/{changed['id']}/open")
+    state = kept.post("/api/run").json()
+    assert state["run"]["kept"] is None
+    wait_until(run_is(kept, "done"))
+    assert kept.get("/api/step/60").json()["cameras"][0]["measurements"] != []
+
+
+def test_a_moved_slider_computes_on_from_a_kept_run(kept: TestClient) -> None:
+    kept.post(f"/api/library/runs/{runs_of(kept)[1]['id']}/open")
+    state = kept.patch("/api/parameters", json={"changes": {P_D: 0.7}}).json()
+    assert state["run"]["kept"] is None
+    wait_until(run_is(kept, "done"))
+    wait_until(lambda: len(runs_of(kept)) == 3)
+
+
+def test_a_run_of_older_code_says_so_and_is_another_than_a_computation(
+    kept: TestClient, path: Path
+) -> None:
+    number = runs_of(kept)[1]["id"]
+    with Library(path) as library:
+        library._connection.execute(
+            "UPDATE runs SET code = 'old', key = 'old' WHERE id = ?", (number,)
+        )
+    assert runs_of(kept)[1]["older_code"]
+    shown = kept.post(f"/api/library/runs/{number}/open").json()["run"]
+    assert shown["stands_for"] != ""
+    assert shown["key"] != shown["stands_for"]
+    again = kept.post("/api/run").json()["run"]
+    assert (again["key"], again["kept"]) == (shown["stands_for"], None)
+
+
+def test_a_run_of_another_recording_opens_it_first(kept: TestClient, data: Path) -> None:
+    number = runs_of(kept)[0]["id"]
+    kept.post("/api/sequence", json={"name": "numbers"})
+    wait_until(lambda: kept.get("/api/state").json()["sequence"]["name"] == "numbers")
+    kept.post(f"/api/library/runs/{number}/open")
+    wait_until(lambda: kept.get("/api/state").json()["run"]["kept"] == number)
+    assert kept.get("/api/state").json()["sequence"]["name"] == "crossing"
+    assert kept.get("/api/step/60").json()["tracks"] != []
+
+
+def test_a_kept_run_is_pinned_beside_the_shown_one(kept: TestClient) -> None:
+    state = kept.post(f"/api/library/runs/{runs_of(kept)[1]['id']}/pin").json()
+    assert state["pinned"]["differs"] == [P_D]
+    wait_until(lambda: kept.get("/api/evaluation/comparison").status_code == 200)
+    comparison = kept.get("/api/evaluation/comparison").json()
+    assert comparison["against"] == "pinned"
+
+
+def test_names_stars_notes_and_deletion(kept: TestClient) -> None:
+    number = runs_of(kept)[0]["id"]
+    wish = {"name": "baseline", "star": True, "note": "as it comes", "tags": ["paper"]}
+    told = kept.patch(f"/api/library/runs/{number}", json=wish).json()
+    assert {key: told[key] for key in wish} == wish
+    gone = kept.post("/api/library/delete", json={"runs": [number]}).json()
+    assert gone["bytes"] > 0
+    assert len(runs_of(kept)) == 1
+    kept.post("/api/library/take-back", json={"runs": [number]})
+    assert runs_of(kept)[0]["name"] == "baseline"
+    answer = kept.post("/api/library/delete", json={"runs": [999]})
+    assert answer.status_code == 409
+    assert "no run 999" in answer.json()["error"]["message"]
+
+
+def test_the_preview_has_what_is_drawn(kept: TestClient) -> None:
+    number = runs_of(kept)[0]["id"]
+    told = kept.get(f"/api/library/runs/{number}").json()
+    assert told["frames"] == 120
+    assert {track["id"] for track in told["tracks"]} == {c["id"] for c in told["courses"]}
+    assert max(told["people"]) == 2.0
+    step = kept.get("/api/step/60").json()
+    firsts = {c["id"]: np.array(c["points"]) for c in told["courses"]}
+    for track in step["tracks"]:
+        ways = firsts[track["id"]] - np.array(track["position"][:2])
+        assert np.hypot(*ways.T).min() < 0.3
+
+
+def test_runs_stay_when_the_recording_is_gone(kept: TestClient, data: Path, path: Path) -> None:
+    with Library(path) as library:
+        library._connection.execute("UPDATE recordings SET place = place || '-gone'")
+    number = runs_of(kept)[0]["id"]
+    told = kept.get("/api/library").json()["recordings"]
+    assert any(r["missing"] and "any more" in r["missing"] for r in told)
+    answer = kept.post(f"/api/library/runs/{number}/open")
+    assert answer.status_code == 422
+    assert kept.get(f"/api/library/runs/{number}").status_code == 200
+
+
+def test_a_damaged_library_is_told_and_the_workbench_goes_on(data: Path, path: Path) -> None:
+    path.write_bytes(b"not a database " * 100)
+    with application(data, path) as client:
+        wait_until(run_is(client, "done"))
+        told = client.get("/api/library").json()
+        assert "damaged" in told["error"]
+        assert any(r["name"] == "numbers" for r in told["recordings"])
+        answer = client.get("/api/library/runs/1")
+        assert answer.status_code == 409
+        assert "damaged" in answer.json()["error"]["message"]
+    assert path.read_bytes() == b"not a database " * 100
+
+
+def test_a_workbench_without_a_library_keeps_nothing(client: TestClient) -> None:
+    told = client.get("/api/library").json()
+    assert "without a library" in told["error"]

@@ -1,0 +1,199 @@
+"""Stage 1 looks at reduced, upright pictures, and everybody else sees the camera's own pixels."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy import ndarray
+
+from tests.engine.standing import CAMERAS, HALF_EXTENTS, ROOM
+from tests.engine.synthetic import CAMERAS as SMALL
+from tests.engine.synthetic import HALF_EXTENTS as HEAD
+from tests.engine.synthetic import ROOM as SMALL_ROOM
+from tracker.camera import Camera
+from tracker.foreground import pack, unpack
+from tracker.parameters import RunParameters, with_values
+from tracker.parameters.pictures import PictureParams
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence, Template, View
+from tracker.single_view.box_sizes import upright_boxes
+from tracker.single_view.protocol import ViewResult
+from tracker.single_view.working.sequence import Working
+from tracker.single_view.working.view import WorkingView, working_view
+
+LENS = np.array([-0.05, 0.01, 0.002, -0.001, 0.0])
+
+
+def rolled(camera: Camera, angle: float, **changes: object) -> Camera:
+    """The camera turned about its own axis, so that what stands leans to the right."""
+    cos, sin = math.cos(angle), math.sin(angle)
+    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    turned = replace(camera, rotation=turn @ camera.rotation, translation=turn @ camera.translation)
+    return replace(turned, **changes)  # type: ignore[arg-type]
+
+
+def seen(camera: Camera, **numbers: float) -> WorkingView:
+    view = working_view(camera, ROOM, HALF_EXTENTS, PictureParams(**numbers))
+    assert view is not None
+    return view
+
+
+def places(count: int = 40) -> ndarray:
+    return np.random.default_rng(0).uniform([-1.5, -1.5, 0.3], [1.5, 1.5, 1.5], (count, 3))
+
+
+def test_a_small_level_camera_is_left_alone() -> None:
+    assert all(working_view(c, SMALL_ROOM, HEAD, PictureParams()) is None for c in SMALL)
+
+
+@given(
+    angle=st.floats(-math.pi, math.pi),
+    focal_ratio=st.floats(0.8, 1.25),
+    fisheye=st.booleans(),
+)
+def test_the_working_calibration_sees_what_the_working_picture_shows(
+    angle: float, focal_ratio: float, fisheye: bool
+) -> None:
+    camera = CAMERAS[1]
+    intrinsics = camera.intrinsics * np.array([[1.0], [focal_ratio], [1.0]])
+    intrinsics[0, 2] += 31.0
+    lens = LENS[[0, 1, 4, 4]] if fisheye else LENS
+    camera = rolled(camera, angle, intrinsics=intrinsics, distortion=lens, fisheye=fisheye)
+    view = seen(camera)
+    full, valid = camera.project(places())
+    working, also = view.camera.project(places())
+    assert valid.all()
+    assert also.all()
+    # the working picture's sides are whole pixels: a part of one is left
+    np.testing.assert_allclose(working, view.points(full), atol=0.6)
+    np.testing.assert_allclose(view.points_back(view.points(full)), full, atol=1e-9)
+
+
+@given(angle=st.floats(-math.pi, math.pi))
+def test_people_stand_in_the_working_picture(angle: float) -> None:
+    view = seen(rolled(CAMERAS[0], angle))
+    middle = view.camera.centre + 4.0 * view.camera.rotation[2]
+    (foot, head), _ = view.camera.project(middle + np.array([[0, 0, -0.1], [0, 0, 0.1]]))
+    up = head - foot
+    assert up[1] < 0.0
+    assert abs(math.atan2(up[0], -up[1])) <= PictureParams().level_from + 1e-3
+
+
+def test_what_is_in_the_picture_is_where_the_working_calibration_says() -> None:
+    camera = rolled(CAMERAS[2], 0.6, distortion=LENS)
+    view = seen(camera)
+    for place in places(5):
+        picture = np.zeros((camera.image_size[1], camera.image_size[0], 3), dtype=np.uint8)
+        centre = camera.project(place[None])[0][0]
+        cv2.circle(picture, (round(centre[0]), round(centre[1])), 6, (255, 255, 255), -1)
+        small = view.picture(picture)
+        assert small.shape[1::-1] == view.camera.image_size
+        rows, columns = np.nonzero(small[:, :, 0] > 100)
+        expected = view.camera.project(place[None])[0][0]
+        np.testing.assert_allclose([columns.mean(), rows.mean()], expected, atol=1.0)
+        back = view.mask((small[:, :, 0] > 100).astype(np.uint8))
+        rows, columns = np.nonzero(back)
+        found = (np.array([columns.mean(), rows.mean()]) + 0.5) / view.factors - 0.5
+        np.testing.assert_allclose(found, centre, atol=3.0)
+
+
+@pytest.mark.parametrize(("lines", "shorter"), [(480, 480), (240, 240), (2000, 800)])
+def test_a_picture_is_reduced_to_so_many_lines(lines: int, shorter: int) -> None:
+    camera = replace(CAMERAS[0])
+    numbers = {"lines": lines, "target_height": 2000}
+    view = working_view(camera, ROOM, HALF_EXTENTS, PictureParams(**numbers))
+    assert (camera if view is None else view.camera).image_size[1] == shorter
+
+
+def test_far_targets_keep_their_pixels() -> None:
+    few = seen(CAMERAS[0], lines=120, least_height=8)
+    many = seen(CAMERAS[0], lines=120, least_height=100)
+    assert few.camera.image_size[1] == 120
+    boxes, there = upright_boxes(many.camera, places(400), HALF_EXTENTS)
+    assert 80.0 < 2.0 * np.median(boxes[there, 3]) < 125.0
+
+
+def test_an_upright_box_comes_back_around_the_same_person() -> None:
+    for angle in (0.0, 0.4, -0.4, math.pi / 2.0):
+        view = seen(rolled(CAMERAS[0], angle))
+        boxes, there = upright_boxes(view.camera, places(), HALF_EXTENTS)
+        boxes = boxes[there]
+        back = view.boxes_back(boxes)
+        np.testing.assert_allclose(view.points(back[:, :2]), boxes[:, :2], atol=1e-6)
+        aside = abs(math.sin(angle)) > 0.9
+        long, short = back[:, 2 if aside else 3], back[:, 3 if aside else 2]
+        assert (long > short).all()
+        np.testing.assert_allclose(long * view.scale / boxes[:, 3], 1.0, atol=0.1)
+
+
+@given(angle=st.floats(-math.pi, math.pi).filter(lambda a: abs(abs(math.tan(a)) - 1.0) > 0.05))
+def test_a_drawn_box_gives_the_upright_one(angle: float) -> None:
+    view = seen(rolled(CAMERAS[0], angle))
+    half = np.array([HALF_EXTENTS[0], HALF_EXTENTS[2]]) * 90.0
+    cos, sin = math.cos(view.roll), math.sin(view.roll)
+    bounds = [math.hypot(half[0] * cos, half[1] * sin), math.hypot(half[0] * sin, half[1] * cos)]
+    drawn = np.array([600.0, 400.0, *(np.array(bounds) / view.factors)])
+    np.testing.assert_allclose(view.drawn_box(drawn, HALF_EXTENTS)[2:], half, rtol=1e-6)
+
+
+def test_ellipses_come_back_turned() -> None:
+    view = seen(rolled(CAMERAS[0], 0.5))
+    gate = np.array([[50.0, 60.0, 100.0, 20.0, 400.0]])
+    back = view.gates_back(gate)[0]
+    matrix = np.array([[100.0, 20.0], [20.0, 400.0]])
+    border = np.linalg.cholesky(matrix) @ [0.6, 0.8] + gate[0, :2]
+    apart = view.points_back(border[None])[0] - back[:2]
+    full = np.array([[back[2], back[3]], [back[3], back[4]]])
+    assert apart @ np.linalg.solve(full, apart) == pytest.approx(1.0)
+
+
+def recording(folder: Path, camera: Camera) -> Sequence:
+    picture = np.full((camera.image_size[1], camera.image_size[0], 3), 90, dtype=np.uint8)
+    cv2.imwrite(str(folder / "0.png"), picture)
+    template = Template("somebody", camera.name, 0, np.array([300.0, 200.0, 80.0, 200.0]))
+    return Sequence(
+        name="one",
+        folder=folder,
+        fps=25.0,
+        frames=1,
+        room=ROOM,
+        target_half_extents=HALF_EXTENTS,
+        views=(View(camera, images=(folder / "0.png",)),),
+        templates=(template,),
+    )
+
+
+def test_methods_get_the_reduced_recording_and_their_results_come_back(tmp_path: Path) -> None:
+    sequence = recording(tmp_path, rolled(CAMERAS[0], 0.4))
+    with FrameReader(sequence) as reader:
+        working = Working.of(sequence, RunParameters(), reader)
+        picture = working.reader.picture(0, 0)
+        assert picture is not None
+        assert picture.shape[1::-1] == working.sequence.cameras[0].image_size
+        assert working.sequence.views[0].has_pictures
+        mask = np.ones(picture.shape[:2], dtype=np.uint8)
+        boxes = np.array([[100.0, 120.0, 10.0, 30.0]])
+        result = ViewResult.of_boxes(boxes, np.ones(1), np.ones((1, 4)))
+        back = working.back(0, replace(result, foreground=pack(mask)))
+        view = working.views[0]
+        assert view is not None
+        np.testing.assert_allclose(view.points(back.boxes[:, :2]), boxes[:, :2])
+        assert back.foreground is not None
+        reduced = np.rint(view.factors * [1280, 800])
+        assert unpack(back.foreground).shape == (reduced[1], reduced[0])
+
+
+def test_methods_that_look_at_no_pictures_get_the_recording_as_it_is(tmp_path: Path) -> None:
+    sequence = recording(tmp_path, rolled(CAMERAS[0], 0.4))
+    with FrameReader(sequence) as reader:
+        parameters = with_values(RunParameters(), {"single_view": "none"})
+        working = Working.of(sequence, parameters, reader)
+        assert working.sequence is sequence
+        assert working.reader is reader

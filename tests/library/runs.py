@@ -1,0 +1,72 @@
+"""Small runs and libraries for tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from tracker.library.columns import KeptTracks
+from tracker.library.records import NewRecording, NewRun
+from tracker.library.store import Library
+from tracker.parameters import RunParameters
+from tracker.trajectories import Trajectories
+
+RECORDING = NewRecording("room44-3p", "room44-3p", "rendered", "d", 2, 500, 25.0, True, False, 3)
+
+
+def tracks(steps: int = 40, people: int = 3, *, cameras: int = 2, seed: int = 0) -> KeptTracks:
+    """People who wander, all of them at all steps."""
+    rng = np.random.default_rng(seed)
+    count = steps * people
+    ways = rng.normal(0.0, 0.02, (steps, people, 3)).cumsum(axis=0)
+    ways[:, :, 2] += 0.9
+    rows = Trajectories(
+        frames=np.repeat(np.arange(steps), people),
+        ids=np.tile(np.arange(1, people + 1), steps),
+        positions=ways.reshape(-1, 3),
+        existences=1.0 - 10.0 ** rng.uniform(-9.0, -1.0, count),
+        sigmas=rng.uniform(0.02, 0.06, (count, 3)),
+        seen=rng.random((count, cameras)) > 0.1,
+        components=np.tile(np.arange(people), steps),
+        labels=np.tile(np.arange(people) + 40, steps),
+    )
+    probabilities = np.where(rng.random((count, cameras)) < 0.7, 0.95, rng.random((count, cameras)))
+    return KeptTracks(rows, probabilities.round(3))
+
+
+KEPT = tracks()
+
+
+def run(number: int, *, kept: KeptTracks = KEPT, **values: object) -> NewRun:
+    """A run that differs from others by its number."""
+    return NewRun(
+        **{
+            "key": f"key-{number}",
+            "digest": "d",
+            "began": 1000.0 + number,
+            "seconds": 2.0,
+            "steps": int(kept.tracks.frames[-1]) + 1,
+            "single_view": "colour_phd",
+            "fusion_method": "multi_bernoulli",
+            "changes": {"fusion.clutter_rate": 1.5},
+            "parameters": RunParameters().model_dump(mode="json"),
+            "seed": 0,
+            "version": "0.1.0",
+            "code": "c",
+            "machine": "m",
+            "source": "track",
+            "targets": 3,
+            "figures": {"mota": 0.9, "idf1": 0.8, "hota": None, "ospa": 0.1, "misses": 4},
+            "kept": kept,
+            **values,
+        }  # type: ignore[arg-type]
+    )
+
+
+def filled(path: Path, count: int) -> Library:
+    """A library with runs 1 … count."""
+    library = Library(path)
+    for number in range(count):
+        library.keep(RECORDING, run(number))
+    return library

@@ -1,0 +1,149 @@
+"""The library's file: what is kept, what falls out, and what a person says of it."""
+
+from __future__ import annotations
+
+import sqlite3
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.library.runs import KEPT, RECORDING, filled, run
+from tracker.library import schema
+from tracker.library.errors import LibraryError
+from tracker.library.store import Library
+from tracker.parameters import RunParameters
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "somewhere" / "library.sqlite3"
+
+
+def test_a_run_comes_back_after_the_program_ended(path: Path) -> None:
+    with Library(path) as library:
+        number = library.keep(RECORDING, run(7))
+    with Library(path) as library:
+        result = library.result(number)
+        (recording,) = library.recordings()
+    assert result.run.changes == {"fusion.clutter_rate": 1.5}
+    assert (result.run.mota, result.run.hota, result.run.misses) == (0.9, None, 4)
+    assert result.parameters == RunParameters()
+    assert result.unknown == ()
+    np.testing.assert_array_equal(result.kept.tracks.positions, KEPT.tracks.positions)
+    assert (recording.name, recording.people, recording.runs) == ("room44-3p", 3, 1)
+
+
+def test_the_newest_runs_come_first(path: Path) -> None:
+    with filled(path, 3) as library:
+        assert [library.result(r.id).key for r in library.runs()] == ["key-2", "key-1", "key-0"]
+        assert library.runs(recording=99) == []
+
+
+def test_the_same_run_computed_again_is_one_run(path: Path) -> None:
+    with filled(path, 2) as library:
+        number = library.keep(RECORDING, run(0, began=5000.0))
+        assert [r.id for r in library.runs()] == [number, 2]
+        library.delete([number])
+        library.keep(RECORDING, run(0))
+        assert len(library.runs()) == 2
+
+
+def test_untouched_runs_beyond_the_budget_fall_out_and_others_never(path: Path) -> None:
+    with filled(path, 6) as library:
+        library.star(1)
+        library.rename(2, "the  one for\nthe paper")
+        library.note(3, "two ghosts at the door")
+        library.tag(4, ["paper"])
+        library.keep(RECORDING, run(100), budget=1)
+        assert [r.id for r in library.runs()] == [7, 4, 3, 2, 1]
+        assert library.find("the one for the paper").id == 2
+        assert library.run(4).tags == ["paper"]
+
+
+def test_deleted_runs_can_be_taken_back_until_their_space_is_freed(path: Path) -> None:
+    with filled(path, 3) as library:
+        assert library.delete([1, 2]) > 1000
+        assert [r.id for r in library.runs()] == [3]
+        library.take_back([1])
+        assert [r.id for r in library.runs()] == [3, 1]
+        assert library.collect(budget=100)[0] == 1
+        with pytest.raises(LibraryError, match="run 2 cannot be taken back"):
+            library.take_back([2])
+
+
+def test_a_run_that_is_not_there_is_told(path: Path) -> None:
+    with filled(path, 2) as library:
+        for act in (library.run, library.result, lambda n: library.delete([n])):
+            with pytest.raises(LibraryError, match="no run 9"):
+                act(9)
+        library.rename(1, "one")
+        library.rename(2, "one")
+        with pytest.raises(LibraryError, match=r"several \(2, 1\)"):
+            library.find("one")
+
+
+def test_of_several_deletions_all_are_made_or_none(path: Path) -> None:
+    with filled(path, 2) as library:
+        with pytest.raises(LibraryError):
+            library.delete([1, 9])
+        assert len(library.runs()) == 2
+
+
+def test_values_of_another_version_are_taken_as_far_as_they_are_known(path: Path) -> None:
+    values = RunParameters().model_dump(mode="json")
+    values["fusion"] |= {"clutter_rate": 1.25, "of_the_future": 3}
+    values["fusion_method"] = "of_the_future"
+    with Library(path) as library:
+        result = library.result(library.keep(RECORDING, run(1, parameters=values)))
+    assert result.parameters.fusion.clutter_rate == 1.25
+    assert set(result.unknown) == {"fusion_method", "fusion.of_the_future"}
+
+
+def test_a_file_of_every_version_becomes_today_s(tmp_path: Path) -> None:
+    for version in range(schema.VERSION):
+        path = tmp_path / f"{version}.sqlite3"
+        with sqlite3.connect(path, isolation_level=None) as old:
+            schema.migrate(old, path, schema.MIGRATIONS[:version])
+        old.close()
+        with Library(path) as library:
+            library.keep(RECORDING, run(1))
+        with sqlite3.connect(path) as now:
+            assert now.execute("PRAGMA user_version").fetchone() == (schema.VERSION,)
+            assert now.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+        now.close()
+
+
+def test_a_migration_that_fails_leaves_the_file_as_it_was(path: Path) -> None:
+    filled(path, 2).close()
+    broken = (*schema.MIGRATIONS, ("ALTER TABLE runs ADD COLUMN x TEXT", "NOT SQL"))
+    with sqlite3.connect(path, isolation_level=None) as connection:
+        with pytest.raises(sqlite3.OperationalError):
+            schema.migrate(connection, path, broken)
+        names = [row[1] for row in connection.execute("PRAGMA table_info(runs)")]
+        assert "x" not in names
+        assert connection.execute("PRAGMA user_version").fetchone() == (schema.VERSION,)
+    connection.close()
+    with Library(path) as library:
+        assert len(library.runs()) == 2
+
+
+def test_ten_thousand_runs_are_listed_at_once(path: Path) -> None:
+    filled(path, 1).close()
+    with sqlite3.connect(path) as connection:
+        columns = [row[1] for row in connection.execute("PRAGMA table_info(runs)")][1:]
+        listed = ", ".join(columns)
+        connection.execute(
+            f"WITH RECURSIVE n (i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 9999) "
+            f"INSERT INTO runs ({listed}) SELECT {listed} FROM runs, n"
+        )
+    connection.close()
+    with Library(path) as library:
+        fastest = np.inf
+        for _ in range(5):
+            begin = time.perf_counter()
+            found = library.runs()
+            fastest = min(fastest, time.perf_counter() - begin)
+    assert len(found) == 10_000
+    assert fastest < 0.25  # 0.05 is the aim on an idle machine; the benchmark tells it

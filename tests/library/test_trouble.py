@@ -1,0 +1,153 @@
+"""A library that is newer, another's, locked, read-only, on a full disk or damaged: a sentence."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import sqlite3
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.library.runs import RECORDING, filled, run
+from tracker.library import repair, schema
+from tracker.library.errors import LibraryError, told
+from tracker.library.store import Library, open_library
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    path = tmp_path / "library.sqlite3"
+    filled(path, 4).close()
+    return path
+
+
+def spoil(path: Path, statement: str) -> None:
+    with sqlite3.connect(path) as connection:
+        connection.execute(statement)
+    connection.close()
+
+
+def test_of_a_newer_version(path: Path) -> None:
+    spoil(path, f"PRAGMA user_version = {schema.VERSION + 1}")
+    before = path.read_bytes()
+    with pytest.raises(LibraryError, match="newer version of multiview-phd"):
+        Library(path)
+    assert path.read_bytes() == before
+
+
+def test_another_program_s_database(tmp_path: Path) -> None:
+    path = tmp_path / "bookmarks.sqlite"
+    spoil(path, "CREATE TABLE bookmarks (a)")
+    before = path.read_bytes()
+    with pytest.raises(LibraryError, match="found another database"):
+        Library(path)
+    assert path.read_bytes() == before
+
+
+def test_no_database_at_all(tmp_path: Path) -> None:
+    path = tmp_path / "notes.txt"
+    path.write_text("not a database, but long enough to be taken for one " * 20)
+    with pytest.raises(LibraryError, match=r"damaged .*not a database"):
+        Library(path)
+    with pytest.raises(LibraryError, match=r"cannot be (opened|reached)"):
+        Library(tmp_path / "notes.txt" / "library.sqlite3")
+
+
+def test_held_by_another_program(path: Path) -> None:
+    holder = sqlite3.connect(path, isolation_level=None)
+    holder.execute("BEGIN IMMEDIATE")
+    with Library(path, wait_seconds=0.05) as library:
+        assert len(library.runs()) == 4  # who only reads need not wait
+        with pytest.raises(LibraryError, match="another program holds the library"):
+            library.star(1)
+        holder.execute("ROLLBACK")
+        holder.close()
+        library.star(1)
+        assert library.run(1).star == 1
+
+
+def test_on_a_full_disk(path: Path) -> None:
+    with Library(path) as library:
+        pages = library._connection.execute("PRAGMA page_count").fetchone()[0]
+        library._connection.execute(f"PRAGMA max_page_count = {pages}")
+
+        def fill() -> None:
+            for number in range(100, 140):
+                library.keep(RECORDING, run(number))
+
+        with pytest.raises(LibraryError, match="no space left"):
+            fill()
+        whole = [library.result(r.id) for r in library.runs()]  # those that were kept, wholly
+        assert len(whole) >= 4
+    assert repair.check(path).complaints == ()
+
+
+def test_one_that_may_only_be_read(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path.chmod(0o444)
+    if os.geteuid() == 0:  # who may write anywhere; the others are told by their rights
+        monkeypatch.setattr(os, "access", lambda *_: False)
+    with open_library(path) as library:
+        assert library.read_only
+        assert len(library.runs()) == 4
+        with pytest.raises(LibraryError, match="open for reading alone"):
+            library.keep(RECORDING, run(9))
+        with pytest.raises(LibraryError, match="can be read but not written"), told(path):
+            library._connection.execute("UPDATE runs SET star = 1")
+
+
+def whole_runs(path: Path) -> int:
+    """How many runs can be read, however damaged the file."""
+    with contextlib.suppress(LibraryError):
+        return repair.check(path).runs
+    return 0
+
+
+def flipped(path: Path, rng: np.random.Generator) -> None:
+    data = bytearray(path.read_bytes())
+    for place in rng.integers(0, len(data), int(rng.integers(1, 9))).tolist():
+        data[place] ^= 1 << int(rng.integers(8))
+    path.write_bytes(bytes(data))
+
+
+def try_flipped(path: Path, folder: Path, tries: int) -> None:
+    """Damage copies at random; whatever is then done ends well or in a sentence, and no run that
+    could be read before is lost by it, repaired or not."""
+    rng = np.random.default_rng(1)
+    complaints = 0
+    for number in range(tries):
+        spoilt = folder / f"{number}.sqlite3"
+        shutil.copy(path, spoilt)
+        flipped(spoilt, rng)
+        readable = whole_runs(spoilt)
+        try:
+            with open_library(spoilt) as library:
+                for one in library.runs():
+                    library.result(one.id).run.to_json()
+                library.recordings()
+                library.keep(RECORDING, run(1000 + number))
+                library.star(1)
+        except LibraryError as error:
+            complaints += str(spoilt) in str(error)
+        assert whole_runs(spoilt) >= readable
+        with contextlib.suppress(LibraryError):
+            if repair.check(spoilt).complaints:
+                copied = spoilt.read_bytes()
+                aside, saved, _ = repair.repair(spoilt)
+                assert aside.read_bytes() == copied
+                assert saved >= readable
+                assert repair.check(spoilt).complaints == ()
+        for left in folder.glob(f"{number}*"):
+            left.unlink()
+    assert complaints > tries / 10  # else the damage was none
+
+
+def test_flipped_bytes(path: Path, tmp_path: Path) -> None:
+    try_flipped(path, tmp_path, 60)
+
+
+@pytest.mark.long
+def test_flipped_bytes_500_times(path: Path, tmp_path: Path) -> None:
+    try_flipped(path, tmp_path, 500)

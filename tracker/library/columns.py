@@ -1,0 +1,139 @@
+"""A run's tracks as bytes: each column by itself, as what changes from row to row, compressed.
+
+Rows are put in the order of tracks and then steps, where neighbours differ little; of each
+number what differs from the one before is kept, byte planes apart, by zlib, whose checksum
+tells a damaged one. Positions are exact; existence and standard deviations are rounded to
+float32, and p_D to a thousandth.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Shaped
+from numpy import ndarray
+
+from tracker.trajectories import Trajectories
+
+_MAGIC = b"MVT1"
+_HEAD = struct.Struct("<4sIH")
+_LEVEL = 6
+_MOST_ROWS = 1 << 28
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KeptTracks:
+    """What is kept of a run's result."""
+
+    tracks: Trajectories
+    detection_probabilities: Float[ndarray, "N C"]
+    """p_D that each camera was given for each row."""
+
+
+def pack(kept: KeptTracks) -> bytes:
+    """As bytes."""
+    tracks = kept.tracks
+    order = np.lexsort((tracks.frames, tracks.ids))
+    rows, cameras = len(tracks), tracks.seen.shape[1]
+    probabilities = np.rint(kept.detection_probabilities[order] * 1000.0).astype(np.int16)
+    parts = [
+        _planes(tracks.ids[order].astype(np.int32)),
+        _planes(tracks.frames[order].astype(np.int32)),
+        _planes(tracks.labels[order].astype(np.int64)),
+        *(_planes(column.view(np.int64)) for column in _apart(tracks.positions[order], np.float64)),
+        _planes(tracks.existences[order].astype(np.float32).view(np.int32)),
+        *(_planes(column.view(np.int32)) for column in _apart(tracks.sigmas[order], np.float32)),
+        *(np.packbits(column).tobytes() for column in tracks.seen[order].T),
+        *(_planes(np.ascontiguousarray(column)) for column in probabilities.T),
+    ]
+    return _HEAD.pack(_MAGIC, rows, cameras) + zlib.compress(b"".join(parts), _LEVEL)
+
+
+def unpack(data: bytes) -> KeptTracks:
+    """What :func:`pack` was given, sorted by step and then id.
+
+    Raises:
+        ValueError: If the bytes are damaged.
+    """
+    try:
+        magic, rows, cameras = _HEAD.unpack_from(data)
+        if magic != _MAGIC or rows > _MOST_ROWS:
+            raise ValueError("they do not begin as they should")
+        raw = zlib.decompress(data[_HEAD.size :])
+        reader = _Reader(raw, rows)
+        ids = reader.take(np.int32)
+        frames = reader.take(np.int32)
+        labels = reader.take(np.int64)
+        positions = [reader.take(np.int64).view(np.float64) for _ in range(3)]
+        existences = reader.take(np.int32).view(np.float32)
+        sigmas = [reader.take(np.int32).view(np.float32) for _ in range(3)]
+        seen = [reader.bits() for _ in range(cameras)]
+        probabilities = [reader.take(np.int16) for _ in range(cameras)]
+        reader.end()
+    except (ValueError, struct.error, zlib.error) as error:
+        raise ValueError(f"the tracks' bytes are damaged: {error}") from None
+    order = np.lexsort((ids, frames))
+    frames = frames[order].astype(np.int64)
+    firsts = np.searchsorted(frames, frames)
+    return KeptTracks(
+        Trajectories(
+            frames=frames,
+            ids=ids[order].astype(np.int64),
+            positions=_together(positions, order),
+            existences=existences[order].astype(np.float64),
+            sigmas=_together(sigmas, order),
+            seen=_beside(seen, rows, bool)[order],
+            components=np.arange(rows) - firsts,
+            labels=labels[order],
+        ),
+        _beside(probabilities, rows, np.int16)[order] / 1000.0,
+    )
+
+
+def _apart(values: ndarray, kind: type[np.floating]) -> list[ndarray]:
+    return [np.ascontiguousarray(column, dtype=kind) for column in values.T]
+
+
+def _together(columns: list[ndarray], order: ndarray) -> ndarray:
+    together: ndarray = np.stack(columns, axis=1)[order].astype(np.float64)
+    return together
+
+
+def _beside(columns: list[ndarray], rows: int, kind: type) -> ndarray:
+    return np.stack(columns, axis=1) if columns else np.zeros((rows, 0), dtype=kind)
+
+
+def _planes(values: Shaped[ndarray, " N"]) -> bytes:
+    """What differs from the value before, modulo the integer's size; its bytes by significance."""
+    difference = values.copy()
+    difference[1:] = values[1:] - values[:-1]
+    return difference.view(np.uint8).reshape(-1, values.itemsize).T.tobytes()
+
+
+class _Reader:
+    def __init__(self, raw: bytes, rows: int) -> None:
+        self._raw = raw
+        self._rows = rows
+        self._at = 0
+
+    def take(self, kind: type[np.signedinteger]) -> ndarray:
+        size = np.dtype(kind).itemsize
+        planes = self._bytes(size * self._rows).reshape(size, self._rows)
+        difference = np.ascontiguousarray(planes.T).view(kind)[:, 0]
+        return np.cumsum(difference, dtype=kind)
+
+    def bits(self) -> ndarray:
+        return np.unpackbits(self._bytes(-(-self._rows // 8)), count=self._rows).astype(bool)
+
+    def end(self) -> None:
+        if self._at != len(self._raw):
+            raise ValueError("there are more of them than there should be")
+
+    def _bytes(self, count: int) -> ndarray:
+        if self._at + count > len(self._raw):
+            raise ValueError("some are missing")
+        self._at += count
+        return np.frombuffer(self._raw, dtype=np.uint8, count=count, offset=self._at - count)

@@ -1,0 +1,61 @@
+"""What goes wrong with a library, in a sentence each."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+class LibraryError(ValueError):
+    """The library cannot be used; the message says why and what to do."""
+
+
+@contextmanager
+def told(path: Path) -> Iterator[None]:
+    """Turn every failure of the database into a sentence about its file.
+
+    Raises:
+        LibraryError: Instead of what SQLite, or what reads a damaged row, raises.
+    """
+    try:
+        yield
+    except LibraryError:
+        raise
+    except sqlite3.Error as error:
+        raise LibraryError(_sentence(path, error)) from error
+    except (ValueError, TypeError, OverflowError, KeyError, IndexError) as error:
+        raise LibraryError(
+            f"{path}: a row of the library is not as it was written ({error}); "
+            "`multiview-phd library check` says how much can be read"
+        ) from error
+    except OSError as error:
+        raise LibraryError(f"{path}: the library cannot be reached ({error.strerror})") from error
+
+
+def _sentence(path: Path, error: sqlite3.Error) -> str:
+    words = str(error)
+    code = getattr(error, "sqlite_errorcode", 0) & 0xFF
+    if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
+        return f"{path}: another program holds the library; end it, or wait until it has written"
+    if code == sqlite3.SQLITE_FULL:
+        return f"{path}: there is no space left for the library; free some, or name another place"
+    if code == sqlite3.SQLITE_READONLY:
+        return (
+            f"{path}: the library can be read but not written; change its rights, or name another "
+            "by --library"
+        )
+    if code == sqlite3.SQLITE_CANTOPEN:
+        return (
+            f"{path}: the library cannot be opened; see that its folder is there and can be "
+            "written to, or name another by --library"
+        )
+    if code == sqlite3.SQLITE_IOERR:
+        return f"{path}: the disk failed under the library ({words})"
+    if code == sqlite3.SQLITE_CONSTRAINT:
+        return f"{path}: the library refuses what it was given ({words})"
+    return (
+        f"{path}: the library is damaged ({words}); `multiview-phd library check --repair` "
+        "keeps a copy aside and saves what can be read"
+    )

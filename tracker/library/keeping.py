@@ -1,0 +1,200 @@
+"""From a finished run to a row of the library, and back to a run that can be shown."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import platform
+
+import cv2
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker import __version__
+from tracker.evaluation import Evaluation
+from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.folders import cache_folder
+from tracker.fusion.protocol import FusionResult
+from tracker.library.columns import KeptTracks
+from tracker.library.records import NewRecording, NewRun, Result, Source
+from tracker.parameters import changed
+from tracker.runs.fitting import default_parameters
+from tracker.runs.numbers_version import numbers_version
+from tracker.runs.run import Run, stage_keys
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.protocol import ViewResult
+
+THUMBNAIL = (144, 96)
+"""Width and height in pixels that a recording's picture fills: twice what the page shows."""
+
+_QUALITY = 80
+
+
+def code_version() -> str:
+    """Another word for every code that may give other tracks."""
+    return hashlib.sha256(numbers_version("tracks").encode()).hexdigest()[:12]
+
+
+def recording_of(
+    sequence: Sequence, opened_as: str, thumbnail: bytes | None = None
+) -> NewRecording:
+    """What the library keeps of a recording.
+
+    Args:
+        sequence: It.
+        opened_as: The room's name or the folder that opened it.
+        thumbnail: From :func:`thumbnail_of`.
+    """
+    rendered = cache_folder() in sequence.folder.absolute().parents
+    truth = sequence.ground_truth
+    return NewRecording(
+        place=opened_as if rendered else str(sequence.folder.absolute()),
+        name=sequence.name,
+        kind="rendered" if rendered else "folder",
+        digest=sequence.digest,
+        cameras=len(sequence.views),
+        frames=sequence.frames,
+        fps=sequence.fps,
+        has_pictures=sequence.has_pictures,
+        has_detections=sequence.has_detections,
+        people=None if truth is None else len(np.unique(truth.ids)),
+        thumbnail=thumbnail,
+    )
+
+
+def thumbnail_of(sequence: Sequence, reader: FrameReader | None = None) -> bytes | None:
+    """The middle picture of the first camera that has one, small; None without pictures."""
+    if reader is None:
+        with FrameReader(sequence) as own:
+            return thumbnail_of(sequence, own)
+    for index, view in enumerate(sequence.views):
+        picture = reader.picture(index, sequence.frames // 2) if view.has_pictures else None
+        if picture is None:
+            continue
+        height, width = picture.shape[:2]
+        scale = max(THUMBNAIL[0] / width, THUMBNAIL[1] / height)
+        size = (max(1, round(width * scale)), max(1, round(height * scale)))
+        small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+        left, top = ((a - b) // 2 for a, b in zip(size, THUMBNAIL, strict=True))
+        cut = small[top : top + THUMBNAIL[1], left : left + THUMBNAIL[0]]
+        done, data = cv2.imencode(".jpg", cut, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+        return data.tobytes() if done else None
+    return None
+
+
+def kept_of(run: Run) -> KeptTracks:
+    """What is kept of a run's result."""
+    tracks = run.tracks
+    probabilities = np.zeros(tracks.seen.shape)
+    for step in range(run.done):
+        rows = tracks.at(step)
+        known = run.fused[step].detection_probabilities
+        probabilities[rows] = known[:, tracks.components[rows]].T
+    return KeptTracks(tracks, probabilities)
+
+
+def run_of(
+    run: Run,
+    *,
+    source: Source,
+    began: float,
+    seconds: float,
+    evaluation: Evaluation | None = None,
+) -> NewRun:
+    """What the library keeps of a finished run.
+
+    Args:
+        run: Complete.
+        source: Who computed it.
+        began: When, seconds since 1970.
+        seconds: How long it took.
+        evaluation: Where there is a truth.
+    """
+    parameters = run.parameters
+    figures = {}
+    if evaluation is not None and evaluation.has_truth:
+        figures = {figure.definition.key: figure.value for figure in evaluation.figures}
+    return NewRun(
+        key=run.key,
+        digest=run.sequence.digest,
+        began=began,
+        seconds=seconds,
+        steps=run.done,
+        single_view=parameters.single_view,
+        fusion_method=parameters.fusion_method,
+        changes=changed(parameters, default_parameters(run.sequence)),
+        parameters=parameters.model_dump(mode="json"),
+        seed=run.seed,
+        version=__version__,
+        code=code_version(),
+        machine=f"{platform.system()} {platform.machine()}, {platform.node()}",
+        source=source,
+        targets=len(np.unique(run.tracks.ids)),
+        figures=figures,
+        kept=kept_of(run),
+    )
+
+
+def run_from(sequence: Sequence, result: Result, *, key: str) -> Run:
+    """A run that shows what was kept: its tracks at once, without what the cameras found.
+
+    Each track is the one component of its step's posterior; boxes, measurements and the
+    associations are not there.
+
+    Args:
+        sequence: The recording, as it is now.
+        result: From the library.
+        key: By which the run is known.
+
+    Raises:
+        ValueError: If the recording has another number of cameras now.
+    """
+    keys = {**stage_keys(sequence, result.parameters, result.run.seed), "tracks": key}
+    run = Run(sequence, result.parameters, result.run.seed, keys)
+    tracks = result.kept.tracks
+    cameras = len(sequence.views)
+    steps = min(result.run.steps, sequence.frames)
+    rows = slice(0, tracks.at(steps).start)
+    every = np.arange(rows.stop)
+    run.tracks = tracks.take(every)
+    if tracks.seen.shape[1] != cameras:
+        raise ValueError(
+            f"run {result.run.id} is of {tracks.seen.shape[1]} cameras, and {sequence.name} has "
+            f"{cameras} now"
+        )
+    ends = np.searchsorted(run.tracks.frames, np.arange(steps + 1)).tolist()
+    covariances = np.zeros((rows.stop, 3, 3))
+    covariances[:, [0, 1, 2], [0, 1, 2]] = run.tracks.sigmas**2
+    probabilities = result.kept.detection_probabilities[rows].T
+    run.fused = [
+        _posterior(run, slice(first, last), covariances, probabilities)
+        for first, last in itertools.pairwise(ends)
+    ]
+    nothing = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
+    run.views = [(nothing,) * cameras] * steps
+    run.done = steps
+    return run
+
+
+def _posterior(
+    run: Run,
+    rows: slice,
+    covariances: Float[ndarray, "N 3 3"],
+    probabilities: Float[ndarray, "C N"],
+) -> FusionResult:
+    tracks = run.tracks
+    shape = (len(probabilities), rows.stop - rows.start)
+    return FusionResult(
+        GaussianMixture(
+            tracks.existences[rows],
+            tracks.positions[rows],
+            covariances[rows],
+            tracks.labels[rows],
+        ),
+        probabilities[:, rows],
+        np.full(shape, -1),
+        np.zeros(shape),
+        np.full(shape, -1),
+    )

@@ -1,0 +1,168 @@
+"""What the library tells of a recording and of a run."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+from tracker.library.columns import KeptTracks
+from tracker.parameters import RunParameters
+
+Source = Literal["track", "page", "bundle"]
+
+HEADLINES = (
+    "mota", "idf1", "hota", "ospa", "position_error", "misses", "false_positives", "id_switches",
+)  # fmt: skip
+"""Figures that have a column of their own: runs are listed and sorted by them."""
+
+
+class Recording(NamedTuple):
+    """A recording of which runs are kept, or that was opened."""
+
+    id: int
+    place: str
+    """A rendered room's name, or a folder: what opens it again."""
+    name: str
+    kind: str
+    """``rendered`` or ``folder``."""
+    digest: str
+    """Of its content when it was opened last."""
+    cameras: int
+    frames: int
+    fps: float
+    has_pictures: int
+    has_detections: int
+    people: int | None
+    """Of its truth; None without one."""
+    opened: float
+    """Seconds since 1970."""
+    runs: int
+
+
+class KeptRun(NamedTuple):
+    """A run without its tracks; of 10,000 a list is made at once."""
+
+    id: int
+    recording: int
+    recording_name: str
+    began: float
+    """Seconds since 1970."""
+    seconds: float
+    steps: int
+    single_view: str
+    fusion_method: str
+    changes_json: str
+    seed: int
+    version: str
+    code: str
+    source: str
+    targets: int
+    """How many tracks."""
+    mota: float | None
+    idf1: float | None
+    hota: float | None
+    ospa: float | None
+    position_error: float | None
+    misses: int | None
+    false_positives: int | None
+    id_switches: int | None
+    name: str
+    star: int
+    note: str
+    tags_json: str
+
+    @property
+    def changes(self) -> dict[str, Any]:
+        """The values that were not at the recording's defaults, by key."""
+        return dict(json.loads(self.changes_json))
+
+    @property
+    def tags(self) -> list[str]:
+        """Words that somebody put to it."""
+        return list(json.loads(self.tags_json))
+
+    @property
+    def steps_per_second(self) -> float:
+        """Mean speed of the computation; 0 where nothing was computed."""
+        return self.steps / self.seconds if self.seconds > 0.0 else 0.0
+
+    @property
+    def title(self) -> str:
+        """Its name with its number, or the number alone."""
+        return f"{self.name} ({self.id})" if self.name else f"run {self.id}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Everything as plain values."""
+        told = self._asdict()
+        del told["changes_json"], told["tags_json"]
+        return {
+            **told,
+            "star": bool(self.star),
+            "changes": self.changes,
+            "tags": self.tags,
+            "steps_per_second": self.steps_per_second,
+        }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Result:
+    """A run as it is read back: what is needed to show it, score it and write it out."""
+
+    run: KeptRun
+    place: str
+    """What opens its recording again."""
+    key: str
+    """Of recording, parameters, seed and code."""
+    digest: str
+    """Of the recording as it was tracked."""
+    machine: str
+    parameters: RunParameters
+    unknown: tuple[str, ...]
+    """Keys of those that this version does not know or take: they are at their defaults."""
+    values: dict[str, Any]
+    """All of them as they were written."""
+    figures: dict[str, Any]
+    kept: KeptTracks
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NewRecording:
+    """A recording that is opened."""
+
+    place: str
+    name: str
+    kind: str
+    digest: str
+    cameras: int
+    frames: int
+    fps: float
+    has_pictures: bool
+    has_detections: bool
+    people: int | None
+    thumbnail: bytes | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NewRun:
+    """A run that came to its end."""
+
+    key: str
+    digest: str
+    began: float
+    seconds: float
+    steps: int
+    single_view: str
+    fusion_method: str
+    changes: dict[str, Any]
+    parameters: dict[str, Any]
+    seed: int
+    version: str
+    code: str
+    machine: str
+    source: Source
+    targets: int
+    figures: dict[str, float | int | None]
+    kept: KeptTracks
+    name: str = ""
+    note: str = ""

@@ -1,0 +1,156 @@
+"""Checking a library, and saving from a damaged one what can be read."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sqlite3
+import time
+import zlib
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from tracker.library import columns, schema
+from tracker.library.errors import LibraryError, told
+
+_MOST_COMPLAINTS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """What a look through a library found."""
+
+    complaints: tuple[str, ...]
+    """One sentence each; none where it is whole."""
+    runs: int
+    """How many runs can be read with their tracks."""
+
+
+def check(path: Path) -> Checked:
+    """Look through the whole file and every run's tracks; nothing is written.
+
+    Raises:
+        LibraryError: If it is not a library, of a newer version, or cannot be opened at all.
+    """
+    if not path.is_file():
+        raise LibraryError(f"{path}: there is no library; it is made when a run is kept")
+    complaints: list[str] = []
+    with (
+        told(path),
+        closing(_reader(path)) as connection,
+        closing(sqlite3.connect(":memory:", isolation_level=None)) as memory,
+    ):
+        schema.version_of(connection, path)
+        complaints += [
+            " ".join(word.split())
+            for (word,) in connection.execute(f"PRAGMA integrity_check({_MOST_COMPLAINTS})")
+            if word != "ok"
+        ]
+        schema.migrate(memory, path)
+        lost = [f"row {row} of {table} {why}" for table, row, why in _save(connection, memory)]
+        # a row that the walk through a damaged table misses is told by the walk alone
+        complaints += lost
+        (good,) = memory.execute("SELECT count(*) FROM runs").fetchone()
+    return Checked(tuple(complaints[:_MOST_COMPLAINTS]), good)
+
+
+def repair(path: Path) -> tuple[Path, int, int]:
+    """Put a copy of the file aside, and make a new one of all rows that can be read.
+
+    Returns:
+        The copy, how many runs were saved, and how many rows were not.
+
+    Raises:
+        LibraryError: If nothing can be read; the file is as it was.
+    """
+    aside = path.with_name(f"{path.stem}-damaged-{time.strftime('%Y%m%d-%H%M%S')}{path.suffix}")
+    made = path.with_name(f".{path.name}.repaired")
+    beside = [path.with_name(path.name + end) for end in ("-wal", "-shm")]
+    with told(path):
+        for source in (path, *beside):
+            if source.exists():
+                shutil.copy2(source, aside.with_name(aside.name + source.name[len(path.name) :]))
+        made.unlink(missing_ok=True)
+        try:
+            with closing(_reader(path)) as old, closing(sqlite3.connect(made)) as new:
+                new.isolation_level = None
+                schema.migrate(new, made)
+                new.execute("BEGIN")
+                lost = len(_save(old, new, with_tracks=True))
+                new.execute("COMMIT")
+                (saved,) = new.execute("SELECT count(*) FROM runs").fetchone()
+            for source in beside:
+                source.unlink(missing_ok=True)
+            made.replace(path)
+        finally:
+            made.unlink(missing_ok=True)
+    return aside, int(saved), lost
+
+
+def _reader(path: Path) -> sqlite3.Connection:
+    connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=5.0)
+    connection.text_factory = lambda data: data.decode("utf-8", errors="replace")
+    return connection
+
+
+def _save(
+    old: sqlite3.Connection, new: sqlite3.Connection, *, with_tracks: bool = False
+) -> list[tuple[str, int, str]]:
+    """Copy what can be read, row by row: runs with their tracks, and their recordings.
+
+    Args:
+        old: The damaged one.
+        new: An empty one of today's version.
+        with_tracks: Copy the tracks too, rather than only look at them.
+
+    Returns:
+        What was not saved: table, row and why.
+    """
+    lost: list[tuple[str, int, str]] = []
+    tracked: set[int] = set()
+    for table in ("results", "recordings", "runs"):
+        names = [row[1] for row in new.execute(f"PRAGMA table_info({table})")]
+        listed, marks = ", ".join(names), ", ".join("?" * len(names))
+        for number in _numbers(old, table):
+            try:
+                row = old.execute(
+                    f"SELECT {listed} FROM {table} WHERE rowid = ?", (number,)
+                ).fetchone()
+                if row is None:
+                    raise ValueError("is not where the table says")
+                if table == "results":
+                    columns.unpack(row[3])
+                    json.loads(zlib.decompress(row[1])), json.loads(zlib.decompress(row[2]))
+                    tracked.add(number)
+                    if not with_tracks:
+                        continue
+                if table == "runs" and number not in tracked:
+                    raise ValueError("has no tracks that can be read")
+                if table == "runs":
+                    new.execute(_LOST_RECORDING, {"id": row[1]})
+                new.execute(f"INSERT INTO {table} ({listed}) VALUES ({marks})", row)
+            except (sqlite3.Error, zlib.error, ValueError, TypeError, OverflowError) as error:
+                lost.append((table, number, " ".join(str(error).split())))
+    new.execute("DELETE FROM results WHERE run NOT IN (SELECT id FROM runs)")
+    return lost
+
+
+_LOST_RECORDING = """
+INSERT OR IGNORE INTO recordings
+VALUES (:id, 'lost-' || :id, 'a recording that was lost', 'folder', '', 0, 0, 25.0, 0, 0, NULL,
+        NULL, 0.0)
+"""
+"""Instead of a row that cannot be read: its runs still can be."""
+
+
+def _numbers(old: sqlite3.Connection, table: str) -> list[int]:
+    """The row numbers that can be walked to from either end."""
+    found: set[int] = set()
+    for order in ("ASC", "DESC"):
+        try:
+            for (number,) in old.execute(f"SELECT rowid FROM {table} ORDER BY rowid {order}"):
+                found.add(number)
+        except sqlite3.Error:
+            continue
+    return sorted(found)

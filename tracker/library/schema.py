@@ -1,0 +1,118 @@
+"""The tables of the library, and how an older one becomes today's.
+
+``PRAGMA user_version`` counts the migrations that a file has gone through. A migration, once
+released, is never changed: what is new is another one behind it.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from pathlib import Path
+
+from tracker.library.errors import LibraryError
+
+APPLICATION_ID = 0x4D56_5048
+"""``MVPH``: what ``file`` and SQLite's own tools know the file by."""
+
+MIGRATIONS: tuple[tuple[str, ...], ...] = (
+    (
+        """
+        CREATE TABLE recordings (
+            id INTEGER PRIMARY KEY,
+            place TEXT NOT NULL UNIQUE,      -- a rendered room's name, or a folder
+            name TEXT NOT NULL,
+            kind TEXT NOT NULL,              -- rendered, or folder
+            digest TEXT NOT NULL,            -- of its content when it was opened last
+            cameras INTEGER NOT NULL,
+            frames INTEGER NOT NULL,
+            fps REAL NOT NULL,
+            has_pictures INTEGER NOT NULL,
+            has_detections INTEGER NOT NULL,
+            people INTEGER,                  -- of the truth; NULL where there is none
+            thumbnail BLOB,                  -- JPEG
+            opened REAL NOT NULL             -- seconds since 1970
+        ) STRICT
+        """,
+        """
+        CREATE TABLE runs (
+            id INTEGER PRIMARY KEY AUTOINCREMENT,
+            recording INTEGER NOT NULL REFERENCES recordings (id),
+            key TEXT NOT NULL,               -- of recording, parameters, seed and code
+            digest TEXT NOT NULL,            -- of the recording as it was tracked
+            began REAL NOT NULL,             -- seconds since 1970
+            seconds REAL NOT NULL,
+            steps INTEGER NOT NULL,
+            single_view TEXT NOT NULL,
+            fusion_method TEXT NOT NULL,
+            changes TEXT NOT NULL,           -- JSON: the values that are not the defaults
+            seed INTEGER NOT NULL,
+            version TEXT NOT NULL,           -- of the program
+            code TEXT NOT NULL,              -- hash of what makes the numbers
+            machine TEXT NOT NULL,
+            source TEXT NOT NULL,            -- track, page or bundle
+            targets INTEGER NOT NULL,        -- how many tracks
+            mota REAL, idf1 REAL, hota REAL, ospa REAL, position_error REAL,
+            misses INTEGER, false_positives INTEGER, id_switches INTEGER,
+            name TEXT NOT NULL DEFAULT '',
+            star INTEGER NOT NULL DEFAULT 0,
+            note TEXT NOT NULL DEFAULT '',
+            tags TEXT NOT NULL DEFAULT '[]',
+            deleted REAL                     -- when; it can still be taken back
+        ) STRICT
+        """,
+        "CREATE INDEX runs_by_recording ON runs (recording, began)",
+        "CREATE INDEX runs_by_key ON runs (key)",
+        """
+        CREATE TABLE results (               -- apart: a list of runs reads past none of it
+            run INTEGER PRIMARY KEY REFERENCES runs (id) ON DELETE CASCADE,
+            parameters BLOB NOT NULL,        -- JSON by zlib: all
+            figures BLOB NOT NULL,           -- JSON by zlib: all of them; {} without a truth
+            columns BLOB NOT NULL            -- the tracks
+        ) STRICT
+        """,
+        f"PRAGMA application_id = {APPLICATION_ID}",
+    ),
+)
+"""What leads from each version to the next, the first from an empty file."""
+
+VERSION = len(MIGRATIONS)
+
+
+def version_of(connection: sqlite3.Connection, path: Path) -> int:
+    """The version of a file; 0 for an empty one.
+
+    Raises:
+        LibraryError: If the file is another program's, or of a newer version of this one.
+    """
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    (application,) = connection.execute("PRAGMA application_id").fetchone()
+    if version > VERSION and application == APPLICATION_ID:
+        raise LibraryError(
+            f"{path}: the library is of a newer version of multiview-phd ({version}, this one "
+            f"knows {VERSION}); update the program, or name another library by --library"
+        )
+    (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    if application != APPLICATION_ID and (tables or version):
+        raise LibraryError(
+            f"{path}: expected a library of multiview-phd, found another database; name another "
+            "file by --library"
+        )
+    return int(version)
+
+
+def migrate(
+    connection: sqlite3.Connection,
+    path: Path,
+    migrations: tuple[tuple[str, ...], ...] = MIGRATIONS,
+) -> None:
+    """Bring a file to today's version: wholly or not at all, whoever else tries at once."""
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        for number in range(version_of(connection, path), len(migrations)):
+            for statement in migrations[number]:
+                connection.execute(statement)
+            connection.execute(f"PRAGMA user_version = {number + 1}")
+        connection.execute("COMMIT")
+    except BaseException:
+        connection.execute("ROLLBACK")
+        raise

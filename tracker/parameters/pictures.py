@@ -1,0 +1,29 @@
+"""Numbers of the pictures that stage 1 looks at: no larger than it needs, and upright."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from tracker.parameters.definition import Params, ui
+
+
+class PictureParams(Params):
+    """Size and turn of the pictures that stage 1 looks at; its boxes come back in full pixels."""
+
+    lines: Annotated[int, Field(ge=120, le=4320), ui("n_l", unit="px", log=True)] = 480
+    """A picture whose shorter side is longer than this is reduced to it."""
+
+    target_height: Annotated[int, Field(ge=16, le=2000), ui("n_t", unit="px", log=True)] = 160
+    """And further, down to half of that, until the middle one of the targets is this high."""
+
+    least_height: Annotated[
+        int, Field(ge=8, le=500), ui("n_m", unit="px", log=True, advanced=True)
+    ] = 40
+    """But never so far that the middle one of the targets is lower than this."""
+
+    level_from: Annotated[
+        float, Field(ge=0.0, le=3.2), ui("θ_l", unit="rad", step=0.01, advanced=True)
+    ] = 0.15
+    """The picture of a camera that is rolled further than this is turned until people stand."""

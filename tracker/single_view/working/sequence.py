@@ -1,0 +1,119 @@
+"""A recording as stage 1 looks at it, and its results as everybody else knows them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from tracker.boxes import Boxes
+from tracker.foreground import pack, unpack
+from tracker.sequences.frames import Picture, Pictures
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.protocol import ViewResult
+from tracker.single_view.working.view import WorkingView, working_view
+
+if TYPE_CHECKING:
+    from tracker.parameters import RunParameters
+
+_Made = TypeVar("_Made")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Working:
+    """A recording whose pictures are reduced and turned for stage 1."""
+
+    sequence: Sequence
+    """With the working pictures' calibrations and templates."""
+    reader: Pictures
+    """Of the working pictures."""
+    views: tuple[WorkingView | None, ...]
+    """None where a camera's own pictures are used as they are."""
+
+    @staticmethod
+    def of(sequence: Sequence, parameters: RunParameters, reader: Pictures) -> Working:
+        """What the chosen method of stage 1 is to work on.
+
+        Args:
+            sequence: The recording.
+            parameters: The method, and how large the pictures are to be.
+            reader: Of the recording's pictures.
+        """
+        views: tuple[WorkingView | None, ...] = (None,) * len(sequence.views)
+        used = parameters.method("single_view").used(parameters)
+        if used.pictures and any(part.group == "pictures" for part in used.reads):
+            views = tuple(
+                working_view(
+                    camera, sequence.room, sequence.target_half_extents, parameters.pictures
+                )
+                for camera in sequence.cameras
+            )
+        if all(view is None for view in views):
+            return Working(sequence, reader, views)
+        return Working(_reduced(sequence, views), _WorkingReader(reader, views), views)
+
+    def back(self, camera: int, result: ViewResult) -> ViewResult:
+        """A result in working pixels as one in the camera's own."""
+        view = self.views[camera]
+        if view is None:
+            return result
+        foreground = result.foreground
+        return replace(
+            result,
+            boxes=view.boxes_back(result.boxes),
+            sigmas=view.sigmas_back(result.sigmas),
+            estimates=view.boxes_back(result.estimates),
+            measurements=view.boxes_back(result.measurements),
+            samples=view.boxes_back(result.samples).astype(np.float32),
+            gates=view.gates_back(result.gates),
+            foreground=None if foreground is None else pack(view.mask(unpack(foreground))),
+        )
+
+
+def _reduced(sequence: Sequence, views: tuple[WorkingView | None, ...]) -> Sequence:
+    """The recording with the working pictures' calibrations and templates."""
+    cameras = {view.full.name: view for view in views if view is not None}
+    templates = []
+    for template in sequence.templates:
+        view = cameras.get(template.camera)
+        if view is not None:
+            drawn = Boxes.from_left_top(template.box[None]).centred[0]
+            box = Boxes(view.drawn_box(drawn, sequence.target_half_extents)).left_top
+            template = replace(template, box=box)
+        templates.append(template)
+    return replace(
+        sequence,
+        views=tuple(
+            own if view is None else replace(own, camera=view.camera)
+            for own, view in zip(sequence.views, views, strict=True)
+        ),
+        templates=tuple(templates),
+    )
+
+
+class _WorkingReader:
+    """The working pictures, made of another reader's."""
+
+    def __init__(self, reader: Pictures, views: tuple[WorkingView | None, ...]) -> None:
+        self._reader = reader
+        self._views = views
+        self._key = tuple(None if view is None else view.key for view in views)
+
+    def picture(self, camera: int, step: int) -> Picture | None:
+        return self._look(camera, self._reader.picture(camera, step))
+
+    def iterate(self, camera: int, first: int = 0) -> Iterator[Picture | None]:
+        for picture in self._reader.iterate(camera, first):
+            yield self._look(camera, picture)
+
+    def once(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
+        return self._reader.once(("working", self._key, name), make)
+
+    def check(self) -> None:
+        self._reader.check()
+
+    def _look(self, camera: int, picture: Picture | None) -> Picture | None:
+        view = self._views[camera]
+        return picture if view is None or picture is None else view.picture(picture)

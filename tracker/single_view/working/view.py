@@ -1,0 +1,237 @@
+"""One camera as stage 1 looks at it: its picture reduced and turned, its calibration likewise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from jaxtyping import Float, UInt8
+from numpy import ndarray
+
+from tracker.camera import Camera
+from tracker.parameters.pictures import PictureParams
+from tracker.sequences.sequence import Room
+from tracker.single_view.box_sizes import BoxSizes
+
+_SMALLER = 0.95
+"""A picture that would keep more than this of its size is left as it is."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WorkingView:
+    """The map between a camera's pixels and those that stage 1 works on.
+
+    A picture is reduced by the factors s along its axes and then turned by the camera's
+    roll θ, so that what stands in the room stands in the picture. Both are exact for the
+    calibration: with K of square pixels after the reduction, and Q the turn,
+
+        K' = T diag(s, 1) K,  R' = Q R,  t' = Q t,  (p2', p1') = Q (p2, p1)
+
+    for the lens's radial part does not know of turns, and its tangential one is a vector.
+    A box keeps its centre; its sizes are those of the upright target, and in the camera's
+    own picture it is as large as the axes of that target reach.
+    """
+
+    camera: Camera
+    """The calibration of the working picture."""
+    full: Camera
+    """That of the camera's own."""
+    factors: Float[ndarray, " 2"]
+    """s, horizontal and vertical."""
+    turn: Float[ndarray, "2 3"] | None
+    """From the reduced picture's pixels to the working picture's; None for no turn."""
+    roll: float
+    """θ, radians: how far the picture is turned, clockwise."""
+
+    @property
+    def scale(self) -> float:
+        """Working pixels in a full one."""
+        return float(np.sqrt(self.factors.prod()))
+
+    @property
+    def key(self) -> tuple[float, ...]:
+        """Of what is made from working pictures."""
+        return (*self.camera.image_size, *self.factors.tolist(), self.roll)
+
+    def picture(self, full: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h2 w2 3"]:
+        """The working picture: areas are averaged; beyond the camera's own picture it is black."""
+        reduced = cv2.resize(full, self._reduced_size, interpolation=cv2.INTER_AREA)
+        if self.turn is not None:
+            reduced = cv2.warpAffine(reduced, self.turn, self.camera.image_size)
+        return np.asarray(reduced, dtype=np.uint8)
+
+    def mask(self, working: UInt8[ndarray, "h2 w2"]) -> UInt8[ndarray, "h1 w1"]:
+        """A mask of the working picture as one of the camera's own, reduced."""
+        if self.turn is None:
+            return working
+        flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
+        return np.asarray(cv2.warpAffine(working, self.turn, self._reduced_size, flags=flags))
+
+    def points(self, full: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
+        """Full pixels as working pixels."""
+        reduced = (full + 0.5) * self.factors - 0.5
+        if self.turn is not None:
+            reduced = reduced @ self.turn[:, :2].T + self.turn[:, 2]
+        return np.asarray(reduced)
+
+    def points_back(self, working: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
+        """Working pixels as full pixels."""
+        reduced = working
+        if self.turn is not None:
+            reduced = (working - self.turn[:, 2]) @ self.turn[:, :2]
+        return np.asarray((reduced + 0.5) / self.factors - 0.5)
+
+    def drawn_box(
+        self, box: Float[ndarray, " 4"], half_extents: Float[ndarray, " 3"]
+    ) -> Float[ndarray, " 4"]:
+        """The upright box of a target around which one was drawn in the camera's own picture.
+
+        A person is more an ellipse than a rectangle. Of one with half axes w and h that is
+        turned by θ the bounds reach
+
+            W² = w² cos² θ + h² sin² θ,  H² = w² sin² θ + h² cos² θ
+
+        which is undone with the proportions w / h of the target.
+
+        Args:
+            box: Centre and half sizes, pixels.
+            half_extents: Of a target, metres.
+        """
+        aspect = float(half_extents[:2].mean() / half_extents[2])
+        across, along = abs(math.cos(self.roll)), abs(math.sin(self.roll))
+        width, height = box[2:] * self.factors
+        if across < along:
+            width, height, across, along = height, width, along, across
+        sizes = [
+            width / math.hypot(across, along / aspect),
+            height / math.hypot(across, along * aspect),
+        ]
+        return np.concatenate([self.points(box[None, :2])[0], sizes])
+
+    def boxes_back(self, working: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
+        """Boxes of upright targets as the camera's own picture has them.
+
+        Half sizes are how far the longer-reaching of the target's two axes comes, drawn turned:
+        what the fusion expects of a rolled camera's box is where the ends of the upright axis are.
+        """
+        centres = self.points_back(working[:, :2])
+        return np.concatenate([centres, self._reach(working[:, 2:])], axis=1)
+
+    def sigmas_back(self, working: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
+        """Standard deviations of boxes likewise."""
+        across, along = abs(math.cos(self.roll)), abs(math.sin(self.roll))
+        turned = np.array([[across, along], [along, across]])
+        centres = np.sqrt(working[:, :2] ** 2 @ (turned**2).T) / self.factors
+        return np.concatenate([centres, self._reach(working[:, 2:])], axis=1)
+
+    def gates_back(self, working: Float[ndarray, "G 5"]) -> Float[ndarray, "G 5"]:
+        """Ellipses, centre and xx, xy, yy of their matrix, likewise."""
+        matrix = working[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
+        turn = np.eye(2) if self.turn is None else self.turn[:, :2]
+        back = turn.T / self.factors[:, None]
+        full = back @ matrix @ back.T
+        ellipse = full.reshape(-1, 4)[:, [0, 1, 3]]
+        return np.concatenate([self.points_back(working[:, :2]), ellipse], axis=1)
+
+    def _reach(self, sizes: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
+        across, along = abs(math.cos(self.roll)), abs(math.sin(self.roll))
+        turned = np.maximum(sizes * across, sizes[:, ::-1] * along)
+        return np.asarray(turned / self.factors)
+
+    @property
+    def _reduced_size(self) -> tuple[int, int]:
+        width, height = self.full.image_size
+        return round(width * self.factors[0]), round(height * self.factors[1])
+
+
+def working_view(
+    camera: Camera, room: Room, half_extents: Float[ndarray, " 3"], parameters: PictureParams
+) -> WorkingView | None:
+    """What stage 1 is to see of a camera; None where its own pictures are just right.
+
+    Args:
+        camera: As calibrated.
+        room: Where targets are.
+        half_extents: Of a target, metres.
+        parameters: How large, and from which roll on it is turned.
+    """
+    scale = _scale(camera, room, half_extents, parameters)
+    roll = _roll(camera)
+    turned = abs(roll) > parameters.level_from and _can_turn(camera)
+    if scale > _SMALLER and not turned:
+        return None
+    scale = 1.0 if scale > _SMALLER else scale
+    width, height = camera.image_size
+    square = camera.intrinsics[0, 0] / camera.intrinsics[1, 1] if turned else 1.0
+    size = np.maximum(np.rint([width * scale, height * scale * square]), 1.0)
+    factors = size / [width, height]
+    intrinsics = camera.intrinsics.copy()
+    intrinsics[:2, :2] *= factors[:, None]
+    intrinsics[:2, 2] = (intrinsics[:2, 2] + 0.5) * factors - 0.5
+    reduced = replace(camera, intrinsics=intrinsics, image_size=(int(size[0]), int(size[1])))
+    if not turned:
+        return WorkingView(reduced, camera, factors, None, 0.0)
+    return _turned(reduced, camera, factors, roll)
+
+
+def _turned(
+    reduced: Camera, full: Camera, factors: Float[ndarray, " 2"], roll: float
+) -> WorkingView:
+    cos, sin = math.cos(roll), math.sin(roll)
+    rotation = np.array([[cos, sin], [-sin, cos]])
+    width, height = reduced.image_size
+    corners = np.array([[x, y] for x in (-0.5, width - 0.5) for y in (-0.5, height - 0.5)])
+    places = corners @ rotation.T
+    low = places.min(axis=0)
+    size = np.ceil(places.max(axis=0) - low)
+    shift = -low - 0.5
+    intrinsics = reduced.intrinsics.copy()
+    # the pixels are square to a rounding; what is left of it is shared
+    focal = math.sqrt(intrinsics[0, 0] * intrinsics[1, 1])
+    intrinsics[0, 0] = intrinsics[1, 1] = focal
+    intrinsics[:2, 2] = rotation @ intrinsics[:2, 2] + shift
+    turn = np.eye(3)
+    turn[:2, :2] = rotation
+    distortion = np.array(full.distortion, dtype=float)
+    if not full.fisheye:
+        distortion[[3, 2]] = rotation @ distortion[[3, 2]]
+    camera = replace(
+        reduced,
+        image_size=(int(size[0]), int(size[1])),
+        intrinsics=intrinsics,
+        rotation=turn @ full.rotation,
+        translation=turn @ full.translation,
+        distortion=distortion,
+    )
+    return WorkingView(camera, full, factors, np.column_stack([rotation, shift]), roll)
+
+
+def _scale(
+    camera: Camera, room: Room, half_extents: Float[ndarray, " 3"], parameters: PictureParams
+) -> float:
+    """How far a picture may be reduced."""
+    shorter = min(camera.image_size)
+    if shorter <= parameters.lines:
+        return 1.0
+    scale = parameters.lines / shorter
+    sizes = BoxSizes.of(camera, room, half_extents).sizes
+    if len(sizes):
+        height = 2.0 * float(np.median(sizes[:, 1]))
+        scale = min(scale, max(parameters.target_height / height, scale / 2.0))
+        scale = max(scale, parameters.least_height / height)
+    return min(scale, 1.0)
+
+
+def _can_turn(camera: Camera) -> bool:
+    """Whether the lens is the same after a turn: of a skewed picture it is not."""
+    return bool(abs(camera.intrinsics[0, 1]) < 1e-6 * camera.intrinsics[0, 0])
+
+
+def _roll(camera: Camera) -> float:
+    """By how much what stands on the optical axis leans to the right in the picture, radians."""
+    across, down, _ = camera.rotation[:, 2]
+    if math.hypot(across, down) < 0.2:  # seen from above or below, where upright is every way
+        return 0.0
+    return math.atan2(across, -down)

@@ -1,0 +1,1 @@
+"""Tracks in the forms of other programs."""
