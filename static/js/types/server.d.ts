@@ -669,6 +669,8 @@ declare namespace Server {
 		error: string | null;
 		/** Its number in the library that it was taken from; what the cameras found is not there. */
 		kept: number | null;
+		/** Whether the people are those of stage 3; else the filter's, as a live system would see. */
+		smoothed: boolean;
 		/** The key that a computation would have, where older code made what is shown; else empty. */
 		stands_for: string;
 	}
