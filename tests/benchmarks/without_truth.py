@@ -86,13 +86,15 @@ def main() -> int:
     if FILE.is_file():
         kept = json.loads(FILE.read_text(encoding="utf-8"))
     until = time.monotonic() + arguments.seconds
-    for name, sequence in sequences(arguments.data).items():
-        if arguments.only is not None and name not in arguments.only:
-            continue
-        pairs = kept.setdefault(name, [])
-        base = RunParameters(single_view="none")
-        while len(pairs) < arguments.settings and time.monotonic() < until:
-            run = pipeline.compute(sequence, with_values(base, settings(len(pairs))))
+    base = RunParameters(single_view="none")
+    whole = sequences(arguments.data)
+    for number in range(arguments.settings):
+        for name, sequence in whole.items():
+            pairs = kept.setdefault(name, [])
+            named = arguments.only is None or name in arguments.only
+            if len(pairs) > number or not named or time.monotonic() > until:
+                continue
+            run = pipeline.compute(sequence, with_values(base, settings(number)))
             truth = evaluate_sequence(sequence, run.tracks)["idf1"]
             pairs.append([round(estimate(run).score, 4), round(float(truth or 0.0), 4)])
             FILE.write_text(_text(kept), encoding="utf-8")
@@ -107,7 +109,7 @@ def main() -> int:
 
 
 def _text(kept: dict[str, list[list[float]]]) -> str:
-    lines = ",\n".join(f"{json.dumps(name)}: {json.dumps(pairs)}" for name, pairs in kept.items())
+    lines = ",\n".join(f"{json.dumps(k)}: {json.dumps(v)}" for k, v in kept.items() if v)
     return f"{{\n{lines}\n}}\n"
 
 

@@ -124,9 +124,9 @@ def _cut(
     there, _ = lifetimes(smoother, paths, shared, p)
     reasons = np.zeros(rows, dtype=np.int64)
     fed = np.bincount(shared.links.rows, shared.links.shares, rows) > _FED
-    longest = round(p.gap / step_time)
-    away = _long_gaps(paths, fed, longest) | (there < 0.5)
-    reasons[away | _not_bridged(paths, had, away, longest)] = 3
+    too_long = round(p.gap / step_time)
+    away = _long_gaps(paths, fed, too_long) | (there < 0.5)
+    reasons[away | _not_bridged(paths, had, away, too_long)] = 3
     around = round(_AROUND / step_time)
     # where boxes err alike for a while, past and future contradict each other by less than it seems
     jumps = np.flatnonzero(fitted.jumps * independence(step_time, p.memory) > p.jump)
