@@ -30,9 +30,10 @@ def toml(folder: Path, *, scale: float = 1.0, size: tuple[int, int] = SIZE) -> N
     (folder / "calibration.toml").write_text("\n".join(lines))
 
 
-def detections(folder: Path, first: int = 0) -> None:
+def detections(folder: Path, first: int = 0, *, size: tuple[int, int] = SIZE) -> None:
     for camera in cameras():
         frames, found = boxes(camera, PLACES)
+        found = found * np.tile(np.array(size) / SIZE, 2)
         rows = [
             f"{f + first},{','.join(map(str, b))}"
             for f, b in zip(frames, found.tolist(), strict=True)

@@ -180,21 +180,23 @@ class Draft:
             FormatError: If it cannot become one yet, or its name is taken.
         """
         with self._lock:
-            known, settled = self._known, self._known.settled
-            if settled is None or known.phase != "settled":
+            known = self._known
+            if known.phase != "settled":
                 raise FormatError(known.error or "the files are not understood yet; wait a moment")
             place = self.home / folder_name(known.wish.name)
             if place.exists():
                 raise FormatError(f"there is a recording {place.name} already; choose another name")
             self._stop.set()
             self._tell(phase="writing", busy=False)
-        arguments = (settled, known.wish, place, then)
+        arguments = (known.taken, known.wish, place, then)
         threading.Thread(target=self._write, args=arguments, name="import", daemon=True).start()
 
     def _write(
-        self, settled: Settled, wish: Wish, place: Path, then: Callable[[Path], object]
+        self, taken: tuple[Taken, ...], wish: Wish, place: Path, then: Callable[[Path], object]
     ) -> None:
         try:
+            # what was wished last may not have been looked into yet
+            settled = settle(taken, options_of(wish, taken))
             copied = wish.copy and self.upload is None
             told = write(settled, self.folder, wish.name, copy=copied)
             self.folder.replace(place)

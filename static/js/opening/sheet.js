@@ -18,6 +18,8 @@ export function mountOpening({ store, actions }) {
 	/** @type {AbortController | null} */
 	let sending = null;
 	let [shown, trouble, turns] = ["", "", 0];
+	/** What is being wished; writing comes after it. */
+	let wishing = Promise.resolve();
 	/** @type {Timer} */
 	let timer;
 
@@ -109,7 +111,7 @@ export function mountOpening({ store, actions }) {
 		info = { ...info, wish: told };
 		const { key } = info;
 		const turn = (turns += 1);
-		void attempt(async () => {
+		wishing = attempt(async () => {
 			const answer = await sendJson("PUT", `/api/import/${key}/wish`, told);
 			if (turn === turns && info?.key === key) take(answer);
 		});
@@ -178,6 +180,7 @@ export function mountOpening({ store, actions }) {
 	/** @param {boolean} open */
 	const write = (open) =>
 		attempt(async () => {
+			await wishing;
 			if (!info || one("[data-do=track]", dialog).disabled) return;
 			if (open) store.set({ asked: info.wish.name });
 			take(await sendJson("POST", `/api/import/${info.key}/write`, { open }));

@@ -66,13 +66,13 @@ declare namespace Server {
 		id: number;
 		/** Reprojected; null where a part is behind the camera. */
 		box: [number, number, number, number] | null;
-		/** Whether one of the camera's boxes fed it at this step. */
+		/** Whether one of the camera's boxes is associated with it at this step. */
 		seen: boolean;
 		detection_probability: number;
-		/** Index of the box that fed it among what the camera gave the fusion, -1 for none. */
+		/** Index of the associated box among those that the camera gave the fusion, -1 for none. */
 		source: number;
 		fed_by: Feeding | null;
-		/** Id of the target in front of it. */
+		/** Id of the target that occludes it; null for none. */
 		hidden_by: number | null;
 		visible: boolean;
 		/** Why it is not, or hardly, visible. */
@@ -232,12 +232,12 @@ declare namespace Server {
 		switches: Switch[];
 	}
 
-	/** The box that fed a track, as the camera gave it to the fusion. */
+	/** The box associated with a track, as the single-view stage gave it to the fusion. */
 	interface Feeding {
 		box: [number, number, number, number];
 		/** Its weight, existence or detector's score. */
 		weight: number;
-		/** Probability that it is this track's. */
+		/** Association probability: that this track made the box, 0 … 1. */
 		share: number;
 	}
 
@@ -467,6 +467,12 @@ declare namespace Server {
 	interface Measurement {
 		box: [number, number, number, number];
 		score: number;
+		/** Id of the track that it feeds; null where it is nobody's. */
+		track: number | null;
+		/** Of one that is nobody's: the track that it is nearest to. */
+		nearest: number | null;
+		/** And how far that is, in standard deviations of where its box is expected. */
+		sigmas: number | null;
 	}
 
 	/** The chosen methods. */
@@ -564,6 +570,8 @@ declare namespace Server {
 	/** A track of the pinned run. */
 	interface PinnedLife {
 		id: number;
+		/** Whose colours it has, among people with templates. */
+		name: string | null;
 		first: number;
 		/** Of its whole life. */
 		last: number;
@@ -751,6 +759,8 @@ declare namespace Server {
 		parameters: Record<string, any>;
 		/** Keys whose value is not the default. */
 		changed: string[];
+		/** Keys that have an effect with what is chosen. */
+		shown: string[];
 		/** The command that computes the same in a terminal; empty while nothing is open. */
 		command: string;
 		methods: MethodsInfo;
@@ -767,6 +777,7 @@ declare namespace Server {
 		selection: number | null;
 		/** Of the 3D view. */
 		layers: Record<string, boolean>;
+		trail: TrailInfo;
 		/** What the 3D view looks through: a camera's index, from above, or freely. */
 		view: number | "top" | null;
 		/** Of the 3D view. */
@@ -824,7 +835,10 @@ declare namespace Server {
 		first: number;
 		/** Steps a bucket: 1 where each step has its own value. */
 		stride: number;
+		/** Expected number of people. */
 		cardinality: Numbers;
+		/** Its standard deviation. */
+		deviation: Numbers;
 		/** Targets reported. */
 		count: Counts;
 		/** People really there, over all steps asked for. */
@@ -860,6 +874,8 @@ declare namespace Server {
 	/** A track's life. */
 	interface TrackLife {
 		id: number;
+		/** Whose colours it has, among people with templates. */
+		name: string | null;
 		first: number;
 		/** Of its whole life. */
 		last: number;
@@ -871,6 +887,14 @@ declare namespace Server {
 		 * Within the steps asked for; ones shorter than ``stride`` are joined with their neighbours.
 		 */
 		spans: ([number, number, "seen" | "coasting" | "long miss"])[];
+	}
+
+	/** How trails are drawn, in 3D and in pictures. */
+	interface TrailInfo {
+		/** How far back they go. */
+		seconds: number;
+		/** Whether they are fainter the older they are. */
+		fades: boolean;
 	}
 
 	/** Where a person really is. */

@@ -58,7 +58,7 @@ def _files(info: ImportInfo) -> Markup:
         element("p", element("b", one.label), " ", one.complaint or one.format or "is not used")
         for one in info.files
     ]
-    return element("div", rows, class_="in-scroll in-files")
+    return element("div", rows, class_="in-scroll in-files", tabindex=0)
 
 
 def _foot(info: ImportInfo) -> Markup:

@@ -130,6 +130,7 @@ def checks_part(info: ImportInfo) -> Markup:
         _pairs(info),
         _line("good" if info.truth else "absent", "truth", truth),
         class_="in-scroll",
+        tabindex=0,
         aria_label="Checks",
     )
 
@@ -207,6 +208,7 @@ def target_part(info: ImportInfo) -> Markup:
         heading("Then track with"),
         element("p", boxes if info.has_boxes else colours),
         class_="in-scroll",
+        tabindex=0,
         aria_label="Target and place",
     )
 
