@@ -848,7 +848,7 @@ declare namespace Server {
 		/** Where a run is pinned that is not the shown one. */
 		pinned: PinnedTimeline | null;
 		/** Of all steps, also of those not asked for, in their order. */
-		events: ([number, number, "birth" | "death" | "long miss"])[];
+		events: ([number, number, "birth" | "death" | "long miss" | "cut" | "joined" | "removed"])[];
 		/** How many more live there: the shorter ones, where they are very many. */
 		left_out: number;
 	}
