@@ -166,14 +166,20 @@ class Detect:
 
 @dataclass
 class Evaluate:
-    """Score a track file against the truth of the sequence that it is of."""
+    """Score a track file against the truth, or, without one, estimate how well ids hold."""
 
     sequence: Annotated[
         Positional[str], arg(metavar="SEQUENCE", help="A built-in room's name or a folder.")
     ]
     tracks: Annotated[
-        Positional[Path], arg(metavar="TRACKS.csv", help="As `track` and the page write it.")
-    ]
+        Positional[Path | None],
+        arg(
+            metavar="TRACKS.csv",
+            help="As `track` and the page write it. Without one nothing needs to be known of the "
+            "truth: the sequence is tracked forward, backwards and without each camera.",
+            help_behavior_hint="(optional)",
+        ),
+    ] = None
     json: FlagCreatePairsOff[bool] = False
     """Print everything as JSON instead of tables."""
     html: Annotated[Path | None, arg(metavar="REPORT.html", help_behavior_hint="(optional)")] = None
