@@ -33,6 +33,7 @@ BUILT_IN: dict[MethodKey, tuple[str, ...]] = {
         "tracker.parameters.jpda:METHOD",
         "tracker.parameters.pseudo_particle:METHOD",
         "tracker.parameters.association_matrix:METHOD",
+        "tracker.parameters.onnx_detector:METHOD",
         "tracker.parameters.detections:FILTERED",
         "tracker.parameters.detections:AS_THEY_ARE",
     ),
@@ -56,8 +57,8 @@ FOLLOWING = ("colour_phd", "none")
 for, else the first that can work on it at all."""
 
 FOLLOWS = (
-    "follows the recording: colour_phd with pictures and templates, else none with "
-    "detections, else colour_phd"
+    "follows the recording: onnx_detector where a detector is named, else colour_phd with "
+    "pictures and templates, else none with detections, else colour_phd"
 )
 """The same in words."""
 
