@@ -120,9 +120,10 @@ class PeakFinder:
         )
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
-        """Standard deviations of peaks: proportional to the box."""
+        """Standard deviations of peaks: proportional to the box, and no more of a large one."""
         p = self._parameters
         half_sizes = np.maximum(boxes[:, 2:], 0.5)
+        half_sizes = half_sizes * np.minimum(1.0, p.sigma_height / half_sizes[:, 1:])
         return np.concatenate([p.centre_sigma * half_sizes, p.size_sigma * half_sizes], axis=1)
 
     def _sample(

@@ -127,7 +127,9 @@ class _Foreground:
     ) -> None:
         self._parameters = parameters
         self._minimum_area = foreground.minimum_area
-        self._model: ForegroundModel | None = learn(sequence, camera_index, reader, foreground)
+        self._model: ForegroundModel | None = learn(
+            sequence, camera_index, reader, foreground, motion=True
+        )
         camera = sequence.views[camera_index].camera
         self._sizes = (
             TargetSizes(
