@@ -58,7 +58,7 @@ class Palette:
 
     tracks: UInt8[ndarray, "24 3"]
     canvas: Rgb
-    """viser's background: what a fading colour fades to."""
+    """viser's background, into which faded colours are blended."""
     grid_minor: Rgb
     grid_major: Rgb
     line: Rgb
@@ -71,7 +71,7 @@ class Palette:
     pinned: Rgb
     """Whatever belongs to the run that this one is compared with."""
     errors: tuple[Rgb, Rgb]
-    """Of the line from truth to estimate: without an error, and with one as large as counts."""
+    """Ends of the scale of position errors: none, and the largest that the scale tells apart."""
 
     def of(self, tracks: Int[ndarray, " N"]) -> UInt8[ndarray, "N 3"]:
         """Red, green and blue of each track id."""
@@ -85,7 +85,7 @@ class Palette:
         return mix(np.asarray(self.canvas), colours, strength)
 
     def error(self, share: Float[ndarray, " N"]) -> UInt8[ndarray, "N 3"]:
-        """From the colour of no error to that of the largest that counts."""
+        """The colour of an error by its share, 0 … 1, of the largest on :attr:`errors`."""
         none, most = (np.asarray(colour, dtype=np.uint8) for colour in self.errors)
         return mix(none, np.broadcast_to(most, (*np.shape(share), 3)), share)
 

@@ -111,6 +111,6 @@ MISTAKES: dict[str, tuple[Callable[[Sequence], Sequence], str]] = {
     "corners": (corners, "--boxes xyxy"),
     "counted from 1": (counted_from_one, "--first-index 1"),
     "normalised": (normalised, "--boxes ltwh-normalised"),
-    "exchanged": (exchanged, "--swap cam1,cam2"),
+    "exchanged": (exchanged, "--swap cam1=cam2"),
 }
 """Of each: how it is made, and the remedy that must be named."""

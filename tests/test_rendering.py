@@ -21,7 +21,7 @@ from tracker.sequences.rendering.cast.paths import FASTEST, FRAMES_PER_SECOND, w
 from tracker.sequences.rendering.raster import floor_shadows
 from tracker.sequences.rendering.rooms import CAMERAS, TARGET_HALF_EXTENTS
 from tracker.sequences.rendering.scene import Scene, script
-from tracker.sequences.rendering.studio import Studio
+from tracker.sequences.rendering.studio import Studio, studio_of
 from tracker.sequences.rendering.walls.background import Tracer
 from tracker.sequences.rendering.walls.interior import furnish
 
@@ -33,7 +33,7 @@ def scenes() -> dict[str, Scene]:
 
 @pytest.fixture(scope="module")
 def studio() -> Studio:
-    return Studio(ROOMS["room44-3p"], CAMERAS[:2], seed=0)
+    return studio_of(ROOMS["room44-3p"], CAMERAS[:2], seed=0)
 
 
 @pytest.fixture(scope="module")
@@ -248,7 +248,7 @@ def test_videos_have_every_step(rendered: Path) -> None:
         pictures.append(picture)
     assert len(pictures) == 64
     assert pictures[0].shape == (288, 360, 3)
-    drawn = Studio(ROOMS["room24-2p"], CAMERAS[:2], 0).draw(50, 51).pictures[0][0]
+    drawn = studio_of(ROOMS["room24-2p"], CAMERAS[:2], 0).draw(50, 51).pictures[0][0]
     assert np.abs(pictures[50].astype(float) - drawn).mean() < 4.0
 
 

@@ -1,7 +1,6 @@
-"""The assignment of least cost, whose library is read when it is first asked.
+"""The assignment of least cost, whose library is imported when it is first needed.
 
-SciPy's optimisers take a quarter of a second to import; a server that only shows its page need
-not wait for them.
+SciPy's optimisers are slow to import; a server that only shows its page need not wait for them.
 """
 
 from __future__ import annotations

@@ -3,7 +3,9 @@
 World: metres, z up, right-handed. Camera: OpenCV axes (x right, y down, z ahead),
 ``x_camera = R @ x_world + t``. Image: pixels, origin at the centre of the top-left
 pixel, x right, y down. Lens: OpenCV's radial-tangential model (k1 k2 p1 p2 k3), its rational
-model (k4 k5 k6 as well), or its fisheye.
+model (k4 k5 k6 as well), or its fisheye; the equations are those of OpenCV's calib3d module
+(Brown, "Close-range camera calibration", Photogrammetric Engineering 37(8), 1971; Kannala, Brandt,
+IEEE TPAMI 28(8), 2006).
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ NEAREST_DEPTH = 0.05
 """Metres: a point nearer than this in front of the lens counts as behind the camera."""
 
 _LENS_ITERATIONS = 12
-"""Of Newton's method at most, which doubles the digits with each."""
+"""Of Newton's method at most, which doubles the correct digits with each."""
 
 _CORNER_SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 

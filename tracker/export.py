@@ -96,7 +96,7 @@ def write_tracks_csv(
 
 def _fixed(values: Float[ndarray, "N C"], decimals: int) -> Iterator[list[str]]:
     """Columns of text with a fixed number of decimals; NaN is empty, and zero has no sign."""
-    rounded = np.round(values, decimals) + 0.0  # −0.0 + 0.0 is 0.0
+    rounded = np.round(values, decimals) + 0.0  # turns −0.0 into 0.0
     for column in rounded.T:
         yield [f"{number:.{decimals}f}" if number == number else "" for number in column.tolist()]
 

@@ -16,7 +16,7 @@ from numpy import ndarray
 from tracker.kernels.pictures import images
 
 ITERATIONS = 30
-"""Steps after which a climb ends; most end after five to ten."""
+"""Steps after which a climb ends; most converge well before."""
 
 TOLERANCE = 0.01
 """A climb ends when a step is shorter than this many half sizes: far below any peak's deviation."""

@@ -20,7 +20,7 @@ from numpy import ndarray
 from tracker.kernels import particles
 
 ITERATIONS = 30
-"""Steps after which a climb ends; most end after five."""
+"""Steps after which a climb ends; most converge well before."""
 
 TOLERANCE = 0.01
 """A climb ends when a step is shorter than this many half sizes: far below any mode's deviation."""
@@ -49,7 +49,7 @@ def normalised_by_group(
 ) -> Float[ndarray, " S"]:
     """Weights that sum to 1, each group's to its share of the particles.
 
-    Whoever fits his colours a little worse than another loses no particles to him.
+    A target that fits its colours a little worse than another loses no particles to it.
 
     Args:
         logarithms: Of the weights, however small.

@@ -60,7 +60,7 @@ def compute(
         on_progress: Called from this thread every so often, and at the end, with the
             run so far: its steps below ``done`` may be read.
         cancelled: Asked between steps and pictures, also by the threads of the cameras.
-        thread_begins: What each of these threads does first: give itself a priority, say.
+        thread_begins: Called first in each of these threads, for instance to set its priority.
 
     Returns:
         The run, complete unless ``steps`` says otherwise.

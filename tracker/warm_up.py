@@ -46,7 +46,7 @@ _COLOURS = ((40, 40, 220), (220, 60, 40))
 """Of the two people, blue green red."""
 
 HALVES = ("first", "second")
-"""Two processes' work: the fusion's step is the longest to compile, and goes by itself."""
+"""The work of two processes: the fusion's step takes longest to compile, and has its own."""
 
 _OTHER_WAYS = (
     {"fusion.update": "unscented"},

@@ -8,7 +8,14 @@ from pathlib import Path
 
 from app.command.flags import Experiment as Command
 from app.command.terminal import Bar, CommandError, check_data, print_table, say
-from tracker.experiments import EXPERIMENTS, Context, Experiment, Result, Unavailable
+from tracker.experiments import (
+    EXPERIMENTS,
+    Context,
+    Experiment,
+    RandomRooms,
+    Result,
+    Unavailable,
+)
 from tracker.experiments.laboratory.pool import cores
 from tracker.experiments.laboratory.writing import can_draw, write
 from tracker.parameters import ParameterError
@@ -43,7 +50,14 @@ def experiment(command: Command) -> None:
             'pip install "multiview-phd[figures]" brings it'
         )
     with _Bars() as bars:
-        context = Context(quick=command.quick, data=command.data, processes=cores(), told=bars.told)
+        context = Context(
+            quick=command.quick,
+            data=command.data,
+            output=command.output,
+            rooms=RandomRooms(command.count, command.first, command.method, command.keep_rooms),
+            processes=cores(),
+            told=bars.told,
+        )
         for one in chosen:
             begin = time.perf_counter()
             try:
@@ -90,14 +104,14 @@ class _Bars:
         self.close()
 
     def told(self, words: str, done: int, total: int) -> None:
-        """So far; other words begin another bar."""
+        """Show how much is done; other words begin another bar."""
         if self._bar is None or words != self._words:
             self.close()
             self._words, self._bar = words, Bar(words, "step")
         self._bar.at(done, total)
 
     def close(self) -> None:
-        """Nothing is being done."""
+        """Remove the bar."""
         if self._bar is not None:
             self._bar.__exit__()
             self._bar = None

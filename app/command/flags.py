@@ -87,8 +87,8 @@ class Track:
     ] = ()
     """One parameter, as in --set fusion.survival_probability=0.98; `parameters` lists the keys."""
     seed: int = 0
-    """Seed of all randomness; the same seed gives the same tracks, but for last digits on processors
-    without fused multiply-add."""
+    """Seed of all randomness; the same seed gives the same tracks, but for the last digits on
+    processors without fused multiply-add."""
     cache: bool = True
     """Take up what the cameras found in an earlier run with the same values, and keep it."""
     library: LibraryFile = None
@@ -158,9 +158,20 @@ class Experiment:
         arg(metavar="NAME", help="Which one.", help_behavior_hint="(optional)"),
     ] = None
     all: FlagCreatePairsOff[bool] = False
-    """Run every one, a few minutes in all."""
+    """Run every one, a quarter of an hour in all."""
     quick: FlagCreatePairsOff[bool] = False
     """Shortened to what shows the direction of each claim."""
+    count: int = 20
+    """Of `rooms`: how many random rooms."""
+    first: int = 0
+    """Of `rooms`: seed of the first; the others follow."""
+    method: Annotated[
+        UseAppendAction[tuple[str, ...]],
+        arg(metavar="NAME", help_behavior_hint="(repeatable; default: all)"),
+    ] = ()
+    """Of `rooms`: only this single-view method."""
+    keep_rooms: FlagCreatePairsOff[bool] = False
+    """Of `rooms`: leave the rendered rooms in the output folder, about 15 MB each."""
     output: Annotated[Path, arg(metavar="DIR")] = Path("experiment-results")
     """Folder for the figures (PNG) and numbers (JSON)."""
     data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None
@@ -202,9 +213,12 @@ class Import:
     ] = None
     """Axes of a camera: y down and z ahead, or y up and z back."""
     boxes: Annotated[
-        Literal["ltwh", "xyxy", "cxcywh"] | None, arg(help_behavior_hint="(default: found out)")
+        Literal["ltwh", "xyxy", "cxcywh", "ltwh-normalised", "xyxy-normalised", "cxcywh-normalised"]
+        | None,
+        arg(help_behavior_hint="(default: found out)"),
     ] = None
-    """What the four numbers of a box are: left, top and size; two corners; centre and size."""
+    """What the four numbers of a box are: left, top and size; two corners; centre and size; in
+    pixels, or normalised: as parts of the picture's width and height."""
     first_index: Annotated[int | None, arg(help_behavior_hint="(default: found out)")] = None
     """Number of the first frame in boxes and truth, 0 or 1."""
     fps: Annotated[float | None, arg(help_behavior_hint="(default: the videos')")] = None
@@ -214,6 +228,11 @@ class Import:
         arg(metavar="NAME=FILE", help_behavior_hint="(repeatable)"),
     ] = ()
     """Video, folder of pictures or boxes of a camera, where names do not tell."""
+    swap: Annotated[
+        UseAppendAction[tuple[str, ...]],
+        arg(metavar="NAME=NAME", help_behavior_hint="(repeatable)"),
+    ] = ()
+    """Two cameras whose calibrations are each other's; exchanged in the order given."""
 
 
 @dataclass
@@ -253,14 +272,24 @@ class Sequences:
 
 @dataclass
 class Render:
-    """Render a built-in room into a folder, as an ordinary sequence."""
+    """Render a built-in room, or with --random a room of any kind, as an ordinary sequence."""
 
-    name: Annotated[Positional[str], arg(metavar="NAME", help="`sequences` lists the names.")]
-    folder: Annotated[Positional[Path], arg(metavar="FOLDER", help="It must not exist yet.")]
+    places: Annotated[
+        Positional[tuple[str, ...]],
+        arg(
+            metavar="[NAME] FOLDER",
+            help="A room (`sequences` lists the names; none with --random), and a folder that "
+            "must not exist yet.",
+        ),
+    ]
+    random: Annotated[int | None, arg(metavar="SEED", help_behavior_hint="(optional)")] = None
+    """Draw the room by this seed: cameras, lenses, people, light and what disturbs."""
+    detections: FlagCreatePairsOff[bool] = False
+    """With --random: write the boxes too that a detector would find."""
     cameras: int = 2
-    """Two as in the paper, or three."""
+    """Of a built-in room: two as in the paper, or three."""
     seed: int = 0
-    """Seed of the noise."""
+    """Of a built-in room: seed of the noise."""
 
 
 @dataclass

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +43,9 @@ def _import(command: Import) -> int:
 
     if command.output is not None and (command.output / FILE).exists():
         raise CommandError(f"{command.output}: holds a {FILE} already; name another folder")
-    taken = gather([*command.sources, *_not_inside(options.cameras.values(), command.sources)])
+    taken = gather(
+        [*command.sources, *_not_inside((path for _, path in options.cameras), command.sources)]
+    )
     print_table(
         ("file", "taken for", "note"),
         [(one.label, one.format if one.pieces else "–", one.complaint) for one in taken],
@@ -61,7 +63,7 @@ def _import(command: Import) -> int:
     for sentence in write(settled, command.output, name, copy=command.copy):
         say(sentence)
     say(f"{facts}, written to {command.output}")
-    _print_checks(library.open_sequence(str(command.output)))
+    _print_checks(library.open_sequence(str(command.output)), settled.reading)
     return 0
 
 
@@ -92,23 +94,29 @@ def _options(command: Import) -> Any:
         raise ParameterError(
             "--fps", f"expected a rate above 0 and up to 1000, got {command.fps:g}"
         )
-    cameras: dict[str, Path] = {}
-    for item in command.camera:
-        name, mark, path = item.partition("=")
-        if not mark or not path:
-            raise ParameterError("--camera", f"expected NAME=FILE, got {item!r}")
-        cameras[name] = Path(path)
     first: Any = command.first_index
+    layout, _, normalised = (command.boxes or "").partition("-")
+    boxes: Any = layout or None
     return ImportOptions(
         unit=unit,
         up=command.up,
         pose=command.pose,
         axes=command.axes,
-        boxes=command.boxes,
+        boxes=boxes,
+        normalised=True if normalised else None,
         first_index=first,
         fps=command.fps,
-        cameras=cameras,
+        cameras=tuple((a, Path(b)) for a, b in _pairs("--camera", "NAME=FILE", command.camera)),
+        swap=tuple(_pairs("--swap", "NAME=NAME", command.swap)),
     )
+
+
+def _pairs(flag: str, form: str, items: Sequence[str]) -> Iterator[tuple[str, str]]:
+    for item in items:
+        first, _, second = item.partition("=")
+        if not first or not second:
+            raise ParameterError(flag, f"expected {form}, got {item!r}")
+        yield first, second
 
 
 def _check(command: Check) -> int:
@@ -119,11 +127,14 @@ def _check(command: Check) -> int:
     return _print_checks(sequence)
 
 
-def _print_checks(sequence: Any) -> int:
+def _print_checks(sequence: Any, reading: Any = None) -> int:
     """Every check in a row; status 1 where one of them warns."""
     from tracker.checks import check
+    from tracker.importing.remedies import for_import
 
     checks = check(sequence)
+    if reading is not None:
+        checks = [for_import(one, reading) for one in checks]
     rows = [(SIGNS[one.status], one.name, str(one)) for one in checks]
     rows += [("!", "opening", warning) for warning in sequence.warnings]
     print_table(("", "check", "found"), rows)

@@ -54,12 +54,12 @@ def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit status."""
     try:
         status = _run(parse(arguments))
-        sys.stdout.flush()  # at the interpreter's end nobody could hear that the reader is gone
+        sys.stdout.flush()  # a pipe that is closed raises here, where it is caught, not at exit
         return status
     except ParameterError as error:
         say(str(error))
         return USAGE
-    except BrokenPipeError:  # whoever read our output has enough
+    except BrokenPipeError:  # the reader of our output closed its end, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except (Exception, KeyboardInterrupt) as error:
@@ -110,7 +110,7 @@ def _run(command: Arguments) -> int:
 
 
 def _is_interruption(error: BaseException | None) -> bool:
-    """Whether Ctrl-C is behind it: one heard inside a compiled kernel comes out as its failure."""
+    """Whether Ctrl-C caused an exception: inside a compiled kernel it is raised as another one."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__
     return error is not None
@@ -334,23 +334,31 @@ def _sequences(command: Sequences) -> None:
 def _render(command: Render) -> None:
     from tracker.sequences import rendering
 
-    if command.name not in rendering.ROOMS:
+    if len(command.places) != (2 if command.random is None else 1):
+        wanted = "NAME FOLDER" if command.random is None else "FOLDER alone with --random"
+        found = " ".join(command.places) or "nothing"
+        raise ParameterError("[NAME] FOLDER", f"expected {wanted}, got {found}")
+    folder = Path(command.places[-1])
+    name = f"random room {command.random}" if command.random is not None else command.places[0]
+    if command.random is None and name not in rendering.ROOMS:
         known = ", ".join(rendering.ROOMS)
-        raise ParameterError("NAME", f"expected one of {known}, got {command.name!r}")
+        raise ParameterError("NAME", f"expected one of {known}, got {name!r}")
     _check_seed(command.seed)
+    if command.random is not None:
+        _check_seed(command.random, "--random")
     if command.cameras not in (2, 3):
         raise ParameterError("--cameras", f"expected 2 or 3, got {command.cameras}")
-    if command.folder.exists():
-        raise CommandError(f"{command.folder} exists; name a folder that does not")
+    if folder.exists():
+        raise CommandError(f"{folder} exists; name a folder that does not")
+    cameras = command.cameras
     with Bar("rendering", "frame") as bar:
-        rendering.render(
-            command.name,
-            command.folder,
-            cameras=command.cameras,
-            seed=command.seed,
-            progress=bar.at,
-        )
-    say(f"{command.name} with {command.cameras} cameras, written to {command.folder}")
+        if command.random is not None:
+            cameras = rendering.render_random(
+                command.random, folder, detections=command.detections, progress=bar.at
+            ).cameras
+        else:
+            rendering.render(name, folder, cameras=cameras, seed=command.seed, progress=bar.at)
+    say(f"{name} with {cameras} cameras, written to {folder}")
 
 
 def _check_keep(keep: int) -> None:
@@ -358,9 +366,9 @@ def _check_keep(keep: int) -> None:
         raise ParameterError("--keep", f"expected a whole number from 0, got {keep}")
 
 
-def _check_seed(seed: int) -> None:
+def _check_seed(seed: int, flag: str = "--seed") -> None:
     if seed < 0:
-        raise ParameterError("--seed", f"expected a whole number from 0, got {seed}")
+        raise ParameterError(flag, f"expected a whole number from 0, got {seed}")
 
 
 def _parameters() -> None:

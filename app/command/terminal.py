@@ -31,7 +31,7 @@ def say(text: str) -> None:
 
 
 class Bar:
-    """A progress bar on standard error, there from the first step on, and only for people."""
+    """A progress bar on standard error, from the first step on, and only on a terminal."""
 
     def __init__(self, words: str, unit: str) -> None:
         self._words = words
@@ -46,7 +46,7 @@ class Bar:
             self._bar.close()
 
     def at(self, done: int, total: int) -> None:
-        """So far."""
+        """Show that ``done`` of ``total`` units are done."""
         if self._bar is None:
             from tqdm import tqdm
 

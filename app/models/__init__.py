@@ -12,6 +12,7 @@ from app.models.base import (
     Vector,
 )
 from app.models.requests import (
+    CurveRequest,
     LayerChanges,
     OpenRequest,
     ParameterChanges,
@@ -25,6 +26,7 @@ from app.models.requests import (
     StreamSeek,
     StreamSelect,
     ThemeChange,
+    TrailChanges,
     ViewChange,
 )
 from app.models.state import (
@@ -44,6 +46,7 @@ from app.models.state import (
     State,
     TargetInfo,
     TeachingInfo,
+    TrailInfo,
     ViserInfo,
 )
 from app.models.step import (
@@ -79,6 +82,7 @@ __all__ = [
     "CameraTrack",
     "CameraTruth",
     "Counts",
+    "CurveRequest",
     "EntranceInfo",
     "Estimate",
     "Feeding",
@@ -122,6 +126,8 @@ __all__ = [
     "Timeline",
     "Track",
     "TrackLife",
+    "TrailChanges",
+    "TrailInfo",
     "Truth",
     "Vector",
     "ViewChange",

@@ -42,6 +42,21 @@ class PresetName(Model):
     name: str = Field(max_length=4096)
 
 
+class TrailChanges(Model):
+    """How trails are drawn, in 3D and in pictures."""
+
+    seconds: float | None = Field(None, ge=0.5, le=600.0)
+    """How far back they go."""
+    fades: bool | None = None
+    """Whether they are fainter the older they are."""
+
+
+class CurveRequest(Model):
+    """Compute what some parameters would change."""
+
+    keys: list[str] = Field(max_length=40)
+
+
 class LayerChanges(Model):
     """Layers of the 3D view, by name."""
 
@@ -87,14 +102,14 @@ class StreamSelect(SelectChange):
 
 
 class StreamMotion(Model):
-    """From the page over the socket: what its person wishes of movement."""
+    """From the page over the socket: whether its browser asks for reduced motion."""
 
     type: Literal["motion"]
     flies: bool
-    """False: another view in 3D is there at once, however it was chosen."""
+    """Whether the 3D view may animate a change of viewpoint; false for reduced motion."""
 
 
 class StreamPing(Model):
-    """From the page over the socket: is anybody there?"""
+    """From the page over the socket: asks for a ``pong``, which shows that the server answers."""
 
     type: Literal["ping"]

@@ -120,6 +120,15 @@ class TeachingInfo(Model):
     """Whether the 3D view has handles on the room."""
 
 
+class TrailInfo(Model):
+    """How trails are drawn, in 3D and in pictures."""
+
+    seconds: float
+    """How far back they go."""
+    fades: bool
+    """Whether they are fainter the older they are."""
+
+
 class ViserInfo(Model):
     """Where the 3D view is."""
 
@@ -136,6 +145,8 @@ class State(Model):
     parameters: dict[str, Any]
     changed: list[str]
     """Keys whose value is not the default."""
+    shown: list[str]
+    """Keys that have an effect with what is chosen."""
     command: str
     """The command that computes the same in a terminal; empty while nothing is open."""
     methods: MethodsInfo
@@ -150,6 +161,7 @@ class State(Model):
     selection: int | None
     layers: dict[str, bool]
     """Of the 3D view."""
+    trail: TrailInfo
     view: int | Literal["top"] | None
     """What the 3D view looks through: a camera's index, from above, or freely."""
     theme: Literal["dark", "light"]

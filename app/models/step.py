@@ -14,6 +14,12 @@ class Measurement(Model):
 
     box: Box
     score: float
+    track: int | None = None
+    """Id of the track that it feeds; null where it is nobody's."""
+    nearest: int | None = None
+    """Of one that is nobody's: the track that it is nearest to."""
+    sigmas: float | None = None
+    """And how far that is, in standard deviations of where its box is expected."""
 
 
 class Estimate(Model):
@@ -41,13 +47,13 @@ Reason = Literal["out of view", "behind camera", "near the edge"]
 
 
 class Feeding(Model):
-    """The box that fed a track, as the camera gave it to the fusion."""
+    """The box associated with a track, as the single-view stage gave it to the fusion."""
 
     box: Box
     weight: float
     """Its weight, existence or detector's score."""
     share: float
-    """Probability that it is this track's."""
+    """Association probability: that this track made the box, 0 … 1."""
 
 
 class CameraTrack(Model):
@@ -57,13 +63,13 @@ class CameraTrack(Model):
     box: Box | None
     """Reprojected; null where a part is behind the camera."""
     seen: bool
-    """Whether one of the camera's boxes fed it at this step."""
+    """Whether one of the camera's boxes is associated with it at this step."""
     detection_probability: float
     source: int
-    """Index of the box that fed it among what the camera gave the fusion, -1 for none."""
+    """Index of the associated box among those that the camera gave the fusion, -1 for none."""
     fed_by: Feeding | None
     hidden_by: int | None
-    """Id of the target in front of it."""
+    """Id of the target that occludes it; null for none."""
     visible: bool
     reason: Reason | None
     """Why it is not, or hardly, visible."""

@@ -36,6 +36,13 @@ class ValueChange(Model):
     value: float = Field(ge=-1e4, le=1e4, allow_inf_nan=False)
 
 
+class TargetChange(Model):
+    """How large a person is."""
+
+    half_extents: Vector
+    """Half width, depth and height, metres."""
+
+
 class NewEntrance(Model):
     """Where people appear."""
 

@@ -17,6 +17,8 @@ class TrackLife(Model):
     """A track's life."""
 
     id: int
+    name: str | None = None
+    """Whose colours it has, among people with templates."""
     first: int
     last: int
     """Of its whole life."""
@@ -70,6 +72,9 @@ class Timeline(Model):
     stride: int
     """Steps a bucket: 1 where each step has its own value."""
     cardinality: Numbers
+    """Expected number of people."""
+    deviation: Numbers
+    """Its standard deviation."""
     count: Counts
     """Targets reported."""
     truth: Counts | None

@@ -15,7 +15,7 @@ from tracker.trajectories import Trajectories
 DEFAULT_MASS = 0.9
 """Probability that an ellipsoid holds of its Gaussian."""
 
-TRAIL_SECONDS, FUTURE_SECONDS = 4.0, 2.0
+FUTURE_SECONDS = 2.0
 """How far back, and how far ahead, the way of a track is drawn."""
 
 _CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)

@@ -16,7 +16,7 @@ from viser._messages import HotkeyKey, KeyModifier
 from app.paths import static_folder
 
 VISERS_OWN = frozenset({*"WASDQE", "arrowup", "arrowdown", "arrowleft", "arrowright"})
-"""They move its viewpoint."""
+"""Keys with which viser itself moves the viewpoint."""
 
 _MODIFIERS: dict[str, KeyModifier | None] = {"": None, "Shift": "shift", "Ctrl": "cmd/ctrl"}
 _KNOWN: dict[str, HotkeyKey] = {key.lower(): key for key in get_args(HotkeyKey)}

@@ -21,6 +21,7 @@ DISC = 26.0
 """Pixels across, of the disc behind a label of 12 pixels."""
 
 NO_TURN = np.array([1.0, 0.0, 0.0, 0.0])
+"""The identity as a unit quaternion w, x, y, z."""
 
 
 class Lines:

@@ -11,8 +11,9 @@ from numpy import ndarray
 
 from app.colours import PALETTES, Palette, mix
 from app.scene import geometry
-from app.scene.geometry import FUTURE_SECONDS, TRAIL_SECONDS
+from app.scene.geometry import FUTURE_SECONDS
 from app.scene.nodes import Lines, Meshes, Tag, Tags
+from app.state.snapshot import Trail
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.pipeline import Run
 from tracker.sequences.sequence import Room, Sequence
@@ -70,6 +71,7 @@ class PeopleNodes:
         selected: int | None,
         layers: Mapping[str, bool],
         palette: Palette,
+        trail: Trail,
     ) -> None:
         """Draw one step.
 
@@ -81,6 +83,7 @@ class PeopleNodes:
             layers: Which of boxes, ellipsoids and trails are on, and whether tracks other
                 than the selected one are.
             palette: Of the theme.
+            trail: How long trails are.
         """
         self._palette = palette
         tracks = run.tracks if run is not None else Trajectories.empty(len(sequence.views))
@@ -102,10 +105,11 @@ class PeopleNodes:
             sequence.fps,
             float(sequence.room.minimum[2]),
             selected,
+            trail,
         )
         posterior = run.fused[step].posterior if run is not None else GaussianMixture.empty(3)
         recent = slice(
-            int(np.searchsorted(tracks.frames, step - round(TRAIL_SECONDS * sequence.fps))),
+            int(np.searchsorted(tracks.frames, step - round(trail.seconds * sequence.fps))),
             now.stop,
         )
         known = dict(zip(tracks.labels[recent].tolist(), tracks.ids[recent].tolist(), strict=True))
@@ -188,15 +192,22 @@ class PeopleNodes:
         self._rays.show(segments, shade[None])
 
     def _show_trails(
-        self, tracks: Trajectories, step: int, fps: float, floor: float, selected: int | None
+        self,
+        tracks: Trajectories,
+        step: int,
+        fps: float,
+        floor: float,
+        selected: int | None,
+        trail: Trail,
     ) -> None:
         """Where people walked, on the floor."""
-        way = geometry.trails(tracks, step, TRAIL_SECONDS, fps, ahead=FUTURE_SECONDS)
+        way = geometry.trails(tracks, step, trail.seconds, fps, ahead=FUTURE_SECONDS)
         way.segments[..., 2] = floor + 0.012
         past = way.ages[:, 1] >= 0.0
-        span = np.where(past, TRAIL_SECONDS, -FUTURE_SECONDS)[:, None]
+        span = np.where(past, trail.seconds, -FUTURE_SECONDS)[:, None]
         full = np.where(past, 0.92, 0.5)[:, None]
-        strength = full - (full - 0.12) * way.ages / span
+        fading = np.where(past, trail.fades, True)[:, None]
+        strength = full - fading * (full - 0.12) * way.ages / span
         shades = self._palette.of(way.ids)[:, None].repeat(2, axis=1)
         shades = mix(np.asarray(self._palette.ground), shades, strength)
         chosen = way.ids == (selected if selected is not None else -1)

@@ -11,6 +11,7 @@ from app.colours import Palette
 from app.scene import geometry
 from app.scene.nodes import Lines
 from app.state.pairs import GATE, pairs_at
+from app.state.snapshot import Trail
 from tracker.sequences.sequence import Sequence
 from tracker.trajectories import Trajectories
 
@@ -56,7 +57,12 @@ class ReferenceNodes:
         self._errors.show(lines, palette.error(pairs.errors / GATE)[:, None])
 
     def show_pinned(
-        self, sequence: Sequence, tracks: Trajectories | None, step: int, palette: Palette
+        self,
+        sequence: Sequence,
+        tracks: Trajectories | None,
+        step: int,
+        palette: Palette,
+        trail: Trail,
     ) -> None:
         """Draw the pinned run's people and the way they came; None draws nothing."""
         if tracks is None:
@@ -67,8 +73,8 @@ class ReferenceNodes:
         self._pinned.show(
             segments, palette.fade(np.broadcast_to(shade, (len(segments), 1, 3)), 0.7)
         )
-        way = geometry.trails(tracks, step, geometry.TRAIL_SECONDS, sequence.fps, float(half[2]))
-        ages = way.ages / geometry.TRAIL_SECONDS
+        way = geometry.trails(tracks, step, trail.seconds, sequence.fps, float(half[2]))
+        ages = way.ages / trail.seconds * trail.fades
         shades = np.broadcast_to(shade, (len(way.segments), 2, 3))
         # every second segment: dashed, like all that is not of this run
         kept = np.arange(len(way.segments)) % 4 < 2

@@ -1,8 +1,8 @@
 """Handles in 3D on the room's six faces and on its entrances, while somebody edits the room.
 
-What is dragged is drawn at once, with its numbers; the sequence is taught it on release,
-and the run follows. Without the mode there are no handles, and what still comes of one is
-not heard.
+What is dragged is drawn at once, with its numbers; on release the sequence gets the new
+value, and the run follows. Outside the mode there are no handles, and late events of one are
+ignored.
 """
 
 from __future__ import annotations
@@ -174,7 +174,7 @@ class RoomEditing:
             if index not in self.handles:
                 self._make(index)
         places = grips(room)
-        # a hand would lose the handle that it holds if any of them moved or grew meanwhile
+        # viser ends a drag when any handle is moved or resized meanwhile
         standing = sequence.room
         side = float(min((standing.maximum - standing.minimum)[:2].min(), 6.0))
         edges = geometry.box_edges(

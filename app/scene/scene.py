@@ -130,7 +130,7 @@ class Scene:
         step = snapshot.playhead
         drawing = (
             sequence, run, step, snapshot.selection, dict(snapshot.layers), self._looking,
-            snapshot.run_state.state, snapshot.theme, snapshot.scores.pinned,
+            snapshot.run_state.state, snapshot.theme, snapshot.scores.pinned, snapshot.trail,
         )  # fmt: skip
         if drawing == self._drawn:
             return
@@ -138,10 +138,14 @@ class Scene:
         pictures = [self._picture(snapshot, run, camera) for camera in range(len(sequence.views))]
         with self._server.atomic():
             layers, palette = snapshot.layers, PALETTES[snapshot.theme]
-            self._people.show(sequence, run, step, snapshot.selection, layers, palette)
+            self._people.show(
+                sequence, run, step, snapshot.selection, layers, palette, snapshot.trail
+            )
             tracks = run.tracks if run is not None else Trajectories.empty(len(sequence.views))
             self._reference.show_truth(sequence, tracks, step if layers["truth"] else None, palette)
-            self._reference.show_pinned(sequence, pinned_tracks(snapshot), step, palette)
+            self._reference.show_pinned(
+                sequence, pinned_tracks(snapshot), step, palette, snapshot.trail
+            )
             for camera, picture in enumerate(pictures):
                 self._frusta.show_picture(camera, picture)
             self._status.content = status_html(snapshot, run)
@@ -254,5 +258,5 @@ def status_html(snapshot: Snapshot, run: Run | None) -> str:
         f"<p><b>{step}</b> / {sequence.frames - 1} · <b>{step / sequence.fps:.2f}</b> s"
         f"<span>{words}</span></p>"
         f"<small>grid {grid_cell(sequence.room):g} m · {size} m"
-        f" · ellipsoids hold {mass} %</small></div>"
+        f" · ellipsoids {mass} %</small></div>"
     )

@@ -54,6 +54,8 @@ label[for] { cursor: help; }
   background: var(--mvp-field); border-color: var(--mvp-line); color: var(--mvp-ink-1);
   font-variant-numeric: tabular-nums; }
 .mantine-Checkbox-root { transform: scale(.8); transform-origin: left; }
+.mvp-group { padding: 4px 10px 2px; font-size: 10px; line-height: 13px;
+  color: var(--mvp-ink-3); }
 /* sections with a line above instead of frames */
 .mantine-Paper-root:has(> .mantine-Paper-root + div) { margin: 0 !important;
   padding: 0 0 6px !important; border: 0 solid var(--mvp-line); border-top-width: 1px !important;
@@ -74,10 +76,10 @@ box-sizing: border-box; white-space: nowrap; font-variant-numeric: tabular-nums;
 
 
 def symbols(indices: dict[str, tuple[str, str]]) -> str:
-    """Style that writes what stands low behind a symbol, and the unit after it.
+    """Style that writes the subscript of a symbol, and the unit after it.
 
     Args:
-        indices: Index and unit, by the input's id.
+        indices: Subscript and unit, by the input's id.
     """
     rules = []
     for uuid, (index, unit) in indices.items():

@@ -57,7 +57,7 @@ class Views:
 
         Args:
             through: The camera's pose for an aspect; None is the free view.
-            flies: Otherwise it is there at once.
+            flies: Whether the way there is animated; otherwise it is there at once.
         """
         clients = self._server.get_clients()
         with self._lock:

@@ -43,7 +43,7 @@ class Drafts:
         try:
             draft = json.loads(path.read_text(encoding="utf-8"))
             saved, taught = draft["saved"], draft["taught"]
-            changes(saved, taught)  # they are in another version's notation, if it fails
+            changes(saved, taught)  # raises where another version wrote them
             return saved, taught
         except FileNotFoundError:
             return None

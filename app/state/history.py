@@ -16,6 +16,10 @@ from tracker.parameters import ParameterError, RunParameters
 MOST_RUNS = 50
 """Older ones are forgotten."""
 
+DRAG_SECONDS = 1.5
+"""Runs that follow each other within this time and differ in the same values are one drag of a
+slider: where it came to rest is worth a row, the way there is not."""
+
 
 @dataclass(frozen=True, slots=True)
 class PastRun:
@@ -24,7 +28,7 @@ class PastRun:
     number: int
     """From 1 on."""
     at: str
-    """When it began: the time of day."""
+    """Time of day at which it began, as text."""
     sequence: str
     """Its name then."""
     recording: str
@@ -36,6 +40,10 @@ class PastRun:
     """How far it was when it was last heard of."""
     taught: str
     """The digest of the sequence with the templates and the room that it had."""
+    moved: frozenset[str] = frozenset()
+    """The keys in which it differs from the one before."""
+    asked: float = 0.0
+    """When it was asked for, monotonic seconds."""
 
 
 class History:
@@ -89,13 +97,25 @@ class History:
                 if run.state.key == state.key:
                     self._runs[index] = replace(run, state=state)
                     return
-            # one that was overtaken before it showed anything is not worth a row
+            # a run that was superseded before its first step is not worth a row
             earlier = [r for r in self._runs if r.state.state != "computing" or r.state.done]
+            moved, asked = frozenset[str](), time.monotonic()
+            if earlier and earlier[0].recording == now.sequence_key:
+                moved = _differing(earlier[0].parameters, now.parameters)
+                same = moved and moved == earlier[0].moved and sequence.digest == earlier[0].taught
+                if same and asked - earlier[0].asked < DRAG_SECONDS:
+                    self._counted = earlier.pop(0).number - 1
             self._counted += 1
             changes = len(table.changed(now.parameters, now.defaults))
             at = time.strftime("%H:%M:%S")
             new = PastRun(
                 self._counted, at, sequence.name, now.sequence_key, now.parameters, changes, state,
-                sequence.digest,
+                sequence.digest, moved, asked,
             )  # fmt: skip
             self._runs = [new, *earlier][:MOST_RUNS]
+
+
+def _differing(a: RunParameters, b: RunParameters) -> frozenset[str]:
+    """The keys of the values that two runs do not share."""
+    keys = (*table.METHODS, *table.PARAMETERS)
+    return frozenset(key for key in keys if table.value(a, key) != table.value(b, key))

@@ -34,8 +34,9 @@ from tracker.sequences.sequence import Sequence
 logger = logging.getLogger("app")
 
 NICENESS = 2
-"""Work on pictures yields to whoever scrubs: the kernel gives its threads what the server
-leaves. The fusion does not: it is short, and whoever moves a slider waits for it."""
+"""Priority (Unix niceness) of the threads that work on pictures: the operating system runs them
+when the server is idle, so that scrubbing stays fluent. The fusion keeps the usual one: it is
+short, and whoever moves a slider waits for it."""
 
 OPENING_TELLS_SECONDS = 0.1
 """At most this often an opening tells how far it is."""
@@ -262,8 +263,8 @@ class Jobs:
             if self._under_way is not None:
                 self._under_way.cancelled.set()
             self._wanted = _Wanted(snapshot, key)
-            # told under the lock, so that of two changes at once the newer is told last;
-            # whoever is told only takes note
+            # subscribers are called under the lock, so that of two changes at once the newer comes
+            # last; they only take note and return
             self._workbench.run_begins(key)
             self._condition.notify_all()
 
@@ -342,7 +343,7 @@ class Jobs:
 
 
 def in_background(work: Callable[[], object]) -> None:
-    """Do something that nobody waits for, and that may be cut short by the program's end."""
+    """Run something in a daemon thread of low priority; the end of the program may cut it short."""
 
     def nicely() -> None:
         be_nice()
@@ -352,7 +353,7 @@ def in_background(work: Callable[[], object]) -> None:
 
 
 def be_nice() -> None:
-    """Give this thread, and those it starts, less of a busy machine (where that can be said)."""
+    """Lower the priority of this thread and of those it starts, where the system lets threads."""
     set_priority: Callable[[int, int, int], None] | None = getattr(os, "setpriority", None)
     if set_priority is not None and sys.platform.startswith("linux"):
         with contextlib.suppress(OSError):

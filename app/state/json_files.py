@@ -1,4 +1,4 @@
-"""Small files that a person would miss: written beside their place, moved there when complete."""
+"""Small files that a person would miss, written atomically: to a temporary file, then renamed."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """A person's own presets: named sets of values, kept in a file for every later start.
 
 The file holds one object by name; each has the values, by key, that were not at their
-defaults. It is written beside its place and moved there when it is complete.
+defaults. It is written atomically.
 """
 
 from __future__ import annotations

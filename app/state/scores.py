@@ -43,7 +43,7 @@ class Scored:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scores:
-    """All of them. A value: what is new makes another."""
+    """All of them, as an immutable value: :meth:`add` and :meth:`pin` return another."""
 
     shown: Scored | None = None
     """The newest that was scored; while a run computes, this may be the one before."""

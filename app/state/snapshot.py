@@ -43,6 +43,16 @@ CLAMPED_ORIGIN = "viser"
 
 
 @dataclass(frozen=True, slots=True)
+class Trail:
+    """How the ways of people are drawn, in 3D and in pictures."""
+
+    seconds: float = 4.0
+    """How far back they go."""
+    fades: bool = True
+    """Whether they are fainter the older they are."""
+
+
+@dataclass(frozen=True, slots=True)
 class RunState:
     """How far the run is that the parameters ask for."""
 
@@ -105,14 +115,14 @@ class Snapshot:
     opened_as: str = ""
     """The name or folder that opens the sequence again."""
     sequence_key: str = ""
-    """Another for every content, so that pictures may be kept for ever."""
+    """Changes with the content, so that browsers may cache pictures for ever."""
     reader: FrameReader | None = None
     opening: Opening | None = None
     parameters: RunParameters = field(default_factory=RunParameters)
     defaults: RunParameters = field(default_factory=RunParameters)
     """The values that a reset returns to: of methods, those that fit the sequence."""
     parameters_origin: str = ""
-    """Who changed the parameters last, so that nobody is told their own news."""
+    """Who changed the parameters last, so that a client is not sent its own change."""
     presets: Presets = field(default_factory=lambda: MappingProxyType({}))
     playhead: int = 0
     playhead_origin: str = ""
@@ -128,9 +138,10 @@ class Snapshot:
         # the truth is in the pictures at first: in 3D twice as many boxes hide the people
         default_factory=lambda: MappingProxyType({name: name != "truth" for name in LAYERS})
     )
+    trail: Trail = Trail()
     view: View = None
     flies: bool = True
-    """Whether the 3D view moves to another, or is there at once: somebody wants less motion."""
+    """Whether changes of the 3D view are animated; false once a page asks for reduced motion."""
     theme: Theme = "dark"
     """Of the 3D view."""
 
@@ -155,7 +166,7 @@ class Snapshot:
         return unfit_methods(self.sequence, self.parameters)
 
     def named(self, sequence: Sequence) -> Sequence:
-        """What a run was made of, by its name now: it is another since a copy was saved."""
+        """The sequence of a run under its present name, which saving a copy changes."""
         return sequence if self.sequence is None else replace(sequence, name=self.sequence.name)
 
     @property

@@ -32,7 +32,7 @@ KEPT_STATES = 500
 """Rooms and templates that can be gone back to."""
 
 PIXEL_DIGITS, METRE_DIGITS = 1, 3
-"""Digits that a drawn box and a dragged place are given."""
+"""Decimals to which a drawn box (pixels) and a dragged place (metres) are rounded."""
 
 LEAST_BOX = 4.0
 """Pixels of a template's side: what is smaller has no colours to speak of."""
@@ -126,6 +126,15 @@ class Teaching:
             values["room"][side][axis] = _metres(metres)
 
         self._edit(move)
+
+    def set_target(self, half_extents: tuple[float, float, float]) -> None:
+        """Say how large a person is: half width, depth and height, metres.
+
+        Raises:
+            SequenceError: If it has no size.
+        """
+        half = [round(float(value), METRE_DIGITS + 1) for value in half_extents]
+        self._edit(lambda values: values["target"].update(half_extents=half))
 
     def add_entrance(self, position: tuple[float, float, float] | None = None) -> None:
         """Add an entrance, in the middle of the room where no place is given."""

@@ -29,6 +29,7 @@ from app.state.snapshot import (
     Presets,
     RunState,
     Snapshot,
+    Trail,
     View,
     clamp,
 )
@@ -176,6 +177,16 @@ class Workbench:
             if layers != now.layers:
                 self._put("layers", layers=MappingProxyType(layers))
 
+    def set_trail(self, seconds: float | None = None, fades: bool | None = None) -> None:
+        """Draw trails longer or shorter, seconds, fading or not; None leaves it as it is."""
+        with self._edit() as now:
+            trail = Trail(
+                now.trail.seconds if seconds is None else seconds,
+                now.trail.fades if fades is None else fades,
+            )
+            if trail != now.trail:
+                self._put("layers", trail=trail)
+
     def pin(self) -> bool:
         """Pin the shown run, to set others against it; whether it was a finished one."""
         with self._edit() as now:
@@ -191,7 +202,7 @@ class Workbench:
                 self._put("pinned", scores=now.scores.pin(Scored.of(run)))
 
     def unpin(self) -> None:
-        """Nothing is pinned any more."""
+        """Pin nothing any more."""
         with self._edit() as now:
             if now.scores.pinned is not None:
                 self._put("pinned", scores=replace(now.scores, pinned=None))
@@ -217,7 +228,7 @@ class Workbench:
                 self._put("view", view=view)
 
     def set_flies(self, flies: bool) -> None:
-        """Have the 3D view move to another view, or be there at once."""
+        """Have changes of the 3D view animated, or not (reduced motion)."""
         with self._edit() as now:
             if flies != now.flies:
                 self._put("view", flies=flies)

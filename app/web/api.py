@@ -12,6 +12,7 @@ from fastapi import APIRouter, Query, Request, Response
 from app import models
 from app.errors import ApiError, sentence
 from app.state.history import History
+from app.state.sensitivity import Sensitivity
 from app.state.teaching import Teaching
 from app.web.dependencies import (
     ERRORS,
@@ -154,6 +155,17 @@ async def use_again(request: Request, number: int, bench: Bench) -> models.State
     return results.state_of(bench.snapshot())
 
 
+@router.post("/sensitivity")
+async def compute_curves(request: Request, wish: models.CurveRequest, bench: Bench) -> models.State:
+    """Compute in the background what some parameters would change, until somebody works.
+
+    ``GET /api/tables/changes`` and the 3D view's panel show it.
+    """
+    sensitivity: Sensitivity = request.app.state.sensitivity
+    sensitivity.ask(wish.keys)
+    return results.state_of(bench.snapshot())
+
+
 @router.post("/seek")
 async def seek(wish: models.SeekChange, bench: Bench) -> models.State:
     """Move the playhead, as far as the sequence goes."""
@@ -172,6 +184,13 @@ async def select(wish: models.SelectChange, bench: Bench) -> models.State:
 async def set_layers(wish: models.LayerChanges, bench: Bench) -> models.State:
     """Switch layers of the 3D view."""
     bench.set_layers(wish.changes)
+    return results.state_of(bench.snapshot())
+
+
+@router.patch("/trail")
+async def set_trail(wish: models.TrailChanges, bench: Bench) -> models.State:
+    """Draw trails longer or shorter, fading or not."""
+    bench.set_trail(wish.seconds, wish.fades)
     return results.state_of(bench.snapshot())
 
 
@@ -213,6 +232,7 @@ async def step(
     bench: Bench,
     samples: Annotated[bool, Query(description="With each camera's samples.")] = False,
     trails: Annotated[bool, Query(description="With the tracks' ways in the pictures.")] = False,
+    seconds: Annotated[float, Query(ge=0.5, le=600.0, description="How far back.")] = 4.0,
 ) -> models.Step:
     """One step of the shown run: what each camera found, the targets, the truth."""
     snapshot = bench.snapshot()
@@ -226,7 +246,9 @@ async def step(
             f"There is no step {step}: {sequence.name} has 0 … {sequence.frames - 1}.",
             field="step",
         )
-    return steps.step_of(sequence, snapshot.run, step, with_samples=samples, with_trails=trails)
+    return steps.step_of(
+        sequence, snapshot.run, step, with_samples=samples, trails=seconds if trails else 0.0
+    )
 
 
 @router.get("/timeline")

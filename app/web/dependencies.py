@@ -14,7 +14,7 @@ from app.state.workbench import Workbench
 from app.web.views.timeline import BUCKETS, Window
 
 FOR_EVER = "private, max-age=31536000, immutable"
-"""A picture's address names its content."""
+"""Cache header of pictures: their address names their content, which never changes."""
 
 ERRORS: dict[int | str, dict[str, Any]] = {
     "4XX": {"model": ErrorBody, "description": "What was expected, what was found, what to do."},
@@ -39,7 +39,7 @@ def _own_presets(request: Request) -> OwnPresets:
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """The part of the steps that somebody looks at, and in how many values a curve."""
+    """The range of steps that a plot shows, and into how many buckets it is summed up."""
 
     first: int
     last: int | None

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     import viser
 
 HAS_FOCUS = b"<script>Document.prototype.hasFocus=()=>true</script>"
-"""viser's client reconnects only while its document has the focus, which inside
-a frame it mostly has not."""
+"""Makes ``document.hasFocus()`` true: viser's client reconnects only while its document has the
+focus, which inside a frame it mostly has not."""
 
 LABELS_LEAD_TO_THE_MANUAL = b"""<script>
 addEventListener("click", (event) => {
@@ -114,7 +114,7 @@ class Gateway:
         """Pass messages both ways until either side ends."""
         try:
             port = await self.port()
-            # viser's messages are packed already and come in windows of up to many megabytes
+            # viser's messages are compressed already and may have many megabytes
             upstream = await connect(
                 f"ws://127.0.0.1:{port}",
                 subprotocols=[websockets.Subprotocol(p) for p in socket.scope["subprotocols"]],

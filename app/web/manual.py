@@ -45,7 +45,7 @@ class Manual(StaticFiles):
             return HTMLResponse(NOT_BUILT, 404)
         try:
             response = await super().get_response(path, scope)
-        except RuntimeError as error:  # the folder goes while it is built anew
+        except RuntimeError as error:  # a new build removes the folder for a moment
             raise HTTPException(404) from error
         response.headers["content-security-policy"] = CONTENT_POLICY
         response.headers["cache-control"] = "no-cache"  # kept, but checked by its ETag

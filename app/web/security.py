@@ -1,8 +1,8 @@
 """Who may talk to the server: known hosts, writes and sockets of our own page, small bodies.
 
-Loopback keeps other machines out. The Host check keeps out pages whose name was
-made to point here; the Origin check keeps out writes and sockets of other pages
-in the same browser, those of the embedded 3D view included.
+Loopback keeps other machines out. The Host check keeps out pages whose domain name was
+re-pointed to this machine (DNS rebinding); the Origin check keeps out writes and sockets of
+other pages in the same browser (cross-site requests), those of the embedded 3D view included.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ class Guard:
         Args:
             app: What is guarded.
             hosts: Names in the Host header that are answered, without port.
-            addresses_are_fine: Answer to any numeric address too: on a server that others may
-                reach, its own addresses are not known, and a number cannot be re-pointed.
+            addresses_are_fine: Answer to any numeric address too: a server that others may
+                reach does not know all of its own, and DNS rebinding needs a name.
         """
         self._app = app
         self._hosts = frozenset(hosts)

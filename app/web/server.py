@@ -25,14 +25,18 @@ from app.state import opening_step
 from app.state.compiling import Compiling
 from app.state.evaluator import Evaluator
 from app.state.history import History
+from app.state.importing.desk import Desk
 from app.state.jobs import Jobs, in_background
 from app.state.keeper import Keeper
 from app.state.presets import OwnPresets
+from app.state.recents import Recents
+from app.state.sensitivity import Sensitivity
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench
 from app.web import api, gateway, stream, teaching_routes
 from app.web.evaluation import routes as evaluation
 from app.web.gateway import Gateway
+from app.web.importing import routes as importing
 from app.web.library import routes as library
 from app.web.manual import Manual
 from app.web.pictures import foreground, likelihood_routes
@@ -65,6 +69,7 @@ ROUTERS = (
     teaching_routes.router,
     teaching_tables.router,
     evaluation.router,
+    importing.router,
     library.router,
     stream.router,
     gateway.router,
@@ -161,13 +166,20 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     teaching = app.state.teaching = Teaching(
         workbench, settings.data, settings_folder() / "unsaved" if kept else None
     )
+    given = Path(settings.sequence or "").expanduser()
+    roots = [given] if settings.sequence and given.is_dir() else []
+    desk = app.state.desk = Desk(settings.data, roots)
+    recents = app.state.recents = Recents(
+        workbench, settings_folder() / "recent.json" if kept else None
+    )
     evaluator = app.state.evaluator = Evaluator(workbench)
+    sensitivity = app.state.sensitivity = Sensitivity(workbench, settings.seed)
     keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep)
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
     told.start()
     opening_step.follow(workbench)
-    room = _Room(workbench, teaching)
+    room = _Room(workbench, teaching, sensitivity)
     if settings.with_viser:
         door.prepare()
         # the page is served meanwhile; requests for the 3D view wait
@@ -187,9 +199,14 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
             await asyncio.gather(starting, return_exceptions=True)
         told.stop()
         teaching.close()
+        recents.close()
+        desk.close()
         pictures.close()
         await asyncio.gather(
-            *(asyncio.to_thread(part.close) for part in (keeper, jobs, evaluator, room))
+            *(
+                asyncio.to_thread(part.close)
+                for part in (keeper, jobs, evaluator, sensitivity, room)
+            )
         )
 
 
@@ -218,8 +235,9 @@ async def _start_viser(room: _Room, door: Gateway, workbench: Workbench) -> None
 class _Room:
     """viser's server with what is in it."""
 
-    def __init__(self, workbench: Workbench, teaching: Teaching) -> None:
+    def __init__(self, workbench: Workbench, teaching: Teaching, sensitivity: Sensitivity) -> None:
         self._workbench = workbench
+        self._sensitivity = sensitivity
         self._teaching = teaching
         self._parts: list[Callable[[], object]] = []
 
@@ -233,7 +251,7 @@ class _Room:
         self._parts.append(server.stop)
         self._parts.append(Scene(server, self._workbench).close)
         self._parts.append(RoomEditing(server, self._workbench, self._teaching).close)
-        self._parts.append(Controls(server, self._workbench).close)
+        self._parts.append(Controls(server, self._workbench, self._sensitivity).close)
         return server
 
     def close(self) -> None:
@@ -251,8 +269,8 @@ def bind(host: str, port: int) -> sockets.socket:
     family, _, _, _, address = sockets.getaddrinfo(
         host, port, type=sockets.SOCK_STREAM, flags=sockets.AI_PASSIVE
     )[0]
-    # asyncio switches off the collecting of small packets (40 ms of waiting for each answer)
-    # only on sockets that say they are TCP
+    # asyncio switches Nagle's algorithm off only on sockets that say they are TCP; with it each
+    # small answer waits for the browser's delayed acknowledgement, some 40 ms
     listener = sockets.socket(family, sockets.SOCK_STREAM, sockets.IPPROTO_TCP)
     try:
         listener.setsockopt(sockets.SOL_SOCKET, sockets.SO_REUSEADDR, 1)

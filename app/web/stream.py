@@ -156,7 +156,10 @@ class Stream:
                 page.wake.set()
 
     def _set_flies(self) -> None:
-        """The 3D view flies only if no page asked for less motion: a click there has no sender."""
+        """Animate the 3D view only if no page asks for reduced motion.
+
+        A click inside viser does not tell which page it came from, so one answer is for all.
+        """
         self._workbench.set_flies(all(page.flies for page in self._pages))
 
     async def _tell(self, socket: WebSocket, page: _Page) -> None:
@@ -168,7 +171,7 @@ class Stream:
                 await socket.send_text(text)
             news, page.news = page.news, set()
             snapshot = self._workbench.snapshot()
-            if "playhead" in news:  # first, so that the picture is asked for before the rest
+            if "playhead" in news:  # first: the page then asks for the picture at once
                 origin = snapshot.playhead_origin
                 told = {"type": "playhead", "step": snapshot.playhead, "origin": origin}
                 await socket.send_text(json.dumps(told))

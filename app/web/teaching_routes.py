@@ -17,6 +17,7 @@ from app.models.teaching import (
     NewEntrance,
     NewTemplate,
     RestoreRequest,
+    TargetChange,
     TextChange,
     ValueChange,
 )
@@ -85,6 +86,29 @@ def set_face(side: Side, axis: Axis, wish: ValueChange, bench: Bench, teach: Tea
     """Move one of the room's six faces."""
     with _complaining():
         teach.set_face(side, axis, wish.value)
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/target")
+def set_target(wish: TargetChange, bench: Bench, teach: Teach) -> models.State:
+    """Say how large a person is."""
+    with _complaining():
+        teach.set_target(wish.half_extents)
+    return results.state_of(bench.snapshot())
+
+
+@router.patch("/target/{axis}")
+def set_target_side(axis: Axis, wish: ValueChange, bench: Bench, teach: Teach) -> models.State:
+    """Say how wide, deep or tall a person is."""
+    sequence = bench.snapshot().sequence
+    if sequence is None:
+        raise nothing_open()
+    x, y, z = (
+        wish.value / 2.0 if own == axis else float(half)
+        for own, half in enumerate(sequence.target_half_extents)
+    )
+    with _complaining():
+        teach.set_target((x, y, z))
     return results.state_of(bench.snapshot())
 
 

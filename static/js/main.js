@@ -2,6 +2,7 @@
 import { one } from "./elements/dom.js";
 import { mountSide } from "./inspector/side.js";
 import { mountTeach } from "./inspector/teach.js";
+import { mountOpening } from "./opening/sheet.js";
 import { mountCameras } from "./panes/cameras.js";
 import { mountControls, pressed } from "./panes/controls.js";
 import { mountLayout } from "./panes/layout.js";
@@ -65,6 +66,7 @@ mountSide(one(".side"), context);
 mountTimeline(one(".time"), context);
 mountTeach(one(".mosaic"), context);
 mountSheets(context);
+mountOpening(context);
 mountLayout(context);
 mountControls(context);
 

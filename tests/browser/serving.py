@@ -25,6 +25,7 @@ class Server:
         cache: Path | None,
         *,
         kernels: Path | None = None,
+        data: Path | None = None,
         wait: bool = True,
     ) -> None:
         """Start it on a sequence, with a cache folder of its own or the person's.
@@ -33,6 +34,7 @@ class Server:
         """
         self.folder = sequence
         self._arguments = [str(sequence), "--no-open"]
+        self._arguments += [] if data is None else ["--data", str(data)]
         self._environment = dict(os.environ)
         self._environment["NUMBA_CACHE_DIR"] = str(kernels or kernel_folder())
         if cache is not None:

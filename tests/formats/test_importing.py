@@ -9,57 +9,16 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from app.command.main import main
-from tests.formats.rig import FLIP, HALF_EXTENTS, SIZE, boxes, cameras, walks
+from tests.formats.recorded import PLACES, detections, settled_of, toml, videos
+from tests.formats.rig import FLIP, HALF_EXTENTS, SIZE, boxes, cameras
 from tracker.formats.pieces import FormatError
-from tracker.importing.gathering import gather
 from tracker.importing.names import match, short_names
 from tracker.importing.options import ImportOptions
-from tracker.importing.settling import Settled, settle
+from tracker.importing.settling import Settled
 from tracker.importing.writing import write
 from tracker.sequences.reader import read_sequence
-
-PLACES = walks()
-
-
-def _toml(folder: Path, *, scale: float = 1.0, size: tuple[int, int] = SIZE) -> None:
-    """Anipose's calibration, whose unit nobody knows."""
-    lines = []
-    for camera in cameras():
-        k = np.diag([size[0] / SIZE[0], size[1] / SIZE[1], 1.0]) @ camera.intrinsics
-        lines += [
-            f'[{camera.name}]\nname = "{camera.name}"\nsize = {list(size)}',
-            f"matrix = {k.tolist()}\ndistortions = {camera.distortion.tolist()}",
-            f"rotation = {Rotation.from_matrix(camera.rotation).as_rotvec().tolist()}",
-            f"translation = {(scale * camera.translation).tolist()}",
-        ]
-    (folder / "calibration.toml").write_text("\n".join(lines))
-
-
-def _detections(folder: Path, first: int = 0) -> None:
-    for camera in cameras():
-        frames, found = boxes(camera, PLACES)
-        rows = [
-            f"{f + first},{','.join(map(str, b))}"
-            for f, b in zip(frames, found.tolist(), strict=True)
-        ]
-        path = folder / f"{camera.name}.csv"
-        path.write_text("\n".join(["frame,left,top,width,height", *rows]))
-
-
-def _videos(folder: Path, size: tuple[int, int] = SIZE, frames: int = 60) -> None:
-    for camera in cameras():
-        path = str(folder / f"{camera.name}.avi")
-        writer = cv2.VideoWriter(path, cv2.VideoWriter.fourcc(*"MJPG"), 20.0, size)
-        for _ in range(frames):
-            writer.write(np.zeros((size[1], size[0], 3), np.uint8))
-        writer.release()
-
-
-def _settled(folder: Path, options: ImportOptions | None = None) -> Settled:
-    return settle(gather([folder]), options)
 
 
 def _assert_cameras(settled: Settled, tolerance: float = 1e-6) -> None:
@@ -72,9 +31,9 @@ def _assert_cameras(settled: Settled, tolerance: float = 1e-6) -> None:
 def test_the_unit_follows_from_the_height_of_people(
     tmp_path: Path, unit: str, scale: float
 ) -> None:
-    _toml(tmp_path, scale=scale)
-    _detections(tmp_path)
-    settled = _settled(tmp_path)
+    toml(tmp_path, scale=scale)
+    detections(tmp_path)
+    settled = settled_of(tmp_path)
     assert settled.reading.unit == unit
     _assert_cameras(settled)
     assert settled.room.minimum[2] == pytest.approx(0.0, abs=0.25)
@@ -90,18 +49,18 @@ def test_poses_of_ones_own_the_other_way_round(tmp_path: Path) -> None:
         for c in cameras()
     }  # fmt: skip
     (tmp_path / "cameras.json").write_text(json.dumps(tables))
-    _detections(tmp_path)
-    settled = _settled(tmp_path)
+    detections(tmp_path)
+    settled = settled_of(tmp_path)
     assert (settled.reading.direction, settled.reading.axes) == ("camera-to-world", "opengl")
     _assert_cameras(settled)
     with pytest.raises(AssertionError):  # a flag is believed
-        _assert_cameras(_settled(tmp_path, ImportOptions(pose="world-to-camera", axes="opencv")))
+        _assert_cameras(settled_of(tmp_path, ImportOptions(pose="world-to-camera", axes="opencv")))
 
 
 def test_a_calibration_of_another_resolution_is_scaled(tmp_path: Path) -> None:
-    _toml(tmp_path, size=(2560, 1440))
-    _videos(tmp_path)
-    settled = _settled(tmp_path, ImportOptions(unit="m"))
+    toml(tmp_path, size=(2560, 1440))
+    videos(tmp_path)
+    settled = settled_of(tmp_path, ImportOptions(unit="m"))
     found = settled.views[0].camera
     assert found.image_size == SIZE
     np.testing.assert_allclose(found.intrinsics[0, 0], cameras()[0].intrinsics[0, 0])
@@ -110,26 +69,26 @@ def test_a_calibration_of_another_resolution_is_scaled(tmp_path: Path) -> None:
 
 
 def test_a_calibration_of_another_shape_is_refused(tmp_path: Path) -> None:
-    _toml(tmp_path, size=(720, 1280))
-    _videos(tmp_path, frames=3)
+    toml(tmp_path, size=(720, 1280))
+    videos(tmp_path, frames=3)
     with pytest.raises(FormatError, match="they are turned"):
-        _settled(tmp_path)
+        settled_of(tmp_path)
 
 
 def test_what_is_written_opens_and_is_whole(tmp_path: Path) -> None:
     source, target = tmp_path / "source", tmp_path / "target"
     source.mkdir()
-    _toml(source)
-    _videos(source)
+    toml(source)
+    videos(source)
     (source / "boxes").mkdir()
-    _detections(source / "boxes", first=1)
+    detections(source / "boxes", first=1)
     rows = [
         f"{step},{who},{x},{y},{z}"
         for step, people in enumerate(PLACES)
         for who, (x, y, z) in enumerate(people)
     ]
     (source / "truth.csv").write_text("\n".join(["frame,id,x,y,z", *rows]))
-    settled = _settled(source)
+    settled = settled_of(source)
     told = write(settled, target, "a room")
     sequence = read_sequence(target)
     assert told == []
@@ -150,8 +109,8 @@ def test_what_is_written_opens_and_is_whole(tmp_path: Path) -> None:
 
 
 def test_truth_with_y_up_finds_its_way_into_the_boxes(tmp_path: Path) -> None:
-    _toml(tmp_path)
-    _detections(tmp_path)
+    toml(tmp_path)
+    detections(tmp_path)
     head = (
         "PathFileType\t4\t(X/Y/Z)\ta.trc\nDataRate\tUnits\n25\tm\nFrame#\tTime\tHip\t\t\n"
         "\t\tX1\tY1\tZ1\n"
@@ -163,7 +122,7 @@ def test_truth_with_y_up_finds_its_way_into_the_boxes(tmp_path: Path) -> None:
             for n, (x, y, z) in enumerate(PLACES[:, person].tolist())
         ]
         (tmp_path / f"P{person}.trc").write_text(head + "\n".join(rows))
-    truth = _settled(tmp_path).truth
+    truth = settled_of(tmp_path).truth
     assert truth is not None
     assert set(truth.ids.tolist()) == {1, 2}
     np.testing.assert_allclose(truth.positions[truth.ids == 2], PLACES[:, 1], atol=1e-9)
@@ -176,8 +135,8 @@ def test_poses_alone_tell_direction_and_unit(tmp_path: Path) -> None:
         for c in cameras()
     ]  # fmt: skip
     (tmp_path / "cameras.json").write_text(json.dumps({"cameras": tables}))
-    _videos(tmp_path, frames=3)
-    settled = _settled(tmp_path)
+    videos(tmp_path, frames=3)
+    settled = settled_of(tmp_path)
     assert settled.reading.direction == "camera-to-world"
     assert settled.reading.unit == "mm"
     for view, camera in zip(settled.views, cameras(), strict=True):
@@ -187,7 +146,7 @@ def test_poses_alone_tell_direction_and_unit(tmp_path: Path) -> None:
 def test_nothing_to_import_says_what_is_missing(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("nothing")
     with pytest.raises(FormatError, match="no calibration"):
-        _settled(tmp_path)
+        settled_of(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -218,8 +177,8 @@ def test_the_command_prints_what_it_takes_files_for(
 ) -> None:
     source = tmp_path / "source"
     source.mkdir()
-    _toml(source, scale=1000.0)
-    _detections(source)
+    toml(source, scale=1000.0)
+    detections(source)
     (source / "notes.txt").write_text("nothing")
     assert main(["import", str(source), "--dry-run"]) == 0
     said = capsys.readouterr()
@@ -244,9 +203,9 @@ def test_the_command_prints_what_it_takes_files_for(
 def test_names_with_slashes_stay_in_the_folder(tmp_path: Path) -> None:
     source = tmp_path / "source"
     source.mkdir()
-    _toml(source)
-    _detections(source)
-    settled = _settled(source)
+    toml(source)
+    detections(source)
+    settled = settled_of(source)
     evil = [
         replace(view, camera=replace(view.camera, name=f'../../{view.camera.name}, "#\n'))
         for view in settled.views
@@ -260,7 +219,7 @@ def test_names_with_slashes_stay_in_the_folder(tmp_path: Path) -> None:
 @pytest.mark.data
 @pytest.mark.parametrize("name", ["pose2sim-multi", "wildtrack-60"])
 def test_foreign_recordings_open_without_a_flag(foreign: Path, tmp_path: Path, name: str) -> None:
-    settled = _settled(foreign / name)
+    settled = settled_of(foreign / name)
     write(settled, tmp_path / name, name)
     sequence = read_sequence(tmp_path / name)
     assert sequence.has_detections
@@ -272,14 +231,14 @@ def test_foreign_recordings_open_without_a_flag(foreign: Path, tmp_path: Path, n
 
 
 def test_a_video_of_another_rate_keeps_its_own(tmp_path: Path) -> None:
-    _toml(tmp_path)
-    _videos(tmp_path)
+    toml(tmp_path)
+    videos(tmp_path)
     slow = str(tmp_path / "cam2.avi")
     writer = cv2.VideoWriter(slow, cv2.VideoWriter.fourcc(*"MJPG"), 10.0, SIZE)
     for _ in range(30):
         writer.write(np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
     writer.release()
-    settled = _settled(tmp_path, ImportOptions(unit="m"))
+    settled = settled_of(tmp_path, ImportOptions(unit="m"))
     assert (settled.fps, settled.frames) == (20.0, 60)
     write(settled, tmp_path / "out", "two rates")
     text = (tmp_path / "out" / "sequence.toml").read_text()

@@ -24,7 +24,7 @@ def main() -> int:
     parser.add_argument(
         "--record", nargs="*", metavar="EXPERIMENT", choices=[*EXPERIMENTS, []], default=None
     )
-    parser.add_argument("--sweeps", nargs="*", metavar="GROUP", default=None)
+    parser.add_argument("--sweeps", nargs="*", metavar="GROUP|KEY", default=None)
     parser.add_argument("--machines", action="store_true")
     parser.add_argument("--data", type=Path, default=DATA, help="folder of the real recordings")
     arguments = parser.parse_args()

@@ -73,7 +73,9 @@ def record() -> None:
 
 
 def section() -> str:
-    """The part of the page of results."""
+    """The part of the page of results; empty without a record, which alone backs what it says."""
+    if not FILE.is_file():
+        return ""
     lines = ["| exchanged | arrays that differ | pictures |", "|---|---|---|"]
     for row in json.loads(FILE.read_text(encoding="utf-8")):
         pictures = "differ" if row["pictures differ"] else "same"

@@ -55,20 +55,34 @@ def values(parameter: Parameter) -> list[Any]:
     return sorted({*(min(max(value, low), high) for value in digits), parameter.default})
 
 
-def record(groups: list[str], data: Path) -> None:
+def chosen(names: list[str]) -> list[Parameter]:
+    """The parameters of some groups or keys, in the order of definition; all, if none is named.
+
+    Raises:
+        ValueError: If a name is neither a group nor a key.
+    """
+    known = {*PARAMETERS, *(p.group for p in PARAMETERS.values())}
+    if unknown := [name for name in names if name not in known]:
+        raise ValueError(f"expected groups or keys of parameters, got {', '.join(unknown)}")
+    return [p for p in PARAMETERS.values() if not names or {p.key, p.group} & {*names}]
+
+
+def record(names: list[str], data: Path) -> None:
     """Run the pieces, and keep what came out.
 
     Args:
-        groups: Of parameters; all, if none is named.
+        names: Groups or keys of parameters; all, if none is named.
         data: The folder of the real recordings.
+
+    Raises:
+        ValueError: If a name is neither a group nor a key.
     """
     found = kept()
-    for group in dict.fromkeys(p.group for p in PARAMETERS.values()):
-        if groups and group not in groups:
-            continue
+    wanted = chosen(names)
+    for group in dict.fromkeys(p.group for p in wanted):
         name, sequence = _piece(group, data)
         base: Run | None = None
-        for parameter in (p for p in PARAMETERS.values() if p.group == group):
+        for parameter in (p for p in wanted if p.group == group):
             steps = STEPS[parameter.stage]
             points = []
             for value in values(parameter):

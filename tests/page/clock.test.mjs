@@ -29,6 +29,12 @@ test("slow painting slows play down instead of skipping", () => {
   assert.deepEqual(play(1, 0.2), [1, 2, 3, 4, 5]);
 });
 
+test("where real time is wanted, slow painting skips steps and keeps the clock", () => {
+  assert.deepEqual(play(1, 0.2, { ...HOW, realTime: true }), [5, 10, 15, 20, 25]);
+  const { step } = clock.advance({ step: 10, rest: 0 }, 30, { ...HOW, realTime: true });
+  assert.equal(step, 35, "after a pause of the page it does not race either");
+});
+
 test("after a pause of the page play does not race", () => {
   const { step, rest } = clock.advance({ step: 10, rest: 0 }, 30, HOW);
   assert.equal(step, 11);

@@ -12,6 +12,11 @@ import {
   stateAt,
   viewWords,
 } from "../../static/js/state/events.js";
+import { lensOf } from "../../static/js/draw/picture.js";
+import { magnified } from "../../static/js/panes/magnify.js";
+import { kindsOf } from "../../static/js/inspector/listed.js";
+import { strands } from "../../static/js/draw/braid.js";
+import { valueOf } from "../../static/js/state/offers.js";
 import { mosaic } from "../../static/js/draw/mosaic.js";
 import { viewFrom, viewOf } from "../../static/js/state/views.js";
 import { createStore } from "../../static/js/state/store.js";
@@ -56,10 +61,13 @@ test("the address round-trips and names what it does not know", () => {
     look: "top",
     view: { tab: "changes", zoom: "20-90", layers: "boxes.truth" },
     values: { "fusion.detection_probability": "0.6", fusion_method: "sequential_phd" },
+    pinned: { "fusion.memory": "2" },
   };
   assert.deepEqual(readPlace(writePlace(place)), { place, unknown: [] });
   const nowhere = { sequence: null, step: null, selection: null, camera: null, look: null };
-  const none = { ...nowhere, values: null, view: {} };
+  const none = { ...nowhere, values: null, pinned: null, view: {} };
+  const atDefaults = { ...none, pinned: {} };
+  assert.deepEqual(readPlace(writePlace(atDefaults)).place, atDefaults);
   assert.equal(writePlace(none), "");
   assert.equal(writePlace({ ...none, values: {} }), "");
   assert.deepEqual(readPlace(""), { place: none, unknown: [] });
@@ -83,6 +91,10 @@ test("how it is looked at: only what is not as at first is written, and it is re
     layers2d: { ...first.layers2d, truth: false, samples: true },
     measure: "gospa",
     laneOrder: "born",
+    listed: "worst",
+    eventKind: "long miss",
+    zooms: { 1: [3, 0.25, 0.5] },
+    layers3d: { ...first.layers3d, truth: true, volume: false },
   };
   const words = viewOf(other);
   assert.equal(words.layers, "measurements.boxes.samples");
@@ -90,6 +102,8 @@ test("how it is looked at: only what is not as at first is written, and it is re
   const back = { ...viewFrom(words), frames: 100 };
   assert.deepEqual(viewOf(back), words);
   assert.deepEqual(back.span, [20, 80]);
+  assert.deepEqual(back.zooms, other.zooms);
+  assert.deepEqual(back.layers3d, other.layers3d);
   const senseless = { tab: "x", zoom: "9-3", speed: "7", loop: "a-b", layers: "none" };
   assert.deepEqual(Object.keys(viewOf({ ...viewFrom(senseless), frames: 9 })), ["layers"]);
 });
@@ -306,6 +320,15 @@ test("pictures keep their shape, stay inside and do not overlap", () => {
   assert.deepEqual(mosaic([], null, { width: 610, most: 338, gap: 4 }), { cells: [], height: 0 });
 });
 
+test("pictures that are alike lie side by side, the last row in the middle", () => {
+  const { cells } = mosaic([1.25, 1.25, 1.25], null, { width: 1440, most: 800, gap: 4 });
+  const [a, b, c] = cells;
+  assert.ok(Math.abs(b.x - a.x - a.width - 4) <= 1, "no void between two");
+  assert.ok(Math.abs(c.x + c.width / 2 - 720) <= 1);
+  assert.ok(Math.abs(a.x + b.x + b.width - 1440) <= 2);
+  assert.ok(a.height * 2 + 12 >= 796, "as high as there is room");
+});
+
 test("what a camera tells of its people is one line of words", () => {
   assert.equal(viewWords([]), "");
   assert.equal(viewWords([{ kind: "new", labels: [7] }]), "7 new");
@@ -314,4 +337,88 @@ test("what a camera tells of its people is one line of words", () => {
     { kind: "vanished", labels: [1, 2, 4] },
   ];
   assert.equal(viewWords(events), "3 and 5 occluded, 1, 2 and 4 vanished");
+});
+
+test("a picture that is magnified at a point keeps that point in its place", () => {
+  const spot = { x: 120, y: 60, width: 400, height: 300 };
+  const seen = (zoom, { x, y, width, height }) => {
+    const { k, left, top } = lensOf(zoom, width, height);
+    return [(x + left) / k, (y + top) / k];
+  };
+  let zoom;
+  for (let k = 0; k < 6; k += 1) {
+    const before = seen(zoom, spot);
+    zoom = magnified(zoom, 1.5, spot);
+    seen(zoom, spot).forEach((at, axis) => assert.ok(Math.abs(at - before[axis]) < 1));
+  }
+  assert.ok(zoom[0] > 11);
+  for (let k = 0; k < 7 && zoom; k += 1) zoom = magnified(zoom, 1 / 1.5, spot);
+  assert.equal(zoom, undefined, "out again it is the whole picture");
+  const { left, top } = lensOf([4, 0, 1], 400, 300);
+  assert.deepEqual([left, top], [0, 900], "it never leaves the picture");
+});
+
+test("tracks are listed by what is wrong with them", () => {
+  const tracks = Array.from({ length: 10 }, (_, k) => ({ id: k + 1 }));
+  const scored = new Map(
+    tracks.map(({ id }) => [id, { kind: id > 8 ? "false" : "person", mean_error: id / 10 }]),
+  );
+  const events = [
+    [5, 3, "long miss"],
+    [9, 3, "long miss"],
+    [7, 4, "death"],
+  ];
+  const ids = Object.entries(kindsOf(tracks, scored, events)).map(([kind, list]) => [
+    kind,
+    list.map(({ id }) => id),
+  ]);
+  assert.deepEqual(Object.fromEntries(ids.slice(1)), {
+    false: [9, 10],
+    missed: [3],
+    worst: [10, 9],
+  });
+  assert.deepEqual(kindsOf(tracks, new Map(), []).worst, []);
+});
+
+test("where two exchange their tracks their strands cross", () => {
+  const people = [
+    { id: 1, first: 0, last: 99, track: 1 },
+    { id: 2, first: 10, last: 99, track: 2 },
+    { id: 3, first: 10, last: 20, track: null },
+  ];
+  const switches = [
+    { step: 50, person: 1, before: 1, track: 2 },
+    { step: 50, person: 2, before: 2, track: 1 },
+    { step: 60, person: 1, before: 2, track: 1 },
+  ];
+  const found = strands(people, switches);
+  assert.deepEqual(
+    found.map(({ person, parts }) => [person, parts.map((p) => [p.from, p.to, p.track])]),
+    [
+      [
+        1,
+        [
+          [0, 50, 1],
+          [50, 60, 2],
+          [60, 99, 1],
+        ],
+      ],
+      [
+        2,
+        [
+          [10, 50, 2],
+          [50, 99, 1],
+        ],
+      ],
+    ],
+  );
+});
+
+test("the palette takes a value only where it may be one", () => {
+  const number = { kind: "float", minimum: 0.1, maximum: 1, choices: [] };
+  assert.equal(valueOf(number, " 0,5"), 0.5);
+  for (const wrong of ["", "2", "x", "-1"]) assert.equal(valueOf(number, wrong), null);
+  assert.equal(valueOf({ ...number, kind: "int", maximum: 9 }, "2.5"), null);
+  assert.equal(valueOf({ kind: "bool", choices: [] }, "off"), false);
+  assert.equal(valueOf({ kind: "choice", choices: ["soft", "hard"] }, "ha"), "hard");
 });

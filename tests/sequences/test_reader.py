@@ -175,6 +175,51 @@ def test_what_is_wrong_is_said_in_these_words(folder: Path, case: dict[str, str]
     assert complaint(folder) == case["message"]
 
 
+@pytest.mark.parametrize(
+    ("field", "value", "found"),
+    [
+        ("fps", "1" + "0" * 400, "expected a number above 0 and at most 1000, found 1000"),
+        ("min", "[-1e308, -1.5, 0.0]", "expected 3 numbers (x, y, z in metres) of at most 1e+06"),
+        ("min", f"[-1{'0' * 400}, -1.5, 0.0]", "expected 3 numbers (x, y, z in metres), found -1"),
+        ("position", "[1.4, 1e154, 1.0]", "of at most 1e+06, found 1e+154"),
+        ("sigma", "[1e154, 0.1, 0.1]", "of at most 1e+06, found 1e+154"),
+        ("sigma", "[1e-160, 0.1, 0.1]", "of at least 0.0001, found [1e-160, 0.1, 0.1]"),
+        ("t", "[1e300, 0.0, 3.0]", "of at most 1e+06, found 1e+300"),
+        ("half_extents", "[0.3, 0.3, 1e99]", "of at most 1e+06, found 1e+99"),
+        ("fps", "1" + "0" * 5000, "expected numbers of at most 18 digits"),
+        ("description", "[" * 5000 + "]" * 5000, "a few levels deep"),
+    ],
+)
+def test_what_no_room_can_have_is_refused_where_it_is_read(
+    folder: Path, field: str, value: str, found: str
+) -> None:
+    text = (folder / "sequence.toml").read_text(encoding="utf-8")
+    changed, count = re.subn(
+        rf"\b{field} = (\[[^\]]*\]|[^,\n]+)", f"{field} = {value}", text, count=1
+    )
+    assert count == 1
+    (folder / "sequence.toml").write_text(changed, encoding="utf-8")
+    message = complaint(folder)
+    assert message.startswith("room/sequence.toml")
+    assert found in message
+    assert len(message) < 300
+
+
+@pytest.mark.parametrize("file", ["cam1.csv", "ground_truth.csv"])
+def test_a_table_with_a_number_that_nothing_measures_names_line_and_column(
+    folder: Path, file: str
+) -> None:
+    rows = (folder / file).read_text(encoding="utf-8").splitlines()
+    cells = rows[2].split(",")
+    cells[3] = "-1e200"
+    rows[2] = ",".join(cells)
+    (folder / file).write_text("\n".join(rows), encoding="utf-8")
+    name = rows[0].split(",")[3]
+    assert complaint(folder) == (
+        f'room/{file}, line 3, column "{name}": expected a number of at most 1e+06, found "-1e200"'
+    )
+
+
 def test_an_empty_table_has_no_header(folder: Path) -> None:
     (folder / "cam2.csv").write_text("", encoding="utf-8")
     assert complaint(folder).startswith("room/cam2.csv, line 1: expected a header with the columns")

@@ -57,6 +57,10 @@ def widen(values: Values) -> None:
     values["room"]["max"][0] = 1.75
 
 
+def shrink(values: Values) -> None:
+    values["target"]["half_extents"] = [0.25, 0.25, 0.75]
+
+
 def move_door(values: Values) -> None:
     values["room"]["entrances"][0]["position"][1] = -0.5
 
@@ -82,6 +86,7 @@ def test_changes_are_told_one_by_one(opened: Sequence) -> None:
     assert after(lambda v: v["template"].clear()) == ["template person1 removed"]
     assert after(lambda v: v["template"][0].update(name="Bob")) == ["template person1 renamed Bob"]
     assert after(widen) == ["room, max x: 1.5 to 1.75 m"]
+    assert after(shrink) == ["target: 0.5 × 0.5 × 1.5 m"]
     assert after(move_door) == ["entrance 1 moved"]
     assert after(lambda v: v["room"]["entrances"].insert(0, DOOR)) == ["entrance 1 added"]
     assert after(lambda v: v["room"]["entrances"].clear()) == ["entrance 1 removed"]
@@ -93,6 +98,11 @@ def test_changes_are_told_one_by_one(opened: Sequence) -> None:
         (
             lambda v: v["room"]["max"].__setitem__(2, -1.0),
             "room/sequence.toml, [room], max: expected z above that of min, 0, found -1",
+        ),
+        (
+            lambda v: v["target"]["half_extents"].__setitem__(2, 0.0),
+            "room/sequence.toml, [target], half_extents: expected 3 positive numbers (half width, "
+            "depth and height in metres), found [0.3, 0.3, 0.0]",
         ),
         (
             lambda v: v["template"].append({**NEW, "name": " "}),

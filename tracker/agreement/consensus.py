@@ -3,7 +3,10 @@
 Two cameras see head and foot of a person as four rays. Rays of the same person meet, in front
 of both lenses; rays of different people, or through cameras that stand elsewhere than is said,
 meet by chance only. And all people stand the same way up and are of about one height, so the
-ways from foot to head agree with each other, in whatever axes and unit the world has.
+vectors from foot to head (here *rises*) agree with each other, in whatever axes and unit the
+world has. Points are triangulated by the midpoint method: the middle of the shortest segment
+between two rays (Hartley, Sturm, "Triangulation", Computer Vision and Image Understanding
+68(2), 1997, §5.3).
 """
 
 from __future__ import annotations
@@ -19,10 +22,10 @@ from numpy import ndarray
 from tracker.agreement.observed import PairsOfBoxes, Pose, Rays, in_world
 
 LARGEST_GAP = 0.15
-"""In heights of the person as the box shows it: by how much two rays may miss each other."""
+"""Largest distance between two rays that meet, as a share of the person's height there."""
 
 SPREAD = 0.25
-"""In heights: how far a way from foot to head may be from what most agree on."""
+"""Largest distance of a rise from the common one, as a share of the latter's length."""
 
 _LEAST_SINE = 0.05  # of the angle between two rays that are to meet: flatter ones tell no depth
 _LARGEST_RATIO = 2.5  # between the heights that two cameras see; one may look down steeply
@@ -32,16 +35,16 @@ _MOST_VOTES = 4000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Meetings:
-    """N pairs of boxes whose rays meet."""
+    """N pairs of boxes whose rays meet, in the axes and the unit of the calibration's world."""
 
     pairs: Int[ndarray, " N"]
     """Index into the pairs of boxes."""
     feet: Float[ndarray, "N 3"]
-    """World, its own unit."""
+    """Triangulated feet."""
     rises: Float[ndarray, "N 3"]
-    """From foot to head."""
+    """Vectors from foot to head."""
     gaps: Float[ndarray, " N"]
-    """The larger of both, in heights."""
+    """Distance between the two rays, the larger of head's and foot's, as a share of the height."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,23 +52,24 @@ class Consensus:
     """What the pairs of boxes agree on, in the world's own axes and unit."""
 
     rise: Float[ndarray, " 3"]
-    """From foot to head of the usual person; zero where nobody is found."""
+    """The common vector from foot to head; zero where nobody is found."""
     share: float
-    """Boxes that agree with one of the other camera, of all that could; 0 … 1."""
+    """:attr:`agreeing` / :attr:`possible`, 0 … 1."""
     shares: Mapping[tuple[int, int], float]
     """The same of every pair of cameras that have boxes at the same steps."""
     agreeing: int
-    """How many agree."""
+    """Pairs of boxes that meet and have the common rise, each box in one pair at most."""
     possible: int
+    """The largest number of such pairs that there could be."""
     feet: Float[ndarray, "N 3"]
-    """Of those who agree."""
+    """Of the agreeing pairs, as the following."""
     rises: Float[ndarray, "N 3"]
     gaps: Float[ndarray, " N"]
-    """In heights."""
+    """As of :class:`Meetings`."""
     fits: Float[ndarray, " N"]
-    """1 for what fits wholly, 0 for what only just agrees."""
+    """Weight of each: 1 for a perfect fit, 0 for one that only just agrees."""
     cameras: Int[ndarray, "N 2"]
-    """Which two cameras."""
+    """Indices of the two cameras."""
 
     @property
     def height(self) -> float:
@@ -96,7 +100,7 @@ def meet(pairs: PairsOfBoxes, first: Rays, second: Rays, one: Pose, other: Pose)
 def _between(
     base: Float[ndarray, " 3"], one: Float[ndarray, "N 3"], other: Float[ndarray, "N 3"]
 ) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
-    """The middles between rays from 0 and from ``base``, how far along, gaps, and if ahead."""
+    """Midpoints between rays from 0 and from ``base``, distances along both, gaps, and if ahead."""
     together = np.einsum("ni,ni->n", one, other)
     sine_squared = np.maximum(1.0 - together**2, 1e-12)
     on_one, on_other = one @ base, other @ base
@@ -172,7 +176,7 @@ def _agree(rises: Float[ndarray, "N 3"], rise: Float[ndarray, " 3"]) -> Bool[nda
 
 
 def _usual(rises: Float[ndarray, "N 3"], rng: np.random.Generator) -> Float[ndarray, " 3"]:
-    """The way from foot to head that most are near to, and then the median of those."""
+    """The rise that most others are near to, then the median of those: a consensus (RANSAC)."""
     if not len(rises):
         return np.zeros(3)
     votes = rises

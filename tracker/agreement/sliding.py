@@ -14,10 +14,10 @@ from tracker.camera import Camera
 from tracker.kernels import sliding
 
 SIGMA = 0.06
-"""Heights of a box: how far one may be off."""
+"""σ of :func:`tracker.kernels.sliding.slide`: noise of a box's ends, as a share of its height."""
 
 DEPTH_SIGMA = 0.15
-"""Logarithm of the distance that one box alone tells."""
+"""σ_λ: standard deviation of the logarithm of the distance that one box's size tells."""
 
 _LINKED = 0.5  # heights that a box may move in a step, and by which share its height may change
 _STEP = 0.05  # of the logarithm of the distance, for the derivative
@@ -77,15 +77,16 @@ def slid(
     height: float,
     most_steps: int = 150,
 ) -> tuple[Float[ndarray, "O S"], Float[ndarray, "O S"]]:
-    """How well the boxes of another camera fit to those of one, for offsets in time.
+    """How well the boxes of two cameras agree, for offsets in time between them.
 
-    Every box of the one tells by its size where the person is; seen from the other camera there
-    should be a box, at the right height on the epipolar line and not too far along it.
+    The size of a box in camera ``one`` gives the person's distance, and so where the other camera
+    should have a box: across the epipolar line within the noise, along it within the error of that
+    distance. The equation stands in :mod:`tracker.kernels.sliding`.
 
     Args:
         one: Whose boxes say where people are.
         other: What is seen by ``one`` at step k is sought here at step k + offset.
-        offsets: Steps, also parts of one.
+        offsets: Steps; fractions are interpolated.
         height: Of people, metres.
         most_steps: So many of the steps where ``one`` has boxes are taken, evenly.
 

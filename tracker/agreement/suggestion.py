@@ -39,7 +39,7 @@ class Suggestion:
     floor: float
     """z of what people stand on, metres."""
     people: int
-    """Pairs of boxes behind it; 0 where the cameras alone are."""
+    """Pairs of boxes that it was made from; 0 where it follows from the cameras alone."""
 
 
 def agreement(cameras: Many[Camera], rays: Many[Rays], most_pairs: int = 20_000) -> Consensus:

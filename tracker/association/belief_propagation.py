@@ -16,14 +16,14 @@ from numpy import ndarray
 from tracker.kernels.association.belief_propagation import Settling, belief_propagation
 
 TOLERANCE = 1e-6
-"""Largest change of a message, relative to the intensity it meets, at which all are settled:
-far below what a probability is told with."""
+"""Convergence: the largest change of a message, relative to the intensity that it meets; far below
+the precision to which an association probability matters."""
 
 ITERATIONS = 200
-"""At most so many, should they not settle."""
+"""At most so many, where the messages have not converged by then."""
 
 SETTLING = Settling(TOLERANCE, ITERATIONS)
-"""Both, for a kernel that propagates beliefs within."""
+"""Both, as kernels take them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

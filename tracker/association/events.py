@@ -3,6 +3,8 @@
 [WW10] Wang, Wan, patent CN101783020A, 2010.
 [FBS83] Fortmann, Bar-Shalom, Scheffe, "Sonar tracking of multiple targets using joint
 probabilistic data association", IEEE Journal of Oceanic Engineering 8(3), 1983.
+[M68] K. G. Murty, "An algorithm for ranking all the assignments in order of increasing
+cost", Operations Research 16(3), 1968.
 """
 
 from __future__ import annotations
@@ -65,7 +67,7 @@ def simplified_murty(
 
     the logarithm of how much likelier it is than none, where it is much likelier, and
     always above 0. The heaviest matching, by the Hungarian method, is one event: who is
-    matched without a pair is missed, or is nobody's. Its pairs are taken out of the graph,
+    matched to a dummy is missed, or is clutter. Its pairs are taken out of the graph,
     and the next is sought in what is left. Exact Murty would split the rest into n parts
     and search each.
 
@@ -102,7 +104,7 @@ def murty(
 ) -> JointEvents:
     """The K joint events of the greatest weight Π w_i0 Π w_ij Π ρ_j, greatest first.
 
-    By Murty's partition of a square assignment problem in which target i may also take
+    By Murty's partition [M68] of a square assignment problem in which target i may also take
     a dummy of its own for w_i0, and measurement j one for ρ_j.
 
     Args:

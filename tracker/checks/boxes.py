@@ -9,7 +9,7 @@ import numpy as np
 
 from tracker.agreement.suggestion import LEAST_AGREEING, Suggestion, suggest
 from tracker.checks.check import Check, Remedy, absent, good, percent, warning
-from tracker.checks.reading import Reading, exchanged
+from tracker.checks.reading import Reading, exchanged, exchanges
 from tracker.checks.readings import (
     LEAST_SHARE,
     Judge,
@@ -32,6 +32,7 @@ SCORE_THRESHOLD = 0.3
 """Boxes below it are left out."""
 
 _SMALLER, _TALLER = 0.6, 1.6  # than the target: how tall boxes may be
+_SMALLEST = 0.08  # metres: not even a head
 _TALLEST_TARGET = 4.0  # metres: who states more has not written metres
 _LEAST_INSIDE = 0.25  # of the people: with fewer in the room it is another place
 _FLOOR_OFF = 0.5  # metres
@@ -125,7 +126,11 @@ def check_boxes(sequence: Sequence, told: BoxesTell | None) -> Iterator[Check]:
     if told is None:
         few = sum(view.detections is not None for view in sequence.views)
         why = "no camera has boxes" if not few else "fewer than two cameras have boxes at a step"
-        yield absent(name, f"{why}, so nothing says whether the calibration is right")
+        yield absent(
+            name,
+            f"{why}, so only lenses, places of the cameras and motion are checked: neither poses, "
+            "unit and axes against people, nor their size",
+        )
         return
     if told.mistaken:
         yield _mistake(sequence, told)
@@ -172,7 +177,7 @@ def _mistake(sequence: Sequence, told: BoxesTell) -> Check:
     if reading.order is not None:
         pairs = exchanged(reading.order, names)
         words.append(f"the calibrations exchanged ({pairs})")
-        remedies.append(Remedy("--swap", pairs.replace(" and ", ",")))
+        remedies += [Remedy("--swap", f"{a}={b}") for a, b in exchanges(reading.order, names)]
     shared = told.given.consensus.share
     if words:
         sentence = (
@@ -237,6 +242,13 @@ def _tilt(told: BoxesTell) -> Check:
 def _size(sequence: Sequence, told: BoxesTell) -> Check:
     height = told.given.consensus.height
     known = 2.0 * float(sequence.target_half_extents[2])
+    if height < _SMALLEST:
+        return warning(
+            "size of people",
+            f"boxes are {height:.2g} m tall in the room, nobody is as small: translations are in "
+            "a larger unit than they were taken for",
+            height=height,
+        )
     if _fits(height, known):
         return good(
             "size of people",

@@ -18,6 +18,8 @@ class Remedy:
     flag: str
     """``--pose``, ``--axes``, …; or the field, for instance ``camera.time_offset``."""
     value: str
+    camera: str = ""
+    """Whose field it is."""
 
     def __str__(self) -> str:
         return (

@@ -29,7 +29,7 @@ WIDTH = 160
 """Pixels across, to which pictures are made smaller."""
 
 MOST_STEPS = 1500
-"""So many steps in the middle of a recording are looked at."""
+"""In the middle of a recording, where nobody wants fewer."""
 
 _NOISE = 8  # grey values that a pixel changes by without anything moving
 _BLOCK = 25  # steps that count as one part of the recording
@@ -70,11 +70,17 @@ class MotionPairing:
 
 
 def motion_pairings(
-    sequence: Sequence, reader: FrameReader
+    sequence: Sequence, reader: FrameReader, most_steps: int = MOST_STEPS
 ) -> dict[tuple[int, int], MotionPairing]:
-    """The pairs of cameras whose pictures show some of the same epipolar planes."""
-    first = max(0, (sequence.frames - MOST_STEPS) // 2)
-    steps = min(sequence.frames, MOST_STEPS)
+    """The pairs of cameras whose pictures show some of the same epipolar planes.
+
+    Args:
+        sequence: With calibrated cameras.
+        reader: Of its pictures.
+        most_steps: So many in the middle of the recording are looked at.
+    """
+    first = max(0, (sequence.frames - most_steps) // 2)
+    steps = min(sequence.frames, most_steps)
     moving = [_motion(reader, c, first, steps) for c in range(len(sequence.views))]
     pairings: dict[tuple[int, int], MotionPairing] = {}
     for a, b in itertools.combinations(range(len(moving)), 2):

@@ -147,3 +147,15 @@ def exchanged(order: Many[int], names: Many[str]) -> str:
         elif order[second] != first:
             told.append(f"{names[first]} has that of {names[second]}")
     return ", ".join(told)
+
+
+def exchanges(order: Many[int], names: Many[str]) -> list[tuple[str, str]]:
+    """The same as exchanges of two, one after the other."""
+    told: list[tuple[str, str]] = []
+    now = list(range(len(order)))
+    for place, wanted in enumerate(order):
+        other = now.index(wanted)
+        if other != place:
+            now[place], now[other] = now[other], now[place]
+            told.append((names[place], names[other]))
+    return told

@@ -13,7 +13,7 @@ from numpy import ndarray
 from tracker.agreement.observed import Rays, rays_of
 from tracker.agreement.sliding import Course, course, slid
 from tracker.agreement.suggestion import LEAST_AGREEING, agreement
-from tracker.checks.motion import motion_pairings
+from tracker.checks.motion import MOST_STEPS, motion_pairings
 from tracker.checks.offsets import Curve, Offset, Pairing, solve
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
@@ -58,6 +58,7 @@ def synchronise(
     source: Literal["boxes", "motion"] | None = None,
     reader: FrameReader | None = None,
     height: float | None = None,
+    most_steps: int = MOST_STEPS,
 ) -> tuple[CameraOffset, ...]:
     """Find out how late each camera is. Nothing is applied.
 
@@ -66,6 +67,7 @@ def synchronise(
         source: What is compared; boxes where every camera has them, else the pictures' motion.
         reader: Of the pictures; one is opened where none is given.
         height: Of the boxes, metres; worked out where it is not given.
+        most_steps: Of which pictures are looked at.
 
     Returns:
         One for each camera that can be compared; none where nothing can be.
@@ -77,7 +79,7 @@ def synchronise(
     elif sequence.has_pictures:
         own = reader or FrameReader(sequence)
         try:
-            pairings = {**motion_pairings(sequence, own)}
+            pairings = {**motion_pairings(sequence, own, most_steps)}
         finally:
             if reader is None:
                 own.close()

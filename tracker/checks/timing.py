@@ -16,18 +16,23 @@ _NEAR = 0.4  # heights of a box
 _LEAST_NEAR = 100
 
 
-def check_time(sequence: Sequence, reader: FrameReader | None = None) -> Iterator[Check]:
+def check_time(
+    sequence: Sequence,
+    reader: FrameReader | None = None,
+    found: tuple[CameraOffset, ...] | None = None,
+) -> Iterator[Check]:
     """Is any camera late; from the boxes, or from the motion in the pictures where there are none.
 
     Args:
         sequence: Read rightly: with a wrong calibration nothing can be said.
         reader: Of the pictures.
+        found: What :func:`synchronise` found, where it is known.
     """
     name = "cameras show the same moments"
     if len(sequence.views) < 2:
         yield absent(name, "it needs two cameras")
         return
-    found = synchronise(sequence, reader=reader)
+    found = synchronise(sequence, reader=reader) if found is None else found
     if not found:
         yield absent(name, "neither boxes nor pictures of two cameras can be compared")
         return
@@ -36,7 +41,7 @@ def check_time(sequence: Sequence, reader: FrameReader | None = None) -> Iterato
         yield warning(
             name,
             offset.sentence,
-            Remedy("camera.time_offset", f"{-offset.seconds:.3f}"),
+            Remedy("camera.time_offset", f"{-offset.seconds:.3f}", offset.camera),
             steps=offset.steps,
             seconds=offset.seconds,
             sharpness=offset.sharpness,

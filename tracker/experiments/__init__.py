@@ -11,10 +11,12 @@ from tracker.experiments.laboratory.experiment import (
     Context,
     Experiment,
     Finding,
+    RandomRooms,
     Result,
     Unavailable,
     Verdict,
 )
+from tracker.experiments.rooms import experiment as rooms
 
 EXPERIMENTS: dict[str, Experiment] = {
     experiment.name: experiment
@@ -29,6 +31,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         ppf.EXPERIMENT,
         association.EXPERIMENT,
         methods.EXPERIMENT,
+        rooms.EXPERIMENT,
     )
 }
 """By name, in the order in which ``--all`` runs them."""
@@ -38,6 +41,7 @@ __all__ = [
     "Context",
     "Experiment",
     "Finding",
+    "RandomRooms",
     "Result",
     "Unavailable",
     "Verdict",

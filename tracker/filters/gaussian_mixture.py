@@ -1,4 +1,8 @@
-"""An intensity as a weighted sum of Gaussians: predict, prune, merge, cap."""
+"""An intensity as a weighted sum of Gaussians: predict, prune, merge, cap.
+
+[VM06] B.-N. Vo, W.-K. Ma, "The Gaussian mixture probability hypothesis density
+filter", IEEE Transactions on Signal Processing 54(11), 2006.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +21,7 @@ from tracker.kernels.intensity import mixture as mixture_kernels
 from tracker.kernels.linear_algebra import Gaussians
 
 _NOBODY = np.zeros(0, dtype=np.int64)
-"""Instead of owners, where no component has one."""
+"""Stands for the owners where no component has one."""
 
 
 class _Weighted(Protocol):
@@ -104,7 +108,7 @@ class GaussianMixture:
             )
         if indices.dtype == np.bool_:
             indices = indices.nonzero()[0]
-        # several times faster than brackets, which prepare for any kind of index
+        # cheaper than indexing with brackets, which prepares for any kind of index
         return GaussianMixture(
             self.weights.take(indices),
             self.means.take(indices, 0),
@@ -251,7 +255,7 @@ def gate_distance(probability: float, dimension: int) -> float:
     """Squared Mahalanobis distance within which a Gaussian has a share of its mass.
 
     The quantile of χ² with d degrees of freedom, 2 P⁻¹(d/2, P_G), with the regularised
-    incomplete gamma function P. (``scipy.stats`` has it too, and takes half a second to import.)
+    incomplete gamma function P. (``scipy.stats`` has it too, and is slow to import.)
 
     Args:
         probability: P_G, 0 … 1.

@@ -1,4 +1,8 @@
-"""Motion, birth and clutter: the parts of the model that a sequence determines."""
+"""Motion, birth and clutter: the parts of the model that a sequence determines.
+
+[ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
+density filtering", 2021.
+"""
 
 from __future__ import annotations
 
@@ -102,7 +106,7 @@ def random_walk_noise(sigma: float, step_time: float, dimension: int) -> Float[n
 
 
 def entrance_births(room: Room, weight: float) -> GaussianMixture:
-    """The birth intensity γ: one component at each entrance, without labels yet.
+    """The birth intensity γ ([ZW21] §2.4): one component at each entrance, without labels yet.
 
     A room without entrances gives one broad component over its whole volume, so
     that people are still found.
@@ -138,7 +142,7 @@ def visible_area(camera: Camera, room: Room) -> float:
     False boxes are taken as uniform over it ([ZW21] §2.4: clutter uniform over
     the volume, as this camera sees it). Never less than one per cent of the
     picture, so that the clutter intensity stays finite for a camera that looks
-    elsewhere. Of the same camera and room it is found once: every run asks for it.
+    elsewhere. The result is kept for the same camera and room: every run asks for it.
     """
     axes = np.linspace(room.minimum, room.maximum, 12).T
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""The Gaussian-mixture PHD recursion: update and extraction.
+"""The Gaussian-mixture PHD recursion: update and extraction of estimates.
 
 [VM06] B.-N. Vo, W.-K. Ma, "The Gaussian mixture probability hypothesis density
 filter", IEEE Transactions on Signal Processing 54(11), 2006.
@@ -29,7 +29,7 @@ uncertain, but less than half a target cannot be reported."""
 
 @dataclass(frozen=True, slots=True)
 class PhdUpdate:
-    """The intensity after one measurement set, and what fed it."""
+    """The intensity after one measurement set, and from which pairs it was made."""
 
     posterior: GaussianMixture
     """First the J predicted components as missed, then one for every gated pair."""
@@ -40,7 +40,7 @@ class PhdUpdate:
     log_odds: Float[ndarray, " P"]
     """log(p_D w' q(z) / κ(z)) of each gated pair: this component against clutter."""
     measurement_weights: Float[ndarray, " M"]
-    """W_z: the expected number of targets (0 … 1) that each measurement came from."""
+    """W_z = Σ_j w_j(z): the expected number of targets, 0 … 1, behind each measurement z."""
 
 
 def update(
@@ -67,7 +67,7 @@ def update(
         predicted: v', J components.
         measurements: z, one a row; none is allowed.
         expected: h(m_j) for each component, for a linear model H m_j; H for each or one for
-            all; and what each adds to the noise where h bends.
+            all; and what each adds to the noise where h is nonlinear (Ω of the unscented form).
         noise: R, one for all measurements (N = 1) or one each (N = M).
         detection_probability: p_D, one for all or one a component. Where it is
             0 the component is left as it is.
@@ -97,7 +97,7 @@ def _filled(value: float | Float[ndarray, " N"], count: int) -> Float[ndarray, "
     """One number for all as one each."""
     if isinstance(value, np.ndarray):
         return value
-    filled = np.empty(count)  # a third of the time of np.full, which counts at every update
+    filled = np.empty(count)  # cheaper than np.full, and done at every update
     filled.fill(value)
     return filled
 

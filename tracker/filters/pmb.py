@@ -52,7 +52,7 @@ def update(
     Args:
         tracks: n Bernoullis: existence as weight, Gaussian, label.
         measurements: z, one a row; none is allowed.
-        expected: h(m_i), H_i, and what each track adds to the noise where h bends.
+        expected: h(m_i), H_i, and what each track adds to the noise where h is nonlinear.
         noise: R, one for all measurements (N = 1) or one each (N = M).
         detection_probability: p_i of each track.
         unexplained_intensity: ρ_j = κ(z_j) + e_j, clutter and newborns at each measurement.

@@ -29,7 +29,7 @@ from tracker.kernels.pictures.foreground import (
 from tracker.parameters.foreground import ForegroundParams
 
 ITERATIONS = 20
-"""Of the c-means at most; most come to rest after five to eight."""
+"""Of the c-means at most; the thresholds usually come to rest well before."""
 
 CLOSING = np.ones((3, 3), dtype=np.uint8)
 """Gaps that are closed, as published."""
@@ -43,7 +43,7 @@ class AdaptiveState:
     """The background of one camera, and how long each pixel has shown it."""
 
     background: UInt16[ndarray, "h w 3"]
-    """256 times the level, BGR: a tenth of a grey level counts."""
+    """256 times the grey level, BGR: slow changes are below one level a picture."""
     still: UInt8[ndarray, "h w"]
     """For how many pictures each pixel has been away from the foreground, 255 at most."""
 

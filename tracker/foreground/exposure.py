@@ -26,10 +26,10 @@ LEVELS = 16
 """Levels of the source at which a tone curve is measured; between them it is interpolated."""
 
 SAMPLED_PIXELS = 6000
-"""About so many pixels a tone curve is measured on: some hundred for each level's median."""
+"""About so many pixels a tone curve is measured on: a few hundred for each level's median."""
 
 MEDIAN_VALUES = 50_000
-"""Values of a picture of which medians are taken at a time: some ten milliseconds."""
+"""Values of a picture of which medians are taken between two looks at whether to stop."""
 
 OFTEN = 0.3
 """Share of the pictures in which a pixel that is only passed by seldom shows who passes."""

@@ -150,4 +150,15 @@ class ImagesPiece:
     """Width and height of the first, pixels."""
 
 
-Piece = CalibrationPiece | DetectionPiece | TruthPiece | VideoPiece | ImagesPiece
+@dataclass(frozen=True, slots=True, eq=False)
+class TimesPiece:
+    """When one camera took its frames. F frames."""
+
+    source: Path
+    camera: str
+    """What the file says of the camera: the number of its port; may be empty."""
+    times: Float[ndarray, " F"]
+    """Seconds, ascending, from a beginning that all cameras share."""
+
+
+Piece = CalibrationPiece | DetectionPiece | TruthPiece | VideoPiece | ImagesPiece | TimesPiece

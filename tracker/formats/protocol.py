@@ -9,7 +9,7 @@ from typing import Literal, Protocol
 from tracker.formats.pieces import Piece
 from tracker.formats.source import SourceFile
 
-Kind = Literal["calibration", "detections", "truth", "pictures"]
+Kind = Literal["calibration", "detections", "truth", "pictures", "time"]
 
 
 class Certainty(IntEnum):

@@ -21,7 +21,7 @@ from tracker.formats.calibration import (
     tsai,
 )
 from tracker.formats.detections import coco, cvat, motchallenge, openpose, table, yolo
-from tracker.formats.pictures import images, video
+from tracker.formats.pictures import images, times, video
 from tracker.formats.pieces import FormatError
 from tracker.formats.protocol import Certainty, Format
 from tracker.formats.source import SourceFile
@@ -55,6 +55,7 @@ FORMATS: tuple[Format, ...] = (
     panoptic_skeletons,
     video,
     images,
+    times,
 )
 
 

@@ -42,7 +42,7 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Newborns:
-    """N newcomers: where, how sure, and which box of each of C cameras says so."""
+    """N newcomers: position, existence, and the box of each of C cameras behind them."""
 
     positions: Float[ndarray, "N 3"]
     covariances: Float[ndarray, "N 3 3"]
@@ -62,7 +62,7 @@ class Newborns:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BirthModel:
-    """What is known of newcomers and of what is taken for them."""
+    """The model of births, of their detection, and of the clutter that is mistaken for them."""
 
     birth_rate: float
     """λ_b, expected newcomers a step."""
@@ -90,9 +90,11 @@ class MeasurementBirths:
         Λ = λ_b/V ∫ Π_{c sees} p_c g(z_c | x) / κ_c  Π_{c misses} (1 − p_c) dx
 
     and the newcomer's existence is Λ / (1 + Λ): the rule for new tracks of the
-    Poisson multi-Bernoulli filter, taken over all cameras at once; at the first step
-    those who are there already count with the newcomers. The integral is Laplace's, around the place that fits the boxes best. After the adaptive
-    birth of Ristic, Clark, Vo and Vo (IEEE TAES 48(2), 2012).
+    Poisson multi-Bernoulli filter, taken over all cameras at once; at the first step those
+    who are there already count with the newcomers. The integral
+    is approximated by Laplace's method, around the place that fits the boxes best. After the
+    adaptive birth of Ristic, Clark, Vo and Vo (IEEE TAES 48(2), 2012), with the rule for new
+    tracks of Williams (IEEE TAES 51(3), 2015).
     """
 
     def __init__(

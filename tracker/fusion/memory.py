@@ -1,4 +1,4 @@
-"""People lately lost from sight: who comes back near where he should be gets his label back."""
+"""People lost a short while ago: who reappears near the predicted place gets the old label back."""
 
 from __future__ import annotations
 
@@ -18,11 +18,10 @@ from tracker.fusion.model import CONFIRMED, FusionModel
 class Memory:
     """Who is known, and who of them was lost a short while ago.
 
-    A filter forgets a person whom no camera sees within a step or two: that is right
-    for the picture of the room, and wrong for the name. So the last place of a sure
-    person who vanished inside the room is predicted on for a while, and the first
-    newcomer to become sure near it is taken for the same person. Nothing else of
-    the filter changes.
+    A filter drops a person whom no camera sees within a step or two, which is right for the
+    estimate and wrong for the label. So the last state of a confirmed person who vanished
+    inside the room is predicted on for a while, and the first new track that is confirmed
+    within its gate is taken for the same person. Nothing else of the filter changes.
     """
 
     known: GaussianMixture

@@ -127,7 +127,7 @@ class FusionModel:
         views: Many[ViewResult],
         recent: Recent,
     ) -> tuple[tuple[GaussianMixture, Newborns] | None, Recent]:
-        """As :meth:`newborns`, and what is to be remembered of this step's frames.
+        """As :meth:`newborns`, with what cameras that have no frame now left unexplained lately.
 
         Args:
             evidence: What the cameras leave unexplained.
@@ -164,7 +164,7 @@ class FusionModel:
         labels: Int[ndarray, " n"],
         sources: Int[ndarray, "C n"],
     ) -> Bool[ndarray, " n"]:
-        """Which of n people only repeat a surer or older one at the same place.
+        """Which of n tracks are duplicates, which repeat a surer or older one at the same place.
 
         Two nearer than ``near`` are one person, unless some camera gave each a box of
         its own; at half of it they are one even so, for a detector may draw two boxes

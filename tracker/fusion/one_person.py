@@ -1,4 +1,4 @@
-"""One label, one person: what the plain PHD recursion does not know of a labelled intensity.
+"""One label, one person: a constraint that the plain PHD recursion does not have.
 
 The PHD takes people as Poisson: a camera's miss multiplies every weight by 1 − p_D
 whatever the cameras before saw, one component may explain two boxes, and two labels

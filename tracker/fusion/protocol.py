@@ -1,4 +1,4 @@
-"""The face of every fusion method: the boxes of all cameras in, a 3D intensity out."""
+"""The interface of every fusion method: the boxes of all cameras in, a 3D intensity out."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tracker.single_view.protocol import ViewResult
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Associations:
-    """Which box belongs to whom: the pairs worth telling of one step, camera after camera."""
+    """Association probabilities of one step: pairs of component and box, camera after camera."""
 
     cameras: Int[ndarray, " A"]
     components: Int[ndarray, " A"]
@@ -43,11 +43,11 @@ class FusionResult:
     detection_probabilities: Float[ndarray, "C J"]
     """p_D that each camera was given for each component; 0 outside its picture."""
     sources: Int[ndarray, "C J"]
-    """Index into ``ViewResult.boxes`` of the box that fed each component, -1 for none."""
+    """Index into ``ViewResult.boxes`` of the box associated with each component, -1 for none."""
     source_weights: Float[ndarray, "C J"]
     """The share of the component that its box made: an association probability, 0 … 1."""
     hidden_by: Int[ndarray, "C J"]
-    """Label of the target that hides the component in each camera, -1 for none."""
+    """Label of the target that occludes the component in each camera, -1 for none."""
     associations: Associations = field(default_factory=Associations.none)
     """All association probabilities, of which ``sources`` names the greatest."""
 

@@ -13,12 +13,12 @@ from tracker.fusion.protocol import Associations, FusionResult
 from tracker.kernels.linear_algebra import sum_pairs
 
 WORTH_TELLING = 0.01
-"""Association probability below which a pair is not told: a hundredth is no news to anybody."""
+"""Association probability below which a pair is left out of the result, which it keeps small."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Record:
-    """The evidence of C cameras for J components: the why of a :class:`FusionResult`."""
+    """The evidence of C cameras for J components, of which a :class:`FusionResult` is made."""
 
     detection_probabilities: Float[ndarray, "C J"]
     sources: Int[ndarray, "C J"]
@@ -27,7 +27,7 @@ class Record:
 
     @staticmethod
     def blank(cameras: int, size: int) -> Record:
-        """Nothing said yet."""
+        """No evidence yet."""
         nobody = np.full((cameras, size), -1, dtype=np.int64)
         return Record(np.zeros((cameras, size)), nobody, np.zeros((cameras, size)), nobody.copy())
 
@@ -78,7 +78,7 @@ class Ledger:
         boxes: Int[ndarray, " A"],
         probabilities: Float[ndarray, " A"],
     ) -> None:
-        """Note one camera's pairs of label and box; pairs not worth telling are left out."""
+        """Note one camera's pairs of label and box, but for those below :data:`WORTH_TELLING`."""
         told = (probabilities >= WORTH_TELLING).nonzero()[0]
         if not len(told):
             return

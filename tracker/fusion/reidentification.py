@@ -30,10 +30,10 @@ class Identities:
 
         π ← (1 − Δt/T) π + Δt/T · 1/G,   log π_g ← log π_g + Δt/τ Σ_c a_c log p_g(z_c)
 
-    for each box z_c with association probability a_c: the exponent Δt/τ makes of the
-    many alike pictures of a second one independent look. The first track that is
-    surely of a person owns the name, and whoever is surely of the same person later
-    gets that track's label: people are one each.
+    for each box z_c with association probability a_c: consecutive pictures are alike, so the
+    exponent Δt/τ lets those of τ seconds count as one independent observation. The first
+    track that is surely of a person owns that identity, and a later track that is surely of
+    the same person gets its label: each person has one label at a time.
     """
 
     labels: Int[ndarray, " K"]
@@ -67,7 +67,7 @@ def reidentify(
         views: The boxes with their likenesses; of less than two people nothing is told.
         waiting: Labels of people lost from sight, whose looks are kept.
         step_time: Δt, seconds.
-        parameters: How far colours are believed, and from which odds.
+        parameters: How much colours count, and from which odds a pair holds.
 
     Returns:
         New label by old one, each at most once on either side; and the identities after it.

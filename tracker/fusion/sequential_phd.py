@@ -87,7 +87,7 @@ class SequentialPhd:
         """Predict one step ahead and update with every camera's boxes, in the cameras' order."""
         p = self._parameters
         mixture = self._model.motion.predict(state.mixture, p.survival_probability)
-        # heaviest first, so read from the end: a label's heaviest component has the last word
+        # components are heaviest first; read from the end, a label keeps its heaviest one's place
         previous = dict(zip(mixture.labels[::-1].tolist(), mixture.means[::-1, :3], strict=True))
         sure = _confirmed_labels(mixture)
         next_label = state.next_label
@@ -203,7 +203,7 @@ class SequentialPhd:
         grouped = linear_algebra.group_labels(mixture.labels)
         labels, label = grouped.labels, grouped.places
         held = np.bincount(label, mixture.weights, len(labels))
-        # the heaviest component of a label has the last word on where its person is
+        # the heaviest component of a label says where its person is
         heaviest = mixture_kernels.heaviest_of_groups(mixture.weights, label, len(labels))
         duplicate = self._model.duplicates(
             mixture.means[heaviest], held, labels, record.sources[:, heaviest]

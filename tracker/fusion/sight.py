@@ -1,4 +1,4 @@
-"""Cameras without a frame at a step: they say nothing there, neither a box nor a miss.
+"""Cameras without a frame at a step: they give no evidence there, neither a box nor a miss.
 
 A person is not less likely to exist for a picture that was never taken: such a camera's p_D
 is 0. What nobody explained in its last frame is remembered for a moment, so that cameras whose

@@ -42,7 +42,7 @@ class ExpectedBoxes:
 
     expected: Expected
     """Values: centre (x, y), or horizontal centre, top, bottom (and width), in pixels. Their
-    derivatives by the state, pixels a metre; zero for velocities. What the bend of the
+    derivatives by the state, pixels a metre; zero for velocities. What the nonlinearity of the
     projection adds to the noise, squared pixels: one each, or nothing. The same of a person
     who lies or is bent, where that is asked for."""
     boxes: Float[ndarray, "J 4"]
@@ -73,22 +73,17 @@ class TargetModel:
 
     The box is predicted from the target's vertical axis: top and bottom are the
     projected ends of the axis, the horizontal centre lies between them, the
-    width is that of a cylinder of the target's mean half width. On boxes of a
-    real person detector this agrees with the truth to a few hundredths of the
-    box's height, where the bounds of a projected cuboid are off by a sixth at
-    the feet.
+    width is that of a cylinder of the target's mean half width. So do the boxes of
+    person detectors end; the bounds of a projected cuboid reach further below the feet.
 
-    The projection bends. ``extended`` takes it as straight at the mean. With
-    ``unscented`` the values are the mean over the state's uncertainty, the
-    Jacobian is that of the best straight line through it (statistical linear
-    regression) and ``spreads`` holds what is left. Against a particle reference, as
-    medians: of a person who is followed (a place known to 0.08 m) both updates are
-    within 3 mm, at any distance. Of a newcomer (known to 0.4 m) the unscented one is
-    nearer: its mean is off by 5 to 6 cm at 1.2 m from the camera, as much as or a little
-    less than the extended one's, with two thirds of the divergence; by 2 cm against
-    4 cm at 3 m; by 2 cm against 3 cm at 5 m. On recordings nothing of that is left, for
-    a newcomer is one for a step only, and it takes about a third more time: so the
-    extended update is the default.
+    The projection is nonlinear. ``extended`` linearises it at the mean (extended Kalman
+    filter). With ``unscented`` the values are the mean over the state's uncertainty, the
+    Jacobian is that of the best linear fit through it (statistical linear regression:
+    Lefebvre, Bruyninckx, De Schutter, IEEE Transactions on Automatic Control 47(8), 2002)
+    and ``spreads`` holds what is left. The tests compare both with a particle reference: of
+    a person who is followed (known to 0.08 m) they agree within 5 mm; of a newcomer (known
+    to 0.4 m) the unscented one is nearer. A newcomer is one for a few steps only, and the
+    unscented update takes more time: so the extended one is the default.
 
     A person may also lie, crouch or bend, or half of him is behind a table. Then the
     box is of another shape: with ``posture_share`` a box is one of two kinds, and
@@ -108,7 +103,7 @@ class TargetModel:
         Args:
             half_extents: Half width, depth and height, metres.
             kind: What is used of a box.
-            update: How the bend of the projection is met.
+            update: How the nonlinear projection is handled.
             posture_share: Share of the boxes that show a person in another posture than upright:
                 lying, crouching, bent.
             parameters: What the box of such a person should be, and how far it may be off.

@@ -15,8 +15,8 @@ from tracker.kernels import boxes as box_kernels
 from tracker.kernels.boxes import Occlusion
 
 WORTH_TELLING = 0.2
-"""Share of a target's box that must be covered for its occluder to be named. It changes what is
-told, not what is tracked."""
+"""Share of a target's box that must be covered for its occluder to be named in the result. It
+changes what is reported, not what is tracked."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

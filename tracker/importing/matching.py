@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from tracker.formats.pieces import (
@@ -11,6 +11,7 @@ from tracker.formats.pieces import (
     FormatError,
     ImagesPiece,
     RawCamera,
+    TimesPiece,
     TruthPiece,
     VideoPiece,
 )
@@ -34,6 +35,7 @@ class MatchedCamera:
     video: VideoPiece | None = None
     images: ImagesPiece | None = None
     detections: DetectionPiece | None = None
+    times: TimesPiece | None = None
     how: dict[str, How] = field(default_factory=dict)
     """How its pictures and boxes were matched."""
 
@@ -77,6 +79,12 @@ def match_all(taken: Sequence[Taken], sets: Sequence[CameraSet], options: Import
     _by_flag(cameras, videos, detections, options)
     _match_pictures(cameras, videos, told)
     _match_boxes(cameras, detections, told)
+    _match_times(cameras, _times(taken), told)
+    _exchange(cameras, options)
+    wanted = [c for c in cameras if c.raw.name not in options.left_out]
+    if not wanted:
+        raise FormatError("every camera is left out; expected at least one that is not")
+    cameras = wanted
     used = [c for c in cameras if c.video or c.images or c.detections is not None]
     if used and len(used) < len(cameras):
         left = [c.raw.name for c in cameras if c not in used]
@@ -133,11 +141,8 @@ def _choose(sets: Sequence[CameraSet], labels: Sequence[str]) -> CameraSet:
 def _by_flag(
     cameras: list[MatchedCamera], pictures: _Pictures, boxes: _Boxes, options: ImportOptions
 ) -> None:
-    for name, path in options.cameras.items():
-        own = [camera for camera in cameras if camera.raw.name == name]
-        if not own:
-            known = ", ".join(camera.raw.name for camera in cameras)
-            raise FormatError(f"--camera {name}: expected a camera of the calibration: {known}")
+    for name, path in options.cameras:
+        own = [_named(cameras, name, "--camera")]
         wanted = path.resolve()
         found = False
         for row in [*pictures]:
@@ -157,6 +162,21 @@ def _by_flag(
                 f"--camera {name}={path}: is neither a video, nor a folder of pictures, nor boxes "
                 "among what is imported; name it as a source too"
             )
+
+
+def _named(cameras: Sequence[MatchedCamera], name: str, flag: str) -> MatchedCamera:
+    for camera in cameras:
+        if camera.raw.name == name:
+            return camera
+    known = ", ".join(camera.raw.name for camera in cameras)
+    raise FormatError(f"{flag} {name}: expected a camera of the calibration: {known}")
+
+
+def _exchange(cameras: list[MatchedCamera], options: ImportOptions) -> None:
+    """Calibrations that are the other camera's; names stay with pictures and boxes."""
+    for first, second in options.swap:
+        one, other = (_named(cameras, name, "--swap") for name in (first, second))
+        one.raw, other.raw = replace(other.raw, name=first), replace(one.raw, name=second)
 
 
 def _give_pictures(camera: MatchedCamera, piece: VideoPiece | ImagesPiece, how: How) -> None:
@@ -179,6 +199,33 @@ def _match_pictures(cameras: list[MatchedCamera], pictures: _Pictures, told: lis
             _give_pictures(free[pairs[place]], piece, how)
         else:
             told.append(f"{label}: belongs to no camera of the calibration; --camera NAME=FILE")
+
+
+def _times(taken: Sequence[Taken]) -> list[tuple[str, TimesPiece]]:
+    """Time stamps with what says of which camera they are."""
+    return [
+        (piece.camera or one.label.rsplit(".", 1)[0], piece)
+        for one in taken
+        for piece in one.pieces
+        if isinstance(piece, TimesPiece)
+    ]
+
+
+def _match_times(
+    cameras: list[MatchedCamera], times: list[tuple[str, TimesPiece]], told: list[str]
+) -> None:
+    """Time stamps of frames, where every one of them belongs to a camera that has pictures."""
+    labels = [label for label, _ in times]
+    found = match([c.raw.name for c in cameras], labels, by_order=False) if labels else None
+    pairs = {} if found is None else found[0]
+    for place, (label, piece) in enumerate(times):
+        if place in pairs:
+            cameras[pairs[place]].times = piece
+        else:
+            told.append(
+                f"{piece.source.name}: its time stamps of {label} belong to no camera of the "
+                "calibration; they are not used"
+            )
 
 
 def _sizes_fit(cameras: list[MatchedCamera], pictures: _Pictures, pairs: dict[int, int]) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.agreement.observed import rays_of
@@ -14,36 +14,22 @@ from tracker.agreement.suggestion import STANDING, Suggestion, agreement, sugges
 from tracker.camera import Camera
 from tracker.checks.reading import Reading, read_boxes, to_camera
 from tracker.checks.readings import Open, Seen, find_meaning
-from tracker.formats.pieces import (
-    DetectionPiece,
-    FormatError,
-    Layout,
-    RawCamera,
-    TruthPiece,
-    VideoPiece,
-)
+from tracker.formats.pieces import FormatError, Layout, RawCamera
 from tracker.importing.calibrations import camera_sets
 from tracker.importing.gathering import Taken
 from tracker.importing.geometry import read_poses
 from tracker.importing.matching import MatchedCamera, match_all
 from tracker.importing.options import ImportOptions
 from tracker.importing.pictures import picture_sizes, scaled
+from tracker.importing.times import CameraTime, Times, first_index, frames_of, settle_times
 from tracker.importing.truths import settle_truth
 from tracker.sequences.sequence import Detections, GroundTruth
-
-USUAL_RATE = 25.0
-"""Steps a second where no file says."""
 
 ROOM_MARGIN = 1.0
 """Metres on each side: a room that is too large costs little, who is outside is lost."""
 
 PERSON = 1.70
 """Metres: the usual stature, by which a reconstruction without a unit is scaled."""
-
-SAME_RATE = 0.002
-"""By how much rates may differ that are the same: 29.97 and 30 are not within ten minutes."""
-
-MOST_FRAMES = 10_000_000
 
 _WITHOUT_UNIT = ("COLMAP", "nerfstudio")
 """Formats whose unit is arbitrary."""
@@ -56,6 +42,8 @@ class SettledView:
     camera: Camera
     matched: MatchedCamera
     detections: Detections | None
+    """By frames of the camera's own file."""
+    time: CameraTime
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +54,12 @@ class Settled:
     fps: float
     frames: int
     room: Suggestion
+    """As it is written."""
+    suggested: Suggestion
+    """As it was found out."""
     truth: GroundTruth | None
+    calibration: str
+    """What its file was recognised as."""
     reading: Reading
     found: tuple[tuple[str, str], ...]
     """What was not in the files or had to be chosen, and why it is so."""
@@ -94,33 +87,84 @@ def settle(taken: Sequence[Taken], options: ImportOptions | None = None) -> Sett
         _told(scaled(camera.raw, size), options)
         for camera, size in zip(cameras, sizes, strict=True)
     ]
-    frames, fps = _time(cameras, matched.truths, options, found)
-    boxes = _boxes(cameras, sizes, frames, fps, options, found, told)
-    ratios = [fps / (own_rate(camera.video, fps) or fps) for camera in cameras]
+    times = settle_times(cameras, matched.truths, options, found)
+    boxes = _boxes(cameras, sizes, times, options, found, told)
     arbitrary = matched.format.startswith(_WITHOUT_UNIT)
-    reading, raws, boxes = _read(raws, boxes, ratios, arbitrary, found)
+    reading, raws, boxes = _read(raws, boxes, times, arbitrary, found)
     settled = [to_camera(raw, reading, size) for raw, size in zip(raws, sizes, strict=True)]
     detections = [_detections(own) for own in boxes]
     at_steps = [
-        None if own is None else replace(own, frames=_steps(own.frames, ratio))
-        for own, ratio in zip(detections, ratios, strict=True)
+        None if own is None else at_steps_of(own, time)
+        for own, time in zip(detections, times.cameras, strict=True)
     ]
-    room = _room(settled, at_steps, found)
+    suggested = _room(settled, at_steps, found)
+    room = _as_told(suggested, options)
     truth = settle_truth(
         [piece for _, piece in matched.truths],
         settled,
         at_steps,
         reading,
-        frames,
+        times.frames,
         float(room.half_extents[2]) + room.floor,
         options.first_index,
         found,
     )
     views = tuple(
-        SettledView(camera, own, boxes_)
-        for camera, own, boxes_ in zip(settled, cameras, detections, strict=True)
+        SettledView(camera, own, boxes_, time)
+        for camera, own, boxes_, time in zip(
+            _renamed(settled, options), cameras, detections, times.cameras, strict=True
+        )
     )
-    return Settled(views, fps, frames, room, truth, reading, tuple(found), tuple(told))
+    return Settled(
+        views,
+        times.fps,
+        times.frames,
+        room,
+        suggested,
+        truth,
+        matched.format,
+        reading,
+        tuple(found),
+        tuple(told),
+    )
+
+
+def at_steps_of(own: Detections, time: CameraTime) -> Detections:
+    """Boxes by step in place of the file's frames, without those of frames that no step shows."""
+    if time.clock is None:
+        return own
+    steps = time.steps_of(own.frames)
+    rows = np.flatnonzero(steps >= 0)
+    rows = rows[np.argsort(steps[rows], kind="stable")]
+    return Detections(steps[rows], own.boxes[rows], own.scores[rows])
+
+
+def _renamed(cameras: Sequence[Camera], options: ImportOptions) -> list[Camera]:
+    """Cameras under the names that are wished."""
+    renamed = [replace(c, name=options.names.get(c.name, c.name).strip()) for c in cameras]
+    names = [camera.name for camera in renamed]
+    for name in names:
+        if not name or names.count(name) > 1:
+            raise FormatError(
+                f'expected a name of its own for each camera, found "{name}"'
+                f"{' twice' if name else ''}; choose another"
+            )
+    return renamed
+
+
+def _as_told(room: Suggestion, options: ImportOptions) -> Suggestion:
+    """The room and the size of people as they are stated."""
+    if options.half_extents is not None:
+        room = replace(room, half_extents=np.array(options.half_extents))
+    if options.room is None:
+        return room
+    minimum, maximum = (np.array(corner) for corner in options.room)
+    for axis, low, high in zip("xyz", minimum, maximum, strict=True):
+        if not low < high:
+            raise FormatError(
+                f"room: expected {axis} to end above {low:g} m, where it begins, found {high:g} m"
+            )
+    return replace(room, minimum=minimum, maximum=maximum)
 
 
 def _told(raw: RawCamera, options: ImportOptions) -> RawCamera:
@@ -145,122 +189,36 @@ def _resized(raw: RawCamera, factor: float) -> RawCamera:
     return replace(raw, translation=raw.translation * factor)
 
 
-def _time(
-    cameras: Sequence[MatchedCamera],
-    truths: Sequence[tuple[str, TruthPiece]],
-    options: ImportOptions,
-    found: list[tuple[str, str]],
-) -> tuple[int, float]:
-    """Steps and rate: those of the pictures, else those of the boxes."""
-    fps = _rate(cameras, truths, options, found)
-    counts = [_in_steps(c.video, fps, c.video.frames) for c in cameras if c.video is not None]
-    counts += [len(c.images.files) for c in cameras if c.images is not None]
-    if counts:
-        frames = min(counts)
-        if max(counts) > frames:
-            found.append(
-                ("frames", f"{frames}, those of the shortest of {min(counts)} … {max(counts)}")
-            )
-    else:
-        lasts = [
-            max(int(c.detections.frames.max(initial=-1)), c.detections.last_frame or 0)
-            - _first_index(c.detections, options, None)
-            for c in cameras
-            if c.detections is not None
-        ]
-        frames = max(lasts, default=-1) + 1
-        found.append(("frames", f"{frames}, up to the last that the boxes name"))
-    if not 0 < frames <= MOST_FRAMES:
-        raise FormatError(
-            f"expected 1 to {MOST_FRAMES:,} steps in videos, pictures or boxes, found {frames}"
-        )
-    return frames, fps
-
-
-def own_rate(video: VideoPiece | None, fps: float) -> float | None:
-    """The rate of a camera's video where it is another than that of the steps."""
-    if video is None or video.fps <= 0.0 or abs(video.fps / fps - 1.0) <= SAME_RATE:
-        return None
-    return video.fps
-
-
-def _in_steps(video: VideoPiece | None, fps: float, frames: int) -> int:
-    """So many frames of a video as steps."""
-    rate = own_rate(video, fps)
-    return frames if rate is None else int(frames * fps / rate)
-
-
-def _rate(
-    cameras: Sequence[MatchedCamera],
-    truths: Sequence[tuple[str, TruthPiece]],
-    options: ImportOptions,
-    found: list[tuple[str, str]],
-) -> float:
-    """Steps a second: the videos' usual rate, else that of the truth's file."""
-    if options.fps is not None:
-        return options.fps
-    rates = [c.video.fps for c in cameras if c.video is not None and c.video.fps > 0.0]
-    if not rates:
-        rates = [truth.fps for _, truth in truths if truth.fps is not None]
-    if not rates:
-        found.append(("fps", f"{USUAL_RATE:g}, since no file says it; --fps"))
-        return USUAL_RATE
-    fps = sorted(rates)[len(rates) // 2]
-    for camera in cameras:
-        own = own_rate(camera.video, fps)
-        if own is not None:
-            found.append((f"{camera.raw.name} fps", f"{own:.6g}, the steps have {fps:.6g}"))
-    return fps
-
-
-def _steps(frames: Int[ndarray, " D"], ratio: float) -> Int[ndarray, " D"]:
-    """The step nearest to each frame of a camera with a rate of its own."""
-    return np.round(frames * ratio).astype(np.int64)
-
-
-def _first_index(piece: DetectionPiece, options: ImportOptions, frames: int | None) -> int:
-    """The number of the first frame in a file of boxes."""
-    if options.first_index is not None:
-        return options.first_index
-    if piece.first_index is not None:
-        return piece.first_index
-    if len(piece.frames) == 0 or piece.frames.min() == 0:
-        return 0
-    last = max(int(piece.frames.max()), piece.last_frame or 0)
-    return 1 if piece.frames.min() == 1 and (frames is None or last >= frames) else 0
-
-
 _Boxes = tuple[Detections, Layout | None]
 
 
 def _boxes(
     cameras: Sequence[MatchedCamera],
     sizes: Sequence[tuple[int, int]],
-    frames: int,
-    fps: float,
+    times: Times,
     options: ImportOptions,
     found: list[tuple[str, str]],
     told: list[str],
 ) -> list[_Boxes | None]:
     """Boxes in pixels, those of a known layout as left, top, width, height."""
     pieces = [camera.detections for camera in cameras]
-    firsts = {_first_index(p, options, frames) for p in pieces if p is not None}
+    firsts = {first_index(p, options, times.frames) for p in pieces if p is not None}
     # all cameras were written by the same program: one that begins at 0 speaks for all
     first = min(firsts, default=0)
     if first and any(p is not None and p.first_index is None for p in pieces):
         found.append(("first index", "1, since no frame is called 0; --first-index"))
     result: list[_Boxes | None] = []
-    for camera, size in zip(cameras, sizes, strict=True):
+    for camera, size, time in zip(cameras, sizes, times.cameras, strict=True):
         piece = camera.detections
         if piece is None:
             result.append(None)
             continue
         layout = options.boxes or piece.layout
-        scale = size if piece.normalised else None
+        normalised = piece.normalised if options.normalised is None else options.normalised
+        scale = size if normalised else None
         four = read_boxes(piece.boxes, layout or "ltwh", scale)
         steps = piece.frames - first
-        video = camera.video
-        within = frames if own_rate(video, fps) is None or video is None else video.frames
+        within = frames_of(camera, time, times.frames)
         there = (steps >= 0) & (steps < within)
         if not there.all():
             told.append(
@@ -276,14 +234,14 @@ def _boxes(
 def _read(
     raws: list[RawCamera],
     boxes: list[_Boxes | None],
-    ratios: Sequence[float],
+    times: Times,
     arbitrary: bool,
     found: list[tuple[str, str]],
 ) -> tuple[Reading, list[RawCamera], list[_Boxes | None]]:
     """How poses and boxes are meant: by flags, formats, the boxes and the poses, in this order."""
     seen = [
-        None if own is None else Seen(_steps(own[0].frames, ratio), own[0].boxes)
-        for own, ratio in zip(boxes, ratios, strict=True)
+        None if own is None else _seen(own[0], time)
+        for own, time in zip(boxes, times.cameras, strict=True)
     ]
     unknown = any(own is not None and own[1] is None for own in boxes)
     layouts: tuple[Layout, ...] = ("ltwh", "xyxy") if unknown else ("ltwh",)
@@ -325,6 +283,11 @@ def _read(
         raws = [_resized(raw, factor) for raw in raws]
         found.append(("unit", f"scaled by {factor:.4g}, so that people are {PERSON} m; --unit"))
     return replace(reading, layout="ltwh", order=None), raws, changed
+
+
+def _seen(own: Detections, time: CameraTime) -> Seen:
+    steps = time.steps_of(own.frames)
+    return Seen(steps[steps >= 0], own.boxes[steps >= 0])
 
 
 def _detections(own: _Boxes | None) -> Detections | None:

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.formats.pieces import FormatError
-from tracker.importing.settling import Settled, SettledView, own_rate
+from tracker.importing.settling import Settled, SettledView
 from tracker.sequences.sequence import Detections, GroundTruth
 
 FILE = "sequence.toml"
@@ -44,7 +44,7 @@ def write(settled: Settled, folder: Path, name: str, *, copy: bool = False) -> l
     told: list[str] = []
     tables = []
     for view, own in zip(settled.views, names, strict=True):
-        tables.append(_camera(view, own, settled.fps, folder, copy, told))
+        tables.append(_camera(view, own, folder, copy, told))
     truth = ""
     if settled.truth is not None:
         _write_truth(folder / "ground_truth.csv", settled.truth)
@@ -70,9 +70,7 @@ def write(settled: Settled, folder: Path, name: str, *, copy: bool = False) -> l
     return told
 
 
-def _camera(
-    view: SettledView, name: str, fps: float, folder: Path, copy: bool, told: list[str]
-) -> str:
+def _camera(view: SettledView, name: str, folder: Path, copy: bool, told: list[str]) -> str:
     camera = view.camera
     lines = ["[[camera]]", f"name = {_text(_plain_name(camera.name))}"]
     lines.append(f"image_size = [{camera.image_size[0]}, {camera.image_size[1]}]")
@@ -80,10 +78,16 @@ def _camera(
     if matched.video is not None:
         place = _bring(matched.video.path, folder, name, copy, told)
         lines.append(f"video = {_text(place)}")
-        rate = own_rate(matched.video, fps)
-        lines += [] if rate is None else [f"fps = {_number(rate)}"]
     elif matched.images is not None:
         lines.append(f"images = {_text(_bring_images(matched.images.files, folder, name, copy))}")
+    timing = view.time.timing
+    lines += [] if timing.fps is None else [f"fps = {_number(timing.fps)}"]
+    lines += [f"time_offset = {_number(timing.time_offset)}"] if timing.time_offset else []
+    if timing.stamps is not None:
+        file = f"{name}_times.csv"
+        rows = "\n".join(map(_number, timing.stamps))
+        (folder / file).write_text(f"frame_time\n{rows}\n", encoding="utf-8")
+        lines.append(f"timestamps = {_text(file)}")
     if view.detections is not None:
         file = f"{name}.csv"
         _write_boxes(folder / file, view.detections)

@@ -7,9 +7,9 @@ takes kernels, tuples and constants from: a change leaves nothing stale behind, 
 does not depend on it stays. ``NUMBA_CACHE_DIR`` names another place.
 
 While another process compiles (:func:`while_compiling`), a kernel whose machine code is
-not there yet runs as plain Python: the same source, and so the same numbers, some eighty
-times slower, which a room with a few people bears. Those that loop over pixels or samples
-would take seconds a picture; they are :func:`pixel_kernel`, and are always compiled.
+not there yet runs as plain Python: the same source, and so the same numbers, far slower,
+which a room with a few people bears. Those that loop over pixels or samples would take seconds
+a picture; they are :func:`pixel_kernel`, and are always compiled.
 """
 
 from __future__ import annotations
@@ -203,7 +203,7 @@ def _is_compiled_in(file: Path, text: bytes) -> bool:
     return in_room or _HAS_KERNELS.search(text) is not None
 
 
-@cache  # every kernel file asks of those that it uses, and reading one takes milliseconds
+@cache  # each file is asked for by many kernel files
 def _imported(source: bytes) -> tuple[str, ...]:
     """Every module of the engine that a source may import, in whatever way it says so."""
     found: list[str] = []

@@ -32,7 +32,7 @@ class AssociationMatrixParams(Params):
     confirmation_steps: Annotated[
         int, Field(ge=1, le=100), ui("n_c", unit="steps", step=1, published=1)
     ] = 5
-    """Somebody new counts once he was alone for so long; a piece that came off does not."""
+    """A new target is confirmed once its object was alone for so long; a piece split off is not."""
 
     join_gap: Annotated[
         float, Field(ge=0.0, le=1.0), ui("g", unit="target heights", step=0.01, published=0.0)
@@ -109,7 +109,7 @@ class AssociationMatrixParams(Params):
     least_inside: Annotated[
         float, Field(ge=0.0, le=1.0), ui("f_min", step=0.05, advanced=True, when=_TARGETS)
     ] = 0.4
-    """Targets: a box with a smaller share of foreground is nobody."""
+    """Targets: a box with a smaller share of foreground is rejected."""
 
     averaging_width: Annotated[
         float,
@@ -123,7 +123,7 @@ class AssociationMatrixParams(Params):
         Field(ge=0.0, le=5.0),
         ui("d", unit="half sizes", step=0.1, advanced=True, when=_TARGETS),
     ] = 1.0
-    """Targets: the distance that two boxes keep."""
+    """Targets: the least distance between the centres of two boxes."""
 
 
 METHOD = Method(

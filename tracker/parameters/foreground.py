@@ -97,7 +97,7 @@ class ForegroundParams(Params):
     """Adaptive: how far the background goes towards each picture."""
 
     minimum_area: Annotated[int, Field(ge=1, le=5000), ui("A_min", unit="px", log=True)] = 40
-    """Smaller pieces of foreground are nobody."""
+    """Smaller pieces of foreground are dropped."""
 
     darkest_shadow: Annotated[float, Field(ge=0.0, le=1.0), ui("s_l", step=0.01, advanced=True)] = (
         0.65
@@ -105,19 +105,19 @@ class ForegroundParams(Params):
     """A shadow leaves at least this share of the light."""
 
     shadow_tint: Annotated[float, Field(ge=0.0, le=1.0), ui("s_t", step=0.01, advanced=True)] = 0.08
-    """And the same of each channel, up to this."""
+    """The shares of light that a shadow leaves in the three channels differ by at most this."""
 
     blinding_share: Annotated[
         float, Field(ge=0.05, le=1.0), ui("n_b", step=0.05, advanced=True, when=_ADAPTIVE)
     ] = 0.6
-    """Adaptive: a picture of which a larger share differs shows another scene or light."""
+    """Adaptive: a picture of which a larger share differs, another scene or light, is skipped."""
 
     blank_deviation: Annotated[
         float,
         Field(ge=0.0, le=50.0),
         ui("σ_0", unit="grey levels", step=0.5, advanced=True, when=_ADAPTIVE),
     ] = 4.0
-    """Adaptive: a picture whose grey levels deviate by less than this shows nothing."""
+    """Adaptive: a picture whose grey levels deviate by less than this is blank and skipped."""
 
     @property
     def read_by_colours(self) -> tuple[Reads, ...]:

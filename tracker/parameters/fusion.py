@@ -68,7 +68,7 @@ class FusionParams(Params):
     """Share of the boxes that show a person lying, crouching or bent; 0: everybody stands."""
 
     update: Annotated[Literal["extended", "unscented"], ui("h(x)")] = "extended"
-    """How the bend of the projection is met: a straight line at the mean, or unscented points."""
+    """How the nonlinear projection is handled: linearised at the mean, or by unscented points."""
 
     motion: Annotated[
         Literal["random_walk", "constant_velocity"], ui("F", published="random_walk")
@@ -90,7 +90,7 @@ class FusionParams(Params):
     vertical_share: Annotated[
         float, Field(ge=0.01, le=1.0), ui("σ_z/σ_x", step=0.01, when=_VELOCITY)
     ] = 0.2
-    """Constant velocity: how lively the height is, relative to the ground plane."""
+    """Constant velocity: the same for the height, as a share of that along the floor."""
 
     velocity_memory: Annotated[
         float, Field(ge=0.1, le=100.0), ui("τ", unit="s", step=0.1, log=True, when=_VELOCITY)
@@ -110,10 +110,10 @@ class FusionParams(Params):
     misses: Annotated[Literal["per_camera", "per_person"], ui("1−p_D", published="per_camera")] = (
         "per_person"
     )
-    """Sequential PHD: whether a miss forgets what other cameras saw, or a label is one person."""
+    """Sequential PHD: a miss scales weights by 1 − p_D, or a label's existence by Bayes' rule."""
 
     occlusion: Annotated[float, Field(ge=0.0, le=1.0), ui("ρ", step=0.05, published=0.0)] = 0.8
-    """How surely a camera misses a person who is wholly covered by another."""
+    """Share by which p_D falls where a person is wholly covered by another."""
 
     edge: Annotated[Literal["soft", "hard"], ui("∂I", published="hard")] = "soft"
     """Whether p_D falls towards the picture's edge with a target's uncertainty, or ends there."""
@@ -131,7 +131,7 @@ class FusionParams(Params):
     followed_margin: Annotated[
         float, Field(ge=0.0, le=5.0), ui("m_f", unit="m", step=0.05, published=0.6)
     ] = 0.5
-    """How far outside the room people are followed, unreported, so that their boxes are theirs."""
+    """How far outside the room people are tracked, unreported, so that their boxes start nobody."""
 
     memory: Annotated[
         float, Field(ge=0.0, le=30.0), ui("t_m", unit="s", step=0.1, published=0.0, essential=True)
@@ -223,24 +223,24 @@ class FusionParams(Params):
         Field(ge=0.01, le=60.0),
         ui("τ_r", unit="s", log=True, advanced=True, when=_RECOGNITION),
     ] = 1.0
-    """Recognition: after so long a look is a new one; pictures of one moment agree."""
+    """Recognition: pictures within this time are alike and count as one observation of colours."""
 
     recognition_swap: Annotated[
         float,
         Field(ge=0.1, le=1000.0),
         ui("T_r", unit="s", log=True, advanced=True, when=_RECOGNITION),
     ] = 30.0
-    """Recognition: time in which a track may come to be of somebody else."""
+    """Recognition: time constant with which earlier evidence of a track's identity fades."""
 
     recognition_odds: Annotated[
         float, Field(ge=1.0, le=10000.0), ui("o_s", log=True, advanced=True, when=_RECOGNITION)
     ] = 20.0
-    """Recognition: odds of the best naming against any without it, from which a pair holds."""
+    """Recognition: odds against any other assignment of ids from which a pair of it holds."""
 
     recognition_own_odds: Annotated[
         float, Field(ge=1.0, le=1000.0), ui("o_o", log=True, advanced=True, when=_RECOGNITION)
     ] = 3.0
-    """Recognition: odds of a track's own looks, from which it may be named."""
+    """Recognition: odds of a track's own colours, from which it may get a person's id."""
 
 
 def _multi_bernoulli_uses(parameters: RunParameters) -> Uses:

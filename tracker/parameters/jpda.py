@@ -113,8 +113,8 @@ class JpdaParams(Params):
     occlusion: Annotated[
         Literal["inside", "measurement"], ui("x|z", published="measurement", when=_FIVE)
     ] = "inside"
-    """Who is hidden by another goes on inside the piece; or all whose gates meet in one
-    measurement take its place and stand still."""
+    """Occluded targets are predicted on inside the piece of foreground that hides them; or all
+    whose gates meet in one measurement take its place and stand still."""
 
     vanish_steps: Annotated[int, Field(ge=1, le=100), ui("k_v", unit="steps", step=1)] = 3
     """A target without measurement at so many steps in a row has vanished."""
@@ -137,10 +137,10 @@ class JpdaParams(Params):
     longest_hidden: Annotated[
         float, Field(ge=0.0, le=60.0), ui("t_h", unit="s", step=0.5, advanced=True, when=_FIVE)
     ] = 4.0
-    """Somebody who does not come out from behind another for so long is given up."""
+    """A target that stays occluded for longer than this is dropped."""
 
     same_size: Annotated[
-        float, Field(ge=1.0, le=5.0), ui("k_s", step=0.1, advanced=True, when=_FIVE)
+        float, Field(ge=1.0, le=5.0), ui("k_m", step=0.1, advanced=True, when=_FIVE)
     ] = 1.5
     """A measurement larger or smaller than its target by this factor shows others too."""
 
@@ -149,12 +149,12 @@ class JpdaParams(Params):
         Field(ge=0.0, le=10.0),
         ui("k_l", unit="half sizes", step=0.1, advanced=True, when=_FIVE),
     ] = 2.0
-    """A measurement this near may be that of a target whose gate it missed."""
+    """A target in a merged piece takes a measurement outside its gate if it is this near."""
 
     one_side: Annotated[
         float, Field(ge=1.0, le=10.0), ui("k_e", step=0.1, advanced=True, when=_FIVE)
     ] = 2.0
-    """An edge of a piece is left over if more is by this factor than of the opposite one."""
+    """A piece's edge is a hidden target's if boxes leave so much more free there than opposite."""
 
     cover: Annotated[
         float,
@@ -179,7 +179,7 @@ class JpdaParams(Params):
         Field(ge=0.0, le=2.0),
         ui("h_c", unit="half heights", step=0.05, advanced=True, when=_CROWNS),
     ] = 0.5
-    """Cracks across a piece up to this height, between head and shirt say, are closed."""
+    """Gaps across a piece up to this height, as between head and shirt, are closed."""
 
     top_reach: Annotated[
         float,

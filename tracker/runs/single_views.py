@@ -18,7 +18,8 @@ from tracker.single_view.protocol import SingleViewMethod, ViewResult
 from tracker.single_view.working.sequence import Working
 
 BLOCK = 5
-"""Steps that a camera does at a time: few enough to stream, enough to pay."""
+"""Steps that a camera computes at a time: few, so that results stream; several, so that handing
+work to a thread pays."""
 
 Cancel = Callable[[], bool]
 

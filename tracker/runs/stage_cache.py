@@ -27,10 +27,10 @@ MEMORY_BYTES = 512 << 20
 """Memory for the columns of all runs and sequences together."""
 
 _OBJECT_BYTES = 112
-"""What an array or another object weighs beside its content."""
+"""Bytes of memory of an array or another object beside its content."""
 
 _SAMPLED = 32
-"""Steps of a column that are weighed; the others weigh the same."""
+"""Steps of a column whose memory is counted; the others are taken to be as large."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -169,7 +169,7 @@ class StageCache:
 
 
 def weigh(column: ViewColumn | FusionColumn | Smoothed | TrackColumn) -> int:
-    """Bytes of memory, by some of the steps."""
+    """Bytes of memory, estimated from some of the steps."""
     if isinstance(column, Smoothed | TrackColumn):
         return _weight(column, set())
     every = max(1, len(column.steps) // _SAMPLED)

@@ -34,7 +34,7 @@ LIMIT_BYTES = 2 << 30
 """Disk space for all columns together."""
 
 ABANDONED_SECONDS = 3600.0
-"""A file that was begun and not touched for so long is nobody's any more."""
+"""A file that was begun and not written to for so many seconds was left by a process that died."""
 
 _UNREADABLE = (
     OSError, ValueError, KeyError, EOFError, NotImplementedError, RuntimeError,

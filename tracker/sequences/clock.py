@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -149,7 +150,11 @@ def _stamps(file: Path, where: str, camera: str) -> tuple[float, ...]:
     the k-th row of a camera by time is frame k of its video.
     """
     columns = read_columns(
-        file, where, needed=("frame_time",), optional={"port": -1.0, "cam_id": -1.0}
+        file,
+        where,
+        needed=("frame_time",),
+        optional={"port": -1.0, "cam_id": -1.0},
+        largest=math.inf,  # some count from 1970, in nanoseconds
     )
     ports = columns.values["port" if "port" in columns.names else "cam_id"]
     rows = np.ones(len(columns), dtype=bool)

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.sequences.fields import did_you_mean, listed, shown
+from tracker.sequences.fields import LARGEST, did_you_mean, listed, shown
 from tracker.sequences.sequence import SequenceError
 
 
@@ -97,6 +97,7 @@ def read_columns(
     needed: tuple[str, ...],
     optional: Mapping[str, float] | None = None,
     blank: tuple[str, ...] = (),
+    largest: float = LARGEST,
 ) -> Columns:
     """Read a CSV file with a header.
 
@@ -108,6 +109,7 @@ def read_columns(
         needed: Columns that must be there.
         optional: Columns that may be there, and what stands for them where they are not.
         blank: Columns whose cells may be empty; empty is NaN.
+        largest: No number lies beyond it, on either side.
 
     Raises:
         SequenceError: Naming line and column, what was expected and what was found.
@@ -121,8 +123,8 @@ def read_columns(
     wanted = [name for name in dict.fromkeys((*needed, *optional, *blank)) if name in names]
     places = [names.index(name) for name in wanted]
     table = _parse(lines[1:], len(names), places)
-    if table is None:
-        table = _parse_slowly(lines[1:], numbers[1:], where, names, wanted, set(blank))
+    if table is None or not (np.abs(table) <= largest).all():
+        table = _parse_slowly(lines[1:], numbers[1:], where, names, wanted, set(blank), largest)
     rows = len(lines) - 1
     values = {name: table[:, column] for column, name in enumerate(wanted)}
     for name, default in optional.items():
@@ -182,10 +184,9 @@ def _parse(lines: list[str], width: int, places: list[int]) -> Float[ndarray, "N
     if any(line.count(",") != width - 1 for line in lines):
         return None
     try:
-        table = np.loadtxt(lines, delimiter=",", usecols=places, ndmin=2, comments=None)
+        return np.loadtxt(lines, delimiter=",", usecols=places, ndmin=2, comments=None)
     except ValueError:
         return None
-    return table if np.isfinite(table).all() else None
 
 
 def _parse_slowly(
@@ -195,6 +196,7 @@ def _parse_slowly(
     names: tuple[str, ...],
     wanted: list[str],
     blank: set[str],
+    largest: float,
 ) -> Float[ndarray, "N C"]:
     """Row by row: cells in quotes, empty cells, and the sentence about what is wrong."""
     table = np.empty((len(lines), len(wanted)))
@@ -219,6 +221,11 @@ def _parse_slowly(
                 found = shown(cell) if cell else "an empty cell"
                 raise SequenceError(
                     f'{where}, line {number}, column "{name}": expected a number, found {found}'
+                )
+            if abs(value) > largest:
+                raise SequenceError(
+                    f'{where}, line {number}, column "{name}": expected a number of at most '
+                    f"{largest:g}, found {shown(cell)}"
                 )
             table[row, column] = value
     return table

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import sys
 from collections.abc import Iterable
 from typing import Any
 
@@ -12,6 +13,13 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.sequences.sequence import SequenceError
+
+LARGEST = 1e6
+"""Metres or pixels: a number beyond is no measurement of a room, and its powers overflow."""
+LARGEST_IN_MATRIX = 1e12
+"""Of a projection, which may bear any scale."""
+SMALLEST = 1e-4
+"""Metres or pixels: what must be positive is not smaller, so that its square can be divided by."""
 
 MISSING: Any = object()
 """The default of a field that must be there."""
@@ -89,7 +97,7 @@ class Fields:
         """A finite number in (above, at_most]."""
         expected = f"a number above {above:g} and at most {at_most:g}"
         value = self._get(name, MISSING, expected)
-        if not _is_number(value) or not above < value <= at_most:
+        if not is_number(value, LARGEST) or not above < value <= at_most:
             raise self.error(name, f"expected {expected}, found {shown(value)}")
         return float(value)
 
@@ -111,7 +119,7 @@ class Fields:
     def vector(
         self, name: str, length: int, what: str, *, positive: bool = False
     ) -> Float[ndarray, " length"]:
-        """``length`` finite numbers."""
+        """``length`` numbers of at most :data:`LARGEST`; positive ones from :data:`SMALLEST` on."""
         expected = f"{length} {'positive ' if positive else ''}numbers ({what})"
         value = self._get(name, MISSING, f"a list of {expected}")
         vector = self._numbers(name, value, expected)
@@ -119,14 +127,18 @@ class Fields:
             raise self.error(name, f"expected {expected}, found {len(vector)}")
         if positive and not (vector > 0.0).all():
             raise self.error(name, f"expected {expected}, found {shown(value)}")
+        if positive and not (vector >= SMALLEST).all():
+            raise self.error(
+                name, f"expected {expected} of at least {SMALLEST:g}, found {shown(value)}"
+            )
         return vector
 
     def numbers(self, name: str) -> Float[ndarray, " length"]:
-        """Finite numbers, any count; none where the field is missing."""
+        """Numbers of at most :data:`LARGEST`, any count; none where the field is missing."""
         return self._numbers(name, self._get(name, [], ""), "a list of numbers")
 
     def matrix(self, name: str, rows: int, columns: int) -> Float[ndarray, "rows columns"]:
-        """``rows`` lists of ``columns`` finite numbers."""
+        """``rows`` lists of ``columns`` numbers of at most :data:`LARGEST_IN_MATRIX`."""
         expected = f"{rows} rows of {columns} numbers"
         value = self._get(name, MISSING, expected)
         if not isinstance(value, list) or not all(isinstance(row, list) for row in value):
@@ -135,7 +147,7 @@ class Fields:
         if lengths != [columns] * rows:
             found = f"{len(value)} rows of {listed(str(n) for n in dict.fromkeys(lengths))}"
             raise self.error(name, f"expected {expected}, found {found if value else 'none'}")
-        return np.array([self._numbers(name, row, expected) for row in value])
+        return np.array([self._numbers(name, row, expected, LARGEST_IN_MATRIX) for row in value])
 
     def table(self, name: str, known: Iterable[str], *, needed: bool = True) -> Fields | None:
         """The table ``[name]``; None where it is missing and not needed."""
@@ -162,12 +174,18 @@ class Fields:
             for number, item in enumerate(value, 1)
         ]
 
-    def _numbers(self, name: str, value: Any, expected: str) -> Float[ndarray, " length"]:
+    def _numbers(
+        self, name: str, value: Any, expected: str, largest: float = LARGEST
+    ) -> Float[ndarray, " length"]:
         if not isinstance(value, list):
             raise self.error(name, f"expected {expected}, found {shown(value)}")
         for item in value:
-            if not _is_number(item):
+            if not is_number(item, math.inf):
                 raise self.error(name, f"expected {expected}, found {shown(item)} among them")
+            if not is_number(item, largest):
+                raise self.error(
+                    name, f"expected {expected} of at most {largest:g}, found {shown(item)}"
+                )
         return np.array(value, dtype=float)
 
 
@@ -178,5 +196,9 @@ def _called(word: str, number: int, item: Any) -> str:
     return f'{plain} "{name}"' if isinstance(name, str) and name else f"{plain} {number}"
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+def is_number(value: Any, largest: float) -> bool:
+    """Whether a value is a finite number, and not beyond the largest on either side."""
+    is_one = isinstance(value, int | float) and not isinstance(value, bool)
+    limit = min(largest, sys.float_info.max)
+    # compared, not converted: a whole number may have more digits than a float can hold
+    return is_one and -limit <= value <= limit

@@ -27,13 +27,13 @@ CACHE_BYTES = 256 * 2**20
 """Memory for decoded pictures, over all cameras: about 800 of 360x288."""
 
 AHEAD = 24
-"""Steps decoded ahead of one who plays: about a second."""
+"""Steps decoded ahead of playback: about a second."""
 
 BEHIND = 12
-"""Steps before the wanted one that are kept where somebody goes backwards."""
+"""Steps before the wanted one that are kept while the steps are asked for backwards."""
 
 NEAR = 4
-"""Steps: two requests no further apart than this are part of one walk, at up to this speed."""
+"""Steps: requests no further apart than this are one movement through the recording, no jump."""
 
 
 class Pictures(Protocol):

@@ -12,16 +12,13 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-from jaxtyping import Float
-from numpy import ndarray
-
 from tracker.sequences.calibration import check_sight
 from tracker.sequences.fields import Fields, did_you_mean, shown
 from tracker.sequences.filling import check_missing, find_room, find_time
 from tracker.sequences.sequence import Sequence, SequenceError
 from tracker.sequences.tables import Reading, read_ground_truth
 from tracker.sequences.views import CAMERA, read_sources, read_views
-from tracker.sequences.writing.taught_fields import read_room, read_templates
+from tracker.sequences.writing.taught_fields import read_room, read_target, read_templates
 
 FILE = "sequence.toml"
 FORMAT = 1
@@ -64,7 +61,7 @@ def read_sequence(folder: Path | str) -> Sequence:
     )
     stated_fps = fields.number("fps", above=0.0, at_most=1000.0) if "fps" in fields else None
     room = read_room(fields) if "room" in fields else None
-    half_extents = _half_extents(fields)
+    half_extents = read_target(fields)
     check_missing(fields, _tables(fields))
     sources = read_sources(_tables(fields), reading)
     time = find_time(sources, stated_fps, stated_frames, fields)
@@ -91,13 +88,6 @@ def read_sequence(folder: Path | str) -> Sequence:
         digest=_digest(text, reading),
         warnings=tuple(reading.warnings),
     )
-
-
-def _half_extents(fields: Fields) -> Float[ndarray, " 3"] | None:
-    target = fields.table("target", ("half_extents",), needed=False)
-    if target is None:
-        return None
-    return target.vector("half_extents", 3, "half width, depth and height in metres", positive=True)
 
 
 def _tables(fields: Fields) -> list[Fields]:
@@ -166,6 +156,14 @@ def _parse(folder: Path, text: str) -> Fields:
         if place == "end of document":
             place = f"line {len(text.splitlines())}"
         raise SequenceError(f"{where}, {place}: is not valid TOML: {problem.lower()}") from None
+    except RecursionError:
+        raise SequenceError(
+            f"{where}: expected tables and lists a few levels deep, found hundreds; remove them"
+        ) from None
+    except ValueError:  # of a whole number with thousands of digits
+        raise SequenceError(
+            f"{where}: expected numbers of at most 18 digits, found one with thousands; shorten it"
+        ) from None
     version = values.get("format", FORMAT)
     if version != FORMAT:
         raise SequenceError(

@@ -16,6 +16,14 @@ if TYPE_CHECKING:
     from tracker.sequences.clock import Clock
 
 
+PRESETS: dict[str, tuple[float, float, float]] = {
+    "Person": (0.3, 0.3, 0.875),
+    "Seated": (0.3, 0.3, 0.65),
+    "Head": (0.12, 0.12, 0.15),
+}
+"""Usual targets: half width, depth and height, metres."""
+
+
 class SequenceError(ValueError):
     """A sequence cannot be read; the message names file and field, expected and found."""
 

@@ -3,7 +3,7 @@
 A container answers "go to frame k" with an estimate: frame rate times time. With a
 varying frame rate, a stream that starts late or a missing index the estimate is wrong
 by a few frames, or by seconds. So the time stamps of all frames are read first, without
-decoding (milliseconds for a minute of video), and wherever a jump lands, the time stamp
+decoding (which is quick), and wherever a jump lands, the time stamp
 of the decoded picture says which frame it is. Files whose time stamps cannot tell (some
 AVI and MPEG files) are never jumped in: they are decoded from their start.
 """

@@ -1,4 +1,8 @@
-"""The face of every single-view method: a picture or boxes in, weighted boxes out."""
+"""The interface of every single-view method: a picture or boxes in, weighted boxes out.
+
+[ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
+density filtering", 2021.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +39,7 @@ class ViewResult:
     labels: Int[ndarray, " N"]
     """Ids within this camera, -1 where the method has none."""
     sigmas: Float[ndarray, "N 4"]
-    """How far each is to be trusted: standard deviations of the same four numbers, pixels."""
+    """Measurement noise: standard deviations of the same four numbers, pixels."""
     estimates: Float[ndarray, "E 4"]
     """The method's own 2D estimates, which it may or may not pass on."""
     estimate_weights: Float[ndarray, " E"]

@@ -12,13 +12,13 @@ import html
 import threading
 from collections.abc import Mapping, Set
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import viser
 
 from app.scene import style
 from app.scene.keys import hotkeys
-from app.scene.panel import finding
+from app.scene.panel import curves, finding
 from app.scene.panel.sliders import (
     Scale,
     hint_text,
@@ -27,11 +27,13 @@ from app.scene.panel.sliders import (
     number_text,
     symbol_parts,
 )
+from app.scene.panel.topics import TOPICS, Topic, topic_of
 from app.scene.worker import LatestWorker
+from app.state.sensitivity import Sensitivity
 from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
 from tracker import parameters as table
-from tracker.parameters import MethodKey, Parameter, ParameterError, RunParameters, Stage
+from tracker.parameters import MethodKey, Parameter, ParameterError, RunParameters
 
 ORIGIN = "viser"
 PANEL_WIDTH = 276
@@ -40,17 +42,15 @@ PANEL_WIDTH = 276
 OWN_VALUES = "own values"
 """What the values are while they are no preset's, as on the page."""
 
-STAGES: dict[Stage, str] = {
+METHODS: dict[MethodKey, str] = {
     "single_view": "Single view",
-    "fusion": "Fusion",
-    "smoothing": "Smoothing",
-    "tracks": "Tracks",
+    "fusion_method": "Fusion",
+    "smoothing_method": "Smoothing",
 }
-METHOD_STAGE: dict[MethodKey, Stage] = {
-    "single_view": "single_view",
-    "fusion_method": "fusion",
-    "smoothing_method": "smoothing",
-}
+"""The words of the choices of a method."""
+
+MOST_CURVES = 12
+"""Computed at one request."""
 
 UNFIT = " · not here"
 """Behind the name of a method that cannot work on the open sequence, as on the page."""
@@ -66,19 +66,27 @@ Input = (
 class Controls:
     """viser's panel, kept equal to the workbench's parameters, and the other way round."""
 
-    def __init__(self, server: viser.ViserServer, workbench: Workbench) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        workbench: Workbench,
+        sensitivity: Sensitivity | None = None,
+    ) -> None:
         """Make the panel and follow the workbench from now on.
 
         Args:
             server: Its panel belongs to this object.
             workbench: Whose parameters.
+            sensitivity: Tells what parameters would change; without it nothing is offered.
         """
+        self._sensitivity = sensitivity
         self._server = server
         self._workbench = workbench
         self._inputs: dict[str, Any] = {}
         self._scales: dict[str, Scale] = {}
-        self._groups: dict[str, list[viser.GuiFolderHandle]] = {}
-        self._resets: dict[Stage, viser.GuiButtonHandle] = {}
+        self._blocks: list[tuple[viser.GuiFolderHandle, frozenset[str]]] = []
+        """Folders without a name of their own, and the keys of what is in each."""
+        self._resets: dict[Topic, viser.GuiButtonHandle] = {}
         self._lock = threading.Lock()
         self._moved: dict[str, Any] = {}
         """Edits of browsers that are not yet in the workbench: the input that was moved, by key."""
@@ -95,6 +103,8 @@ class Controls:
             hint="Takes a named set of values; Changes on the page saves one of your own.",
         )
         self._presets.on_update(self._take_preset)
+        for method in METHODS:
+            self._make_method(method)
         self._sought: Any = server.gui.add_text(
             "Find", "", hint="Words of a parameter's name, symbol, unit or help."
         )
@@ -115,9 +125,12 @@ class Controls:
                         handle.visible = False
                         self._copies.setdefault(parameter.key, []).append(handle)
                         self._hear(parameter.key, handle)
-        self._stages: dict[Stage, viser.GuiFolderHandle] = {}
-        for stage, title in STAGES.items():
-            self._make_stage(stage, title)
+        self._curves: Any = None
+        if sensitivity is not None:
+            self._offer_curves(sensitivity)
+        self._topics: dict[Topic, viser.GuiFolderHandle] = {}
+        for topic in TOPICS:
+            self._make_topic(topic)
         every = [*self._inputs.items(), *((k, h) for k, hs in self._copies.items() for h in hs)]
         server.gui.add_html(
             style.symbols(
@@ -166,23 +179,52 @@ class Controls:
 
     # making the panel
 
-    def _make_stage(self, stage: Stage, title: str) -> None:
-        parameters = [p for p in table.PARAMETERS.values() if p.stage == stage]
-        folder = self._stages[stage] = self._server.gui.add_folder(title, expand_by_default=False)
+    def _offer_curves(self, sensitivity: Sensitivity) -> None:
+        """A button under what is listed, and where the curves are written."""
+        for folder, copy in ((self._essentials, 0), (self._found, -1)):
+            with folder:
+                button = self._server.gui.add_button(
+                    "What would each change?",
+                    hint="Runs the recording with a few other values of each parameter listed "
+                    "here, in the background, until somebody works again.",
+                )
+            button.on_click(partial(self._ask_curves, copy))
+        self._curves = self._server.gui.add_html("")
+        sensitivity.subscribe(lambda: self._worker.ask("refresh"))
+
+    def _ask_curves(self, copy: int, _: object) -> None:
+        assert self._sensitivity is not None
+        keys = [key for key, copies in self._copies.items() if copies[copy].visible]
+        self._sensitivity.ask(keys[:MOST_CURVES])
+
+    def _show_curves(self, parameters: RunParameters) -> None:
+        if self._sensitivity is None:
+            return
+        content = curves.style_of(
+            (
+                curve,
+                table.value(parameters, key),
+                [h._impl.uuid for h in (self._inputs[key], *self._copies.get(key, ()))],
+            )
+            for key, curve in self._sensitivity.curves().items()
+        )
+        if self._curves.content != content:
+            self._curves.content = content
+
+    def _make_topic(self, topic: Topic) -> None:
+        parameters = [p for p in table.PARAMETERS.values() if topic_of(p) == topic]
+        folder = self._topics[topic] = self._server.gui.add_folder(topic, expand_by_default=False)
         with folder:
-            for method, owner in METHOD_STAGE.items():
-                if owner == stage:
-                    self._make_method(method)
             for group in dict.fromkeys(p.group for p in parameters):
                 self._make_group([p for p in parameters if p.group == group])
-            reset = self._server.gui.add_button(f"Reset {title.lower()}", visible=False)
-            reset.on_click(lambda _: self._reset(stage))
-            self._resets[stage] = reset
+            reset = self._server.gui.add_button(f"Reset {topic.lower()}", visible=False)
+            reset.on_click(lambda _: self._reset(topic))
+            self._resets[topic] = reset
 
     def _make_method(self, method: MethodKey) -> None:
         field = RunParameters.model_fields[method]
         chooser = self._server.gui.add_dropdown(
-            "Method",
+            METHODS[method],
             table.METHODS[method],
             initial_value=table.METHODS[method][0],
             hint=field.description,
@@ -190,16 +232,23 @@ class Controls:
         self._follow(method, chooser)
 
     def _make_group(self, parameters: list[Parameter]) -> None:
+        """The parameters of one group that are about one thing, the advanced ones folded away."""
         group = parameters[0].group
         folder = self._server.gui.add_folder(None)
-        self._groups.setdefault(group, []).append(folder)
+        self._blocks.append((folder, frozenset(p.key for p in parameters)))
         with folder:
+            whose = "all cameras" if parameters[0].stage != "single_view" else "each camera"
+            self._server.gui.add_html(
+                f'<div class="mvp-group">{whose} · {group.replace("_", " ")}</div>'
+            )
             for parameter in parameters:
                 if not parameter.advanced:
                     self._make_input(parameter)
             advanced = [p for p in parameters if p.advanced]
             if advanced:
-                with self._server.gui.add_folder("Advanced", expand_by_default=False):
+                more = self._server.gui.add_folder("Advanced", expand_by_default=False)
+                self._blocks.append((more, frozenset(p.key for p in advanced)))
+                with more:
                     for parameter in advanced:
                         self._make_input(parameter)
 
@@ -255,11 +304,10 @@ class Controls:
             self._workbench.apply_preset(event.target.value, ORIGIN)
         self._worker.ask("refresh")  # own values cannot be taken: it shows again what they are
 
-    def _reset(self, stage: Stage | None) -> None:
+    def _reset(self, topic: Topic | None) -> None:
         keys = None
-        if stage is not None:
-            shown = self._shown_keys(self._workbench.snapshot().parameters)
-            keys = [key for key in shown if self._stage_of(key) == stage]
+        if topic is not None:
+            keys = sorted(_about(topic, self._shown_keys(self._workbench.snapshot().parameters)))
         self._workbench.reset_parameters(keys, ORIGIN)
 
     # the worker's thread
@@ -280,7 +328,7 @@ class Controls:
 
     def _value_of(self, key: str, handle: Any) -> Any:
         place = handle.value
-        if key in METHOD_STAGE:
+        if key in METHODS:
             return place.removesuffix(UNFIT)
         return self._scales[key].value(place) if key in self._scales else place
 
@@ -290,7 +338,7 @@ class Controls:
         shown = self._inputs.keys() & self._shown_keys(parameters)
         with self._server.atomic():
             for key, handle in self._inputs.items():
-                if key not in METHOD_STAGE:
+                if key not in METHODS:
                     for input_ in (handle, *self._copies.get(key, ())):
                         self._write(key, input_, table.value(parameters, key))
             for method, unfit in snapshot.unfit.items():
@@ -300,25 +348,25 @@ class Controls:
                 if key in table.PARAMETERS:
                     label = label_text(table.PARAMETERS[key], changed=key in changed)
                 else:
-                    label = "• Method" if key in changed else "Method"
+                    words = METHODS[cast(MethodKey, key)]
+                    label = f"• {words}" if key in changed else words
                 for input_ in (self._inputs[key], *self._copies.get(key, ())):
                     input_.label = label
             for key in shown ^ self._shown:
                 self._inputs[key].visible = key in shown
             self._changed, self._shown = changed, shown
-            self._show_found(parameters, shown, changed)
-            groups = {table.PARAMETERS[key].group for key in shown if key in table.PARAMETERS}
-            for group, folders in self._groups.items():
-                for folder in folders:
-                    folder.visible = group in groups
-            for stage, reset in self._resets.items():
-                reset.visible = any(self._stage_of(k) == stage for k in changed if k in shown)
+            self._show_found(shown, changed)
+            for folder, keys in self._blocks:
+                folder.visible = bool(keys & shown)
+            for topic, reset in self._resets.items():
+                reset.visible = bool(_about(topic, changed & shown))
             self._reset_all.visible = bool(changed)
             self._show_presets(snapshot)
             self._values.content = self._value_style(parameters, changed)
+            self._show_curves(parameters)
         self._server.flush()
 
-    def _show_found(self, parameters: RunParameters, shown: set[str], changed: set[str]) -> None:
+    def _show_found(self, shown: set[str], changed: set[str]) -> None:
         """Essentials and groups, or in their place what somebody looks for."""
         text, only_changed = self._sought.value.strip(), self._only_changed.value
         looks = bool(text or only_changed)
@@ -334,15 +382,13 @@ class Controls:
         self._nothing_found.content = f'<div class="mvp-status">{what}.</div>'
         essential = {key for key in shown if key in self._copies and len(self._copies[key]) > 1}
         self._essentials.label = finding.title(
-            "Essentials", "", len(essential), len(essential & changed)
+            "Essentials", len(essential), len(essential & changed)
         )
-        self._found.label = finding.title("Found", "", len(keys), len(keys & changed))
-        for stage, folder in self._stages.items():
-            own = {key for key in shown & table.PARAMETERS.keys() if self._stage_of(key) == stage}
-            method = next((m for m, owner in METHOD_STAGE.items() if owner == stage), "")
-            name = str(getattr(parameters, method)) if method else ""
-            folder.visible = not looks
-            folder.label = finding.title(STAGES[stage], name, len(own), len(own & changed))
+        self._found.label = finding.title("Found", len(keys), len(keys & changed))
+        for topic, folder in self._topics.items():
+            own = _about(topic, shown)
+            folder.visible = not looks and bool(own)
+            folder.label = finding.title(topic, len(own), len(own & changed))
 
     def _show_presets(self, snapshot: Snapshot) -> None:
         """Those that the page lists, in the same order, and which of them the values are."""
@@ -382,12 +428,6 @@ class Controls:
         """The choices of the methods, and what has an effect with what is chosen."""
         return set(table.shown_keys(parameters))
 
-    def _stage_of(self, key: str) -> Stage:
-        for method, stage in METHOD_STAGE.items():
-            if key == method:
-                return stage
-        return table.PARAMETERS[key].stage
-
     def _value_style(self, parameters: RunParameters, changed: set[str]) -> str:
         """The readable numbers of logarithmic sliders, and stronger ink for changed labels."""
         numbers = {
@@ -402,6 +442,13 @@ class Controls:
             for handle in (self._inputs[key], *self._copies.get(key, ()))
         ]
         return style.values(numbers, marked)
+
+
+def _about(topic: Topic, keys: set[str]) -> set[str]:
+    """Those of the keys whose parameters are about something."""
+    return {
+        key for key in keys & table.PARAMETERS.keys() if topic_of(table.PARAMETERS[key]) == topic
+    }
 
 
 def _is_of_one_method(parameter: Parameter) -> bool:

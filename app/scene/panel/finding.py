@@ -29,9 +29,8 @@ def found(shown: set[str], changed: set[str], text: str, *, only_changed: bool) 
     return {key for key in keys if matches(table.PARAMETERS[key], text)}
 
 
-def title(words: str, method: str, count: int, changed: int) -> str:
+def title(words: str, count: int, changed: int) -> str:
     """Of a folder: what it is about, how much is in it, how much was changed."""
-    name = f" · {method}" if method else ""
-    return f"{'• ' if changed else ''}{words}{name} · {count}" + (
+    return f"{'• ' if changed else ''}{words} · {count}" + (
         f", {changed} changed" if changed else ""
     )

@@ -84,9 +84,9 @@ def number_text(value: float) -> str:
 
 
 def symbol_parts(symbol: str) -> tuple[str, str]:
-    """A symbol's letter and what stands low behind it: ``D_max`` is D with max.
+    """A symbol's letter and its subscript: ``D_max`` is D with the subscript max.
 
-    What is no plain letter with an index stays as the formulas write it.
+    What is not a plain letter with a subscript stays as the formulas write it.
     """
     letter, _, index = symbol.partition("_")
     plain = len(letter) <= 2 and (index.isalnum() or index == "+")
@@ -96,14 +96,14 @@ def symbol_parts(symbol: str) -> tuple[str, str]:
 def label_text(parameter: Parameter, *, changed: bool) -> str:
     """Name and symbol, with a dot in front where the value is not the default.
 
-    The symbol's index and the unit are written by the panel's style sheet.
+    The symbol's subscript and the unit are written by the panel's style sheet.
     """
     letter = symbol_parts(parameter.symbol)[0]
     return f"{'• ' if changed else ''}{parameter.label} {letter}"
 
 
 def manual_places(identifiers: Mapping[str, str]) -> str:
-    """Where the manual tells of each input, as HTML without anything to see.
+    """Links from each input to its place in the manual, as invisible HTML.
 
     Args:
         identifiers: Of the inputs in viser's page, by the key of the parameter or method.

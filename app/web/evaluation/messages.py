@@ -18,7 +18,7 @@ from tracker.evaluation import Evaluation, compare
 from tracker.evaluation.figures import SOURCES
 
 DECIMALS = 4
-"""Of the series: a tenth of a millimetre."""
+"""Decimals of the series, metres."""
 
 
 def evaluation_of(scored: Scored, evaluation: Evaluation) -> models.EvaluationInfo:
@@ -127,7 +127,7 @@ def _share(part: ndarray, rest: ndarray) -> list[float]:
 
 
 def _mean(tracks: dict[int, ndarray], window: Window, steps: int) -> ndarray:
-    """Over the tracks that are paired, of each bucket each track's worst."""
+    """Mean over the paired tracks of each track's largest error within a bucket."""
     starts = window.starts(steps)
     values = [values[window.worst(values)] for values in tracks.values()]
     table = np.array(values).reshape(len(values), len(starts))

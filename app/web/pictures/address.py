@@ -22,7 +22,7 @@ Kept = Annotated[
     str | None,
     Query(description="As the step tells it: with it the answer may be kept for ever."),
 ]
-"""The part of an address that names what a picture was made with."""
+"""The part of an address that names what a picture was made with, so that it may be cached."""
 
 
 def missing(code: str) -> Missing:

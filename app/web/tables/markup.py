@@ -65,14 +65,14 @@ def id_tag(track: int) -> Markup:
 
 
 def symbol(text: str) -> Markup:
-    """A symbol such as ``p_S`` with its index lowered."""
+    """A symbol such as ``p_S`` with its subscript."""
     base, _, index = text.partition("_")
     lowered = f"<sub>{escaped(index)}</sub>" if index else ""
     return Markup(f"<i>{escaped(base)}</i>{lowered}")
 
 
 def quiet(text: object) -> Markup:
-    """Text that stands back."""
+    """Text in a muted colour."""
     return Markup(f'<span class="q">{escaped(text)}</span>')
 
 

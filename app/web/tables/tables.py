@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request
@@ -14,6 +15,7 @@ from app.models import CameraTrack, LaneEvent, Step
 from app.state.evaluator import Evaluator
 from app.state.history import History
 from app.state.scores import Scored
+from app.state.sensitivity import Curve, Sensitivity
 from app.state.snapshot import RunPhase, RunState, Snapshot
 from app.web.dependencies import ERRORS, Bench, nothing_open
 from app.web.evaluation import messages
@@ -201,9 +203,30 @@ def event_table(
 
 
 @router.get("/changes")
-def change_table(bench: Bench) -> str:
-    """What differs from the defaults, each with its reset."""
+def change_table(request: Request, bench: Bench) -> str:
+    """What differs from the defaults, each with its reset; and what parameters would change."""
     snapshot = bench.snapshot()
+    sensitivity: Sensitivity = request.app.state.sensitivity
+    return _changed(snapshot) + _curves_of(sensitivity.curves())
+
+
+def _curves_of(curves: Mapping[str, Curve]) -> str:
+    rows = [
+        (
+            quiet(_stage(key)),
+            _name(key),
+            value_text(value),
+            number(score, 3 if curve.measure == "MOTA" else 0),
+        )
+        for key, curve in curves.items()
+        for value, score in zip(curve.values, curve.scores, strict=True)
+    ]
+    measure = next((curve.measure for curve in curves.values()), "")
+    heads = ("Stage", "What it would change", "#Value", f"#{measure}")
+    return table("What parameters would change", heads, rows) if rows else ""
+
+
+def _changed(snapshot: Snapshot) -> str:
     changed = parameter_table.changed(snapshot.parameters, snapshot.defaults)
     if not changed:
         return blank(

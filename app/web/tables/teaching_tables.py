@@ -13,7 +13,7 @@ from app.state.teaching import Part, Side, Teaching
 from app.web.dependencies import ERRORS, Bench, nothing_open
 from app.web.tables.markup import Cell, Markup, escaped, line, quiet, table
 from tracker.parameters import METHODS, method_of
-from tracker.sequences.sequence import Sequence, Template
+from tracker.sequences.sequence import PRESETS, Sequence, Template
 from tracker.sequences.writing.teaching import AXES, changes, taught_values
 
 router = APIRouter(prefix="/api/tables", responses=ERRORS, default_response_class=HTMLResponse)
@@ -33,6 +33,7 @@ def teach_tables(request: Request, bench: Bench) -> str:
         _templates(snapshot, sequence)
         + _numbers(sequence)
         + _room(sequence)
+        + _target(sequence)
         + _entrances(sequence)
         + _saving(snapshot, teaching)
     )
@@ -135,6 +136,27 @@ def _room(sequence: Sequence) -> str:
             for side, words in SIDES.items()
         ],
     )
+
+
+def _target(sequence: Sequence) -> str:
+    half = [float(side) for side in sequence.target_half_extents]
+    fields = (
+        _field(
+            f"target-{axis}",
+            f"Target, {words}, metres",
+            f"{2.0 * half[axis]:g}",
+            f"PATCH teach/target/{axis}",
+            numeric=True,
+        )
+        for axis, words in enumerate(("width", "depth", "height"))
+    )
+    presets = [
+        _send(words, "POST teach/target", {"half_extents": own}, label=f"Target: {words}")
+        for words, own in PRESETS.items()
+        if any(abs(a - b) > 1e-6 for a, b in zip(own, half, strict=True))
+    ]
+    heads = ("Target", "#width  m", "#depth  m", "#height  m")
+    return table("Target, in metres", heads, [("size", *fields)]) + line("Sizes: ", *presets)
 
 
 def _entrances(sequence: Sequence) -> str:

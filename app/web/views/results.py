@@ -24,6 +24,7 @@ def state_of(snapshot: Snapshot) -> models.State:
         else models.OpeningInfo(**asdict(snapshot.opening)),
         parameters={key: table.value(parameters, key) for key in table.PARAMETERS},
         changed=list(table.changed(parameters, snapshot.defaults)),
+        shown=table.shown_keys(parameters),
         command=command_line(snapshot),
         methods=models.MethodsInfo(
             single_view=parameters.single_view,
@@ -36,6 +37,7 @@ def state_of(snapshot: Snapshot) -> models.State:
         playhead=snapshot.playhead,
         selection=snapshot.selection,
         layers=dict(snapshot.layers),
+        trail=models.TrailInfo(**asdict(snapshot.trail)),
         view=snapshot.view,
         theme=snapshot.theme,
         run=run_of(snapshot),

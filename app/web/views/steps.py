@@ -6,9 +6,10 @@ import numpy as np
 from numpy import ndarray
 
 from app import models
-from app.scene.geometry import FUTURE_SECONDS, TRAIL_SECONDS
+from app.scene.geometry import FUTURE_SECONDS
 from app.state.pairs import pairs_at
 from app.web.pictures.likelihood import key_of
+from app.web.views.owners import tell_owners
 from tracker.boxes import Boxes
 from tracker.fusion.protocol import FusionResult
 from tracker.parameters import ColourPhdParams
@@ -18,6 +19,9 @@ from tracker.single_view.protocol import ViewResult
 
 WORTH_A_REASON = 0.9
 """Below this share of the chosen p_D, a camera's p_D for a track is explained."""
+
+MOST_POINTS = 240
+"""Of one trail in a picture."""
 
 TRAIL_POINTS = 6
 """Points a second of the trails in the pictures."""
@@ -29,7 +33,7 @@ def step_of(
     step: int,
     *,
     with_samples: bool = False,
-    with_trails: bool = False,
+    trails: float = 0.0,
 ) -> models.Step:
     """One step of a run, with the truth; what is not computed yet stays empty.
 
@@ -38,7 +42,8 @@ def step_of(
         run: That is shown.
         step: 0-based.
         with_samples: Whether to tell each camera's samples, which are many.
-        with_trails: Whether to tell where tracks come from and go to in each picture.
+        trails: How many seconds back to tell where tracks come from in each picture, and where
+            they go to; 0 for not at all.
     """
     computed = run is not None and step < run.done
     likelihood = None
@@ -69,8 +74,9 @@ def step_of(
     if run is not None and computed:
         _add_views(message, run, step, with_samples)
         _add_tracks(message, sequence, run, step)
-        if with_trails:
-            _add_trails(message, sequence, run, step)
+        tell_owners(message, sequence, run, step)
+        if trails:
+            _add_trails(message, sequence, run, step, trails)
     return message
 
 
@@ -152,6 +158,7 @@ def _add_tracks(message: models.Step, sequence: Sequence, run: Run, step: int) -
     for index, (view, camera) in enumerate(zip(sequence.views, message.cameras, strict=True)):
         boxes, visible = view.camera.project_boxes(positions, sequence.target_half_extents)
         centres, in_front = view.camera.project(positions)
+        given = _corner_boxes(run.views[step][index].boxes)
         for i, component in enumerate(components.tolist()):
             whole = bool(np.isfinite(boxes[i]).all())
             # the filter knew nothing of whom the smoothing alone found
@@ -173,7 +180,7 @@ def _add_tracks(message: models.Step, sequence: Sequence, run: Run, step: int) -
                     source=-1 if unknown else int(fused.sources[index, component]),
                     fed_by=None
                     if unknown
-                    else _feeding(run.views[step][index], fused, index, component),
+                    else _feeding(run.views[step][index], given, fused, index, component),
                     hidden_by=hidden_by,
                     visible=bool(visible[i]),
                     reason=reason,
@@ -183,25 +190,28 @@ def _add_tracks(message: models.Step, sequence: Sequence, run: Run, step: int) -
 
 
 def _feeding(
-    view: ViewResult, fused: FusionResult, camera: int, component: int
+    view: ViewResult, given: list[models.Box], fused: FusionResult, camera: int, component: int
 ) -> models.Feeding | None:
     source = int(fused.sources[camera, component])
     if not 0 <= source < len(view.boxes):
         return None
     return models.Feeding(
-        box=_corner_boxes(view.boxes[source : source + 1])[0],
+        box=given[source],
         weight=round(float(view.weights[source]), 4),
         share=round(float(fused.source_weights[camera, component]), 4),
     )
 
 
-def _add_trails(message: models.Step, sequence: Sequence, run: Run, step: int) -> None:
+def _add_trails(
+    message: models.Step, sequence: Sequence, run: Run, step: int, seconds: float
+) -> None:
     """Where the feet of each track were and will be, a few points a second."""
     fps, tracks = sequence.fps, run.tracks
-    every = max(1, round(fps / TRAIL_POINTS))
+    # however long it is, a trail has a bounded number of points
+    every = max(1, round(fps / TRAIL_POINTS), round(seconds * fps / MOST_POINTS))
     ids = [track.id for track in message.tracks]
     near = slice(
-        tracks.at(step - round(TRAIL_SECONDS * fps)).start,
+        tracks.at(step - round(seconds * fps)).start,
         tracks.at(min(run.done - 1, step + round(FUTURE_SECONDS * fps))).stop,
     )
     frames, owners = tracks.frames[near], tracks.ids[near]
@@ -235,4 +245,8 @@ def _box(values: ndarray) -> models.Box:
 
 def _corner_boxes(boxes: ndarray) -> list[models.Box]:
     """Centre and half sizes as left, top, width, height."""
-    return [_box(row) for row in Boxes(boxes).left_top]
+    rows: list[models.Box] = [
+        (left, top, width, height)
+        for left, top, width, height in Boxes(boxes).left_top.round(2).tolist()
+    ]
+    return rows

@@ -18,6 +18,7 @@ from numpy import ndarray
 from app import models
 from app.state.pairs import alike
 from app.state.scores import Scored
+from app.web.views.names import Names
 from tracker.pipeline import Run
 from tracker.sequences.sequence import Sequence
 from tracker.trajectories import Trajectories
@@ -49,7 +50,7 @@ class Window:
 
     @staticmethod
     def of(frames: int, first: int = 0, last: int | None = None, buckets: int = BUCKETS) -> Window:
-        """The buckets of the steps ``first`` … ``last``, as far as the sequence goes.
+        """The buckets of the steps ``first`` … ``last``, cut off at the sequence's end.
 
         Buckets begin at multiples of their size, so that a view that moves sideways shows
         the same values again.
@@ -58,7 +59,7 @@ class Window:
         first = max(0, min(first, end))
         stride = max(1, -(-(end - first) // buckets))
         while (end - first // stride * stride) > buckets * stride:
-            stride += 1  # the cut bucket in front was one too many
+            stride += 1  # beginning inside a bucket takes one bucket more
         return Window(first // stride * stride, end, stride)
 
     def starts(self, done: int) -> Int[ndarray, " B"]:
@@ -87,6 +88,23 @@ def numbers(values: Float[ndarray, " S"], window: Window) -> models.Numbers:
     """Numbers over time, to four decimals."""
     low, high, mean = (part.round(4).tolist() for part in _summary(values, window))
     return models.Numbers(low=low, high=high, mean=mean)
+
+
+def deviation(weights: Float[ndarray, " J"], fusion_method: str) -> float:
+    """Standard deviation of the number of people, sqrt(var N).
+
+    The people of a multi-Bernoulli exist independently: the variances of their existences add up
+    to Σ r (1 − r). A PHD takes the number for Poisson distributed (Mahler 2003, IEEE TAES 39(4)):
+    its variance is its mean, Σ w.
+
+    Args:
+        weights: Existences, or expected numbers of people.
+        fusion_method: Whose they are.
+    """
+    if fusion_method == "sequential_phd":
+        return math.sqrt(float(weights.sum()))
+    existences = np.clip(weights, 0.0, 1.0)
+    return math.sqrt(float((existences * (1.0 - existences)).sum()))
 
 
 def _summary(values: ndarray, window: Window) -> tuple[ndarray, ndarray, ndarray]:
@@ -138,6 +156,8 @@ class Timelines:
         self._lock = threading.Lock()
         self._run: Run | None = None
         self._cardinality: list[float] = []
+        self._deviation: list[float] = []
+        self._names = Names()
         self._counted: tuple[Trajectories, int, _Spans, Int[ndarray, " D"]] | None = None
         self._sequence: Sequence | None = None
         self._truth: Int[ndarray, " S"] | None = None
@@ -164,6 +184,7 @@ class Timelines:
     ) -> models.Timeline:
         if run is not self._run:
             self._run, self._cardinality, self._counted = run, [], None
+            self._deviation, self._names = [], Names()
         if sequence is not self._sequence:
             self._sequence, self._truth = sequence, _truth_counts(sequence)
         done, count = 0, np.zeros(0, dtype=np.int64)
@@ -172,9 +193,10 @@ class Timelines:
         left_out = 0
         if run is not None:
             done = run.done
-            self._cardinality.extend(
-                result.posterior.cardinality for result in run.fused[len(self._cardinality) : done]
-            )
+            for result in run.fused[len(self._cardinality) : done]:
+                self._cardinality.append(result.posterior.cardinality)
+                weights = result.posterior.weights
+                self._deviation.append(deviation(weights, run.parameters.fusion_method))
             tracks, counted = run.tracks, self._counted
             # the smoothed tracks take the place of the filter's of as many steps
             if counted is None or counted[0] is not tracks or counted[1] != done:
@@ -186,6 +208,9 @@ class Timelines:
             shortest = math.ceil(LONG_MISS * sequence.fps)
             lives, left_out = _lives(spans, window, shortest)
             events = _events(spans, done, shortest)
+            names = self._names.told(sequence, run)
+            for life in lives:
+                life.name = names.get(life.id)
         return models.Timeline(
             run=run.key if run is not None else "",
             done=done,
@@ -193,6 +218,7 @@ class Timelines:
             first=window.first,
             stride=window.stride,
             cardinality=numbers(np.array(self._cardinality), window),
+            deviation=numbers(np.array(self._deviation), window),
             count=counts(count, window),
             truth=None if self._truth is None else counts(self._truth, window),
             tracks=lives,

@@ -29,8 +29,8 @@ export function drawRange({ g, row, view, ink }, loaded, done, frames) {
 	if (done > 0) bar("accent", 0, done - 1, y + 3, 3);
 }
 
-/** @param {Pen} pen @param {[number | null, number | null]} range */
-export function drawRuler({ g, row, view, ink }, range) {
+/** @param {Pen} pen @param {[number | null, number | null]} range @param {Bookmark[]} [marks] */
+export function drawRuler({ g, row, view, ink }, range, marks = []) {
 	const bottom = row.y + row.height;
 	const { major, minor } = tickSteps(view);
 	g.font = `${ink.get("fs-0")} ${ink.font}`;
@@ -52,6 +52,18 @@ export function drawRuler({ g, row, view, ink }, range) {
 		g.fillStyle = ink.get("ink-3");
 		g.textAlign = x < half ? "left" : x > view.width - half ? "right" : "center";
 		g.fillText(text, x, row.y + (row.height - 4) / 2);
+	}
+	g.fillStyle = ink.get("warn");
+	for (const { step } of marks) {
+		if (step < view.first || step > view.last) continue;
+		const x = Math.round(xOf(step, view));
+		trace(g, [
+			[x - 3, row.y + 1],
+			[x + 3, row.y + 1],
+			[x + 3, row.y + 9],
+			[x, row.y + 6],
+			[x - 3, row.y + 9],
+		]).fill();
 	}
 	g.fillStyle = ink.get("accent");
 	range.forEach((step, end) => {

@@ -20,7 +20,8 @@ export function mosaic(aspects, large, { width, most, gap }) {
 }
 
 /**
- * In the number of columns that makes the pictures largest.
+ * In the number of columns that makes the pictures largest: side by side without gaps between
+ * them, the last row in the middle where it has fewer.
  * @param {number[]} aspects
  * @param {number} inner
  * @param {number} tall
@@ -32,24 +33,23 @@ function alike(aspects, inner, tall, gap) {
 		const columns = index + 1;
 		const rows = Math.ceil(aspects.length / columns);
 		const width = (inner - gap * (columns - 1)) / columns;
-		return {
-			columns,
-			rows,
-			width,
-			height: Math.min((tall - gap * (rows - 1)) / rows, width / widest),
-		};
+		return { columns, rows, height: Math.min((tall - gap * (rows - 1)) / rows, width / widest) };
 	});
-	const { columns, rows, width, height } = grids.reduce((best, grid) =>
+	const { columns, rows, height } = grids.reduce((best, grid) =>
 		grid.height > best.height + 0.5 ? grid : best,
 	);
-	const cells = aspects.map((aspect, index) =>
-		fit(aspect, {
-			x: gap + (index % columns) * (width + gap),
-			y: gap + Math.floor(index / columns) * (height + gap),
+	const width = height * widest;
+	const cells = aspects.map((aspect, index) => {
+		const row = Math.floor(index / columns);
+		const inRow = Math.min(columns, aspects.length - row * columns);
+		const left = (inner - inRow * width - (inRow - 1) * gap) / 2;
+		return fit(aspect, {
+			x: gap + left + (index % columns) * (width + gap),
+			y: gap + row * (height + gap),
 			width,
 			height,
-		}),
-	);
+		});
+	});
 	return { cells, height: Math.round(rows * (height + gap) + gap) };
 }
 

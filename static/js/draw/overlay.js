@@ -73,7 +73,9 @@ export function drawOverlay(g, view, scene) {
 		drawErrors(g, view, scene);
 	}
 	if (layers.measurements)
-		for (const { box } of view.measurements) stroke(outline(g, box, scale), WHITE, 1, [], 0.4);
+		view.measurements.forEach(({ box }, index) =>
+			stroke(outline(g, box, scale), WHITE, index === scene.pointed ? 2.5 : 1, [], 0.4),
+		);
 	if (layers.estimates) {
 		for (const { box } of view.estimates) stroke(corners(g, box, scale), WHITE, 1.75, [], 0.5);
 		if (view.gates.length && roomy) drawGates(g, view, scene);
@@ -120,18 +122,21 @@ function drawGates(g, { gates, estimates }, { scale, ink }) {
  * @param {Server.CameraTrack[]} tracks
  * @param {Scene} scene
  */
-function drawTrails(g, tracks, { scale, ink, selection }) {
+function drawTrails(g, tracks, { scale, ink, selection, opacity, fades }) {
 	for (const { id, trail } of tracks) {
 		const points = trail.map(([, x, y]) => [x * scale, y * scale]);
 		const now = trail.findIndex(([step]) => step >= 0);
 		stroke(trace(g, points.slice(Math.max(0, now))), ink.id(id), 1, [], 0.3);
-		stroke(
-			trace(g, points.slice(0, now < 0 ? undefined : now + 1)),
-			ink.id(id),
-			id === selection ? 2.5 : 1.75,
-			[],
-			0.4,
-		);
+		const past = points.slice(0, now < 0 ? undefined : now + 1);
+		// In a few pieces, the oldest faintest: a halo under each would make beads of them.
+		const pieces = fades ? 8 : 1;
+		for (let k = 0; k < pieces; k += 1) {
+			const [from, to] = [k, k + 1].map((n) => Math.floor((n * (past.length - 1)) / pieces));
+			g.globalAlpha = opacity * (fades ? (k + 1) / pieces : 1);
+			const width = id === selection ? 2.5 : 1.75;
+			stroke(trace(g, past.slice(from, to + 1)), ink.id(id), width, [], 0.4);
+		}
+		g.globalAlpha = opacity;
 	}
 }
 

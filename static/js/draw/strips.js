@@ -70,9 +70,29 @@ export function drawCardinality(pen, timeline) {
 			(most, values) => (values?.high ?? []).reduce((a, b) => Math.max(a, b), most),
 			2,
 		);
+	drawBand(pen, timeline, top);
 	if (truth) drawStairs(pen, timeline, truth, top, pen.ink.get("p-truth"), 3);
 	if (pinned) drawStairs(pen, timeline, pinned.count, top, pen.ink.get("ink-2"), 1, [4, 2]);
 	drawStairs(pen, timeline, count, top, pen.ink.get("p-est"), 1.25);
+}
+
+/**
+ * The expected number of people, a standard deviation up and down.
+ * @param {Pen} pen @param {Server.Timeline} timeline @param {number} top
+ */
+function drawBand({ g, row, view, ink }, timeline, top) {
+	const { cardinality, deviation } = timeline;
+	const slope = (view.last - view.first) / view.width;
+	const level = (/** @type {number} */ value) =>
+		row.y + row.height - 4 - (Math.max(0, Math.min(value, top)) / top) * (row.height - 10);
+	g.fillStyle = faded(ink.get("p-loc"), 0.4);
+	for (let x = 0; x < view.width; x += 1) {
+		const at = bucketOf(view.first + x * slope, timeline);
+		const [mean, sigma] = [cardinality.mean[at], deviation.mean[at]];
+		if (mean === undefined) continue;
+		const [high, low] = [level(mean + sigma), level(mean - sigma)];
+		if (sigma > 0) g.fillRect(x, high, 1, Math.max(1, low - high));
+	}
 }
 
 /**

@@ -10,7 +10,7 @@ import { fill, h, write } from "./dom.js";
  * @param {string} [how.by] word of the column that sorts at first; without one rows stay in their
  * order
  * @param {boolean} [how.down]  from the largest
- * @param {(row: R) => void} [how.choose]  by click or Enter
+ * @param {(row: R, event: MouseEvent | KeyboardEvent) => void} [how.choose]  by click or Enter
  * @param {(row: R) => void} [how.open]  by double click
  * @param {(row: R) => Record<string, any>} [how.attributes]  of the row, and its listeners
  * @returns {Grid<R>}
@@ -61,10 +61,10 @@ export function grid(
 		const { element } = entry;
 		if (choose) {
 			element.tabIndex = -1;
-			element.addEventListener("click", () => choose(entry.row));
+			element.addEventListener("click", (event) => choose(entry.row, event));
 			element.addEventListener("keydown", (event) => {
 				if (event.target !== element) return;
-				if (event.key === "Enter") choose(entry.row);
+				if (event.key === "Enter") choose(entry.row, event);
 				const next =
 					event.key === "ArrowDown"
 						? element.nextElementSibling

@@ -3,6 +3,7 @@
  * something that they tell of is new. Their buttons name an action and its value.
  */
 import { fetcher, request } from "../state/api.js";
+import { eventsNow } from "../state/events.js";
 import { all, choices, one, parts, write } from "../elements/dom.js";
 
 /**
@@ -33,6 +34,8 @@ export function mountTables(root, { store, actions }) {
 		code,
 		pin,
 		unpin,
+		swap,
+		place,
 		more,
 		resetAll,
 	} = parts(root);
@@ -113,9 +116,16 @@ export function mountTables(root, { store, actions }) {
 		renamePreset.hidden = removePreset.hidden = !own.includes(now);
 		resetAll.disabled = locked || changed.length === 0;
 		write(code, server?.command ?? "");
-		unpin.hidden = !server?.pinned;
+		unpin.hidden = swap.hidden = !server?.pinned;
+		swap.disabled = locked || run?.state !== "done" || !server?.pinned?.differs.length;
 		pin.disabled = locked || run?.state !== "done" || server?.pinned?.key === run.key;
 		write(more, every ? "Headlines" : "All figures");
 	}
 	store.watch(["server", "schema", "link", "run", "every", "sequence"], controls);
+	store.watch(["shown", "timeline", "scores", "eventKind"], (state) => {
+		const events = eventsNow(state);
+		const past = events.filter(({ step }) => step <= state.shown).length;
+		write(place, events.length ? `${past} of ${events.length}` : "");
+	});
+	store.on(["eventKind"], ({ eventKind }) => (kind.value = eventKind));
 }

@@ -3,6 +3,7 @@
  * Teaching: boxes dragged on a picture, and the fields of a panel that the server writes; each says
  * where it is sent.
  */
+import { lensOf } from "../draw/picture.js";
 import { all, h, one } from "../elements/dom.js";
 
 const DRAW = "Drag a box around a person. Esc leaves; the Teach tab takes numbers too.";
@@ -29,7 +30,7 @@ export function mountTeach(mosaic, { store, actions }) {
 		hint.hidden = !hint.hidden;
 		mosaic.classList.toggle("drawing", !hint.hidden);
 		one("[data-command=draw-template]").ariaPressed = String(!hint.hidden);
-		store.set({ playing: 0 });
+		store.set({ playing: 0, follow: false });
 	};
 	const { clear } = actions;
 	actions.clear = () =>
@@ -78,10 +79,13 @@ export function mountTeach(mosaic, { store, actions }) {
 			begun = null;
 			drawn.remove();
 			if (!cam || Math.min(sides[2], sides[3]) < 4) return;
-			const camera = store.get().cameras[[...mosaic.children].indexOf(cam)];
-			const [left, top, width, height] = sides.map(
-				(side) => (side * camera.width) / cam.clientWidth,
-			);
+			const index = [...mosaic.children].indexOf(cam);
+			const camera = store.get().cameras[index];
+			// Also of a picture that is looked at closer.
+			const lens = lensOf(store.get().zooms[index], cam.clientWidth, cam.clientHeight);
+			const scale = (cam.clientWidth * lens.k) / camera.width;
+			const [left, top] = [(sides[0] + lens.left) / scale, (sides[1] + lens.top) / scale];
+			const [width, height] = [sides[2] / scale, sides[3] / scale];
 			actions.showTab("teach");
 			added = (store.get().sequence?.templates ?? 0) + 1;
 			void actions.ask("POST", "teach/templates", {

@@ -10,6 +10,7 @@ import {
 	trueCount,
 } from "../state/events.js";
 import { grid } from "../elements/grid.js";
+import { KINDS, kindsOf } from "./listed.js";
 
 /** Rows beyond this are counted, not drawn. */
 const MOST_ROWS = 300;
@@ -17,7 +18,7 @@ const ORDER = { seen: 0, coasting: 1, lost: 2, "not yet": 3, ended: 4 };
 
 /** @type {Pane} */
 export function mountTracks(root, { store, actions, playback }) {
-	const { summary, upcoming, blank } = parts(root);
+	const { summary, upcoming, blank, listed } = parts(root);
 	/** @type {Map<number, Server.ScoredTrackInfo>} */
 	let scored = new Map();
 	const step = () => Math.max(0, store.get().shown);
@@ -94,7 +95,8 @@ export function mountTracks(root, { store, actions, playback }) {
 		key: ({ id }) => id,
 		by: "Length",
 		down: true,
-		choose: ({ id }) => actions.select(store.get().selection === id ? null : id),
+		choose: ({ id }, event) =>
+			event.altKey ? actions.solo(id) : actions.select(store.get().selection === id ? null : id),
 		open: ({ id, first }) => {
 			actions.select(id);
 			playback.seek(first);
@@ -105,27 +107,42 @@ export function mountTracks(root, { store, actions, playback }) {
 		}),
 	});
 	root.prepend(table.element);
+	const buttons = KINDS.map(([name, , tip]) =>
+		h("button", { class: "up start", "data-tip": tip, onclick: () => store.set({ listed: name }) }),
+	);
+	fill(listed, buttons);
 
 	function list() {
 		const { timeline, sequence, run } = store.get();
 		scored = new Map(scoresOf(store.get())?.evaluation.per_track.map((track) => [track.id, track]));
 		table.element.classList.toggle("plain", !sequence?.has_truth);
-		const tracks = (timeline?.tracks ?? []).filter(
+		const kinds = kindsOf(timeline?.tracks ?? [], scored, timeline?.events ?? []);
+		const { listed: kind } = store.get();
+		const truth = sequence?.has_truth;
+		buttons.forEach((button, k) => {
+			const [name, word] = KINDS[k];
+			button.hidden = !truth && (name === "false" || name === "worst");
+			button.ariaPressed = String(name === kind);
+			write(button, `${word} ${kinds[name].length}`);
+		});
+		const tracks = kinds[kind].filter(
 			({ id }) => !isAlone(store.get()) || id === store.get().selection,
 		);
 		table.show(tracks.slice(0, MOST_ROWS));
 		blank.hidden = tracks.length > 0;
 		if (!tracks.length) {
-			const [title, text] = !sequence
-				? ["Tracks appear here", "once a sequence is open."]
-				: run?.state === "computing"
-					? ["No track yet", "The run goes on; tracks appear as they are found."]
-					: !run?.done && run?.state === "cancelled"
-						? ["No track yet", "The run was stopped before its first step."]
-						: [
-								"No track was found",
-								"Lower the extraction threshold, or look at the detections in the pictures: without boxes there is nothing to fuse.",
-							];
+			const [title, text] = kinds.all.length
+				? ["No such track", "All tracks are listed with the first of the buttons below."]
+				: !sequence
+					? ["Tracks appear here", "once a sequence is open."]
+					: run?.state === "computing"
+						? ["No track yet", "The run goes on; tracks appear as they are found."]
+						: !run?.done && run?.state === "cancelled"
+							? ["No track yet", "The run was stopped before its first step."]
+							: [
+									"No track was found",
+									"Lower the extraction threshold, or look at the detections in the pictures: without boxes there is nothing to fuse.",
+								];
 			fill(blank, h("h3", {}, title), h("p", {}, text));
 		}
 		now();
@@ -145,16 +162,21 @@ export function mountTracks(root, { store, actions, playback }) {
 		const of = sequence?.has_truth && result ? ` of ${trueCount(result)}` : "";
 		const words = `${result?.tracks.length}${of} people at step ${step()}${more > 0 ? ` · ${more} more tracks` : ""}`;
 		write(summary, result ? words : sequence ? "not computed at this step" : "");
-		const event = nextEvent(eventsNow(store.get()), step(), 1);
+		const events = eventsNow(store.get());
+		const event = nextEvent(events, step(), 1);
+		const alike = events.filter(({ kind }) => kind === event?.kind);
 		fill(
 			upcoming,
 			event
-				? ["next: ", h("b", {}, `${event.kind} of ${event.id}, step ${event.step}`)]
+				? [
+						h("b", {}, `${event.kind} of ${event.id}, step ${event.step}`),
+						` · ${alike.indexOf(event) + 1} of ${alike.length}`,
+					]
 				: "no later event",
 		);
 	}
 
-	store.watch(["timeline", "sequence", "run", "scores", "layers3d"], list);
+	store.watch(["timeline", "sequence", "run", "scores", "layers3d", "listed"], list);
 	store.on(["shown", "result", "eventKind"], now);
 	store.on(["selection"], () => (isAlone(store.get()) ? list() : now()));
 	store.on(["selection"], ({ selection }) =>

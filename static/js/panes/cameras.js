@@ -1,13 +1,18 @@
 /** The cameras: pictures and what is drawn over them, painted together. */
-import { fill, h, icon, idTag, parts, show, write } from "../elements/dom.js";
+import { fill, h, icon, parts, write } from "../elements/dom.js";
 import { prepare } from "../draw/canvas.js";
-import { drawEmptyPicture, drawOverlay, visibleTracks } from "../draw/overlay.js";
+import { drawLoupe, drawPicture, lensOf } from "../draw/picture.js";
+import { visibleTracks } from "../draw/overlay.js";
+import { fillBoxCard, fillTrackCard } from "./cards.js";
+import { mountMagnifier } from "./magnify.js";
 import { isAlone, viewWords } from "../state/events.js";
 import { mosaic } from "../draw/mosaic.js";
 import { pictureInk } from "../draw/colours.js";
 
 /** A second click within this time makes it a double click, milliseconds. */
 const DOUBLE_CLICK = 220;
+/** Of the window's height, at most, where there is one camera and nothing to be beside it. */
+const LONE = 0.4;
 
 /** @type {Pane} */
 export function mountCameras(root, { store, actions, playback }) {
@@ -24,6 +29,8 @@ export function mountCameras(root, { store, actions, playback }) {
 	let sequenceKey = "";
 	/** @type {Timer} */
 	let clicked;
+	/** Where the pointer is, in which cell.  @type {{index: number, x: number, y: number} | null} */
+	let over = null;
 	const cameras = () => store.get().cameras;
 
 	function build() {
@@ -43,18 +50,25 @@ export function mountCameras(root, { store, actions, playback }) {
 					class: "cam",
 					tabindex: 0,
 					role: "button",
-					"aria-label": `Camera ${camera.name}: Enter makes it large, Shift and Enter look through it in 3D`,
+					"aria-label": `Camera ${camera.name}`,
 					onclick: (event) => {
-						const id = store.get().hover?.id;
-						if (id !== undefined) actions.select(id);
+						const id = hit(index, event)?.track?.id;
+						// A finger does not hover: what it touches is told until it touches elsewhere.
+						point(index, event);
+						if (id !== undefined) (event.altKey ? actions.solo : actions.select)(id);
+						else if (event.shiftKey) through();
 						else if (event.detail < 2)
 							clicked = setTimeout(() => actions.chooseCamera(index), DOUBLE_CLICK);
 					},
-					ondblclick: through,
+					ondblclick: () => clearTimeout(clicked),
 					onkeydown: (event) =>
 						event.key === "Enter" && (event.shiftKey ? through() : actions.chooseCamera(index)),
 					onpointermove: (event) => point(index, event),
-					onpointerleave: () => store.set({ hover: null }),
+					onpointerleave: (/** @type {PointerEvent} */ { pointerType }) => {
+						if (pointerType !== "touch") store.set({ hover: null, pointed: null });
+						over = null;
+						if (store.get().loupe) playback.repaint();
+					},
 				},
 				canvas,
 				h("div", { class: "cam-tag" }, name, words),
@@ -75,7 +89,8 @@ export function mountCameras(root, { store, actions, playback }) {
 		const own = Boolean(layout.cams || layout.max === "cams");
 		root.classList.toggle("own", own);
 		if (own) body.style.height = "";
-		const natural = parseFloat(getComputedStyle(root).getPropertyValue("--h-cam")) * 1.1 + 8;
+		const usual = parseFloat(getComputedStyle(root).getPropertyValue("--h-cam")) * 1.1 + 8;
+		const natural = cameras().length === 1 ? Math.max(usual, LONE * innerHeight) : usual;
 		const { cells: found, height } = mosaic(
 			cameras().map((c) => c.width / c.height),
 			large,
@@ -100,7 +115,7 @@ export function mountCameras(root, { store, actions, playback }) {
 	/** @param {Frame} next */
 	function paint(next) {
 		frame = next;
-		const { sequence, layers2d: layers, selection, hover } = store.get();
+		const { sequence, layers2d: layers, selection, hover, zooms, loupe, pointed } = store.get();
 		if (sequence?.key !== sequenceKey) return;
 		const ink = pictureInk();
 		cells.forEach(({ element, canvas, words }, index) => {
@@ -109,31 +124,65 @@ export function mountCameras(root, { store, actions, playback }) {
 			element.dataset.overlay = String(next.result?.step ?? "");
 			const { width, height } = places[index];
 			const g = prepare(canvas, width, height);
-			const bitmap = next.pictures[index]?.bitmap;
 			const view = next.result?.cameras[index];
-			if (bitmap) {
-				g.imageSmoothingQuality = "medium";
-				g.drawImage(bitmap, 0, 0, width, height);
-			} else drawEmptyPicture(g, width, height);
-			for (const map of next.maps[index] ?? [])
-				if (map.bitmap) g.drawImage(map.bitmap, 0, 0, width, height);
-			const scale = width / cameras()[index].width;
-			if (view)
-				drawOverlay(g, view, {
-					scale,
-					width,
-					height,
-					layers,
-					selection,
-					hover: hover?.id ?? null,
-					alone: isAlone(store.get()),
-					people: next.result?.truth ?? [],
-					opacity: next.stale ? 0.45 : 1,
-					ink,
-				});
+			const what = { bitmap: next.pictures[index]?.bitmap, maps: next.maps[index] ?? [], view };
+			/** @type {Scene} */
+			const scene = {
+				scale: width / cameras()[index].width,
+				width,
+				height,
+				layers,
+				selection,
+				hover: hover?.id ?? null,
+				pointed: pointed?.camera === index ? pointed.box : null,
+				alone: isAlone(store.get()),
+				people: next.result?.truth ?? [],
+				fades: store.get().server?.trail.fades ?? true,
+				opacity: next.stale ? 0.45 : 1,
+				ink,
+			};
+			const lens = lensOf(followed(index, view) ?? zooms[index], width, height);
+			drawPicture(g, what, scene, lens);
+			if (loupe && over?.index === index) drawLoupe(g, what, scene, lens, over);
 			write(words, wordsOf(next, index, width > 260));
+			if (!store.get().playing) element.ariaLabel = sentenceOf(next, index);
 		});
 		placeCards();
+	}
+
+	/**
+	 * The magnification that keeps the selected track in the middle, where somebody wants that.
+	 * @param {number} index @param {Server.CameraStep | undefined} view
+	 * @returns {Magnified | null}
+	 */
+	function followed(index, view) {
+		const { follow, selection, zooms } = store.get();
+		const box = follow && view?.tracks.find(({ id, box }) => id === selection && box)?.box;
+		if (!box) return null;
+		const { width, height } = cameras()[index];
+		const k = zooms[index]?.[0] ?? Math.max(1, Math.min(6, (0.45 * height) / box[3]));
+		return [k, (box[0] + box[2] / 2) / width, (box[1] + box[3] / 2) / height];
+	}
+
+	/** How the picture is seen. @param {number} index */
+	const lensNow = (index) =>
+		lensOf(
+			followed(index, frame?.result?.cameras[index]) ?? store.get().zooms[index],
+			places[index].width,
+			places[index].height,
+		);
+
+	/**
+	 * What is drawn, for who does not see it.
+	 * @param {Frame} shown @param {number} index
+	 */
+	function sentenceOf({ step, result }, index) {
+		const view = result?.cameras[index];
+		const ids = view ? visibleTracks(view).map(({ id }) => id) : [];
+		const seen = !result?.computed
+			? "not computed"
+			: `${ids.length ? `tracks ${ids.join(", ")}` : "no track"}, ${view?.measurements.length} detections`;
+		return `Camera ${cameras()[index].name}, step ${step}: ${seen}. Enter makes it large, Shift and Enter look through it in 3D`;
 	}
 
 	/**
@@ -164,91 +213,76 @@ export function mountCameras(root, { store, actions, playback }) {
 		return words.map((word) => ` · ${word}`).join("");
 	}
 
-	/** @param {number} index @param {PointerEvent} event */
-	function point(index, event) {
+	/**
+	 * The track, else the detection, under the pointer.
+	 * @param {number} index @param {MouseEvent} event
+	 */
+	function hit(index, { clientX, clientY }) {
 		const view = frame && !frame.stale ? frame.result?.cameras[index] : undefined;
-		if (!view || !store.get().layers2d.boxes) return;
-		const scale = places[index].width / cameras()[index].width;
-		const [x, y] = [event.offsetX / scale, event.offsetY / scale];
-		const id = visibleTracks(view)
-			.reverse()
-			.find(
-				({ box: [left, top, width, height] }) =>
-					x >= left && x <= left + width && y >= top && y <= top + height,
-			)?.id;
-		const before = store.get().hover;
-		if (before?.id !== id || (before && before.camera !== index))
+		if (!view) return null;
+		const edge = cells[index].element.getBoundingClientRect();
+		const { k, left, top } = lensNow(index);
+		const scale = (places[index].width / cameras()[index].width) * k;
+		const [x, y] = [(clientX - edge.left + left) / scale, (clientY - edge.top + top) / scale];
+		const inside = (/** @type {Box} */ [left, top, width, height]) =>
+			x >= left && x <= left + width && y >= top && y <= top + height;
+		const { boxes, measurements } = store.get().layers2d;
+		const track = boxes
+			? visibleTracks(view)
+					.reverse()
+					.find(({ box }) => inside(box))
+			: undefined;
+		const box = measurements ? view.measurements.findIndex(({ box }) => inside(box)) : -1;
+		return track ? { track } : box >= 0 ? { box } : null;
+	}
+
+	/** @param {number} index @param {MouseEvent} event */
+	function point(index, event) {
+		const found = hit(index, event);
+		const edge = cells[index].element.getBoundingClientRect();
+		over = { index, x: event.clientX - edge.left, y: event.clientY - edge.top };
+		const { hover, pointed, loupe } = store.get();
+		const id = found?.track?.id;
+		const box = found?.box;
+		if (hover?.id !== id || (hover && hover.camera !== index))
 			store.set({ hover: id === undefined ? null : { id, camera: index } });
+		if (pointed?.box !== box || (pointed && pointed.camera !== index))
+			store.set({ pointed: box === undefined ? null : { camera: index, box } });
+		if (loupe) playback.repaint();
 	}
 
 	/** The card stands left of its box, else right; never over it. */
 	function placeCards() {
-		const { hover } = store.get();
+		const { hover, pointed, large } = store.get();
 		cells.forEach(({ card }, index) => {
 			// What is pointed at elsewhere is explained in the large picture.
-			const here = hover && (hover.camera < 0 ? (store.get().large ?? 0) : hover.camera) === index;
-			const track = here
-				? frame?.result?.cameras[index].tracks.find((t) => t.id === hover.id)
-				: undefined;
-			card.hidden = !track?.box;
-			if (!track?.box) return;
-			fillCard(card, track);
+			const here = hover && (hover.camera < 0 ? (large ?? 0) : hover.camera) === index;
+			const view = frame?.result?.cameras[index];
+			const track = here ? view?.tracks.find((t) => t.id === hover.id) : undefined;
+			const lone =
+				pointed?.camera === index && !track ? view?.measurements[pointed.box] : undefined;
+			const box = track?.box ?? lone?.box;
+			card.hidden = !box;
+			if (!box) return;
+			if (lone) fillBoxCard(card, lone, pointed?.box ?? 0);
+			else if (track)
+				fillTrackCard(
+					card,
+					track,
+					frame?.result?.tracks.find(({ id }) => id === track.id),
+				);
 			const { width, height, x } = places[index];
-			const scale = width / cameras()[index].width;
-			const left = track.box[0] * scale - card.offsetWidth - 8;
+			const { k, left: gone, top } = lensNow(index);
+			const scale = (width / cameras()[index].width) * k;
+			const left = box[0] * scale - gone - card.offsetWidth - 8;
 			const right = Math.min(
-				(track.box[0] + track.box[2]) * scale + 8,
+				(box[0] + box[2]) * scale - gone + 8,
 				root.clientWidth - x - card.offsetWidth - 4,
 			);
+			const down = Math.min(box[1] * scale - top, height - card.offsetHeight - 28);
 			card.style.left = `${Math.round(left + x >= 4 ? left : right)}px`;
-			card.style.top = `${Math.round(Math.max(4, Math.min(track.box[1] * scale, height - card.offsetHeight - 28)))}px`;
+			card.style.top = `${Math.round(Math.max(4, down))}px`;
 		});
-	}
-
-	/** @param {HTMLElement} card @param {Server.CameraTrack} track */
-	function fillCard(
-		card,
-		{ id, seen, detection_probability: p, hidden_by: front, reason, source, fed_by: fed },
-	) {
-		const whole = frame?.result?.tracks.find((t) => t.id === id);
-		const row = (/** @type {Child | Child[]} */ word, /** @type {Child[]} */ ...value) => [
-			h("dt", {}, word),
-			h("dd", {}, ...value),
-		];
-		fill(
-			card,
-			h("h3", {}, idTag(id), seen ? "seen" : "coasting"),
-			h(
-				"dl",
-				{},
-				whole && row("existence", whole.existence.toFixed(2)),
-				p !== null &&
-					row(
-						[h("i", {}, "p"), h("sub", {}, "D")],
-						show(Number(p.toFixed(3))),
-						h("small", {}, front !== null ? ` hidden by ${front}` : reason ? ` ${reason}` : ""),
-					),
-				row(
-					"fed by",
-					...(seen && fed
-						? [
-								`box ${source + 1}`,
-								h(
-									"small",
-									{},
-									`, ${Math.round(100 * fed.share)} % sure, weight ${show(Number(fed.weight.toPrecision(2)))}`,
-								),
-							]
-						: ["no box here"]),
-				),
-				whole &&
-					row(
-						"at",
-						whole.position.map((v) => v.toFixed(2).replace("-", "−")).join("  "),
-						h("small", {}, " m"),
-					),
-			),
-		);
 	}
 
 	function header() {
@@ -288,7 +322,11 @@ export function mountCameras(root, { store, actions, playback }) {
 	store.on(["sequence"], ({ sequence }) => (sequence?.key ?? "") !== sequenceKey && build());
 	store.watch(["server", "sequences"], header);
 	store.on(["large"], arrange);
-	store.on(["selection", "hover", "layers2d", "layers3d"], playback.repaint);
+	mountMagnifier(body, store);
+	store.on(
+		["selection", "hover", "pointed", "layers2d", "layers3d", "zooms", "loupe", "follow"],
+		playback.repaint,
+	);
 	new ResizeObserver(arrange).observe(root);
 	addEventListener("panes", arrange);
 }

@@ -40,6 +40,23 @@ export function mountControls({ store, actions, press }) {
 		for (const [index, name] of ["undo", "redo"].entries())
 			for (const button of all(`[data-command=${name}]`)) button.disabled = !undoable[index];
 	});
+	store.watch(["loupe", "realTime", "follow"], (state) => {
+		for (const [name, key] of /** @type {const} */ ([
+			["loupe", "loupe"],
+			["real-time", "realTime"],
+		]))
+			for (const button of all(`[data-command=${name}]`)) button.ariaPressed = String(state[key]);
+	});
+	// Most of the page keeps the focus where it is when it is pressed, but who presses elsewhere is
+	// done with a field.
+	document.addEventListener(
+		"pointerdown",
+		({ target }) => {
+			const field = /** @type {HTMLElement | null} */ (document.activeElement);
+			if (field?.matches(TYPING) && target !== field) field.blur();
+		},
+		true,
+	);
 	document.addEventListener("keydown", press);
 	// A click leaves the focus where it was, so that Space goes on meaning play; only the 3D view,
 	// which keeps all keys to itself while it has the focus, gives it back.

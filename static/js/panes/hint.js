@@ -24,6 +24,8 @@ export function hintLines(state, step, track) {
 		const at = bucketOf(step, timeline);
 		const truth = timeline.truth ? ` of ${timeline.truth.mean[at]?.toFixed(0) ?? "–"}` : "";
 		lines.push([`people ${timeline.count.mean[at]?.toFixed(0) ?? "–"}${truth}`]);
+		const [mean, sigma] = [timeline.cardinality.mean[at], timeline.deviation.mean[at]];
+		if (mean !== undefined) lines.push([`expected ${mean.toFixed(2)} ± ${sigma.toFixed(2)}`]);
 	}
 	const series = scoresOf(state)?.series;
 	const cost = series?.[measure][bucketOf(step, series)];

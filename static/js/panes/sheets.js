@@ -1,6 +1,7 @@
 /** The two dialogs made from the registry of commands: help with its keys, and the palette. */
 import { COMMANDS, keyLabel, perform, search } from "../state/commands.js";
 import { all, fill, h, parts } from "../elements/dom.js";
+import { matching, offersOf, rangeOf, valueOf } from "../state/offers.js";
 
 /** @param {string[]} keys */
 const signs = (keys) => keys.map((key) => h("kbd", {}, keyLabel(key)));
@@ -42,12 +43,48 @@ export function mountSheets({ store, actions }) {
 	};
 
 	let at = 0;
-	/** @type {Command[]} */
+	/** @type {Offer[]} */
 	let found = [];
+	/** Whose value is asked for.  @type {Server.ParameterInfo | null} */
+	let asked = null;
+
+	/** @returns {Offer[]} */
+	function offered() {
+		if (asked) return valueOffers(asked);
+		const commands = search(input.value).map((command) => ({
+			title: command.title,
+			keys: command.keys.slice(0, 1),
+			run: () => perform(command, actions),
+		}));
+		return [...commands, ...matching(offersOf(store.get(), actions, edit), input.value)];
+	}
+	/** @param {Server.ParameterInfo} parameter */
+	function edit(parameter) {
+		asked = parameter;
+		input.value = "";
+		palette.showModal();
+		offer();
+	}
+	/** @param {Server.ParameterInfo} parameter @returns {Offer[]} */
+	function valueOffers(parameter) {
+		const { key, label, unit, choices, kind } = parameter;
+		const set = (/** @type {any} */ value) => ({
+			title: `${label} = ${value} ${unit}`,
+			keys: [],
+			run: () => void actions.change({ [key]: value }),
+		});
+		const typed = input.value ? valueOf(parameter, input.value) : null;
+		if (typed !== null) return [set(typed)];
+		const words = kind === "choice" ? choices : kind === "bool" ? [true, false] : [];
+		return input.value ? [] : words.map(set);
+	}
 	function offer() {
-		found = search(input.value);
+		found = offered();
 		at = Math.max(0, Math.min(at, found.length - 1));
-		const option = (/** @type {Command} */ command, /** @type {number} */ index) =>
+		input.placeholder = asked
+			? `${asked.label}: ${rangeOf(asked)}, now ${store.get().server?.parameters[asked.key]}`
+			: "Command, parameter, recording or track";
+		const option = (/** @type {Offer} */ one, /** @type {number} */ index) =>
 			h(
 				"div",
 				{
@@ -55,14 +92,15 @@ export function mountSheets({ store, actions }) {
 					role: "option",
 					id: `option-${index}`,
 					"aria-selected": String(index === at),
-					onclick: () => run(command),
+					onclick: () => run(one),
 					onpointermove: () => index !== at && choose(index),
 				},
-				command.title,
+				one.title,
 				h("span", { class: "grow" }),
-				signs(command.keys.slice(0, 1)),
+				signs(one.keys),
 			);
-		fill(list, found.length ? found.map(option) : h("p", {}, "No command has these words."));
+		const none = asked ? `${asked.help} ${rangeOf(asked)}` : "Nothing here has these words.";
+		fill(list, found.length ? found.map(option) : h("p", {}, none));
 		choose(at);
 	}
 	/** @param {number} index */
@@ -72,11 +110,13 @@ export function mountSheets({ store, actions }) {
 		input.setAttribute("aria-activedescendant", found.length ? `option-${at}` : "");
 		list.children[at]?.scrollIntoView({ block: "nearest" });
 	}
-	/** @param {Command} command */
-	function run(command) {
+	/** @param {Offer} one */
+	function run(one) {
+		asked = null;
 		palette.close();
-		perform(command, actions);
+		one.run();
 	}
+	store.on(["timeline", "sequences"], () => palette.open && offer());
 	input.addEventListener("input", () => {
 		at = 0;
 		offer();
@@ -90,6 +130,7 @@ export function mountSheets({ store, actions }) {
 	});
 	actions.palette = () => {
 		if (palette.open) return palette.close();
+		asked = null;
 		input.value = "";
 		at = 0;
 		palette.showModal();

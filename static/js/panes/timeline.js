@@ -3,6 +3,7 @@ import { bucketOf, panned, secondsOf, stepAt, xOf, zoomed } from "../play/clock.
 import { fill, h, idTag, parts, write } from "../elements/dom.js";
 import { hatch, prepare } from "../draw/canvas.js";
 import { drawLanes, drawRange, drawRuler } from "../draw/lanes.js";
+import { drawBraid } from "../draw/braid.js";
 import { drawCardinality, drawErrors, drawParts } from "../draw/strips.js";
 import { isAlone, ordered, resultOf, scoresOf, trueCount } from "../state/events.js";
 import { faded, palette } from "../draw/colours.js";
@@ -29,6 +30,8 @@ export function mountTimeline(root, context) {
 		whose,
 		plot,
 		fixed,
+		braided,
+		exchanged,
 		empty,
 		seek: seekBar,
 		wanted,
@@ -151,8 +154,10 @@ export function mountTimeline(root, context) {
 			switches: series?.switches ?? [],
 		});
 		drawRange(over, playback.loadedSteps(), done, frames);
-		drawRuler(ruler, range);
+		drawRuler(ruler, range, store.get().bookmarks);
 		// Each plot has its row, whether there is something to plot or not.
+		const scores = scoresOf(store.get());
+		if (!braided.hidden && scores) drawBraid(row(token("h-strip")), scores, shownTracks());
 		const [counts, costs, distances] = [0, 1, 2].map(() => row(token("h-strip")));
 		if (timeline) drawCardinality(counts, timeline);
 		if (series && !scored.hidden) {
@@ -207,27 +212,33 @@ export function mountTimeline(root, context) {
 		const ids = new Set(tracks.map((track) => track.id));
 		for (const [id, label] of labels) if (!ids.has(id)) (label.remove(), labels.delete(id));
 		const { selection } = store.get();
-		tracks.forEach(({ id, seen }, index) => {
+		tracks.forEach(({ id, seen, name }, index) => {
 			const label =
 				labels.get(id) ??
 				h(
 					"button",
 					{
 						class: "gr lane",
-						"aria-label": `Track ${id}`,
-						onclick: () => actions.select(id),
+						onclick: (event) => (event.altKey ? actions.solo : actions.select)(id),
 						onpointerenter: () => store.set({ hover: { id, camera: -1 } }),
 						onpointerleave: () => store.set({ hover: null }),
 					},
 					idTag(id),
+					h("span", { class: "who" }),
 					h("span", { class: "r" }),
 				);
 			labels.set(id, label);
+			label.ariaLabel = `Track ${id}${name ? `, ${name}` : ""}`;
+			write(/** @type {Node} */ (label.children[1]), name ?? "");
 			label.ariaPressed = String(id === selection);
 			write(/** @type {Node} */ (label.lastChild), `${Math.round(seen * 100)} %`);
 			if (lanes.children[index] !== label) lanes.insertBefore(label, lanes.children[index] ?? null);
 		});
-		const { run, sequence, laneOrder } = store.get();
+		const { run, sequence, laneOrder, frames } = store.get();
+		const switches = scoresOf(store.get())?.series.switches.length ?? 0;
+		braided.hidden = switches === 0;
+		write(exchanged, `${switches} switch${switches > 1 ? "es" : ""}`);
+		fixed.ariaLabel = `Timeline: ${tracks.length} tracks over ${frames} steps, with the number of people and the errors; the tabs Tracks, Events and Step have it as tables`;
 		const fit = Math.floor(lanes.clientHeight / token("h-lane"));
 		const words = laneOrder === "longest" ? "longest first" : "first born first";
 		// Who does not see all of them is told how many there are.
@@ -329,11 +340,17 @@ export function mountTimeline(root, context) {
 		draw();
 		placeHead();
 	});
-	store.on(["range", "loop", "hover", "theme"], draw);
+	store.on(["range", "loop", "hover", "theme", "bookmarks"], draw);
 	store.on(["shown", "step", "result"], placeHead);
-	store.on(["shown"], ({ shown, frames }) => {
+	store.on(["shown"], ({ shown, frames, turn, playing }) => {
+		if (turn === "off" && playing) return;
+		if (turn === "centre") {
+			const off = Math.round(shown - (view.first + view.last) / 2);
+			const next = panned(view, off, frames);
+			if (playing && next.first !== view.first) look(next);
+		}
 		// Of a part that is shown, the page is turned when the playhead leaves it.
-		if (shown > view.last) look(panned(view, shown - view.first, frames));
+		else if (shown > view.last) look(panned(view, shown - view.first, frames));
 		else if (shown >= 0 && shown < view.first) look(panned(view, shown - view.last, frames));
 	});
 	let waiting = false;

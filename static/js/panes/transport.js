@@ -4,7 +4,7 @@ import { all, choices, parts, write } from "../elements/dom.js";
 
 /** @type {Pane} */
 export function mountTransport(root, { store, playback }) {
-	const { play, read, step, of, seconds, typed, speed, loop, range } = parts(root);
+	const { play, read, step, of, seconds, typed, speed, loop, range, real, turn } = parts(root);
 	const close = () => {
 		typed.hidden = true;
 		read.hidden = false;
@@ -58,4 +58,8 @@ export function mountTransport(root, { store, playback }) {
 		speed.value = String(now);
 	};
 	store.watch(["loop", "range", "sequence", "speed"], marks);
+	store.watch(["realTime", "turn"], ({ realTime, turn: how }) => {
+		write(real, realTime ? "real time" : "every step");
+		write(turn, { page: "turns pages", centre: "centred", off: "stays" }[how]);
+	});
 }

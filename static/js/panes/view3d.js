@@ -12,7 +12,7 @@ function softwareRenderer() {
 
 /** @type {Pane} */
 export function mountView3d(root, { store, actions, retry, press }) {
-	const { views, frame, blank } = parts(root);
+	const { views, frame, blank, trail } = parts(root);
 	let path = "";
 	let reachable = false;
 	let tries = 0;
@@ -126,7 +126,12 @@ export function mountView3d(root, { store, actions, retry, press }) {
 		});
 	}
 
+	trail.addEventListener("change", () => {
+		actions.trail({ seconds: Number(trail.value) });
+		trail.blur();
+	});
 	store.on(["server"], ({ server }) => {
+		trail.value = String(server?.trail.seconds ?? "");
 		header();
 		cover();
 		if (server && server.viser.path !== path) {

@@ -24,18 +24,22 @@ export function playedRange([from, to], frames) {
  * Where play stands after some time.
  *
  * At normal speed and below every step is shown: if painting is slower than the
- * clock, play slows down and nothing is skipped. Above, steps may be skipped.
+ * clock, play slows down and nothing is skipped. Above, and where real time is wanted, steps may be
+ * skipped.
  * @param {{step: number, rest: number}} now  `rest` is the part of a step already waited for
  * @param {number} seconds  since the last call
  * @param {{fps: number, speed: number, direction: 1 | -1, first: number, last: number, loop:
- * boolean}} how
+ * boolean, realTime?: boolean}} how
  * @returns {{step: number, rest: number, ended: boolean}}
  */
-export function advance({ step, rest }, seconds, { fps, speed, direction, first, last, loop }) {
+export function advance({ step, rest }, seconds, how) {
+	const { fps, speed, direction, first, last, loop, realTime = false } = how;
 	const due = rest + Math.max(0, seconds) * fps * speed;
 	const whole = Math.floor(due + 1e-9);
 	if (whole === 0) return { step, rest: due, ended: false };
-	const stride = Math.min(whole, speed <= 1 ? 1 : Math.max(1, Math.ceil(speed * 2)));
+	// Behind by more than a second, play does not jump: the page was asleep.
+	const most = realTime ? Math.ceil(fps * speed) : speed <= 1 ? 1 : Math.ceil(speed * 2);
+	const stride = Math.min(whole, Math.max(1, most));
 	// Up to a step of lateness is caught up; more is forgotten: play is late, it does not race
 	// afterwards.
 	const left = Math.min(1, due - stride);
@@ -49,6 +53,16 @@ export function advance({ step, rest }, seconds, { fps, speed, direction, first,
 		ended: false,
 	};
 }
+
+/**
+ * How long the 3D view is to be left alone after it was told a step, while it plays: where the page
+ * comes too late to its own steps, 3D follows more rarely, and more often again where there is time.
+ * @param {number} wait  milliseconds, so far
+ * @param {number} elapsed  milliseconds between two of the page's frames
+ * @param {number} due  milliseconds a step
+ */
+export const restOf3d = (wait, elapsed, due) =>
+	elapsed > 1.4 * due ? Math.min(1500, Math.max(120, wait * 1.3)) : wait < 40 ? 0 : wait * 0.985;
 
 /**
  * The steps to have ready, nearest first: the step itself, then ahead in the direction of

@@ -7,7 +7,7 @@
  */
 import { getJson } from "../state/api.js";
 import { createCache } from "./cache.js";
-import { advance, clampStep, playedRange, prefetchWindow } from "./clock.js";
+import { advance, clampStep, playedRange, prefetchWindow, restOf3d } from "./clock.js";
 import { createPictures, mapNames, pictureName, PICTURE_BUDGET } from "./pictures.js";
 
 const RESULTS_KEPT = 600;
@@ -27,6 +27,8 @@ export function createPlayback(store, sendSeek) {
 	let lastTick = 0;
 	let rest = 0;
 	let lastSent = -1;
+	/** Since when, and for how long, the 3D view is left alone while it plays, milliseconds. */
+	let [sentAt, wait] = [0, 0];
 
 	const pictures = createPictures(() => {
 		store.set({ loaded: store.get().loaded + 1 });
@@ -66,8 +68,10 @@ export function createPlayback(store, sendSeek) {
 
 	/** What the layers need of a result besides what is always in it. */
 	const queryNow = () => {
-		const { samples, trails } = store.get().layers2d;
-		return samples || trails ? `?samples=${Boolean(samples)}&trails=${Boolean(trails)}` : "";
+		const { layers2d, server } = store.get();
+		const { samples, trails } = layers2d;
+		const long = trails ? `&seconds=${server?.trail.seconds}` : "";
+		return samples || trails ? `?samples=${Boolean(samples)}&trails=${Boolean(trails)}${long}` : "";
 	};
 
 	/** Try again after something failed that may come back. */
@@ -165,9 +169,11 @@ export function createPlayback(store, sendSeek) {
 				first,
 				last,
 				loop: state.loop,
+				realTime: state.realTime,
 			};
 			const next = advance({ step: state.step, rest }, lastTick ? (now - lastTick) / 1000 : 0, how);
 			rest = next.rest;
+			if (lastTick) wait = restOf3d(wait, now - lastTick, Math.max(1000 / 60, 1000 / sequence.fps));
 			lastTick = now;
 			if (next.step !== state.step) windowDirty = true;
 			store.set({ step: next.step, playing: next.ended ? 0 : state.playing });
@@ -182,8 +188,10 @@ export function createPlayback(store, sendSeek) {
 				store.set({ shown: state.step, result: frame.result });
 			}
 		}
-		if (state.step !== lastSent) {
+		// Where it is drawn without a graphics card, 3D takes the time of pictures and overlays.
+		if (state.step !== lastSent && (!state.playing || now - sentAt >= wait)) {
 			lastSent = state.step;
+			sentAt = now;
 			sendSeek(state.step);
 		}
 		if (state.playing) ask();
@@ -211,6 +219,8 @@ export function createPlayback(store, sendSeek) {
 	store.on(["playing"], () => {
 		lastTick = 0;
 		rest = 0;
+		// Where it stops, 3D is to stand at the same step.
+		ask();
 	});
 
 	return {

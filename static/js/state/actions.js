@@ -3,12 +3,19 @@ import { ApiError, request, sendJson } from "./api.js";
 import { SPEEDS, clampStep } from "../play/clock.js";
 import { eventsNow, nextEvent, nextLayers, ordered } from "./events.js";
 
-/** What differs from the defaults. @param {Server.State} server */
+/** What differs from the defaults. @param {Pick<Server.State, "changed" | "parameters">} server */
 export const valuesOf = ({ changed, parameters }) =>
 	Object.fromEntries(changed.map((key) => [key, parameters[key]]));
 
 /** Changes of one drag that follow each other within this time are undone together. */
 const SAME_DRAG = 1500;
+
+/** Arrangements of the panes by name: shares of the window. @type {Record<string, PageState["layout"]>} */
+const LAYOUTS = {
+	tune: {},
+	inspect: { right: 0.64, cams: 0.5 },
+	compare: { right: 0.5, cams: 0.2, lanes: 0.2 },
+};
 
 /**
  * Save what an address gives, once it is known that it gives it.
@@ -134,6 +141,12 @@ export function createActions({ store, seek, send, receive }) {
 			store.set({ selection: id });
 			send({ type: "select", id });
 		},
+		solo(id) {
+			const { selection, layers3d } = store.get();
+			const again = selection === id && layers3d.others === false;
+			actions.select(id);
+			if (again === (layers3d.others === false)) actions.toggleLayer3d("others");
+		},
 		nextTrack(direction) {
 			const { timeline, laneOrder, selection } = store.get();
 			const ids = ordered(timeline?.tracks ?? [], laneOrder).map((track) => track.id);
@@ -164,7 +177,9 @@ export function createActions({ store, seek, send, receive }) {
 		// cameras and 3D
 		chooseCamera(index) {
 			const { cameras, large } = store.get();
-			if (index < cameras.length) store.set({ large: large === index ? null : index });
+			// One that is alone is as large as it can be in its pane.
+			if (cameras.length === 1) actions.maximise("cams");
+			else if (index < cameras.length) store.set({ large: large === index ? null : index });
 		},
 		lookThrough: (view) => void actions.ask("POST", "view", { camera: view }),
 		freeView() {
@@ -208,6 +223,13 @@ export function createActions({ store, seek, send, receive }) {
 		useAgain: (number) => void askApart("POST", `run/again/${number}`),
 		runAgain: () => void actions.ask("POST", "run"),
 		pin: (on) => void actions.ask(on ? "POST" : "DELETE", "run/pin"),
+		async swap() {
+			const { server, run } = store.get();
+			if (!server?.pinned || run?.state !== "done") return;
+			const { parameters, differs } = server.pinned;
+			if (!(await actions.ask("POST", "run/pin"))) return;
+			await actions.change(Object.fromEntries(differs.map((key) => [key, parameters[key]])));
+		},
 		remember(before, after) {
 			const old = Object.fromEntries(
 				Object.keys(after)
@@ -283,8 +305,28 @@ export function createActions({ store, seek, send, receive }) {
 				layout: pane === null ? {} : { ...layout, max: layout.max === pane ? undefined : pane },
 			});
 		},
+		trail: (changes) => void actions.ask("PATCH", "trail", changes),
+		fadeTrails: () => actions.trail({ fades: !store.get().server?.trail.fades }),
+		arrange(name) {
+			store.set({ layout: LAYOUTS[name] });
+			if (name === "compare") actions.showTab("compare");
+		},
+		toggle: (what) => store.set({ [what]: !store.get()[what] }),
+		nextTurn() {
+			const { turn } = store.get();
+			store.set({ turn: turn === "page" ? "centre" : turn === "centre" ? "off" : "page" });
+		},
+		wholePictures: () => store.set({ zooms: {}, follow: false, loupe: false }),
+		bookmark() {
+			const { shown, bookmarks } = store.get();
+			actions.showTab("events");
+			if (shown < 0 || bookmarks.some(({ step }) => step === shown)) return;
+			const all = [...bookmarks, { step: shown, note: "" }];
+			store.set({ bookmarks: all.sort((a, b) => a.step - b.step) });
+		},
 		// what the dialogs and the timeline put in place of these when they are there
 		help() {},
+		openSheet() {},
 		palette() {},
 		zoom() {},
 	};

@@ -14,6 +14,7 @@ const NOWHERE = {
 	camera: null,
 	look: null,
 	values: null,
+	pinned: null,
 	view: {},
 };
 
@@ -43,6 +44,7 @@ export function createAddress(store, actions) {
 			camera: large,
 			look: server.view,
 			values: valuesOf(server),
+			pinned: server.pinned && valuesOf(server.pinned),
 			view: viewOf(store.get()),
 		};
 	}
@@ -70,14 +72,16 @@ export function createAddress(store, actions) {
 		// It may be that the place's sequence cannot be opened.
 		if (place.sequence && !isThere(sequence))
 			return store.set({ step: server.playhead, large: usual });
-		const { step, camera, selection, look, values, view } = place;
+		const { step, camera, selection, look, values, pinned, view } = place;
 		const linked = place.sequence !== null;
+		// Those in 3D are the server's.
+		const kept = { layers3d: server.layers };
 		place = NOWHERE;
 		store.set({
 			step: Math.max(0, Math.min(sequence.frames - 1, step ?? server.playhead)),
 			moved: step !== null,
 			large: camera !== null && camera < cameras ? camera : usual,
-			...(linked || Object.keys(view).length ? viewFrom(view) : {}),
+			...(linked || Object.keys(view).length ? { ...viewFrom(view), ...kept } : {}),
 		});
 		// A link says all of it, also that nobody is selected and nothing looked through.
 		if (linked || selection !== null) actions.select(selection);
@@ -87,13 +91,40 @@ export function createAddress(store, actions) {
 			(typeof look !== "number" || look < cameras)
 		)
 			actions.lookThrough(look);
-		if (values) void restore(server, values);
+		const { layers3d } = viewFrom(view);
+		if (view.in3d && layers3d) void actions.ask("PATCH", "layers", { changes: layers3d });
+		if (pinned && !server.pinned) void compare(pinned, values ?? {});
+		else if (values) void restore(server, values);
+	}
+
+	/**
+	 * Have a run of some values, pin it, and go on with others.
+	 * @param {Record<string, any>} first @param {Record<string, any>} then
+	 */
+	async function compare(first, then) {
+		const { server } = store.get();
+		if (!server) return;
+		const before = server.run.key;
+		const another = await restore(server, first);
+		const unsubscribe = store.on(["server", "run"], pinWhenDone);
+		pinWhenDone();
+		function pinWhenDone() {
+			const { server: now, run } = store.get();
+			if (run?.state === "failed" || now?.sequence?.key !== server?.sequence?.key) unsubscribe();
+			// The answer to a change may still tell of the run before it.
+			else if (run?.state === "done" && run.key === now?.run.key) {
+				if (another && run.key === before) return;
+				unsubscribe();
+				void actions.ask("POST", "run/pin").then((state) => state && restore(state, then));
+			}
+		}
 	}
 
 	/**
 	 * Have these values, and the defaults for all others.
 	 * @param {Server.State} server
 	 * @param {Record<string, any>} values
+	 * @returns {Promise<boolean>} whether they were others
 	 */
 	async function restore(server, values) {
 		const others = server.changed.filter((key) => !(key in values));
@@ -102,6 +133,7 @@ export function createAddress(store, actions) {
 			([key, value]) => String(server.parameters[key]) !== String(value),
 		);
 		if (differing.length) await actions.change(Object.fromEntries(differing));
+		return others.length + differing.length > 0;
 	}
 
 	function write() {
@@ -133,6 +165,9 @@ export function createAddress(store, actions) {
 		"layers2d",
 		"measure",
 		"laneOrder",
+		"zooms",
+		"listed",
+		"eventKind",
 	]);
 	// Browsers limit how often the address may change; while it plays, it follows slowly.
 	store.on([...seen], () => (writing ??= setTimeout(write, 400)));

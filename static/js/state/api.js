@@ -53,7 +53,7 @@ export async function getJson(path, options) {
 	return (await request(path, options)).json();
 }
 
-/** @param {"POST" | "PATCH" | "DELETE"} method @param {string} path @param {object} [body] */
+/** @param {"POST" | "PUT" | "PATCH" | "DELETE"} method @param {string} path @param {object} [body] */
 export async function sendJson(method, path, body = {}) {
 	const headers = { "Content-Type": "application/json" };
 	return (await request(path, { method, headers, body: JSON.stringify(body) })).json();

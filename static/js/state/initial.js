@@ -10,6 +10,8 @@ const KEPT = /** @type {const} */ ([
 	"singleKeys",
 	"layout",
 	"dismissed",
+	"realTime",
+	"turn",
 ]);
 
 /** @returns {Partial<PageState>} */
@@ -49,6 +51,14 @@ export function initialState() {
 		range: [null, null],
 		selection: null,
 		hover: null,
+		pointed: null,
+		zooms: {},
+		loupe: false,
+		follow: false,
+		realTime: false,
+		turn: "page",
+		listed: "all",
+		bookmarks: [],
 		layers3d: {},
 		large: null,
 		tab: "tracks",

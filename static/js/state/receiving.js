@@ -15,6 +15,10 @@ const FORGOTTEN = /** @type {const} */ ({
 	playing: 0,
 	loop: false,
 	hover: null,
+	pointed: null,
+	zooms: {},
+	follow: false,
+	listed: "all",
 });
 
 /**

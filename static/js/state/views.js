@@ -18,6 +18,22 @@ export const LAYERS_2D = {
 	truth: true,
 };
 
+/** Layers in 3D, as they are at first. */
+export const LAYERS_3D = {
+	boxes: true,
+	bodies: true,
+	ellipsoids: true,
+	trails: true,
+	truth: false,
+	volume: true,
+	pinned: true,
+	others: true,
+};
+
+/** @param {Record<string, boolean>} all @param {string} text  those that are on */
+const readLayers = (all, text) =>
+	Object.fromEntries(Object.keys(all).map((name) => [name, text.split(".").includes(name)]));
+
 /** @param {Record<string, boolean>} layers @returns {string} those that are on */
 const layersOn = (layers) =>
 	Object.keys(layers)
@@ -65,17 +81,48 @@ const KEYS = {
 	layers: {
 		first: { layers2d: LAYERS_2D },
 		write: ({ layers2d }) => layersOn(layers2d),
-		read: (text) => {
-			const on = text.split(".");
-			return {
-				layers2d: Object.fromEntries(Object.keys(LAYERS_2D).map((k) => [k, on.includes(k)])),
-			};
-		},
+		read: (text) => ({ layers2d: readLayers(LAYERS_2D, text) }),
+	},
+	in3d: {
+		first: { layers3d: LAYERS_3D },
+		write: ({ layers3d }) => layersOn(layers3d),
+		read: (text) => ({ layers3d: readLayers(LAYERS_3D, text) }),
 	},
 	measure: {
 		first: { measure: "ospa" },
 		write: ({ measure }) => measure,
 		read: (text) => (text === "gospa" ? { measure: text } : null),
+	},
+	list: {
+		first: { listed: "all" },
+		write: ({ listed }) => listed,
+		read: (text) =>
+			["false", "missed", "worst"].includes(text)
+				? { listed: /** @type {PageState["listed"]} */ (text) }
+				: null,
+	},
+	events: {
+		first: { eventKind: "" },
+		write: ({ eventKind }) => eventKind,
+		read: (text) =>
+			["birth", "death", "switch", "long miss"].includes(text)
+				? { eventKind: /** @type {LaneEvent["kind"]} */ (text) }
+				: null,
+	},
+	closer: {
+		first: { zooms: {} },
+		write: ({ zooms }) =>
+			Object.entries(zooms)
+				.map(([camera, [k, x, y]]) =>
+					[Number(camera) + 1, k.toFixed(2), x.toFixed(3), y.toFixed(3)].join("~"),
+				)
+				.join(".."),
+		read: (text) => {
+			const all = text.split("..").map((one) => one.split("~").map(Number));
+			return all.every((one) => one.length === 4 && one.every((n) => n >= 0 && n < 1e3))
+				? { zooms: Object.fromEntries(all.map(([camera, k, x, y]) => [camera - 1, [k, x, y]])) }
+				: null;
+		},
 	},
 	lanes: {
 		first: { laneOrder: "longest" },

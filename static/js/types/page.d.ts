@@ -24,6 +24,17 @@ interface Attributes {
 	[name: string]: unknown;
 }
 
+/** How many times, and the middle of what is seen, in shares of the picture. */
+type Magnified = [number, number, number];
+
+/** A magnification in its cell: how many times, and what lies beyond left and top, CSS pixels. */
+type Lens = { k: number; left: number; top: number };
+
+type Bookmark = { step: number; note: string };
+
+/** A line of the palette. */
+type Offer = { title: string; keys: string[]; run: () => void };
+
 type ApiFailure = { code: string; message: string; field: string | null; hint: string | null };
 
 /** Each value stands for `stride` steps, the first from step `first` on. */
@@ -84,8 +95,24 @@ interface PageState {
 	range: [number | null, number | null];
 	selection: number | null;
 	hover: { id: number; camera: number } | null;
+	/** The detection under the pointer. */
+	pointed: { camera: number; box: number } | null;
+	/** Pictures that are looked at closer, by camera. */
+	zooms: Record<number, Magnified>;
+	/** Whether a glass goes with the pointer over the pictures. */
+	loupe: boolean;
+	/** Whether pictures keep the selected track in the middle. */
+	follow: boolean;
 	layers2d: Record<string, boolean>;
 	layers3d: Record<string, boolean>;
+	/** Whether steps are left out where painting is slower than the clock. */
+	realTime: boolean;
+	/** What the timeline does while the playhead moves through a part of it. */
+	turn: "page" | "centre" | "off";
+	/** Which tracks are listed. */
+	listed: "all" | "false" | "missed" | "worst";
+	/** Steps that somebody has marked in this recording. */
+	bookmarks: Bookmark[];
 	/** The camera that is shown large; null: all alike. */
 	large: number | null;
 	tab: "tracks" | "step" | "events" | "teach" | "changes" | "compare" | "runs";
@@ -124,6 +151,9 @@ type Scores = {
 	reference: Server.EvaluationSeries | null;
 };
 
+/** A file that somebody dropped or chose; its path from the dropped folder. */
+type Dropped = { path: string; file: File };
+
 type PaneName = "view" | "cams" | "side" | "time";
 
 interface Command {
@@ -157,6 +187,8 @@ interface Actions {
 	markRange: (end: 0 | 1) => void;
 	toEvent: (direction: -1 | 1) => void;
 	select: (id: number | null) => void;
+	/** This track alone, again: all. */
+	solo: (id: number) => void;
 	nextTrack: (direction: -1 | 1) => void;
 	/** To an event: its step and track. */
 	go: (place: string) => void;
@@ -172,6 +204,7 @@ interface Actions {
 	toggleLayer2d: (layer: string) => void;
 	toggleLayer3d: (layer: string) => void;
 	open: (name: string) => Promise<any>;
+	openSheet: () => void;
 	change: (changes: Record<string, any>) => Promise<any>;
 	reset: (...keys: string[]) => void;
 	preset: (name: string) => void;
@@ -183,6 +216,8 @@ interface Actions {
 	useAgain: (number: string) => void;
 	runAgain: () => void;
 	pin: (on: boolean) => void;
+	/** The shown run and the pinned one change places. */
+	swap: () => Promise<void>;
 	/** What the parameters were, whoever changed them. */
 	remember: (before: Record<string, any>, after: Record<string, any>) => void;
 	/** What can be undone. */
@@ -202,6 +237,16 @@ interface Actions {
 	maximise: (pane: PaneName | null) => void;
 	help: () => void;
 	palette: () => void;
+	/** Something that is on or off. */
+	/** How long trails are, seconds, and whether they fade. */
+	trail: (changes: { seconds?: number; fades?: boolean }) => void;
+	fadeTrails: () => void;
+	toggle: (what: "realTime" | "follow" | "loupe") => void;
+	nextTurn: () => void;
+	wholePictures: () => void;
+	arrange: (name: "inspect" | "tune" | "compare") => void;
+	/** Mark the shown step, or go to its note. */
+	bookmark: () => void;
 	/** Of the timeline; above 1 shows more steps. */
 	zoom: (factor: number) => void;
 }
@@ -268,6 +313,8 @@ type Place = {
 	/** Through which camera, or from where, the 3D view looks. */
 	look: number | "top" | null;
 	values: Record<string, any> | null;
+	/** Of the pinned run. */
+	pinned: Record<string, any> | null;
 	/** Words of the address. */
 	view: Record<string, string>;
 };
@@ -293,9 +340,13 @@ interface Scene {
 	layers: Record<string, boolean>;
 	selection: number | null;
 	hover: number | null;
+	/** The detection that is pointed at. */
+	pointed: number | null;
 	/** Only the selected track. */
 	alone: boolean;
 	people: Server.Step["truth"];
+	/** Whether trails are fainter the older they are. */
+	fades: boolean;
 	opacity: number;
 	ink: Palette;
 }

@@ -3,6 +3,15 @@
  * Steps are 0-based; boxes are `[left, top, width, height]` in pixels; positions are metres.
  */
 declare namespace Server {
+	/** An import that was begun, or a recording that needs none. */
+	interface Begun {
+		draft: ImportInfo | null;
+		/** Number of the first of the files that were announced. */
+		first: number;
+		/** The folder of a recording that is one already. */
+		recording: string;
+	}
+
 	/** Something that happened to people in a camera's picture, as its method tells it. */
 	interface CameraEvent {
 		kind: "new" | "vanished" | "returned" | "occluded" | "merged" | "split";
@@ -57,13 +66,13 @@ declare namespace Server {
 		id: number;
 		/** Reprojected; null where a part is behind the camera. */
 		box: [number, number, number, number] | null;
-		/** Whether one of the camera's boxes fed it at this step. */
+		/** Whether one of the camera's boxes is associated with it at this step. */
 		seen: boolean;
 		detection_probability: number;
-		/** Index of the box that fed it among what the camera gave the fusion, -1 for none. */
+		/** Index of the associated box among those that the camera gave the fusion, -1 for none. */
 		source: number;
 		fed_by: Feeding | null;
-		/** Id of the target in front of it. */
+		/** Id of the target that occludes it; null for none. */
 		hidden_by: number | null;
 		visible: boolean;
 		/** Why it is not, or hardly, visible. */
@@ -223,12 +232,12 @@ declare namespace Server {
 		switches: Switch[];
 	}
 
-	/** The box that fed a track, as the camera gave it to the fusion. */
+	/** The box associated with a track, as the single-view stage gave it to the fusion. */
 	interface Feeding {
 		box: [number, number, number, number];
 		/** Its weight, existence or detector's score. */
 		weight: number;
-		/** Probability that it is this track's. */
+		/** Association probability: that this track made the box, 0 … 1. */
 		share: number;
 	}
 
@@ -257,6 +266,153 @@ declare namespace Server {
 	interface GroupInfo {
 		name: string;
 		help: string;
+	}
+
+	/** An import on its way. */
+	interface ImportInfo {
+		key: string;
+		version: number;
+		phase: "uploading" | "reading" | "settled" | "failed" | "writing" | "written";
+		busy: boolean;
+		/** What is being looked into. */
+		under_way: string;
+		error: string;
+		wish: ImportWish;
+		/** Bytes. */
+		received: number;
+		bytes: number;
+		files: ImportedFile[];
+		/** Labels of pictures and boxes that a camera may be given. */
+		offered: string[];
+		/** Whether the files were sent by a page. */
+		uploaded: boolean;
+		home: string;
+		/** Bytes on the disk of the recordings. */
+		free: number;
+		fps: number;
+		frames: number;
+		unit: string;
+		up: string;
+		pose: string;
+		axes: string;
+		room: [[number, number, number], [number, number, number]] | null;
+		suggested: [[number, number, number], [number, number, number]] | null;
+		half_extents: [number, number, number] | null;
+		suggested_half_extents: [number, number, number] | null;
+		/** People in the truth; 0 where there is none. */
+		truth: number;
+		/** Whether every camera has boxes. */
+		has_boxes: boolean;
+		found: [string, string][];
+		told: string[];
+		cameras: ImportedCamera[];
+		checks: ImportedCheck[];
+		pairs: ImportedPair[];
+		plan: ImportedPlan | null;
+		/** Where it was written. */
+		folder: string;
+		/** The sheet that shows all this, as HTML. */
+		sheet: string;
+	}
+
+	/** What somebody knows better than the files; null and empty: as it was found out. */
+	interface ImportWish {
+		name: string;
+		unit: "m" | "cm" | "mm" | null;
+		up: "x" | "y" | "z" | "-x" | "-y" | "-z" | null;
+		pose: "world-to-camera" | "camera-to-world" | null;
+		axes: "opencv" | "opengl" | null;
+		boxes: "ltwh" | "xyxy" | "cxcywh" | null;
+		normalised: boolean | null;
+		first_index: 0 | 1 | null;
+		fps: number | null;
+		swap: [string, string][];
+		left_out: string[];
+		/** By the camera's name in the calibration. */
+		names: Record<string, string>;
+		/** Seconds that are added to the time of every frame, by camera. */
+		offsets: Record<string, number>;
+		/** A camera, and the label of a file that is its. */
+		files: [string, string][];
+		room: [[number, number, number], [number, number, number]] | null;
+		half_extents: [number, number, number] | null;
+		/** Whether what lies elsewhere on the disk is copied, not linked. */
+		copy_files: boolean;
+	}
+
+	/** A camera with what belongs to it. */
+	interface ImportedCamera {
+		/** Its name in the calibration. */
+		key: string;
+		name: string;
+		/** Name of the file, or of the folder of pictures; empty where there is none. */
+		video: string;
+		frames: number;
+		fps: number;
+		width: number;
+		height: number;
+		/** What the calibration's file was recognised as. */
+		calibration: string;
+		detections: string;
+		boxes_format: string;
+		boxes_per_step: number;
+		/** As it is wished. */
+		seconds_late: number;
+		/** As it was found, beyond what is wished. */
+		offset: ImportedOffset | null;
+	}
+
+	/** A check, and what mends it. */
+	interface ImportedCheck {
+		name: string;
+		status: "good" | "warning" | "absent";
+		sentence: string;
+		/** As the command line has it; empty where there is none. */
+		remedy: string;
+		/** The wish that mends it; null where nothing here does. */
+		mend: ImportWish | null;
+	}
+
+	/** A file, or a series of numbered ones, and what it was taken for. */
+	interface ImportedFile {
+		label: string;
+		format: string;
+		complaint: string;
+	}
+
+	/** How late a camera is against the others, as it is now. */
+	interface ImportedOffset {
+		steps: number;
+		seconds: number;
+		sharpness: number;
+		sure: boolean;
+		/** Steps that were tried. */
+		offsets: number[];
+		/** Of each; null where too little is left to compare. */
+		agreement: (number | null)[];
+	}
+
+	/** How well the boxes of two cameras meet. */
+	interface ImportedPair {
+		first: string;
+		second: string;
+		share: number;
+		pixels: number | null;
+		odd: boolean;
+	}
+
+	/** The room from above, metres. */
+	interface ImportedPlan {
+		x: number;
+		y: number;
+		cell: number;
+		width: number;
+		height: number;
+		/** How many cameras see the floor, by cell, rows along y. */
+		seen: number[];
+		/** x, y, direction and half the angle across, radians. */
+		cameras: [number, number, number, number][];
+		feet: [number, number][];
 	}
 
 	/** A run in the library. */
@@ -311,6 +467,12 @@ declare namespace Server {
 	interface Measurement {
 		box: [number, number, number, number];
 		score: number;
+		/** Id of the track that it feeds; null where it is nobody's. */
+		track: number | null;
+		/** Of one that is nobody's: the track that it is nearest to. */
+		nearest: number | null;
+		/** And how far that is, in standard deviations of where its box is expected. */
+		sigmas: number | null;
 	}
 
 	/** The chosen methods. */
@@ -408,6 +570,8 @@ declare namespace Server {
 	/** A track of the pinned run. */
 	interface PinnedLife {
 		id: number;
+		/** Whose colours it has, among people with templates. */
+		name: string | null;
 		first: number;
 		/** Of its whole life. */
 		last: number;
@@ -440,6 +604,23 @@ declare namespace Server {
 		courses: Course[];
 	}
 
+	/** A recording that can be opened. */
+	interface RecordingCard {
+		name: string;
+		/** What opens it. */
+		opens: string;
+		kind: "recent" | "folder" | "rendered";
+		description: string;
+		cameras: number;
+		frames: number;
+		/** 0 where it is not known before it is opened. */
+		fps: number;
+		/** Seconds since 1970; 0 where it never was. */
+		opened: number;
+		/** Address of its picture; empty where there is none yet. */
+		picture: string;
+	}
+
 	/** A recording of which runs are kept, or that can be opened. */
 	interface RecordingInfo {
 		/** Null where it was never opened: it has no runs. */
@@ -460,6 +641,19 @@ declare namespace Server {
 		has_thumbnail: boolean;
 		/** Why it cannot be opened now. */
 		missing: string | null;
+	}
+
+	/** What can be opened at once, and what can be imported from the disk. */
+	interface Recordings {
+		recordings: RecordingCard[];
+		/** Below the data folder, that are no recordings yet. */
+		folders: string[];
+		/** Where recordings go. */
+		data: string;
+		/** Bytes on that disk. */
+		free: number;
+		/** The sheet that shows them, as HTML. */
+		sheet: string;
 	}
 
 	/** The volume that people are tracked in. */
@@ -563,6 +757,8 @@ declare namespace Server {
 		parameters: Record<string, any>;
 		/** Keys whose value is not the default. */
 		changed: string[];
+		/** Keys that have an effect with what is chosen. */
+		shown: string[];
 		/** The command that computes the same in a terminal; empty while nothing is open. */
 		command: string;
 		methods: MethodsInfo;
@@ -579,6 +775,7 @@ declare namespace Server {
 		selection: number | null;
 		/** Of the 3D view. */
 		layers: Record<string, boolean>;
+		trail: TrailInfo;
 		/** What the 3D view looks through: a camera's index, from above, or freely. */
 		view: number | "top" | null;
 		/** Of the 3D view. */
@@ -636,7 +833,10 @@ declare namespace Server {
 		first: number;
 		/** Steps a bucket: 1 where each step has its own value. */
 		stride: number;
+		/** Expected number of people. */
 		cardinality: Numbers;
+		/** Its standard deviation. */
+		deviation: Numbers;
 		/** Targets reported. */
 		count: Counts;
 		/** People really there, over all steps asked for. */
@@ -672,6 +872,8 @@ declare namespace Server {
 	/** A track's life. */
 	interface TrackLife {
 		id: number;
+		/** Whose colours it has, among people with templates. */
+		name: string | null;
 		first: number;
 		/** Of its whole life. */
 		last: number;
@@ -683,6 +885,14 @@ declare namespace Server {
 		 * Within the steps asked for; ones shorter than ``stride`` are joined with their neighbours.
 		 */
 		spans: ([number, number, "seen" | "coasting" | "long miss"])[];
+	}
+
+	/** How trails are drawn, in 3D and in pictures. */
+	interface TrailInfo {
+		/** How far back they go. */
+		seconds: number;
+		/** Whether they are fainter the older they are. */
+		fades: boolean;
 	}
 
 	/** Where a person really is. */

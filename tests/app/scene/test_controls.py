@@ -16,6 +16,7 @@ from app.paths import static_folder
 from app.scene.keys import hotkeys
 from app.scene.panel.controls import ORIGIN, Controls
 from app.scene.panel.sliders import Scale, hint_text, label_text, number_text, symbol_parts
+from app.scene.panel.topics import TOPICS, topic_of
 from app.state.workbench import Workbench
 from app.web import gateway
 from tests.app.scene import scene_case
@@ -161,7 +162,8 @@ def test_the_essentials_come_first_and_move_the_same_parameter(
     assert value(workbench, P_D) == 0.6
     assert panel._inputs[P_D].value == 0.6
     assert panel._essentials.label.endswith(", 1 changed")
-    assert panel._stages["fusion"].label.endswith(", 1 changed")
+    assert panel._topics["Detection"].label.endswith(", 1 changed")
+    assert not panel._topics["Birth"].label.endswith("changed")
 
 
 def test_the_filter_lists_what_has_its_words_and_says_where_nothing_has(
@@ -180,7 +182,7 @@ def test_the_filter_lists_what_has_its_words_and_says_where_nothing_has(
         assert expected in visible_copies(panel)
         assert panel._found.visible
         assert not panel._essentials.visible
-        assert not any(folder.visible for folder in panel._stages.values())
+        assert not any(folder.visible for folder in panel._topics.values())
     assert visible_copies(panel) == {"fusion.survival_probability"}
     panel._sought._impl.value = "<xyz>"
     panel._worker.ask("refresh")
@@ -191,7 +193,25 @@ def test_the_filter_lists_what_has_its_words_and_says_where_nothing_has(
     panel._worker.ask("refresh")
     assert panel.wait(SECONDS)
     assert panel._essentials.visible
-    assert panel._stages["fusion"].visible
+    assert panel._topics["Motion"].visible
+
+
+def test_every_parameter_is_about_one_thing_and_none_of_them_about_nothing(
+    panel: Controls,
+) -> None:
+    about = {topic: {k for k, p in PARAMETERS.items() if topic_of(p) == topic} for topic in TOPICS}
+    assert sum(map(len, about.values())) == len(PARAMETERS)
+    for topic, key in (
+        ("Motion", "fusion.acceleration_sigma"),
+        ("Birth", "fusion.birth_rate"),
+        ("Detection", "fusion.detection_probability"),
+        ("Clutter", "detection_boxes.score_threshold"),
+        ("Foreground", "colour_phd.foreground_weight"),
+        ("Extraction", "fusion.extraction_threshold"),
+    ):
+        assert key in about[topic]  # type: ignore[index]
+    held = [key for _, keys in panel._blocks for key in keys if not PARAMETERS[key].advanced]
+    assert len(held) == len(set(held))
 
 
 def test_every_parameter_and_method_has_one_input(panel: Controls) -> None:
@@ -266,7 +286,12 @@ def test_what_is_out_of_range_is_clamped_and_written_back(
 
 def test_only_what_the_methods_read_is_shown(panel: Controls, workbench: Workbench) -> None:
     def shown() -> set[str]:
-        return {g for g, folders in panel._groups.items() if any(f.visible for f in folders)}
+        return {
+            PARAMETERS[key].group
+            for folder, keys in panel._blocks
+            for key in keys
+            if folder.visible
+        }
 
     assert "colour_phd" not in shown()
     assert "fusion" in shown()
@@ -281,8 +306,8 @@ def test_of_a_shared_group_only_the_numbers_that_are_read_are_shown(
     panel: Controls, workbench: Workbench
 ) -> None:
     def shown(key: str) -> bool:
-        group = panel._groups[key.split(".")[0]]
-        return bool(panel._inputs[key].visible) and any(folder.visible for folder in group)
+        blocks = [folder for folder, keys in panel._blocks if key in keys]
+        return bool(panel._inputs[key].visible) and all(folder.visible for folder in blocks)
 
     assert not shown("jpda.gate_probability")
     move(panel, "single_view", "jpda")
@@ -307,14 +332,15 @@ def test_changed_values_are_marked_and_can_be_reset(panel: Controls, workbench: 
     move(panel, "fusion.extraction_threshold", 0.6)
     assert panel.wait(SECONDS)
     assert panel._inputs[key].label.startswith("• ")
-    assert panel._resets["fusion"].visible
+    assert panel._resets["Motion"].visible
+    assert panel._resets["Extraction"].visible
     assert panel._reset_all.visible
-    panel._reset("fusion")
+    panel._reset("Motion")
     assert panel.wait(SECONDS)
     assert value(workbench, key) == PARAMETERS[key].default
     assert value(workbench, "fusion.extraction_threshold") == 0.6
     assert not panel._inputs[key].label.startswith("• ")
-    assert not panel._resets["fusion"].visible
+    assert not panel._resets["Motion"].visible
     panel._reset(None)
     assert panel.wait(SECONDS)
     assert not panel._reset_all.visible

@@ -344,3 +344,23 @@ def test_defaults_follow_what_the_sequence_has_become(client: TestClient) -> Non
     assert snapshot.defaults == pipeline.default_parameters(snapshot.sequence)
     assert state(client)["methods"]["single_view"] == "none"  # nobody's choice is taken away
     assert "Use colour_phd" in client.get("/api/tables/teach").text
+
+
+def test_the_size_of_people_is_taught_saved_and_taken_back(
+    client: TestClient, walkers: Path
+) -> None:
+    before = state(client)
+    half = before["sequence"]["target"]["half_extents"]
+    answer = client.patch("/api/teach/target/2", json={"value": 1.5}).json()
+    assert answer["sequence"]["target"]["half_extents"] == [*half[:2], 0.75]
+    assert answer["teaching"]["unsaved"] == 1
+    assert "target: " in client.get("/api/tables/teach").text
+    back = client.post("/api/teach/restore", json={"key": before["teaching"]["key"]}).json()
+    assert back["sequence"]["target"]["half_extents"] == half
+    client.post("/api/teach/target", json={"half_extents": [0.3, 0.3, 0.65]})
+    client.post("/api/teach/save")
+    assert read_sequence(walkers).target_half_extents.tolist() == [0.3, 0.3, 0.65]
+    for wrong in (0.0, -1.0):
+        assert "positive numbers" in complaint(
+            client.patch("/api/teach/target/0", json={"value": wrong})
+        )

@@ -409,6 +409,8 @@ def test_every_route_is_documented(client: TestClient) -> None:
         ("PATCH", "/api/layers"),
         ("POST", "/api/view"),
         ("POST", "/api/theme"),
+        ("PATCH", "/api/trail"),
+        ("POST", "/api/sensitivity"),
         ("POST", "/api/seek"),
         ("POST", "/api/select"),
     } == {route for route in routes if route[1].startswith("/api/")}

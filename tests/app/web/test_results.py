@@ -69,7 +69,7 @@ def test_trails_in_the_pictures_are_the_feet_of_the_tracks(crossing: Path) -> No
     sequence = read_sequence(crossing)
     run = pipeline.compute(sequence, pipeline.default_parameters(sequence))
     assert all(not t.trail for c in step_of(sequence, run, 60).cameras for t in c.tracks)
-    message = step_of(sequence, run, 60, with_trails=True)
+    message = step_of(sequence, run, 60, trails=4.0)
     found = 0
     for camera, view in zip(message.cameras, sequence.views, strict=True):
         for track in camera.tracks:

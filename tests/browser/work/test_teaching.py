@@ -15,7 +15,7 @@ from playwright.sync_api import Page, expect
 from app.scene import geometry
 from app.scene.scene import _margin_around
 from tests.browser.conftest import Server
-from tests.browser.looking import readout, until, viser
+from tests.browser.looking import as_at_first, readout, until, viser
 from tracker import pipeline
 from tracker.export import read_tracks_csv
 from tracker.sequences.reader import FILE, read_sequence
@@ -118,6 +118,60 @@ def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(
         page.wait_for_timeout(300)  # the page hears of it
     httpx2.post(server.address + "api/parameters/reset", json={})
     server.wait_for_run()
+
+
+def test_the_field_of_a_new_name_is_no_trap(flat_page: Page, server: Server) -> None:
+    page = flat_page
+    as_at_first(server)
+    before = server.get("/api/state").json()["sequence"]["templates"]
+
+    def draw(left: float) -> None:
+        if "drawing" not in (page.locator(".mosaic").get_attribute("class") or ""):
+            page.keyboard.press("c")
+        box = page.locator(".cam").first.bounding_box()
+        assert box is not None
+        scale = box["width"] / 192
+        x, y = box["x"] + left * scale, box["y"] + 30 * scale
+        drag(page, (x, y), (x + 24 * scale, y + 48 * scale))
+
+    def names() -> list[str]:
+        fields = page.locator("[id^=template-]")
+        return [str(fields.nth(i).input_value()) for i in range(fields.count())]
+
+    # letters that were meant for the page, and a click elsewhere: no name
+    draw(40)
+    name = page.locator(f"#template-{before}")
+    expect(name).to_be_focused()
+    expect(name).to_be_in_viewport()
+    given = name.input_value()
+    page.keyboard.type("rr")
+    page.locator(".plot").click(position={"x": 200, "y": 60})
+    expect(name).to_have_value(given)
+    # Escape leaves the field, and again the drawing
+    draw(80)
+    second = page.locator(f"#template-{before + 1}")
+    expect(second).to_be_focused()
+    page.keyboard.type("Bob")
+    page.keyboard.press("Escape")
+    expect(second).not_to_be_focused()
+    expect(second).to_have_value(names()[before + 1])
+    assert "Bob" not in names()
+    page.keyboard.press("Escape")
+    expect(page.locator(".mosaic")).not_to_have_class(re.compile("drawing"))
+    # what was typed is kept by Control and S, and saved
+    draw(120)
+    expect(page.locator(f"#template-{before + 2}")).to_be_focused()
+    page.keyboard.type("Clara")
+    page.keyboard.press("Control+s")
+    server.wait(lambda state: state["teaching"]["unsaved"] == 0)
+    kept = [template.name for template in read_sequence(Path(server.folder)).templates]
+    assert kept[before + 2] == "Clara"
+    assert "Bob" not in kept
+    page.keyboard.press("Escape")
+    for index in (2, 1, 0):
+        httpx2.delete(server.address + f"api/teach/templates/{before + index}")
+    httpx2.post(server.address + "api/teach/save", json={})
+    as_at_first(server)
 
 
 def test_a_face_is_dragged_in_3d_saved_and_reopened(page: Page, server: Server) -> None:

@@ -14,7 +14,7 @@ from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, walk
 from tracker import single_view
 from tracker.parameters import PRESETS, RunParameters, with_values
 from tracker.sequences.frames import FrameReader
-from tracker.sequences.sequence import Sequence, Template, View
+from tracker.sequences.sequence import Sequence, View
 from tracker.single_view.colour_phd import ColourPhd, ColourPhdState
 from tracker.single_view.protocol import ViewResult
 

@@ -22,6 +22,19 @@ class Unavailable(Exception):
 
 
 @dataclass(frozen=True, slots=True)
+class RandomRooms:
+    """Which random rooms an experiment goes through."""
+
+    count: int = 20
+    first: int = 0
+    """Seed of the first; the others follow."""
+    methods: tuple[str, ...] = ()
+    """Only these single-view methods; all, if none is named."""
+    keep: bool = False
+    """Whether they stay in the output folder."""
+
+
+@dataclass(frozen=True, slots=True)
 class Context:
     """What an experiment is run with."""
 
@@ -29,6 +42,10 @@ class Context:
     """Shortened to what shows the direction of each claim."""
     data: Path | None = None
     """Folder of real recordings; None where there are none."""
+    output: Path | None = None
+    """Folder where an experiment of many parts keeps those that are done; None to keep none."""
+    rooms: RandomRooms = RandomRooms()
+    """Of the experiment that draws its own rooms."""
     processes: int = 1
     """At most this many at once."""
     told: Told = lambda words, done, total: None

@@ -20,7 +20,7 @@ class NoisyReader(FrameReader):
     """The pictures of a sequence, each with noise of its own.
 
     A field of normal noise is drawn once; every picture is given a piece of it, cut
-    at a random place and turned at random, which costs a thousandth of drawing it anew.
+    at a random place and turned at random, which is far cheaper than drawing it anew.
     """
 
     def __init__(self, sequence: Sequence, *, sigma: float, seed: int) -> None:

@@ -23,7 +23,7 @@ SECONDS_BETWEEN = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Desk:
-    """What a piece of work tells and asks while it is done."""
+    """What a worker process is given: where to report progress, and whether to stop."""
 
     advance: Callable[[int], None]
     """Called with the number of steps done since the last call."""

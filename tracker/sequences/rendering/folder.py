@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import csv
-import os
-import shutil
-import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import partial
@@ -27,17 +24,20 @@ from tracker.sequences.rendering.rooms import (
     RoomSpec,
 )
 from tracker.sequences.rendering.scene import Scene
-from tracker.sequences.rendering.studio import Studio, in_order
+from tracker.sequences.rendering.studio import Studio, in_order, studio_of
+from tracker.sequences.rendering.writing import (
+    Description,
+    Marked,
+    RenderCancelled,
+    describe,
+    whole_folder,
+)
 
 VERSION = 4
 """Grows when the same call would give other pictures or files."""
 VISIBILITY_FILE = "visibility.csv"
 _QUALITY = 82
 _TEMPLATES_PER_VIEW = 3
-
-
-class RenderCancelled(Exception):
-    """Rendering was stopped on request; nothing was written."""
 
 
 def render(
@@ -78,24 +78,8 @@ def render(
     count = spec.frames if frames is None else frames
     if not 1 <= count <= spec.frames:
         raise ValueError(f"frames must be 1 … {spec.frames} in {name}, got {frames}")
-    folder = Path(folder)
-    _check_replaceable(folder)
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    work = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-    try:
+    with whole_folder(folder) as work:
         _write(spec, work, cameras, seed, count, progress, cancelled or (lambda: False))
-        os.chmod(work, 0o755)
-        _check_replaceable(folder)
-        if folder.exists():
-            old = Path(tempfile.mkdtemp(prefix=f".{folder.name}-old-", dir=folder.parent))
-            folder.rename(old / "old")
-            work.rename(folder)
-            shutil.rmtree(old, ignore_errors=True)
-        else:
-            work.rename(folder)
-    except BaseException:
-        shutil.rmtree(work, ignore_errors=True)
-        raise
 
 
 def read_visibility(folder: Path) -> Float[ndarray, "F P C"]:
@@ -121,15 +105,6 @@ def read_visibility(folder: Path) -> Float[ndarray, "F P C"]:
     return shares
 
 
-def _check_replaceable(folder: Path) -> None:
-    if not folder.exists():
-        return
-    if not folder.is_dir() or (any(folder.iterdir()) and not (folder / "sequence.toml").exists()):
-        raise FileExistsError(
-            f"{folder} exists and is not a sequence folder; choose another name or remove it"
-        )
-
-
 def _write(
     spec: RoomSpec,
     work: Path,
@@ -143,7 +118,7 @@ def _write(
         progress(0, frames)
     if cancelled():
         raise RenderCancelled(spec.name)
-    studio = Studio(spec, CAMERAS[:cameras], seed)
+    studio = studio_of(spec, CAMERAS[:cameras], seed)
     visible = np.zeros((frames, len(spec.people), cameras))
     with ExitStack() as stack:
         writers = [
@@ -231,10 +206,6 @@ def choose_templates(
     return chosen
 
 
-def _numbers(values: ndarray) -> str:
-    return "[" + ", ".join(f"{float(v) + 0.0:.12g}" for v in values) + "]"
-
-
 def _describe(
     spec: RoomSpec,
     cameras: Sequence[Camera],
@@ -243,52 +214,25 @@ def _describe(
     templates: Sequence[tuple[int, int, int, ndarray]],
 ) -> str:
     height = float(np.mean([f.centres[f.inside, 2].mean() for f in scene.figures]))
-    lines = [
-        "format = 1",
-        f'name = "{spec.name}"',
-        f'description = "{spec.description}"',
-        f"fps = {FRAMES_PER_SECOND}",
-        f"frames = {frames}",
-        "",
-        "[room]                       # the volume people are tracked in: metres, z up",
-        f"min = {_numbers(VOLUME_MINIMUM)}",
-        f"max = {_numbers(VOLUME_MAXIMUM)}",
-        "entrances = [                # where people come in (mean, standard deviation), metres",
-    ]
-    for x, y, door in ((spec.back_door, 1.4, "back"), (1.4, spec.front_door, "front")):
-        place = _numbers(np.array([x, y, round(height, 2)]))
-        lines.append(f"  {{ position = {place}, sigma = [0.25, 0.25, 0.08] }},   # {door} door")
-    lines += [
-        "]",
-        "",
-        "[target]                     # what is tracked: head and torso, as an upright box",
-        f"half_extents = {_numbers(TARGET_HALF_EXTENTS)}",
-    ]
-    for camera in cameras:
-        lines += [
-            "",
-            "[[camera]]",
-            f'name = "{camera.name}"',
-            f"image_size = [{camera.image_size[0]}, {camera.image_size[1]}]",
-            f'video = "{camera.name}.avi"',
-            f"K = [{', '.join(_numbers(row) for row in camera.intrinsics)}]",
-            f"distortion = {_numbers(camera.distortion)}",
-            f"R = [{', '.join(_numbers(row) for row in camera.rotation)}]",
-            f"t = {_numbers(camera.translation)}",
-        ]
-    for person, number, step, box in templates:
-        lines += [
-            "",
-            "[[template]]                 # a box whose colours are a model of the person",
-            f'name = "person{person + 1}"',
-            f'camera = "{cameras[number].name}"',
-            f"frame = {step}",
-            f"box = {_numbers(np.round(box, 2))}     # left, top, width, height in pixels",
-        ]
-    lines += [
-        "",
-        "[ground_truth]               # exact, from the people's poses",
-        'file = "ground_truth.csv"',
-        "",
-    ]
-    return "\n".join(lines)
+    sigma = np.array([0.25, 0.25, 0.08])
+    return describe(
+        Description(
+            name=spec.name,
+            description=spec.description,
+            fps=FRAMES_PER_SECOND,
+            frames=frames,
+            minimum=VOLUME_MINIMUM,
+            maximum=VOLUME_MAXIMUM,
+            entrances=[
+                (np.array([x, y, round(height, 2)]), sigma, f"{door} door")
+                for x, y, door in ((spec.back_door, 1.4, "back"), (1.4, spec.front_door, "front"))
+            ],
+            half_extents=TARGET_HALF_EXTENTS,
+            tracked="head and torso",
+            cameras=cameras,
+            templates=[
+                Marked(f"person{person + 1}", cameras[number].name, step, box)
+                for person, number, step, box in templates
+            ],
+        )
+    )

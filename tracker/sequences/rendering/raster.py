@@ -119,6 +119,8 @@ class Sensor(NamedTuple):
     """(N, M, 3), noise of unit size, larger than a picture."""
     offsets: ndarray
     """(F, 2), row and column of the grain where each picture begins."""
+    gains: ndarray
+    """(F, h, 3), factors on the light by row and colour: exposure, white balance, flicker."""
 
 
 class Shots(NamedTuple):
@@ -261,7 +263,7 @@ def draw(
 
     The people are drawn twice as fine as the picture, with a depth buffer that
     begins with the room's own depths, and averaged; then come the floor's
-    shadows, the lens's vignette, the tone curve and the sensor's noise.
+    shadows, the lens's vignette, the camera's gains, the tone curve and the sensor's noise.
 
     Args:
         figures: Who moves.
@@ -275,7 +277,7 @@ def draw(
     vertex_ranges, texture = mesh.vertex_ranges, mesh.texture
     room, room_fine, depth_fine = backdrop.room, backdrop.room_fine, backdrop.depth_fine
     floor_points, vignette = backdrop.floor_points, backdrop.vignette
-    curve, grain, offsets = sensor.curve, sensor.grain, sensor.offsets
+    curve, grain, offsets, gains = sensor.curve, sensor.grain, sensor.offsets, sensor.gains
     frames = points.shape[0]
     height, width = room.shape[:2]
     people = boxes.shape[1]
@@ -408,7 +410,7 @@ def draw(
                                     value += quarter * min(colour[b, a, c], np.float32(1.5))
                     else:
                         value = factor * room[y, x, c]
-                    value *= vignette[y, x]
+                    value *= vignette[y, x] * gains[f, y, c]
                     shown = curve[int(min(one, value) * top_value)]
                     speck = grain[y + offsets[f, 0], x + offsets[f, 1], c]
                     # photon noise: largest in the middle greys after the tone curve

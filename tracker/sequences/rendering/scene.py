@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -25,12 +26,14 @@ from tracker.sequences.rendering.cast.gait import (
 )
 from tracker.sequences.rendering.cast.paths import Path, walk
 from tracker.sequences.rendering.cast.people import Body, build
+from tracker.sequences.rendering.raster import Placed, Skeleton, Surface, place_bodies
 from tracker.sequences.rendering.rooms import (
     TARGET_HALF_EXTENTS,
     VOLUME_MAXIMUM,
     VOLUME_MINIMUM,
     RoomSpec,
 )
+from tracker.sequences.rendering.walls.background import AMBIENT
 from tracker.sequences.rendering.walls.interior import FAR, RIGHT
 
 
@@ -50,6 +53,32 @@ class Figure:
     drawn: Bool[ndarray, " F"]
     """Whether any of the person can be in a picture."""
 
+    def placed(self, steps: slice, lamps: Float[ndarray, "L 9"]) -> Placed:
+        """The body as it stands and is lit at some steps."""
+        bones = Skeleton(
+            self.rest,
+            np.ascontiguousarray(self.poses.rotations[steps]),
+            np.ascontiguousarray(self.poses.joints[steps]),
+        )
+        return place_bodies(surface(self.body), bones, lamps, AMBIENT)
+
+
+class Thing(Protocol):
+    """Something other than a person that moves or changes, over all steps of a scene."""
+
+    @property
+    def body(self) -> Body:
+        """Its mesh and what that is covered with."""
+        ...
+
+    def placed(self, steps: slice, lamps: Float[ndarray, "L 9"]) -> Placed:
+        """The mesh as it stands and is lit at some steps."""
+        ...
+
+    def drawn(self, steps: slice) -> Bool[ndarray, " F"]:
+        """At which of some steps it can be in a picture."""
+        ...
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leaf:
@@ -60,6 +89,22 @@ class Leaf:
     angle: Float[ndarray, " F"]
     """Radians about the vertical through the hinge, from the world's x axis."""
 
+    def placed(self, steps: slice, lamps: Float[ndarray, "L 9"]) -> Placed:
+        """The leaf, turned about its hinge."""
+        angle = self.angle[steps]
+        c, s, zero, one = np.cos(angle), np.sin(angle), 0.0 * angle, 1.0 + 0.0 * angle
+        turned = np.stack([c, -s, zero, s, c, zero, zero, zero, one], axis=1)
+        bones = Skeleton(
+            np.zeros((1, 3)),
+            np.ascontiguousarray(turned.reshape(-1, 1, 3, 3)),
+            np.tile(self.hinge, (len(angle), 1, 1)),
+        )
+        return place_bodies(surface(self.body), bones, lamps, AMBIENT)
+
+    def drawn(self, steps: slice) -> Bool[ndarray, " F"]:
+        """Always."""
+        return np.ones(len(self.angle[steps]), dtype=bool)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
@@ -67,7 +112,12 @@ class Scene:
 
     frames: int
     figures: tuple[Figure, ...]
-    leaves: tuple[Leaf, ...]
+    things: tuple[Thing, ...]
+
+
+def surface(body: Body) -> Surface:
+    """A body as the kernels take it."""
+    return Surface(body.vertices, body.normals, body.bones, body.shares, body.openness)
 
 
 def script(spec: RoomSpec) -> Scene:

@@ -10,28 +10,22 @@ from functools import lru_cache, partial
 from typing import TypeVar
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Bool, Float, UInt8
 from numpy import ndarray
 from scipy.ndimage import gaussian_filter
 
 from tracker.camera import Camera
-from tracker.sequences.rendering.cast.people import Body
 from tracker.sequences.rendering.raster import (
     Backdrop,
     Figures,
     Mesh,
-    Placed,
     Sensor,
-    Skeleton,
-    Surface,
     draw,
     floor_shadows,
-    place_bodies,
 )
 from tracker.sequences.rendering.rooms import CAMERAS, TARGET_HALF_EXTENTS, RoomSpec
-from tracker.sequences.rendering.scene import Figure, Scene, script, shadow_balls
+from tracker.sequences.rendering.scene import Scene, script, shadow_balls
 from tracker.sequences.rendering.walls.background import (
-    AMBIENT,
     FINE,
     Background,
     Tracer,
@@ -44,7 +38,8 @@ Result = TypeVar("Result")
 
 BATCH = 20
 """Steps drawn by one thread at a time."""
-_CELL = 0.04
+CELL = 0.04
+"""Metres: the grid of shadows on the floor."""
 _SPARE = 128
 """Rows and columns of noise more than a picture has."""
 _EXPOSURE = 2.25
@@ -59,36 +54,93 @@ class Drawn:
     """For each camera, blue-green-red."""
     visible: Float[ndarray, "F P C"]
     """Share of each person's silhouette within its target box that each camera sees."""
+    boxes: Float[ndarray, "F P C 4"]
+    """Left, top, right, bottom of those boxes in pixels, not cut at the picture's border; NaN
+    where a person is not before the camera."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stage:
+    """A room with everything that moves in it, before any camera."""
+
+    scene: Scene
+    interior: Interior
+    shade_lamps: Float[ndarray, "L 4"]
+    """The lamps that throw shadows on the floor: position, and share of the floor's light."""
+    origin: Float[ndarray, " 2"]
+    """x and y of the first cell of the floor's grid of shadows, metres."""
+    grid: tuple[int, int]
+    """Its rows and columns, of ``CELL`` metres."""
+    half_extents: Float[ndarray, " 3"] | None
+    """Of the target box around each person's centre; None where the box is the silhouette's."""
+    parts: tuple[Bool[ndarray, " V"], ...] = ()
+    """For each person which vertices the silhouette's box must hold, where it is that."""
+
+
+def stage_of(spec: RoomSpec) -> Stage:
+    """A built-in room."""
+    interior = furnish(spec.decor, spec.back_door, spec.front_door)
+    origin = np.array([LEFT - 0.5, NEAR - 0.2])
+    return Stage(
+        script(spec), interior, _shade_lamps(interior), origin, (190, 160), TARGET_HALF_EXTENTS
+    )
 
 
 @lru_cache(maxsize=len(CAMERAS))
 def _empty_room(spec: RoomSpec, camera: Camera) -> Background:
     """The traced room, kept for the next rendering with another seed."""
     interior = furnish(spec.decor, spec.back_door, spec.front_door)
-    background = render_background(Tracer(interior), camera)
+    return muted_room(render_background(Tracer(interior), camera))
+
+
+def muted_room(background: Background) -> Background:
+    """A traced room in the colours of a plain camera."""
     return replace(background, room=_muted(background.room), room_fine=_muted(background.room_fine))
 
 
-class Studio:
-    """A room lit and traced for some cameras, ready to draw any of its steps."""
+def studio_of(spec: RoomSpec, cameras: Sequence[Camera], seed: int) -> Studio:
+    """A built-in room before some cameras."""
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        backgrounds = list(pool.map(partial(_empty_room, spec), cameras))
+    return Studio(stage_of(spec), cameras, backgrounds, seed)
 
-    def __init__(self, spec: RoomSpec, cameras: Sequence[Camera], seed: int) -> None:
-        self.scene: Scene = script(spec)
+
+class Studio:
+    """A room lit and traced for some cameras, ready to draw any of its steps.
+
+    Args:
+        stage: What is to be seen.
+        cameras: From where.
+        backgrounds: The empty room before each camera.
+        seed: Of the sensors' noise.
+        grains: Strength of each camera's noise, 1 for a plain camera in good light.
+        gains: For each camera the factors on the light by step, row and colour; none by default.
+    """
+
+    def __init__(
+        self,
+        stage: Stage,
+        cameras: Sequence[Camera],
+        backgrounds: Sequence[Background],
+        seed: int,
+        *,
+        grains: Sequence[float] | None = None,
+        gains: Sequence[Float[ndarray, "F h 3"]] | None = None,
+    ) -> None:
+        self.stage = stage
+        self.scene: Scene = stage.scene
         self.cameras = tuple(cameras)
         self.seed = seed
-        interior = furnish(spec.decor, spec.back_door, spec.front_door)
-        with ThreadPoolExecutor(max_workers=2) as pool:
-            self.backgrounds = list(pool.map(partial(_empty_room, spec), self.cameras))
-        self._lamps = lamp_table(interior)
-        self._shade_lamps = _shade_lamps(interior)
-        self._origin = np.array([LEFT - 0.5, NEAR - 0.2])
-        self._grid = (190, 160)
+        self.backgrounds = list(backgrounds)
+        self._lamps = lamp_table(stage.interior)
+        self._gains = gains
         self._floor_points = [
-            np.nan_to_num((b.floor - self._origin) / _CELL, nan=-1.0).astype(np.float32)
+            np.nan_to_num((b.floor - stage.origin) / CELL, nan=-1.0).astype(np.float32)
             for b in self.backgrounds
         ]
-        bodies = [f.body for f in self.scene.figures] + [d.body for d in self.scene.leaves]
+        bodies = [f.body for f in self.scene.figures] + [t.body for t in self.scene.things]
         sizes = np.cumsum([0] + [len(b.vertices) for b in bodies])
+        self._ranges = np.stack([sizes[:-1], sizes[1:]], axis=1)
         width = max(b.texture.shape[1] for b in bodies)
         tops = np.cumsum([0] + [b.texture.shape[0] for b in bodies])
         texture = np.zeros((int(tops[-1]), width, 3), dtype=np.float32)
@@ -103,7 +155,7 @@ class Studio:
                 [b.triangles + start for b, start in zip(bodies, sizes[:-1], strict=True)]
             ),
             np.repeat(np.arange(len(bodies), dtype=np.int32), [len(b.triangles) for b in bodies]),
-            np.stack([sizes[:-1], sizes[1:]], axis=1),
+            self._ranges,
             _muted(texture),
         )
         rng = np.random.default_rng([seed, 1])
@@ -112,6 +164,7 @@ class Studio:
         grain = rng.standard_normal((height + _SPARE, width + _SPARE, 3))
         grain = gaussian_filter(grain, (0.65, 0.65, 0.4), mode="wrap")
         self._grain = (grain / grain.std()).astype(np.float32)
+        self._grains = [1.0] * len(self.cameras) if grains is None else list(grains)
         self._curve = _tone_curve()
         self._vignettes = [_vignette(camera) for camera in self.cameras]
 
@@ -121,41 +174,47 @@ class Studio:
         scene = self.scene
         worlds, lights, present = [], [], []
         for figure in scene.figures:
-            placed = self._place(figure, steps)
+            placed = figure.placed(steps, self._lamps)
             worlds.append(placed.world)
             lights.append(placed.light)
             present.append(figure.drawn[steps])
-        for door in scene.leaves:
-            angle = door.angle[steps]
-            c, s, zero, one = np.cos(angle), np.sin(angle), 0.0 * angle, 1.0 + 0.0 * angle
-            turned = np.stack([c, -s, zero, s, c, zero, zero, zero, one], axis=1)
-            bones = Skeleton(
-                np.zeros((1, 3)),
-                np.ascontiguousarray(turned.reshape(-1, 1, 3, 3)),
-                np.tile(door.hinge, (last - first, 1, 1)),
-            )
-            placed = place_bodies(_surface(door.body), bones, self._lamps, AMBIENT)
+        for thing in scene.things:
+            placed = thing.placed(steps, self._lamps)
             worlds.append(placed.world)
             lights.append(placed.light)
-            present.append(np.ones(last - first, dtype=bool))
+            present.append(thing.drawn(steps))
         world = np.concatenate(worlds, axis=1)
         light = np.concatenate(lights, axis=1)
         balls = np.concatenate([shadow_balls(f, steps) for f in scene.figures], axis=1)
-        shadows = floor_shadows(balls, self._shade_lamps, *self._grid, self._origin, _CELL)
-        pictures, visible = [], []
+        stage = self.stage
+        shadows = floor_shadows(balls, stage.shade_lamps, *stage.grid, stage.origin, CELL)
+        pictures, visible, boxes = [], [], []
         for number in range(len(self.cameras)):
-            frames, seen = self._view(number, steps, world, light, present, shadows)
+            frames, seen, around = self._view(number, steps, world, light, present, shadows)
             pictures.append(frames)
             visible.append(seen)
-        return Drawn(first, tuple(pictures), np.stack(visible, axis=2))
+            boxes.append(around)
+        return Drawn(first, tuple(pictures), np.stack(visible, axis=2), np.stack(boxes, axis=2))
 
-    def _place(self, figure: Figure, steps: slice) -> Placed:
-        bones = Skeleton(
-            figure.rest,
-            np.ascontiguousarray(figure.poses.rotations[steps]),
-            np.ascontiguousarray(figure.poses.joints[steps]),
-        )
-        return place_bodies(_surface(figure.body), bones, self._lamps, AMBIENT)
+    def _corners(
+        self, camera: Camera, pixels: Float[ndarray, "F V 2"], steps: slice
+    ) -> Float[ndarray, "F P 4"]:
+        """Left, top, right and bottom of each person's box, not cut at the picture's border."""
+        found = []
+        for number, figure in enumerate(self.scene.figures):
+            if self.stage.half_extents is not None:
+                box, _ = camera.project_boxes(figure.centres[steps], self.stage.half_extents)
+                found.append(np.concatenate([box[:, :2], box[:, :2] + box[:, 2:]], axis=1))
+                continue
+            first, last = self._ranges[number]
+            own = pixels[:, first:last][:, self.stage.parts[number]]
+            known = np.isfinite(own)
+            low = np.where(known, own, np.inf).min(axis=1)
+            high = np.where(known, own, -np.inf).max(axis=1)
+            corners = np.concatenate([low, high], axis=1)
+            corners[~np.isfinite(corners).all(axis=1)] = np.nan
+            found.append(corners)
+        return np.stack(found, axis=1)
 
     def _view(
         self,
@@ -165,33 +224,34 @@ class Studio:
         light: ndarray,
         present: list[ndarray],
         shadows: ndarray,
-    ) -> tuple[ndarray, ndarray]:
+    ) -> tuple[ndarray, ndarray, ndarray]:
         camera, background = self.cameras[number], self.backgrounds[number]
         flat = world.reshape(-1, 3)
         pixels, _ = camera.project(flat)
         depth = np.einsum("ni,i->n", flat, camera.rotation[2]) + camera.translation[2]
         points = np.column_stack([(pixels + 0.5) * FINE - 0.5, depth]).astype(np.float32)
-        boxes, shares = [], []
-        for figure in self.scene.figures:
-            box, _ = camera.project_boxes(figure.centres[steps], TARGET_HALF_EXTENTS)
-            corners = np.concatenate([box[:, :2], box[:, :2] + box[:, 2:]], axis=1)
-            boxes.append((corners + 0.5) * FINE - 0.5)
-            limit = np.array(camera.image_size) - 0.5
-            cut = np.clip(corners.reshape(-1, 2, 2), -0.5, limit)
-            with np.errstate(invalid="ignore"):
-                shares.append(np.prod(cut[:, 1] - cut[:, 0], axis=1) / np.prod(box[:, 2:], axis=1))
+        corners = self._corners(camera, pixels.reshape(*world.shape[:2], 2), steps)
+        limit = np.array(camera.image_size) - 0.5
+        cut = np.clip(corners.reshape(*corners.shape[:2], 2, 2), -0.5, limit)
+        with np.errstate(invalid="ignore"):
+            whole = np.prod(corners[:, :, 2:] - corners[:, :, :2], axis=2)
+            shares = np.prod(cut[:, :, 1] - cut[:, :, 0], axis=2) / whole
         offsets = np.stack(
             [
                 np.random.default_rng([self.seed, number, step]).integers(0, _SPARE, size=2)
                 for step in range(steps.start, steps.stop)
             ]
         )
+        if self._gains is None:
+            gains = np.ones((steps.stop - steps.start, camera.image_size[1], 3), np.float32)
+        else:
+            gains = np.asarray(self._gains[number][steps], np.float32)
         shots = draw(
             Figures(
                 points.reshape(*world.shape),
                 light,
                 np.stack(present, axis=1),
-                np.stack(boxes, axis=1),
+                (corners + 0.5) * FINE - 0.5,
             ),
             self._mesh,
             Backdrop(
@@ -202,15 +262,11 @@ class Studio:
                 self._vignettes[number],
             ),
             shadows,
-            Sensor(self._curve, self._grain, offsets),
+            Sensor(self._curve, self._grain * np.float32(self._grains[number]), offsets, gains),
         )
         counts = shots.counts
-        inside = np.nan_to_num(np.stack(shares, axis=1))
-        return shots.pictures, inside * counts[:, :, 1] / np.maximum(counts[:, :, 0], 1)
-
-
-def _surface(body: Body) -> Surface:
-    return Surface(body.vertices, body.normals, body.bones, body.shares, body.openness)
+        seen = np.nan_to_num(shares) * counts[:, :, 1] / np.maximum(counts[:, :, 0], 1)
+        return shots.pictures, seen, corners
 
 
 def in_order(

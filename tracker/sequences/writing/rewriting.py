@@ -1,4 +1,4 @@
-"""A ``sequence.toml`` with another room and other templates, and all the rest as it is.
+"""A ``sequence.toml`` with another room, target or templates, and all the rest as it is.
 
 Only the values that differ are touched, so that comments, order and notation of the rest
 stay; what comes out is read and compared before anybody gets it.
@@ -26,12 +26,12 @@ from tracker.sequences.writing.teaching import (
 def rewritten(
     text: str, saved: Sequence, sequence: Sequence, where: str, *, name: str | None = None
 ) -> str:
-    """A ``sequence.toml`` with another room and other templates.
+    """A ``sequence.toml`` with another room, target or templates.
 
     Args:
         text: The file.
-        saved: Whose room and templates it has.
-        sequence: Whose room and templates it is to have.
+        saved: Whose room, target and templates it has.
+        sequence: Whose room, target and templates it is to have.
         where: The file, as the messages begin.
         name: Another name for the sequence.
 
@@ -48,6 +48,10 @@ def rewritten(
         _write_room(document["room"], before["room"], after["room"])
     elif before["room"] != after["room"]:  # it was found out; now somebody says where it is
         document["room"] = tomlkit.item(after["room"])
+    if "target" in values:
+        _write_target(document["target"], before["target"], after["target"])
+    elif before["target"] != after["target"]:
+        document["target"] = tomlkit.item(after["target"])
     _write_templates(document, before["template"], after["template"])
     result = tomlkit.dumps(document)
     if "\r\n" in text:
@@ -55,9 +59,9 @@ def rewritten(
     got = tomllib.loads(result)
     if taught_in(got, after) != after or _rest_of(got) != _rest_of(values):
         raise SequenceError(
-            f"{where}: is written in a way that cannot be kept while it changes; write [room] and "
-            "[[template]] as tables of their own, as the manual shows them under Format, then save "
-            "again"
+            f"{where}: is written in a way that cannot be kept while it changes; write [room], "
+            "[target] and [[template]] as tables of their own, as the manual shows them under "
+            "Format, then save again"
         )
     return result
 
@@ -85,6 +89,13 @@ def _write_room(table: Any, before: Values, after: Values) -> None:
             entrances.insert(now, tomlkit.item(new[now]))
         else:
             _insert(entrances, now, new[now])
+
+
+def _write_target(table: Any, before: Values, after: Values) -> None:
+    sides = zip(before["half_extents"], after["half_extents"], strict=True)
+    for axis, (old, new) in enumerate(sides):
+        if old != new:
+            table["half_extents"][axis] = new
 
 
 def _insert(entrances: Any, index: int, entrance: Values) -> None:
@@ -142,7 +153,8 @@ def _steps(pairs: Pairs) -> tuple[list[tuple[int, int]], list[int], list[int]]:
 
 def _check_unchanged(values: dict[str, Any], before: Values, where: str) -> None:
     found = taught_in(values, before)
-    for field, word in (("room", "[room]"), ("template", "[[template]]")):
+    words = {"room": "[room]", "target": "[target]", "template": "[[template]]"}
+    for field, word in words.items():
         if found[field] != before[field]:
             raise SequenceError(
                 f"{where}, {word}: expected what was there when it was opened, found other values: "
@@ -151,18 +163,20 @@ def _check_unchanged(values: dict[str, Any], before: Values, where: str) -> None
 
 
 def taught_in(values: dict[str, Any], otherwise: Values | None = None) -> Values:
-    """Room and templates of a file in the form of :func:`taught_values`.
+    """Room, target and templates of a file in the form of :func:`taught_values`.
 
     Args:
         values: Of the file.
-        otherwise: Has the room where the file has none.
+        otherwise: Has room and target where the file has none.
     """
 
     def numbers(vector: list[Any]) -> list[float]:
         return [float(value) for value in vector]
 
     room: dict[str, Any] = values["room"] if "room" in values else (otherwise or {})["room"]
+    target: dict[str, Any] = values["target"] if "target" in values else (otherwise or {})["target"]
     return {
+        "target": {"half_extents": numbers(target["half_extents"])},
         "room": {
             "min": numbers(room["min"]),
             "max": numbers(room["max"]),
@@ -184,4 +198,6 @@ def taught_in(values: dict[str, Any], otherwise: Values | None = None) -> Values
 
 
 def _rest_of(values: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in values.items() if key not in ("room", "template")}
+    return {
+        key: value for key, value in values.items() if key not in ("room", "target", "template")
+    }

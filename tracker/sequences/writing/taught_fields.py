@@ -1,10 +1,13 @@
-"""The fields of a ``sequence.toml`` that a person teaches: the room, and boxes of colours.
+"""The fields of a ``sequence.toml`` that a person teaches: room, target, boxes of colours.
 
 Whatever is wrong with them is told in the same words, whether a file brings them or
 somebody who draws them on a picture or drags them in the room.
 """
 
 from __future__ import annotations
+
+from jaxtyping import Float
+from numpy import ndarray
 
 from tracker.sequences.fields import Fields, did_you_mean, listed, shown
 from tracker.sequences.sequence import Entrance, Room, Template, View
@@ -33,6 +36,18 @@ def read_room(fields: Fields) -> Room:
         for entrance in room.tables("entrances", ("position", "sigma"))
     )
     return Room(minimum, maximum, entrances)
+
+
+def read_target(fields: Fields) -> Float[ndarray, " 3"] | None:
+    """Half extents of the table ``[target]``, metres; None where there is none.
+
+    Raises:
+        SequenceError: If something in it is wrong.
+    """
+    target = fields.table("target", ("half_extents",), needed=False)
+    if target is None:
+        return None
+    return target.vector("half_extents", 3, "half width, depth and height in metres", positive=True)
 
 
 def read_templates(fields: Fields, views: tuple[View, ...], frames: int) -> tuple[Template, ...]:

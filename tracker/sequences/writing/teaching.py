@@ -1,8 +1,9 @@
-"""A sequence that was taught: with another room or other templates than its file has.
+"""A sequence that was taught: with another room, target or templates than its file has.
 
 What is taught are plain values in the notation of ``sequence.toml``::
 
     {"room": {"min": […], "max": […], "entrances": [{"position": […], "sigma": […]}, …]},
+     "target": {"half_extents": […]},
      "template": [{"name": …, "camera": …, "frame": …, "box": […]}, …]}
 
 metres in the world, pixels in a picture. They are checked by what checks the file.
@@ -20,7 +21,7 @@ from numpy import ndarray
 
 from tracker.sequences.fields import Fields
 from tracker.sequences.sequence import Sequence
-from tracker.sequences.writing.taught_fields import read_room, read_templates
+from tracker.sequences.writing.taught_fields import read_room, read_target, read_templates
 
 Values = dict[str, Any]
 
@@ -34,7 +35,7 @@ Pairs = list[tuple[int | None, int | None]]
 
 
 def taught_values(sequence: Sequence) -> Values:
-    """Room and templates of a sequence as plain values."""
+    """Room, target and templates of a sequence as plain values."""
     room = sequence.room
     return {
         "room": {
@@ -45,6 +46,7 @@ def taught_values(sequence: Sequence) -> Values:
                 for entrance in room.entrances
             ],
         },
+        "target": {"half_extents": _numbers(sequence.target_half_extents)},
         "template": [
             {
                 "name": template.name,
@@ -62,27 +64,30 @@ def _numbers(vector: ndarray) -> list[float]:
 
 
 def with_taught(opened: Sequence, values: Values, where: str) -> Sequence:
-    """A sequence with this room and these templates, and the rest as it was opened.
+    """A sequence with this room, this target and these templates, the rest as it was opened.
 
     Its digest follows from the one that was opened and from the values, so that what was
     computed of the same ones is found again.
 
     Args:
         opened: As its file was read.
-        values: Room and templates.
+        values: Room, target and templates.
         where: The file, as the messages begin.
 
     Raises:
         SequenceError: If a value does not fit; file, field, expected, found.
     """
-    fields = Fields(where, values, ("room", "template"))
-    room = read_room(fields)
+    fields = Fields(where, values, ("room", "target", "template"))
+    room, half_extents = read_room(fields), read_target(fields)
+    assert half_extents is not None
     templates = read_templates(fields, opened.views, opened.frames)
     digest = opened.digest
     if values != taught_values(opened):
         text = digest + json.dumps(values, sort_keys=True)
         digest = hashlib.sha256(text.encode()).hexdigest()[:16]
-    return replace(opened, room=room, templates=templates, digest=digest)
+    return replace(
+        opened, room=room, target_half_extents=half_extents, templates=templates, digest=digest
+    )
 
 
 def changes(before: Values, after: Values) -> list[str]:
@@ -101,6 +106,10 @@ def changes(before: Values, after: Values) -> list[str]:
         low, high = before["room"][side][axis], after["room"][side][axis]
         if low != high:
             words.append(f"room, {side} {AXES[axis]}: {low:g} to {high:g} m")
+    old_size, new_size = before["target"]["half_extents"], after["target"]["half_extents"]
+    if old_size != new_size:
+        sides = " × ".join(f"{2.0 * half:g}" for half in new_size)
+        words.append(f"target: {sides} m")
     old_places, new_places = before["room"]["entrances"], after["room"]["entrances"]
     for old, new in paired_entrances(old_places, new_places):
         if old is None and new is not None:

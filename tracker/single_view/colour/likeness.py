@@ -1,4 +1,8 @@
-"""Whose colours the boxes of one camera have: told of every method that is given pictures."""
+"""Whose colours the boxes of one camera have: added to the results of every single-view method.
+
+[ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
+density filtering", 2021.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +24,7 @@ from tracker.single_view.colour.templates import read_templates
 logger = logging.getLogger(__name__)
 
 _NUMBERS = ColourPhdParams()
-"""Who looks like whom is asked with one set of numbers, whichever method found the boxes."""
+"""The same colour parameters whichever method found the boxes, so that likenesses compare."""
 
 
 class Likeness:

@@ -51,6 +51,22 @@ class Poses:
     """Height of the crown of the head, metres."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Sitting:
+    """How far a person has sat down at every step, on a seat behind where the feet stand."""
+
+    share: Float[ndarray, " F"]
+    """0 upright, 1 seated."""
+    seat: float
+    """Height of the seat, metres."""
+
+
+SEAT_BACK = 0.40
+"""Metres from the feet back to the hips of who sits, for the height above."""
+_FLESH = 0.09
+"""Metres from a seat up to the hip joints."""
+
+
 def _about_z(angle: ndarray) -> ndarray:
     c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
     return np.stack([c, -s, zero, s, c, zero, zero, zero, one], axis=-1).reshape(-1, 3, 3)
@@ -86,12 +102,14 @@ def _wander(frames: int, seed: int, period: float) -> ndarray:
     return np.asarray(smooth / (smooth.std() + 1e-9))
 
 
-def pose(path: Path, stature: float, seed: int) -> Poses:
+def pose(path: Path, stature: float, seed: int, sitting: Sitting | None = None) -> Poses:
     """Pose a person of the given height along a path.
 
     The feet are on the path's prints; the legs follow by two-bone inverse
     kinematics, the pelvis as high as the legs allow; arms, chest and head swing
-    with the gait. The seed gives each person a manner of looking around.
+    with the gait. Who sits down moves the pelvis back and down onto the seat, bends
+    ahead on the way, and lays the forearms on the thighs. The seed gives each person a
+    manner of looking around.
     """
     scale = stature / STATURE
     joints = JOINTS * scale
@@ -119,12 +137,20 @@ def pose(path: Path, stature: float, seed: int) -> Poses:
     standing = float(joints[THIGH[0], 2]) - 0.008
     hip_height = np.minimum(np.minimum(allowed[0], allowed[1]) + 0.03, standing)
     hip_height = gaussian_filter1d(hip_height, 1.5, mode="nearest")
+    base, down = path.position, np.zeros(frames)
+    if sitting is not None:
+        down = sitting.share
+        back = SEAT_BACK * scale * down[:, None] * yaw[:, :2, 0]
+        base = base - back
+        hips = [hip - back for hip in hips]
+        hip_height = (1.0 - down) * hip_height + down * (sitting.seat + _FLESH)
     pelvis_height = hip_height + joints[PELVIS, 2] - joints[THIGH[0], 2]
 
     rotations[:, PELVIS] = yaw @ _about_z(0.10 * vigour * np.sin(cycle))
-    placed[:, PELVIS] = np.column_stack([path.position, pelvis_height])
+    placed[:, PELVIS] = np.column_stack([base, pelvis_height])
     sway = 0.012 * _wander(frames, seed, 30.0)
     lean = 0.02 + 0.05 * vigour + 0.010 * _wander(frames, seed + 1, 35.0)
+    lean = lean + 2.4 * down * (1.0 - down) - 0.08 * down
     rotations[:, CHEST] = (
         yaw @ _about_z(-0.13 * vigour * np.cos(cycle)) @ _about_y(lean) @ _about_x(sway)
     )
@@ -139,9 +165,10 @@ def pose(path: Path, stature: float, seed: int) -> Poses:
     ahead = np.column_stack([np.cos(path.heading), np.sin(path.heading), np.zeros(frames)])
     for side, sign in enumerate((1.0, -1.0)):
         swing = sign * np.cos(cycle)  # this arm is back while this leg is ahead
-        back = 0.42 * vigour * swing - 0.05
+        fidget = down * _wander(frames, seed + 4 + side, 18.0)
+        back = 0.42 * vigour * swing - 0.05 - 0.20 * down - 0.06 * fidget
         upper = rotations[:, CHEST] @ _about_x(np.full(frames, 0.10 * sign)) @ _about_y(back)
-        bend = 0.22 + 0.18 * vigour * (1.0 - swing)
+        bend = 0.22 + 0.18 * vigour * (1.0 - swing) + 0.66 * down + 0.12 * fidget
         rotations[:, UPPER_ARM[side]] = upper
         rotations[:, FOREARM[side]] = upper @ _about_y(-bend)
         placed[:, UPPER_ARM[side]] = placed[:, CHEST] + _turn(
@@ -176,6 +203,19 @@ def pose(path: Path, stature: float, seed: int) -> Poses:
         )
         placed[:, THIGH[side]], placed[:, SHIN[side]] = hip, knee
         placed[:, FOOT[side]] = ankle
-    crown = np.array([0.0, 0.0, stature - joints[HEAD, 2]])
-    top = placed[:, HEAD, 2] + _turn(rotations[:, HEAD], crown)[:, 2]
-    return Poses(rotations, placed, top)
+    return Poses(rotations, placed, _top(rotations, placed, stature))
+
+
+def lay(poses: Poses, place: Float[ndarray, " 3"], heading: float, stature: float) -> Poses:
+    """The same poses on the back: the middle of the body at a place, the crown to a heading."""
+    middle = np.array([0.0, 0.0, 0.5 * stature])
+    turn = (_about_z(np.array([heading + np.pi])) @ _about_y(np.array([-0.5 * np.pi])))[0]
+    rotations = turn @ poses.rotations
+    feet = poses.joints[:, PELVIS].mean(axis=0) * [1.0, 1.0, 0.0]
+    placed = (poses.joints - feet - middle) @ turn.T + place
+    return Poses(rotations, placed, _top(rotations, placed, stature))
+
+
+def _top(rotations: ndarray, placed: ndarray, stature: float) -> ndarray:
+    crown = np.array([0.0, 0.0, stature - JOINTS[HEAD, 2] * (stature / STATURE)])
+    return np.asarray(placed[:, HEAD, 2] + _turn(rotations[:, HEAD], crown)[:, 2])

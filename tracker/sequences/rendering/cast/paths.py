@@ -50,12 +50,13 @@ def walk(
     frames: int,
     *,
     leg: float,
+    rate: float = FRAMES_PER_SECOND,
 ) -> Path:
     """The smooth walk through timed waypoints.
 
     Between waypoints each coordinate is a monotone cubic of time, so that a
-    pause is two waypoints at one place; a Gaussian of four steps then rounds
-    the changes of speed. Where the waypoints ask for constant velocity, neither
+    pause is two waypoints at one place; a Gaussian of 0.16 s then rounds the
+    changes of speed. Where the waypoints ask for constant velocity, neither
     moves the person in time.
 
     Args:
@@ -64,19 +65,21 @@ def walk(
         facings: Where the person looks other than ahead, for pauses.
         frames: Number of steps.
         leg: Length of a leg in metres; scales the stride.
+        rate: Steps a second.
     """
     steps = np.arange(-_LEAD, frames + _LEAD, dtype=float)
     times = np.array([w[0] for w in waypoints])
     places = np.array([w[1:] for w in waypoints])
     clamped = np.clip(steps, times[0], times[-1])
     position = np.asarray(PchipInterpolator(times, places)(clamped))
-    position = gaussian_filter1d(position, 4.0, axis=0, mode="nearest")
-    velocity = np.gradient(position, axis=0) * FRAMES_PER_SECOND
+    slower = rate / FRAMES_PER_SECOND
+    position = gaussian_filter1d(position, 4.0 * slower, axis=0, mode="nearest")
+    velocity = np.gradient(position, axis=0) * rate
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
-    heading = _heading(steps, position, velocity, speed, facings)
+    heading = _heading(steps, position, velocity, speed, facings, 5.0 * slower)
     turning = np.abs(np.gradient(heading))
     cycle = (0.75 + 0.5 * speed) * leg / 0.83
-    progress = speed / FRAMES_PER_SECOND / cycle + turning / (2.0 * np.pi) * np.exp(-3.0 * speed)
+    progress = speed / rate / cycle + turning / (2.0 * np.pi) * np.exp(-3.0 * speed)
     phase = np.cumsum(progress + 1e-6)
     feet = [
         _foot(phase + offset, position, heading, speed, side)
@@ -98,6 +101,7 @@ def _heading(
     velocity: ndarray,
     speed: ndarray,
     facings: Sequence[Facing],
+    rounding: float,
 ) -> ndarray:
     """Ahead while walking, towards the point looked at in a pause, and smooth between."""
     wanted = np.arctan2(velocity[:, 1], velocity[:, 0])
@@ -112,7 +116,7 @@ def _heading(
         return np.zeros(len(steps))
     turned = np.unwrap(wanted[known])
     return np.asarray(
-        gaussian_filter1d(np.interp(steps, steps[known], turned), 5.0, mode="nearest")
+        gaussian_filter1d(np.interp(steps, steps[known], turned), rounding, mode="nearest")
     )
 
 

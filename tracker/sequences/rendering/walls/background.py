@@ -41,6 +41,7 @@ class Tracer:
     def __init__(self, interior: Interior) -> None:
         self.solids = interior.solids
         self.lamps = interior.lamps
+        self.low, self.high = interior.low, interior.high
         rotations = np.array([solid.rotation() for solid in self.solids])
         self.halves = np.array([solid.half for solid in self.solids])
         centres = np.array([solid.centre for solid in self.solids])
@@ -100,8 +101,17 @@ class Tracer:
         return facing * leaving / (distance**2 + 0.02), toward, distance
 
 
-def render_background(tracer: Tracer, camera: Camera, rounds: int = 4) -> Background:
-    """Trace the empty room through the camera's exact lens model, twice as fine as its picture."""
+def render_background(
+    tracer: Tracer, camera: Camera, *, rounds: int = 4, stride: int = FINE
+) -> Background:
+    """Trace the empty room through the camera's exact lens model, twice as fine as its picture.
+
+    Args:
+        tracer: The room.
+        camera: Through which it is seen.
+        rounds: Samples of each lamp at each point where light is gathered.
+        stride: Rows and columns, of the fine picture, between two such points.
+    """
     width, height = camera.image_size
     columns, rows = width * FINE, height * FINE
     grid = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=2).reshape(-1, 2)
@@ -114,16 +124,17 @@ def render_background(tracer: Tracer, camera: Camera, rounds: int = 4) -> Backgr
     places = origins + distance[:, None] * directions
     own, face, normals = tracer.surface(places, solids)
     colour, glow = paint(tracer.solids, solids, own, face, places)
+    glow += _mirrored(tracer, solids, places, directions, normals, distance)
     surface = (solids * 8 + face).reshape(rows, columns)
 
-    # light is gathered at one point in four; the others take it from their own
+    # light is gathered at some points only; the others take it from their own
     # surface, and what has no such neighbour is gathered after all
     light = np.zeros((rows * columns, 3), np.float32)
-    known = (grid % FINE == 0).all(axis=1)
+    known = (grid % stride == 0).all(axis=1)
     chosen = np.flatnonzero(known)
     for _ in range(2):
         start = places[chosen] + 2e-3 * normals[chosen]
-        light[chosen] = _gather(tracer, start, normals[chosen], grid[chosen] // FINE, rounds)
+        light[chosen] = _gather(tracer, start, normals[chosen], grid[chosen] // stride, rounds)
         known[chosen] = True
         filled, reached = _smooth(light, known, surface)
         chosen = np.flatnonzero(~reached)
@@ -159,6 +170,38 @@ def render_background(tracer: Tracer, camera: Camera, rounds: int = 4) -> Backgr
     floor = (places[:, :2].reshape(height, FINE, width, FINE, 2) * low).mean(axis=(1, 3))
     floor = np.where(share >= 0.5, floor / np.maximum(share, 0.5), np.nan)
     return Background(room, fine, depth, floor)
+
+
+def _mirrored(
+    tracer: Tracer,
+    solids: ndarray,
+    places: ndarray,
+    directions: ndarray,
+    normals: ndarray,
+    distance: ndarray,
+) -> Float[ndarray, "N 3"]:
+    """What mirrors show, as light of their own; ``distance`` grows by the way behind the glass.
+
+    The image in a plane mirror lies straight on, as far behind the glass as the thing is
+    before it: with such depths, people reflected at the glass are drawn like any others.
+    """
+    seen = np.zeros((len(solids), 3), np.float32)
+    glass = np.array([solid.finish.kind == "mirror" for solid in tracer.solids])
+    rows = np.flatnonzero(glass[solids])
+    if not len(rows):
+        return seen
+    cosine = np.einsum("ni,ni->n", directions[rows], normals[rows])
+    onward = directions[rows] - 2.0 * cosine[:, None] * normals[rows]
+    start = places[rows] + 2e-3 * normals[rows]
+    hits = tracer.nearest(start, onward)
+    hit = np.maximum(hits.solids, 0)
+    there = start + hits.distances[:, None] * onward
+    own, face, _ = tracer.surface(there, hit)
+    colour, glow = paint(tracer.solids, hit, own, face, there)
+    plain = np.maximum(tracer.reflectance[hit], 1e-3)
+    seen[rows] = 0.9 * (_rough_light(tracer, there, hit) * colour / plain + glow)
+    distance[rows] += hits.distances
+    return seen
 
 
 def _gather(
@@ -201,11 +244,13 @@ def _rough_light(
     _, _, normals = tracer.surface(places, solids)
     light = np.broadcast_to(AMBIENT.mean(axis=0), (len(places), 3)).astype(np.float32)
     middle = np.zeros((len(places), 2))
-    for lamp in tracer.lamps[:3]:
+    for lamp in tracer.lamps:
+        if lamp.outdoors:
+            continue
         strength, _, _ = tracer.lamp_light(places, normals, lamp, middle)
         light = light + np.minimum(strength, 0.6)[:, None] * np.array(lamp.power, np.float32)
     # corridors see little of the room's lamps
-    outdoors = (places[:, 1] > 1.95) | (places[:, 0] > 2.25)
+    outdoors = np.any((places[:, :2] < tracer.low) | (places[:, :2] > tracer.high), axis=1)
     light = np.where(outdoors[:, None], light * 0.3, light)
     colour = tracer.reflectance[solids] * light
     if glowing:

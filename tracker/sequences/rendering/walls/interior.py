@@ -64,6 +64,8 @@ class Lamp:
     direction: tuple[float, float, float]
     power: tuple[float, float, float]
     """Irradiance by colour that the whole lamp gives one metre below it."""
+    outdoors: bool = False
+    """Whether it lights a corridor and not the room."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +94,9 @@ class Interior:
 
     solids: list[Solid] = field(default_factory=list)
     lamps: list[Lamp] = field(default_factory=list)
+    low: tuple[float, float] = (-math.inf, -math.inf)
+    high: tuple[float, float] = (RIGHT + 0.15, FAR + 0.15)
+    """x and y beyond which there are only corridors, with little of the room's light."""
 
     def box(
         self,
@@ -222,6 +227,7 @@ def _lights(room: Interior, decor: Decor) -> None:
                 (0.0, 0.3, 0.0),
                 (0.0, 0.0, -1.0),
                 (0.80, 0.72, 0.58),
+                outdoors=True,
             )
         )
 
@@ -255,7 +261,7 @@ def _furniture(room: Interior, decor: Decor) -> None:
         room.round(CYLINDER, (1.92, -0.86, 0.76), (0.055, 0.055, 0.02), steel)
         room.round(CYLINDER, (1.92, -0.86, 0.92), (0.010, 0.010, 0.15), steel)
         room.round(CYLINDER, (1.92, -0.86, 1.10), (0.085, 0.085, 0.06), Finish("plain", "#e4d9b8"))
-    _plant(room, 1.86, 1.62, decor.seed)
+    plant(room, 1.86, 1.62, decor.seed)
     # on the walls
     frame = Finish("plain", "#2a2622")
     for number, (y, z, width, height) in enumerate(
@@ -302,7 +308,8 @@ def _armchair(room: Interior, decor: Decor) -> None:
             room.box((x, y, 0.0), (x + 0.04, y + 0.04, 0.12), legs)
 
 
-def _plant(room: Interior, x: float, y: float, seed: int) -> None:
+def plant(room: Interior, x: float, y: float, seed: int) -> None:
+    """A plant in a pot."""
     room.round(CYLINDER, (x, y, 0.16), (0.13, 0.13, 0.16), Finish("plain", "#8d8a84"))
     room.round(CYLINDER, (x, y, 0.31), (0.115, 0.115, 0.015), Finish("plain", "#2c2119"))
     rng = np.random.default_rng(seed)

@@ -219,7 +219,12 @@ def _rug(finish: Finish, uv: ndarray, half: ndarray, places: ndarray) -> ndarray
     return painted
 
 
+def _mirror(finish: Finish, uv: ndarray, half: ndarray, places: ndarray) -> ndarray:
+    return np.zeros((len(uv), 3))  # a mirror has no colour: what it shows is traced
+
+
 PAINTERS: dict[str, Painter] = {
+    "mirror": _mirror,
     "plain": _plain,
     "plaster": _plaster,
     "ceiling": _ceiling,

@@ -1,0 +1,145 @@
+"""Where imports are under way: begun by a page, from files it sends or a folder on the disk."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+import threading
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from app.state.importing.draft import Draft, folder_name
+from app.state.importing.uploads import Announced, UploadError
+from tracker.folders import settings_folder
+from tracker.sequences.reader import FILE
+
+MOST_DRAFTS = 4
+"""Imports that are begun and neither written nor given up; the oldest makes room for another."""
+
+FORGOTTEN_SECONDS = 86400.0
+"""What an earlier start left half uploaded is removed after this time."""
+
+
+class Desk:
+    """Thread-safe owner of all drafts."""
+
+    def __init__(self, data: Path | None = None, roots: Sequence[Path] = ()) -> None:
+        """Nothing is written yet.
+
+        Args:
+            data: Where recordings are; the person's own place where none is given or it can only
+                be read.
+            roots: Further folders that may be imported by their path.
+        """
+        own = settings_folder() / "recordings"
+        self.home = data.absolute() if data is not None and os.access(data, os.W_OK) else own
+        self._data = data.absolute() if data is not None else self.home
+        self._roots = [self._data, self.home, *(root.absolute() for root in roots)]
+        self._lock = threading.Lock()
+        self._drafts: dict[str, Draft] = {}
+
+    def begin(self, files: Sequence[Announced]) -> Draft:
+        """An import of files that a page is going to send.
+
+        Raises:
+            UploadError: If one of them cannot be taken.
+        """
+        first = files[0].path.split("/")[0] if files else "recording"
+        name = first if any("/" in file.path for file in files) else "recording"
+        draft = self._new(name, None)
+        try:
+            assert draft.upload is not None
+            draft.upload.announce(files)
+        except UploadError:
+            self.discard(draft.key)
+            raise
+        return draft
+
+    def begin_from(self, path: str) -> Draft | Path:
+        """An import of files on this machine; where they are a recording already, its folder.
+
+        Args:
+            path: A folder or file below the data folder, or its path from there.
+
+        Raises:
+            UploadError: If it is not there, or not below a folder that may be opened.
+        """
+        given = Path(path).expanduser()
+        place = (self._data / given).resolve()
+        if place.name == FILE:
+            place = place.parent
+        if (place / FILE).is_file():
+            return place
+        if not any(place.is_relative_to(root.resolve()) for root in self._roots):
+            raise UploadError(
+                f"{path}: expected files below the data folder {self._data}; move them there, or "
+                "start the workbench with --data"
+            )
+        if not place.exists():
+            raise UploadError(f"{path}: there is no such file or folder in {self._data}")
+        return self._new(place.stem if place.is_file() else place.name, place)
+
+    def folders(self) -> list[str]:
+        """Folders below the data folder that are no recordings yet."""
+        if not self._data.is_dir():
+            return []
+        return sorted(
+            path.name
+            for path in self._data.iterdir()
+            if path.is_dir() and not path.name.startswith(".") and not (path / FILE).is_file()
+        )
+
+    def free(self) -> int:
+        """Bytes on the disk of the recordings."""
+        place = next(one for one in (self.home, *self.home.parents) if one.exists())
+        return shutil.disk_usage(place).free
+
+    def _new(self, name: str, source: Path | None) -> Draft:
+        try:
+            self.home.mkdir(parents=True, exist_ok=True)
+            self._tidy()
+            draft = Draft(secrets.token_hex(8), self.home, self._free_name(name), source)
+        except OSError as error:
+            raise UploadError(
+                f"{self.home}: cannot be written ({error.strerror}); start the workbench with "
+                "--data and a folder that can"
+            ) from None
+        with self._lock:
+            self._drafts[draft.key] = draft
+            waiting = [key for key, d in self._drafts.items() if d.known.phase != "writing"]
+        for key in waiting[:-MOST_DRAFTS]:
+            self.discard(key)
+        return draft
+
+    def _free_name(self, name: str) -> str:
+        plain = folder_name(name)
+        found, number = plain, 1
+        while (self.home / found).exists():
+            number += 1
+            found = f"{plain}-{number}"
+        return found
+
+    def _tidy(self) -> None:
+        """Without what an earlier start left here."""
+        for path in self.home.glob(".import-*"):
+            own = path.name.removeprefix(".import-") in self._drafts
+            if not own and time.time() - path.stat().st_mtime > FORGOTTEN_SECONDS:
+                shutil.rmtree(path, ignore_errors=True)
+
+    def draft(self, key: str) -> Draft | None:
+        """One that is under way."""
+        return self._drafts.get(key)
+
+    def discard(self, key: str) -> None:
+        """Give one up; what was uploaded for it is removed."""
+        with self._lock:
+            draft = self._drafts.pop(key, None)
+        if draft is not None:
+            draft.discard()
+
+    def close(self) -> None:
+        """Give up all."""
+        for key in list(self._drafts):
+            self.discard(key)

@@ -1,0 +1,242 @@
+"""One import on its way: files that come, what they are taken for, what was found out of them."""
+
+from __future__ import annotations
+
+import logging
+import re
+import shutil
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+import cv2
+import numpy as np
+
+from app.errors import sentence
+from app.state.importing.looking import Looked, look_into
+from app.state.importing.uploads import Upload
+from app.state.importing.wish import Wish, options_of
+from tracker.formats.pieces import FormatError, ImagesPiece, VideoPiece
+from tracker.importing.gathering import Taken, gather
+from tracker.importing.settling import Settled, SettledView, settle
+from tracker.importing.writing import write
+from tracker.pipeline import Cancelled
+from tracker.sequences.video import VideoDecoder, VideoError, index_video, read_image
+
+logger = logging.getLogger("app")
+
+Phase = Literal["uploading", "reading", "settled", "failed", "writing", "written"]
+
+PICTURE_WIDTH = 256
+FILES = "files"
+"""Where uploaded files lie in the folder of their recording."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Known:
+    """What is known of a draft at one moment."""
+
+    phase: Phase
+    wish: Wish
+    version: int = 0
+    """Grows with every change."""
+    taken: tuple[Taken, ...] = ()
+    settled: Settled | None = None
+    """As it was wished last and could be; also while another wish is being looked into."""
+    looked: Looked | None = None
+    busy: bool = False
+    """Whether something is being looked into."""
+    error: str = ""
+    folder: Path | None = None
+    """Where it was written."""
+    told: tuple[str, ...] = field(default_factory=tuple)
+
+
+class Draft:
+    """See the module's words; any thread may ask."""
+
+    def __init__(self, key: str, home: Path, name: str, source: Path | None = None) -> None:
+        """Begin.
+
+        Args:
+            key: Of the draft.
+            home: Folder of the recordings that it may become one of.
+            name: What it is called until somebody says otherwise.
+            source: Files that are there already; None: they are uploaded.
+        """
+        self.key = key
+        self.home = home
+        self.folder = home / f".import-{key}"
+        self.folder.mkdir(parents=True)
+        self.upload = None if source is not None else Upload(self.folder / FILES)
+        if self.upload is not None:
+            self.upload.folder.mkdir()
+        self.source = source or self.folder / FILES
+        self._lock = threading.RLock()
+        self._known = Known("uploading" if source is None else "reading", Wish(name=name))
+        self._gathered = False
+        self._stop = threading.Event()
+        self._pictures: dict[str, bytes | None] = {}
+        if source is not None:
+            self._look_again()
+
+    @property
+    def known(self) -> Known:
+        """What is known now."""
+        return self._known
+
+    @property
+    def size(self) -> int:
+        """Of all videos, pictures and boxes that it is made of."""
+        if self.upload is not None:
+            return self.upload.size
+        return sum(path.stat().st_size for one in self._known.taken for path in one.files)
+
+    def wish(self, wish: Wish) -> None:
+        """Have it otherwise; what follows is found out anew, where it is more than the name."""
+        with self._lock:
+            if self._known.phase in ("writing", "written"):
+                return
+            before = self._known.wish
+            self._tell(wish=wish)
+            same = replace(before, name="", copy=False) == replace(wish, name="", copy=False)
+            if not same and self._gathered:
+                self._look_again()
+
+    def arrived(self) -> None:
+        """All files are there."""
+        with self._lock:
+            self._gathered = False
+            self._look_again()
+
+    def awaits(self) -> None:
+        """More files are to come."""
+        with self._lock:
+            self._stop.set()
+            self._tell(phase="uploading", busy=False)
+
+    def _tell(self, **changes: object) -> None:
+        with self._lock:
+            version = self._known.version + 1
+            self._known = replace(self._known, version=version, **changes)  # type: ignore[arg-type]
+
+    def _look_again(self) -> None:
+        """Find everything out in the background; what was under way is given up."""
+        self._stop.set()
+        stop = self._stop = threading.Event()
+        phase: Phase = "settled" if self._gathered and self._known.settled else "reading"
+        self._tell(phase=phase, busy=True, error="")
+        threading.Thread(target=self._look, args=(stop,), name="importing", daemon=True).start()
+
+    def _look(self, stop: threading.Event) -> None:
+        def tell(**changes: object) -> None:
+            with self._lock:
+                if stop.is_set():
+                    raise Cancelled
+                self._tell(**changes)
+
+        try:
+            with self._lock:
+                wish, taken, gathered = self._known.wish, self._known.taken, self._gathered
+            if not gathered:
+                taken = tuple(gather([self.source]))
+                self._gathered = not stop.is_set()
+                tell(taken=taken)
+            settled = settle(taken, options_of(wish, taken))
+            tell(settled=settled, phase="settled", error="")
+            for looked in look_into(settled, wish.name, stop.is_set):
+                tell(looked=looked)
+            tell(busy=False)
+        except Cancelled:
+            return
+        except Exception as error:
+            if not isinstance(error, ValueError | OSError):
+                logger.exception("looking into an import failed")
+            if not stop.is_set():
+                self._tell(phase="failed", busy=False, error=sentence(error))
+
+    def picture(self, camera: str) -> bytes | None:
+        """The middle picture of a camera, by its name in the calibration, as JPEG."""
+        settled = self._known.settled
+        view = next(
+            (v for v in settled.views if v.matched.raw.name == camera) if settled else iter(()),
+            None,
+        )
+        if view is None:
+            return None
+        if camera not in self._pictures:
+            self._pictures[camera] = _middle(view)
+        return self._pictures[camera]
+
+    def write(self, then: Callable[[Path], object]) -> None:
+        """Write it as a recording, in the background.
+
+        Args:
+            then: Called with the folder.
+
+        Raises:
+            FormatError: If it cannot become one yet, or its name is taken.
+        """
+        with self._lock:
+            known = self._known
+            if known.phase != "settled":
+                raise FormatError(known.error or "the files are not understood yet; wait a moment")
+            place = self.home / folder_name(known.wish.name)
+            if place.exists():
+                raise FormatError(f"there is a recording {place.name} already; choose another name")
+            self._stop.set()
+            self._tell(phase="writing", busy=False)
+        arguments = (known.taken, known.wish, place, then)
+        threading.Thread(target=self._write, args=arguments, name="import", daemon=True).start()
+
+    def _write(
+        self, taken: tuple[Taken, ...], wish: Wish, place: Path, then: Callable[[Path], object]
+    ) -> None:
+        try:
+            # what was wished last may not have been looked into yet
+            settled = settle(taken, options_of(wish, taken))
+            copied = wish.copy and self.upload is None
+            told = write(settled, self.folder, wish.name, copy=copied)
+            self.folder.replace(place)
+        except (FormatError, OSError) as error:
+            self._tell(phase="settled", error=f"it cannot be written: {sentence(error)}")
+            return
+        self._tell(phase="written", folder=place, told=tuple(told))
+        then(place)
+
+    def discard(self) -> None:
+        """Give it up; what was uploaded for it is removed."""
+        with self._lock:
+            self._stop.set()
+            if self._known.phase not in ("writing", "written"):
+                shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def folder_name(name: str) -> str:
+    """A name as a folder's: letters, digits, blanks, dashes and dots."""
+    return re.sub(r"[^\w\- .]+", "-", name).strip(" .-")[:80] or "recording"
+
+
+def _middle(view: SettledView) -> bytes | None:
+    pictures: VideoPiece | ImagesPiece | None = view.matched.video or view.matched.images
+    picture = None
+    if isinstance(pictures, VideoPiece):
+        try:
+            with VideoDecoder(index_video(pictures.path)) as decoder:
+                picture = decoder.read(pictures.frames // 2)
+        except (VideoError, OSError):
+            return None
+    elif pictures is not None:
+        picture = read_image(pictures.files[len(pictures.files) // 2])
+    return None if picture is None else small_jpeg(picture)
+
+
+def small_jpeg(picture: np.ndarray) -> bytes | None:
+    """A picture as wide as a card, as JPEG."""
+    height = max(1, round(picture.shape[0] * PICTURE_WIDTH / picture.shape[1]))
+    if picture.shape[1] > PICTURE_WIDTH:
+        picture = cv2.resize(picture, (PICTURE_WIDTH, height), interpolation=cv2.INTER_AREA)
+    done, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 82])
+    return bytes(data) if done else None

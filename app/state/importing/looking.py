@@ -1,0 +1,136 @@
+"""Looking into a settled recording in the background: checks, clocks, pairs of cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from app.state.importing.plan import Plan, draw_plan
+from tracker.agreement.consensus import Consensus
+from tracker.checks import Check
+from tracker.checks.boxes import check_boxes, listen
+from tracker.checks.cameras import check_lenses, check_places
+from tracker.checks.readings import EVERY_ORDER
+from tracker.checks.synchronisation import CameraOffset, synchronise
+from tracker.checks.timing import check_counting, check_time
+from tracker.importing.preview import as_sequence
+from tracker.importing.remedies import for_import
+from tracker.importing.settling import Settled
+from tracker.pipeline import Cancelled
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+
+MOST_STEPS = 200
+"""Of which pictures are compared; boxes are compared at all steps."""
+
+FEW = 0.25
+"""Of the share of boxes that meet in the best pair: a pair with less is odd."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """How well the boxes of two cameras meet."""
+
+    first: str
+    second: str
+    share: float
+    """Of the boxes that could, how many do."""
+    pixels: float
+    """The usual distance between the rays, in the usual box; NaN where none meet."""
+    odd: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Looked:
+    """What is known so far."""
+
+    plan: Plan
+    checks: tuple[Check, ...] = ()
+    pairs: tuple[Pair, ...] = ()
+    offsets: tuple[CameraOffset, ...] = ()
+    under_way: str = "boxes"
+    """What is being looked into; empty when all is done."""
+
+
+def look_into(settled: Settled, name: str, cancelled: Callable[[], bool]) -> Iterator[Looked]:
+    """Everything that can be said before an import, the quick things first.
+
+    Args:
+        settled: The recording.
+        name: Of it.
+        cancelled: Asked between two pictures.
+
+    Raises:
+        Cancelled: As soon as it is noticed.
+    """
+    looked = Looked(draw_plan(settled, None))
+    yield looked
+    sequence = as_sequence(settled, name)
+    told = listen(sequence, exchanges=len(sequence.views) <= EVERY_ORDER)
+    _stop_if(cancelled)
+    checks = [*check_boxes(sequence, told), check_lenses(sequence.cameras)]
+    mistaken = told is not None and told.mistaken
+    if not mistaken:
+        checks += check_places(sequence.cameras, sequence.room)
+    counting = [] if told is None else [check_counting(sequence, places=not mistaken)]
+    agreed = None if told is None else told.given.consensus
+    looked = replace(
+        looked,
+        plan=draw_plan(settled, agreed),
+        checks=(*checks, *counting),
+        pairs=() if agreed is None else _pairs(sequence, agreed),
+        under_way="" if mistaken or len(sequence.views) < 2 else "clocks",
+    )
+    looked = replace(looked, checks=_for_import(looked.checks, settled))
+    yield looked
+    if mistaken:
+        return
+    offsets: tuple[CameraOffset, ...] = ()
+    if len(sequence.views) > 1:
+        with _Stoppable(sequence, cancelled) as reader:
+            offsets = synchronise(sequence, reader=reader, most_steps=MOST_STEPS)
+    _stop_if(cancelled)
+    timing = list(check_time(sequence, found=offsets))
+    found = _for_import((*checks, *timing, *counting), settled)
+    yield replace(looked, checks=found, offsets=offsets, under_way="")
+
+
+def _for_import(checks: Iterable[Check], settled: Settled) -> tuple[Check, ...]:
+    return tuple(for_import(one, settled.reading) for one in checks)
+
+
+def _stop_if(cancelled: Callable[[], bool]) -> None:
+    if cancelled():
+        raise Cancelled
+
+
+class _Stoppable(FrameReader):
+    """A reader that gives up as soon as nobody wants its pictures any more."""
+
+    def __init__(self, sequence: Sequence, cancelled: Callable[[], bool]) -> None:
+        super().__init__(sequence)
+        self._cancelled = cancelled
+
+    def iterate(self, *arguments: int, **named: int) -> Iterator[np.ndarray | None]:
+        for picture in super().iterate(*arguments, **named):
+            _stop_if(self._cancelled)
+            yield picture
+
+
+def _pairs(sequence: Sequence, agreed: Consensus) -> tuple[Pair, ...]:
+    heights = [
+        float(np.median(v.detections.boxes[:, 3]))
+        for v in sequence.views
+        if v.detections is not None and len(v.detections.boxes)
+    ]
+    usual = float(np.median(heights)) if heights else 0.0
+    best = max(agreed.shares.values(), default=0.0)
+    found: list[Pair] = []
+    for (a, b), share in sorted(agreed.shares.items()):
+        rows = (agreed.cameras == (a, b)).all(axis=1)
+        gap = float(np.median(agreed.gaps[rows])) if rows.any() else float("nan")
+        first, second = (sequence.views[k].camera.name for k in (a, b))
+        found.append(Pair(first, second, share, gap * usual, share < FEW * best))
+    return tuple(found)

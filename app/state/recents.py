@@ -1,0 +1,120 @@
+"""What was open last: kept for the next start, with a small picture of each."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from app.state.importing.draft import small_jpeg
+from app.state.json_files import write_json
+from app.state.snapshot import Change
+from app.state.workbench import Workbench
+from tracker.folders import cache_folder
+from tracker.sequences import library
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.reader import FILE
+from tracker.sequences.sequence import SequenceError
+
+KEPT = 24
+
+
+@dataclass(frozen=True, slots=True)
+class Recent:
+    """A recording that was open."""
+
+    name: str
+    folder: str
+    """Opens it again."""
+    cameras: int
+    frames: int
+    fps: float
+    opened: float
+    """Seconds since 1970."""
+
+
+class Recents:
+    """Follows a workbench."""
+
+    def __init__(self, workbench: Workbench, file: Path | None) -> None:
+        """Read what was open before.
+
+        Args:
+            workbench: Whose recordings.
+            file: Where they are kept; None: not beyond this start.
+        """
+        self._workbench = workbench
+        self._file = file
+        self._lock = threading.Lock()
+        self._list = _read(file)
+        self._unsubscribe = workbench.subscribe(self._on_change)
+
+    def close(self) -> None:
+        """Stop following."""
+        self._unsubscribe()
+
+    def all(self) -> list[Recent]:
+        """Those that are still there, the last one first."""
+        return [one for one in self._list if (Path(one.folder) / FILE).is_file()]
+
+    def _on_change(self, change: Change) -> None:
+        sequence = self._workbench.snapshot().sequence
+        if change != "sequence" or sequence is None:
+            return
+        folder = sequence.folder.absolute()
+        if folder.is_relative_to(cache_folder()):
+            return  # a rendered room, which is always there
+        one = Recent(
+            sequence.name,
+            str(folder),
+            len(sequence.views),
+            sequence.frames,
+            sequence.fps,
+            time.time(),
+        )
+        with self._lock:
+            self._list = [one, *(o for o in self._list if o.folder != one.folder)][:KEPT]
+            if self._file is not None:
+                try:
+                    write_json(self._file, [asdict(own) for own in self._list])
+                except OSError:
+                    self._file = None  # it cannot be kept: nobody needs to hear of that twice
+
+
+def _read(file: Path | None) -> list[Recent]:
+    try:
+        values = json.loads(file.read_text(encoding="utf-8")) if file is not None else []
+        return [Recent(**value) for value in values]
+    except (OSError, ValueError, TypeError):  # none yet, or of another version
+        return []
+
+
+def thumbnail(folder: Path, cancelled: Callable[[], bool] = lambda: False) -> bytes | None:
+    """A small picture of a recording's first camera, as JPEG; made once.
+
+    Returns:
+        None where it has no pictures, or cannot be read.
+    """
+    try:
+        changed = (folder / FILE).stat().st_mtime_ns
+        key = hashlib.sha256(f"{folder} {changed}".encode()).hexdigest()[:24]
+        place = cache_folder() / "thumbnails" / f"{key}.jpg"
+        if place.is_file():
+            return place.read_bytes() or None
+        sequence = library.open_sequence(folder, cancelled=cancelled)
+        with FrameReader(sequence) as reader:
+            steps = (sequence.frames // 2, 0)
+            found = (reader.picture(0, step) for step in steps)
+            picture = next((one for one in found if one is not None), None)
+        jpeg = None if picture is None else small_jpeg(picture)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        partial = place.with_suffix(".part")
+        partial.write_bytes(jpeg or b"")
+        partial.replace(place)
+        return jpeg
+    except (SequenceError, OSError):
+        return None

@@ -1,0 +1,1 @@
+"""The routes of opening and importing, and what they tell."""

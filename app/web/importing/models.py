@@ -1,0 +1,236 @@
+"""What pages and server tell each other of opening and importing."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from app.models.base import Model, Vector
+from app.state.importing.draft import Phase
+from tracker.checks import Status
+from tracker.formats.pieces import Axes, Direction, Layout, Unit, Up
+
+
+class AnnouncedFile(Model):
+    """A file that is to come."""
+
+    path: str = Field(max_length=4096)
+    """From the folder that was dropped, with slashes; or its name alone."""
+    bytes: int = Field(ge=0)
+
+
+class AnnouncedFiles(Model):
+    """Files that are to come."""
+
+    files: list[AnnouncedFile] = Field(max_length=50_000)
+
+
+class PathRequest(Model):
+    """A folder or file on the machine that runs the workbench."""
+
+    path: str = Field(min_length=1, max_length=4096)
+
+
+class WriteRequest(Model):
+    """Write the recording."""
+
+    open: bool = True
+    """Open it when it is written, and so track."""
+
+
+class ImportWish(Model):
+    """What somebody knows better than the files; null and empty: as it was found out."""
+
+    name: str = Field(default="", max_length=120)
+    unit: Unit | None = None
+    up: Up | None = None
+    pose: Direction | None = None
+    axes: Axes | None = None
+    boxes: Layout | None = None
+    normalised: bool | None = None
+    first_index: Literal[0, 1] | None = None
+    fps: float | None = Field(default=None, gt=0.0, le=1000.0)
+    swap: list[tuple[str, str]] = Field(default_factory=list, max_length=200)
+    left_out: list[str] = Field(default_factory=list, max_length=200)
+    names: dict[str, str] = Field(default_factory=dict, max_length=200)
+    """By the camera's name in the calibration."""
+    offsets: dict[str, float] = Field(default_factory=dict, max_length=200)
+    """Seconds that are added to the time of every frame, by camera."""
+    files: list[tuple[str, str]] = Field(default_factory=list, max_length=400)
+    """A camera, and the label of a file that is its."""
+    room: tuple[Vector, Vector] | None = None
+    half_extents: Vector | None = None
+    copy_files: bool = False
+    """Whether what lies elsewhere on the disk is copied, not linked."""
+
+
+class ImportedFile(Model):
+    """A file, or a series of numbered ones, and what it was taken for."""
+
+    label: str
+    format: str
+    complaint: str
+
+
+class ImportedOffset(Model):
+    """How late a camera is against the others, as it is now."""
+
+    steps: float
+    seconds: float
+    sharpness: float
+    sure: bool
+    offsets: list[float]
+    """Steps that were tried."""
+    agreement: list[float | None]
+    """Of each; null where too little is left to compare."""
+
+
+class ImportedCamera(Model):
+    """A camera with what belongs to it."""
+
+    key: str
+    """Its name in the calibration."""
+    name: str
+    video: str
+    """Name of the file, or of the folder of pictures; empty where there is none."""
+    frames: int
+    fps: float
+    width: int
+    height: int
+    calibration: str
+    """What the calibration's file was recognised as."""
+    detections: str
+    boxes_format: str
+    boxes_per_step: float
+    seconds_late: float
+    """As it is wished."""
+    offset: ImportedOffset | None
+    """As it was found, beyond what is wished."""
+
+
+class ImportedCheck(Model):
+    """A check, and what mends it."""
+
+    name: str
+    status: Status
+    sentence: str
+    remedy: str
+    """As the command line has it; empty where there is none."""
+    mend: ImportWish | None
+    """The wish that mends it; null where nothing here does."""
+
+
+class ImportedPair(Model):
+    """How well the boxes of two cameras meet."""
+
+    first: str
+    second: str
+    share: float
+    pixels: float | None
+    odd: bool
+
+
+class ImportedPlan(Model):
+    """The room from above, metres."""
+
+    x: float
+    y: float
+    cell: float
+    width: int
+    height: int
+    seen: list[int]
+    """How many cameras see the floor, by cell, rows along y."""
+    cameras: list[tuple[float, float, float, float]]
+    """x, y, direction and half the angle across, radians."""
+    feet: list[tuple[float, float]]
+
+
+class ImportInfo(Model):
+    """An import on its way."""
+
+    key: str
+    version: int
+    phase: Phase
+    busy: bool
+    under_way: str
+    """What is being looked into."""
+    error: str
+    wish: ImportWish
+    received: int
+    """Bytes."""
+    bytes: int
+    files: list[ImportedFile]
+    offered: list[str]
+    """Labels of pictures and boxes that a camera may be given."""
+    uploaded: bool
+    """Whether the files were sent by a page."""
+    home: str
+    free: int
+    """Bytes on the disk of the recordings."""
+    fps: float
+    frames: int
+    unit: str
+    up: str
+    pose: str
+    axes: str
+    room: tuple[Vector, Vector] | None
+    suggested: tuple[Vector, Vector] | None
+    half_extents: Vector | None
+    suggested_half_extents: Vector | None
+    truth: int
+    """People in the truth; 0 where there is none."""
+    has_boxes: bool
+    """Whether every camera has boxes."""
+    found: list[tuple[str, str]]
+    told: list[str]
+    cameras: list[ImportedCamera]
+    checks: list[ImportedCheck]
+    pairs: list[ImportedPair]
+    plan: ImportedPlan | None
+    folder: str
+    """Where it was written."""
+    sheet: str = ""
+    """The sheet that shows all this, as HTML."""
+
+
+class Begun(Model):
+    """An import that was begun, or a recording that needs none."""
+
+    draft: ImportInfo | None
+    first: int = 0
+    """Number of the first of the files that were announced."""
+    recording: str = ""
+    """The folder of a recording that is one already."""
+
+
+class RecordingCard(Model):
+    """A recording that can be opened."""
+
+    name: str
+    opens: str
+    """What opens it."""
+    kind: Literal["recent", "folder", "rendered"]
+    description: str
+    cameras: int
+    frames: int
+    fps: float
+    """0 where it is not known before it is opened."""
+    opened: float
+    """Seconds since 1970; 0 where it never was."""
+    picture: str
+    """Address of its picture; empty where there is none yet."""
+
+
+class Recordings(Model):
+    """What can be opened at once, and what can be imported from the disk."""
+
+    recordings: list[RecordingCard]
+    folders: list[str]
+    """Below the data folder, that are no recordings yet."""
+    data: str
+    """Where recordings go."""
+    free: int
+    """Bytes on that disk."""
+    sheet: str
+    """The sheet that shows them, as HTML."""

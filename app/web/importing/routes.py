@@ -1,0 +1,219 @@
+"""The routes of opening and importing: what there is, uploads in pieces, wishes, writing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Query, Request, Response
+
+from app.errors import ApiError, sentence
+from app.state.importing.desk import Desk
+from app.state.importing.draft import Draft
+from app.state.importing.uploads import Announced, UploadError
+from app.state.recents import Recents, thumbnail
+from app.web.dependencies import ERRORS, Bench, Work
+from app.web.importing.models import (
+    AnnouncedFiles,
+    Begun,
+    ImportInfo,
+    ImportWish,
+    PathRequest,
+    RecordingCard,
+    Recordings,
+    WriteRequest,
+)
+from app.web.importing.sheet.start import start_sheet
+from app.web.importing.views import info_of, wish_of
+from tracker.formats.pieces import FormatError
+from tracker.sequences import library
+
+router = APIRouter(prefix="/api", responses=ERRORS)
+
+JPEG = {"content": {"image/jpeg": {}}, "description": "The picture."}
+
+
+def _desk(request: Request) -> Desk:
+    desk: Desk = request.app.state.desk
+    return desk
+
+
+AtDesk = Annotated[Desk, Depends(_desk)]
+
+
+def _draft(key: str, desk: AtDesk) -> Draft:
+    draft = desk.draft(key)
+    if draft is None:
+        raise ApiError(
+            404,
+            "no_import",
+            "This import was given up, or the workbench was started anew.",
+            hint="Drop the files again.",
+        )
+    return draft
+
+
+Own = Annotated[Draft, Depends(_draft)]
+
+
+@contextmanager
+def _complaining() -> Iterator[None]:
+    try:
+        yield
+    except (UploadError, FormatError, OSError) as error:
+        words = sentence(error)
+        raise ApiError(422, "cannot_import", f"{words[:1].upper()}{words[1:]}.") from None
+
+
+@router.get("/recordings")
+def recordings(request: Request, desk: AtDesk, bench: Bench) -> Recordings:
+    """What was open last, the folders of the data folder, the rendered rooms."""
+    recents: Recents = request.app.state.recents
+    data: Path | None = request.app.state.settings.data
+    cards = [
+        RecordingCard(
+            name=one.name, opens=one.folder, kind="recent", description="", cameras=one.cameras,
+            frames=one.frames, fps=one.fps, opened=one.opened,
+            picture=f"/api/recordings/picture?recent={number}",
+        )
+        for number, one in enumerate(recents.all())
+    ]  # fmt: skip
+    listed = {card.opens for card in cards}
+    cards += [
+        RecordingCard(
+            name=entry.name, opens=entry.name, kind=entry.kind, description=entry.description,
+            cameras=entry.cameras, frames=entry.frames, fps=0.0, opened=0.0,
+            picture=f"/api/recordings/picture?name={entry.name}" if entry.ready else "",
+        )
+        for entry in library.available(data)
+        if str(entry.folder.absolute()) not in listed and entry.error is None
+    ]  # fmt: skip
+    snapshot = bench.snapshot()
+    open_as = [snapshot.opened_as]
+    if snapshot.sequence is not None:
+        open_as.append(str(snapshot.sequence.folder.absolute()))
+    known = Recordings(
+        recordings=cards, folders=desk.folders(), data=str(desk.home), free=desk.free(), sheet=""
+    )
+    return known.model_copy(update={"sheet": start_sheet(known, open_as)})
+
+
+@router.get("/recordings/picture", response_class=Response, responses={200: JPEG})
+def recording_picture(
+    request: Request,
+    name: Annotated[str, Query(max_length=4096, description="Of the list.")] = "",
+    recent: Annotated[int, Query(ge=-1, description="Place among the recent ones.")] = -1,
+) -> Response:
+    """A small picture of a recording of the list."""
+    recents: Recents = request.app.state.recents
+    last = recents.all()
+    folder = Path(last[recent].folder) if 0 <= recent < len(last) else None
+    if folder is None:
+        entries = library.available(request.app.state.settings.data)
+        folder = next((entry.folder for entry in entries if entry.name == name), None)
+    jpeg = None if folder is None else thumbnail(folder)
+    if jpeg is None:
+        raise ApiError(404, "no_picture", "This recording has no picture.")
+    return Response(jpeg, media_type="image/jpeg", headers={"cache-control": "private, no-cache"})
+
+
+@router.post("/import")
+def begin(wish: AnnouncedFiles, desk: AtDesk) -> Begun:
+    """Begin an import of files that are sent in pieces."""
+    with _complaining():
+        draft = desk.begin([Announced(file.path, file.bytes) for file in wish.files])
+    return Begun(draft=info_of(draft))
+
+
+@router.post("/import/path")
+def begin_from(wish: PathRequest, desk: AtDesk) -> Begun:
+    """Begin an import of a folder on this machine; a recording needs none."""
+    with _complaining():
+        begun = desk.begin_from(wish.path.strip())
+    if isinstance(begun, Path):
+        return Begun(draft=None, recording=str(begun))
+    return Begun(draft=info_of(begun))
+
+
+@router.get("/import/{key}")
+def show(draft: Own) -> ImportInfo:
+    """How far it is, and everything that is known."""
+    return info_of(draft)
+
+
+@router.post("/import/{key}/files")
+def add(wish: AnnouncedFiles, draft: Own) -> Begun:
+    """More files are to come."""
+    with _complaining():
+        if draft.upload is None:
+            raise UploadError("files cannot be added to a folder on the disk; put them there")
+        first = draft.upload.announce([Announced(file.path, file.bytes) for file in wish.files])
+        draft.awaits()
+    return Begun(draft=info_of(draft), first=first)
+
+
+@router.put("/import/{key}/files/{number}", status_code=204)
+async def receive(
+    key: str,
+    number: int,
+    request: Request,
+    draft: Own,
+    offset: Annotated[int, Query(ge=0, description="Of the piece's first byte.")] = 0,
+) -> None:
+    """The next piece of a file."""
+    data = await request.body()
+    with _complaining():
+        if draft.upload is None:
+            raise UploadError("this import takes no files")
+        draft.upload.receive(number, offset, data)
+
+
+@router.post("/import/{key}/arrived")
+def arrived(draft: Own) -> ImportInfo:
+    """All files were sent: look into them."""
+    with _complaining():
+        if draft.upload is not None and not draft.upload.complete:
+            upload = draft.upload
+            raise UploadError(
+                f"expected {upload.size:,} bytes, {upload.received:,} are here; drop the rest"
+            )
+        draft.arrived()
+    return info_of(draft)
+
+
+@router.put("/import/{key}/wish")
+def wish(told: ImportWish, draft: Own) -> ImportInfo:
+    """Have it otherwise."""
+    draft.wish(wish_of(told))
+    return info_of(draft)
+
+
+@router.get("/import/{key}/picture", response_class=Response, responses={200: JPEG})
+def picture(draft: Own, camera: Annotated[str, Query(max_length=4096)]) -> Response:
+    """The middle picture of a camera, by its name in the calibration."""
+    jpeg = draft.picture(camera)
+    if jpeg is None:
+        raise ApiError(404, "no_picture", f"{camera} has no picture.")
+    return Response(jpeg, media_type="image/jpeg", headers={"cache-control": "private, no-cache"})
+
+
+@router.post("/import/{key}/write")
+def write(told: WriteRequest, draft: Own, jobs: Work) -> ImportInfo:
+    """Write the recording, and open it."""
+
+    def then(folder: Path) -> None:
+        if told.open:
+            future = jobs.open(str(folder))
+            future.add_done_callback(lambda done: done.cancelled() or done.exception())
+
+    with _complaining():
+        draft.write(then)
+    return info_of(draft)
+
+
+@router.delete("/import/{key}", status_code=204)
+def give_up(key: str, desk: AtDesk) -> None:
+    """Give it up; what was uploaded for it is removed."""
+    desk.discard(key)

@@ -1,0 +1,98 @@
+"""The sheet once files are there: cameras, room, checks, target, and what happens next."""
+
+from __future__ import annotations
+
+from app.web.importing.models import ImportInfo
+from app.web.importing.sheet.building import (
+    CLOSE,
+    GROW,
+    button,
+    element,
+    field,
+    icon,
+)
+from app.web.importing.sheet.cameras import cameras_table, ready
+from app.web.importing.sheet.settings import checks_part, room_part, target_part
+from app.web.tables.markup import Markup, joined
+
+
+def can_be_written(info: ImportInfo) -> bool:
+    """Whether a recording can be made of it."""
+    pictured = all(camera.video or camera.detections for camera in info.cameras)
+    return info.phase == "settled" and pictured
+
+
+def draft_sheet(info: ImportInfo) -> str:
+    """All of it."""
+    body = [_files(info)]
+    if info.cameras:
+        parts = (room_part(info), checks_part(info), target_part(info))
+        body = [cameras_table(info), element("div", *parts, class_="in-body")]
+    return joined(_head(info), *body, _foot(info)).html
+
+
+def _head(info: ImportInfo) -> Markup:
+    used = sum(bool(one.format) for one in info.files)
+    facts = f"{len(info.files)} files" if info.files else ""
+    if info.frames:
+        facts = (
+            f"{len(info.cameras)} cameras · {info.fps:g} Hz · {info.frames} steps · "
+            f"{info.frames / info.fps:.1f} s · {used} of {len(info.files)} files used"
+        )
+    add = button("Add files…", "files", "") if info.uploaded and info.phase != "uploading" else None
+    return element(
+        "header",
+        button(icon("prev"), "give-up", "icon start", aria_label="Back to recent"),
+        element("h2", "Import"),
+        field("in-name", "Name", info.wish.name, {"name": "$"}, maxlength=80),
+        element("span", facts, class_="sub cut", title=facts),
+        GROW,
+        add,
+        CLOSE,
+        class_="s-head",
+    )
+
+
+def _files(info: ImportInfo) -> Markup:
+    rows = [
+        element("p", element("b", one.label), " ", one.complaint or one.format or "is not used")
+        for one in info.files
+    ]
+    return element("div", rows, class_="in-scroll in-files", tabindex=0)
+
+
+def _foot(info: ImportInfo) -> Markup:
+    odd = sum(one.status == "warning" for one in info.checks)
+    done = sum(ready(info, camera) for camera in info.cameras)
+    things = f"{odd} thing{'' if odd == 1 else 's'} to decide" if odd else "nothing to decide"
+    words = {
+        "uploading": "Uploading",
+        "reading": "Reading the files",
+        "writing": "Writing the recording",
+    }.get(
+        info.phase,
+        f"{done} of {len(info.cameras)} cameras ready, {things}. Nothing is written before you "
+        "import.",
+    )
+    kind = "busy" if info.phase != "settled" else "warn" if odd else "good"
+    if info.error:
+        words, kind = info.error[:1].upper() + info.error[1:], "bad"
+    part = info.received / info.bytes if info.bytes else 1.0
+    bar = element(
+        "span", element("i"), class_="bar", role="progressbar", aria_label="Upload",
+        aria_valuemin=0, aria_valuemax=100, aria_valuenow=round(100 * part),
+        style=f"--part:{part:.4f}", hidden=info.phase != "uploading",
+    )  # fmt: skip
+    off = not can_be_written(info)
+    return element(
+        "footer",
+        element("span", class_=f"dot {kind}"),
+        bar,
+        element("span", words, class_="cut say", role="status", title=words),
+        GROW,
+        button("Stop" if info.phase == "uploading" else "Cancel", "give-up", "tall"),
+        button("Only import", "import", "box tall", disabled=off),
+        button(joined(Markup("Import and track"), element("kbd", "Ctrl ↵")), "track", "main tall",
+               disabled=off),
+        class_="s-foot",
+    )  # fmt: skip

@@ -1,0 +1,249 @@
+"""What was found out of an import: room, checks, target; each can be had otherwise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from app.web.importing.models import ImportedCheck, ImportInfo
+from app.web.importing.sheet.building import (
+    GROW,
+    element,
+    heading,
+    icon,
+    number_field,
+    segment,
+    select,
+    size_text,
+    small,
+    wishing,
+)
+from app.web.tables.markup import Cell, Markup, joined
+from tracker.sequences.sequence import PRESETS
+
+AXES = "xyz"
+UPS = ("x", "y", "z", "-x", "-y", "-z")
+FOUND = "as found"
+
+SIGNS = {"good": ("tick", "good"), "warning": ("warn", "warn"), "absent": ("minus", "none")}
+
+
+def _label(words: str, note: str) -> Markup:
+    return element("div", element("span", words), element("span", note, class_="cut", title=note),
+                   class_="lab")  # fmt: skip
+
+
+def _why(info: ImportInfo, what: str) -> str:
+    """Where a value is from."""
+    if getattr(info.wish, what) is not None:
+        return "as you say"
+    told = dict(info.found).get(what)
+    if told is None:
+        return "as the file says"
+    reason = told.split(";")[0].partition(", ")[2]
+    return f"found: {reason or told}"
+
+
+def room_part(info: ImportInfo) -> Markup:
+    """The room from above, its faces, and how the files are read."""
+    assert info.room is not None
+    words = ", ".join(
+        f"{axis} {info.room[0][k]:g} to {info.room[1][k]:g} m" for k, axis in enumerate(AXES)
+    )
+    plan = element(
+        "canvas", role="img", tabindex=0, data_plan=True,
+        aria_label=f"Room from above, {words}. Arrows move its near faces, with Shift the far ones",
+    )  # fmt: skip
+    fields: list[Markup] = []
+    for axis, letter in enumerate(AXES):
+        fields += [element("span", letter), *(_face(info, end, axis) for end in (0, 1))]
+    cover = [
+        element("span", element("i", class_=f"seen-{count}"), str(count) if count < 4 else "4 +")
+        for count in (1, 2, 3, 4)
+    ]
+    wish = info.wish
+    restore = None
+    if wish.room is not None:
+        restore = wishing(joined(icon("reset", "s"), Markup("As suggested")), {"room": None})
+    side = element(
+        "div",
+        element("div", _label("From, to", "metres"), element("div", fields, class_="xyz")),
+        element("div", _label("Up", _why(info, "up")), segment("Up", UPS, info.up, "up")),
+        element(
+            "div",
+            _label("Unit of the file", _why(info, "unit")),
+            segment("Unit", ("mm", "cm", "m"), info.unit, "unit"),
+        ),
+        _choice("Poses", "pose", wish.pose, info.pose, ("world-to-camera", "camera-to-world")),
+        _choice("Axes", "axes", wish.axes, info.axes, ("opencv", "opengl")),
+        _choice("Boxes", "boxes", wish.boxes, "", ("ltwh", "xyxy", "cxcywh")),
+        _choice("First frame", "first_index", wish.first_index, "", (0, 1)),
+        element("div", _label("Floor seen by", "cameras"),
+                element("div", cover, class_="keyline small")),
+        restore,
+        class_="rf",
+    )  # fmt: skip
+    return element(
+        "section",
+        heading("Room", small("suggested where people were seen or views overlap; drag its faces")),
+        element("div", plan, side, class_="roomy"),
+        aria_label="Room",
+    )
+
+
+def _face(info: ImportInfo, end: int, axis: int) -> Markup:
+    assert info.room is not None
+    corners: list[list[object]] = [list(corner) for corner in info.room]
+    corners[end][axis] = "#"
+    label = f"Room, {('from', 'to')[end]} {AXES[axis]}, metres"
+    value = info.room[end][axis]
+    return number_field(f"in-room-{end}-{axis}", label, value, {"room": corners}, step=0.05)
+
+
+def _choice(
+    words: str, what: str, wished: object, found: str, values: Sequence[str | int]
+) -> Markup:
+    plain = f"{found} (found)" if found and wished is None else FOUND
+    choices = [("", plain), *((str(value), str(value)) for value in values)]
+    mark = "#" if what == "first_index" else "$"
+    now = "" if wished is None else str(wished)
+    return element(
+        "label", words, select(f"in-{what}", words, choices, now, {what: mark}), class_="lab"
+    )
+
+
+def checks_part(info: ImportInfo) -> Markup:
+    """All checks, what is odd first; the pairs of cameras; the truth."""
+    order = {"warning": 0, "good": 1, "absent": 2}
+    checks = sorted(info.checks, key=lambda one: order[one.status])
+    fine = sum(one.status == "good" for one in checks)
+    odd = sum(one.status == "warning" for one in checks)
+    under_way = f"looking at the {info.under_way}…" if info.under_way else ""
+    truth = (
+        f"{info.truth} people: runs are scored against it."
+        if info.truth
+        else "None found: runs are not scored."
+    )
+    return element(
+        "section",
+        heading("Checks", small(under_way), GROW, small(f"{fine} fine · {odd} to look at")),
+        element("div", [_check(one) for one in checks], class_="checks"),
+        _pairs(info),
+        _line("good" if info.truth else "absent", "truth", truth),
+        class_="in-scroll",
+        tabindex=0,
+        aria_label="Checks",
+    )
+
+
+def _check(one: ImportedCheck) -> Markup:
+    sentence = one.sentence + (f": {one.remedy}" if one.remedy and one.mend is None else "")
+    mend = None
+    if one.mend is not None:
+        wish = one.mend.model_dump(mode="json")
+        mend = wishing("Apply", wish, "main", title=one.remedy, aria_label=f"Apply {one.remedy}")
+    return _line(one.status, one.name, sentence, mend)
+
+
+def _line(status: str, name: str, words: str, *more: Cell) -> Markup:
+    sign, kind = SIGNS[status]
+    name = name[:1].upper() + name[1:]
+    words = words[:1].upper() + words[1:]
+    return element("div", icon(sign, kind), element("b", name), element("p", words), *more,
+                   class_="chk")  # fmt: skip
+
+
+def _pairs(info: ImportInfo) -> Markup | None:
+    if not info.pairs:
+        return None
+    cells = [
+        element(
+            "span",
+            f"{pair.first} – {pair.second} ",
+            element("b", "none" if pair.pixels is None else f"{pair.pixels:.1f} px"),
+            class_="w" if pair.odd else None,
+            title=f"{100 * pair.share:.0f} % of their boxes meet",
+        )
+        for pair in info.pairs
+    ]
+    return element("div", cells, class_="pairs", role="group",
+                   aria_label="How far boxes of two cameras miss each other")  # fmt: skip
+
+
+def target_part(info: ImportInfo) -> Markup:
+    """What is tracked, and where the recording is kept."""
+    half, suggested = info.half_extents, info.suggested_half_extents
+    assert half is not None
+    assert suggested is not None
+    rows = [("Suggested", suggested, None), *((w, own, own) for w, own in PRESETS.items())]
+    pressed = next((n for n, (_, own, _) in enumerate(rows) if _same(own, half)), -1)
+    choices = [
+        _chosen(words, _size(own), number == pressed, {"half_extents": value})
+        for number, (words, own, value) in enumerate(rows)
+    ]
+    own_size: list[Markup] = []
+    for axis, words in enumerate(("Width", "Depth", "Height")):
+        wish: list[object] = list(half)
+        wish[axis] = "#"
+        own_size.append(
+            number_field(
+                f"in-size-{axis}", f"{words} of the target, metres", 2.0 * half[axis],
+                {"half_extents": wish}, data_scale=0.5, step=0.01, min=0.02,
+            )
+        )  # fmt: skip
+    own_row = element(
+        "div",
+        element("b", "Own size"),
+        element("span", own_size),
+        class_="choice own",
+        aria_current="true" if pressed < 0 else None,
+    )
+    boxes = "The boxes: no templates are needed."
+    colours = "Colours: drag boxes on the pictures once it is open."
+    return element(
+        "section",
+        heading("Target"),
+        element("div", choices, own_row, class_="choices"),
+        heading("Kept"),
+        _kept(info),
+        heading("Then track with"),
+        element("p", boxes if info.has_boxes else colours),
+        class_="in-scroll",
+        tabindex=0,
+        aria_label="Target and place",
+    )
+
+
+def _same(one: Sequence[float], other: Sequence[float]) -> bool:
+    return all(abs(a - b) < 2e-3 for a, b in zip(one, other, strict=True))
+
+
+def _size(half: Sequence[float]) -> str:
+    return " × ".join(f"{2.0 * side:.2f}" for side in half) + " m"
+
+
+def _chosen(
+    words: str, value: str, pressed: bool, wish: dict[str, object], note: str = ""
+) -> Markup:
+    return element(
+        "button",
+        element("b", words),
+        element("span", value),
+        small(note) if note else None,
+        class_="choice",
+        aria_pressed=str(pressed).lower(),
+        data_wish=wish,
+    )
+
+
+def _kept(info: ImportInfo) -> Markup:
+    free = f"{size_text(info.free)} free there"
+    if info.uploaded:
+        return element("p", f"{size_text(info.bytes)} uploaded to {info.home}, {free}.")
+    copies = info.wish.copy_files
+    return element(
+        "div",
+        _chosen("Link", "", not copies, {"copy_files": False}, "The videos stay where they are."),
+        _chosen("Copy", size_text(info.bytes), copies, {"copy_files": True},
+                f"Into {info.home}, {free}."),
+        class_="choices",
+    )  # fmt: skip

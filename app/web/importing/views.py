@@ -1,0 +1,215 @@
+"""A draft as the page is told of it."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from app.state.importing.draft import Draft, Known
+from app.state.importing.looking import Looked
+from app.state.importing.wish import WORDS, Wish, mended, places
+from app.web.importing.models import (
+    ImportedCamera,
+    ImportedCheck,
+    ImportedFile,
+    ImportedOffset,
+    ImportedPair,
+    ImportedPlan,
+    ImportInfo,
+    ImportWish,
+)
+from app.web.importing.sheet.draft import draft_sheet
+from tracker.checks import Check
+from tracker.checks.synchronisation import CameraOffset
+from tracker.formats.pieces import DetectionPiece
+from tracker.importing.settling import Settled, SettledView
+
+MOST_OFFSETS = 241
+"""Values of a curve of agreement."""
+
+MOST_LISTED = 200
+"""Files that are named one by one."""
+
+
+def wish_of(told: ImportWish) -> Wish:
+    """As the draft takes it."""
+    values = {name: getattr(told, name) for name in WORDS if name != "copy"}
+    for name in ("swap", "left_out", "files"):
+        values[name] = tuple(values[name])
+    values["name"] = told.name.strip()
+    return Wish(**values, copy=told.copy_files)
+
+
+def _wish_info(wish: Wish, changes: Mapping[str, Any] | None = None) -> ImportWish:
+    values: dict[str, Any] = {name: getattr(wish, name) for name in WORDS} | dict(changes or {})
+    values["copy_files"] = values.pop("copy")
+    for name in ("swap", "left_out", "files"):
+        values[name] = list(values[name])
+    for name in ("names", "offsets"):
+        values[name] = dict(values[name])
+    return ImportWish(**values)
+
+
+def info_of(draft: Draft) -> ImportInfo:
+    """Everything that is known, and the sheet that shows it."""
+    info = _info(draft)
+    return info.model_copy(update={"sheet": draft_sheet(info)})
+
+
+def _info(draft: Draft) -> ImportInfo:
+    known, upload = draft.known, draft.upload
+    settled, looked = known.settled, known.looked
+    return ImportInfo(
+        key=draft.key,
+        version=known.version,
+        phase=known.phase,
+        busy=known.busy,
+        under_way=looked.under_way if looked is not None and known.busy else "",
+        error=known.error,
+        wish=_wish_info(known.wish),
+        received=draft.size if upload is None else upload.received,
+        bytes=draft.size,
+        files=_files(known),
+        offered=list(places(known.taken))[:MOST_LISTED],
+        uploaded=upload is not None,
+        home=str(draft.home),
+        free=shutil.disk_usage(draft.home).free,
+        **_recording(settled),
+        cameras=[] if settled is None else [_camera(view, known) for view in settled.views],
+        checks=[] if looked is None else [_check(one, known.wish) for one in looked.checks],
+        pairs=[] if looked is None else _pairs(looked),
+        plan=None if looked is None else _plan(looked),
+        folder="" if known.folder is None else str(known.folder),
+    )
+
+
+def _recording(settled: Settled | None) -> dict[str, Any]:
+    if settled is None:
+        return {
+            "fps": 0.0, "frames": 0, "unit": "", "up": "", "pose": "", "axes": "", "room": None,
+            "suggested": None, "half_extents": None, "suggested_half_extents": None, "truth": 0,
+            "has_boxes": False, "found": [], "told": [],
+        }  # fmt: skip
+    room, own = settled.room, settled.suggested
+    return {
+        "fps": settled.fps,
+        "frames": settled.frames,
+        "unit": settled.reading.unit,
+        "pose": settled.reading.direction,
+        "axes": settled.reading.axes,
+        "up": settled.reading.up,
+        "room": (_vector(room.minimum), _vector(room.maximum)),
+        "suggested": (_vector(own.minimum), _vector(own.maximum)),
+        "half_extents": _vector(room.half_extents),
+        "suggested_half_extents": _vector(own.half_extents),
+        "truth": 0 if settled.truth is None else len(np.unique(settled.truth.ids)),
+        "has_boxes": all(view.detections is not None for view in settled.views),
+        "found": list(settled.found),
+        "told": list(settled.told),
+    }
+
+
+def _vector(values: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = (round(float(value), 4) + 0.0 for value in values)
+    return x, y, z
+
+
+def _files(known: Known) -> list[ImportedFile]:
+    return [
+        ImportedFile(
+            label=one.label,
+            format=one.format if one.pieces else "",
+            complaint=one.complaint,
+        )
+        for one in known.taken[:MOST_LISTED]
+    ]
+
+
+def _camera(view: SettledView, known: Known) -> ImportedCamera:
+    matched, camera = view.matched, view.camera
+    settled, looked = known.settled, known.looked
+    assert settled is not None
+    video, images, boxes = matched.video, matched.images, view.detections
+    own = matched.detections
+    offsets = () if looked is None else looked.offsets
+    return ImportedCamera(
+        key=matched.raw.name,
+        name=camera.name,
+        video=video.path.name if video else images.folder.name if images else "",
+        frames=video.frames if video else len(images.files) if images else 0,
+        fps=round(view.time.timing.fps or settled.fps, 3),
+        width=camera.image_size[0],
+        height=camera.image_size[1],
+        calibration=settled.calibration,
+        detections="" if own is None else _label(known, own),
+        boxes_format="" if own is None else own.format,
+        boxes_per_step=0.0 if boxes is None else round(len(boxes.frames) / settled.frames, 1),
+        seconds_late=0.0 - view.time.timing.time_offset,
+        offset=next((_offset(one) for one in offsets if one.camera == camera.name), None),
+    )
+
+
+def _label(known: Known, piece: DetectionPiece) -> str:
+    """The file or series that a piece is of; of files that are a camera each, this file."""
+    for one in known.taken:
+        if any(own is piece for own in one.pieces):
+            return one.label if len(one.pieces) == 1 else piece.source.name
+    return piece.source.name
+
+
+def _offset(one: CameraOffset) -> ImportedOffset:
+    kept = max(1, -(-len(one.curve.offsets) // MOST_OFFSETS))
+    agreement = [
+        round(float(value), 4) if math.isfinite(value) else None
+        for value in one.curve.agreement[::kept]
+    ]
+    return ImportedOffset(
+        steps=one.steps,
+        seconds=one.seconds,
+        sharpness=one.sharpness if math.isfinite(one.sharpness) else 0.0,
+        sure=one.sure,
+        offsets=[float(value) for value in one.curve.offsets[::kept]],
+        agreement=agreement,
+    )
+
+
+def _check(one: Check, wish: Wish) -> ImportedCheck:
+    changes = mended(wish, one)
+    return ImportedCheck(
+        name=one.name,
+        status=one.status,
+        sentence=one.sentence,
+        remedy=" ".join(str(remedy) for remedy in one.remedies),
+        mend=_wish_info(wish, changes) if changes else None,
+    )
+
+
+def _pairs(looked: Looked) -> list[ImportedPair]:
+    return [
+        ImportedPair(
+            first=pair.first,
+            second=pair.second,
+            share=pair.share,
+            pixels=round(pair.pixels, 2) if math.isfinite(pair.pixels) else None,
+            odd=pair.odd,
+        )
+        for pair in looked.pairs
+    ]
+
+
+def _plan(looked: Looked) -> ImportedPlan:
+    plan = looked.plan
+    return ImportedPlan(
+        x=plan.origin[0],
+        y=plan.origin[1],
+        cell=plan.cell,
+        width=plan.seen.shape[1],
+        height=plan.seen.shape[0],
+        seen=plan.seen.ravel().tolist(),
+        cameras=list(plan.cameras),
+        feet=[(round(float(x), 3), round(float(y), 3)) for x, y in plan.feet],
+    )

@@ -1,0 +1,274 @@
+/** The sheet that opens recordings: by a key, by a drop anywhere, from files or from the disk. */
+import { all, h, one } from "../elements/dom.js";
+import { ApiError, getJson, request, sendJson } from "../state/api.js";
+import { drawCurve, mountPlan } from "./plan.js";
+import { announced, chosen, dropped, send } from "./upload.js";
+
+const ASK_AGAIN = 400;
+const SCROLLING = ".cams-scroll, .in-scroll, .open-list";
+
+/** @param {Context} context */
+export function mountOpening({ store, actions }) {
+	const dialog = /** @type {any} */ (one("dialog.opener"));
+	const layer = one(".drop-layer");
+	/** @type {Server.ImportInfo | null} */
+	let info = null;
+	/** Wishes to go back to, newest last.  @type {Server.ImportWish[]} */
+	let past = [];
+	/** @type {AbortController | null} */
+	let sending = null;
+	let [shown, trouble, turns] = ["", "", 0];
+	/** What is being wished; writing comes after it. */
+	let wishing = Promise.resolve();
+	/** @type {Timer} */
+	let timer;
+
+	/** Do something with the server; what it refuses is told in the sheet. @param {() => Promise<any>} work */
+	async function attempt(work) {
+		trouble = "";
+		try {
+			await work();
+		} catch (error) {
+			if (error instanceof DOMException && error.name === "AbortError") return;
+			if (!(error instanceof ApiError)) throw error;
+			if (error.code === "no_import") info = null;
+			trouble = [error.message, error.hint].filter(Boolean).join(" ");
+		}
+		if (!info) await start();
+		else say(trouble);
+	}
+
+	/** @param {string} words  in place of what the foot says */
+	function say(words) {
+		for (const place of words ? all(".say", dialog) : []) place.title = place.textContent = words;
+	}
+
+	async function start() {
+		const { sheet } = await getJson("/api/recordings");
+		if (info) return;
+		show(sheet);
+		if (trouble) dialog.append(h("p", { class: "s-foot say", role: "alert" }, trouble));
+	}
+
+	/** @param {Server.ImportInfo} next */
+	function take(next) {
+		if (info?.key === next.key && next.version < info.version) return;
+		info = next;
+		clearTimeout(timer);
+		if (next.phase === "written") {
+			info = null;
+			past = [];
+			dialog.close();
+			actions.note("info", `${next.wish.name} was imported`, next.folder);
+		} else {
+			show(next.sheet);
+			if (next.busy || next.phase === "writing" || next.phase === "reading")
+				timer = setTimeout(
+					() => info && attempt(async () => take(await getJson(`/api/import/${next.key}`))),
+					ASK_AGAIN,
+				);
+		}
+	}
+
+	/** @param {string} html */
+	function show(html) {
+		const held = document.activeElement;
+		// Whoever types or drags is not disturbed: what he does is sent when he has done it.
+		const types = held instanceof HTMLInputElement && held.value !== held.defaultValue;
+		if ((dialog.contains(held) && types) || one("[data-held]", dialog)) return;
+		if (html !== shown) {
+			const at = all("button, input, select", dialog).findIndex((control) => control === held);
+			const scrolled = all(SCROLLING, dialog).map(({ scrollTop }) => scrollTop);
+			dialog.innerHTML = shown = html;
+			dialog.classList.toggle("wide", Boolean(info));
+			all(SCROLLING, dialog).forEach((part, k) => (part.scrollTop = scrolled[k] ?? 0));
+			if (at >= 0)
+				(
+					(held?.id && document.getElementById(held.id)) ||
+					all("button, input, select", dialog)[at]
+				)?.focus();
+			for (const image of all("img", dialog)) image.onerror = () => image.remove();
+		}
+		draw();
+	}
+
+	function draw() {
+		const now = info;
+		if (!now) return;
+		for (const curve of all("[data-curve]", dialog)) {
+			const found = now.cameras[Number(curve.dataset.curve)].offset;
+			drawCurve(/** @type {any} */ (curve), found, Number(curve.dataset.late));
+		}
+		for (const plan of all("[data-plan]", dialog))
+			mountPlan(/** @type {any} */ (plan), now, (room) => wish({ room }));
+	}
+
+	/** @param {Partial<Server.ImportWish>} changes @param {boolean} [undone] */
+	function wish(changes, undone) {
+		if (!info) return;
+		if (!undone) past.push(info.wish);
+		const told = { ...info.wish, ...changes };
+		info = { ...info, wish: told };
+		const { key } = info;
+		const turn = (turns += 1);
+		wishing = attempt(async () => {
+			const answer = await sendJson("PUT", `/api/import/${key}/wish`, told);
+			if (turn === turns && info?.key === key) take(answer);
+		});
+	}
+
+	/** What a control wishes, with its value where that belongs. @param {Part} control */
+	function wishOf({ dataset, value, tagName }) {
+		const number = Number(value) * Number(dataset.scale ?? 1);
+		const fits = (/** @type {string} */ _, /** @type {any} */ part) =>
+			part === "$"
+				? value || (tagName === "SELECT" ? null : "")
+				: part === "#"
+					? value
+						? number
+						: null
+					: part;
+		return JSON.parse(dataset.wish ?? "{}", fits);
+	}
+
+	/** @param {Dropped[]} files */
+	function bring(files) {
+		if (!files.length) return;
+		if (!dialog.open) dialog.showModal();
+		void attempt(async () => {
+			const more = info?.uploaded ? info : null;
+			if (!more) await giveUp();
+			const path = more ? `/api/import/${more.key}/files` : "/api/import";
+			const { draft, first } = await sendJson("POST", path, announced(files));
+			take(draft);
+			const begun = performance.now();
+			let sent = 0;
+			sending = new AbortController();
+			try {
+				await send(draft.key, first, files, sending.signal, (bytes) => {
+					sent += bytes;
+					const speed = sent / 1e3 / (performance.now() - begun + 1);
+					const part = (draft.received + sent) / draft.bytes;
+					for (const bar of all(".bar", dialog)) {
+						bar.style.setProperty("--part", String(part));
+						bar.ariaValueNow = String(Math.round(100 * part));
+					}
+					const [here, whole] = [draft.received + sent, draft.bytes].map((b) =>
+						(b / 1e6).toFixed(1),
+					);
+					say(`${here} of ${whole} MB · ${speed.toFixed(0)} MB/s`);
+				});
+			} catch (error) {
+				// What cannot be finished leaves nothing behind.
+				await giveUp();
+				throw error;
+			}
+			take(await sendJson("POST", `/api/import/${draft.key}/arrived`));
+		});
+	}
+
+	async function giveUp() {
+		sending?.abort();
+		sending = null;
+		past = [];
+		clearTimeout(timer);
+		const gone = info;
+		info = null;
+		if (gone) await request(`/api/import/${gone.key}`, { method: "DELETE" });
+	}
+
+	/** @param {boolean} open */
+	const write = (open) =>
+		attempt(async () => {
+			await wishing;
+			if (!info || one("[data-do=track]", dialog).disabled) return;
+			if (open) store.set({ asked: info.wish.name });
+			take(await sendJson("POST", `/api/import/${info.key}/write`, { open }));
+		});
+
+	/** @param {boolean} folder */
+	function choose(folder) {
+		const input = h("input", { type: "file", multiple: true, webkitdirectory: folder });
+		input.onchange = () => input.files && bring(chosen(input.files));
+		input.click();
+	}
+
+	/** @param {string} name */
+	function recording(name) {
+		dialog.close();
+		void actions.open(name);
+	}
+
+	/** What the sheet's buttons do. @type {Record<string, (value: string) => void>} */
+	const DO = {
+		close: () => dialog.close(),
+		files: () => choose(false),
+		folder: () => choose(true),
+		recording,
+		path: () =>
+			void attempt(async () => {
+				const { draft, recording: folder } = await sendJson("POST", "/api/import/path", {
+					path: one("#open-path", dialog).value,
+				});
+				if (draft) take(draft);
+				else recording(folder);
+			}),
+		"give-up": () => void attempt(giveUp),
+		import: () => void write(false),
+		track: () => void write(true),
+	};
+
+	actions.openSheet = () => {
+		if (dialog.open) return dialog.close();
+		dialog.showModal();
+		if (info) take(info);
+		else void attempt(start);
+	};
+	dialog.addEventListener("click", (/** @type {any} */ { target }) => {
+		if (target === dialog) return dialog.close();
+		const button = target.closest("button");
+		if (button?.dataset.wish) wish(wishOf(button));
+		else DO[button?.dataset.do]?.(button.dataset.value);
+	});
+	dialog.addEventListener("submit", (/** @type {Event} */ event) => event.preventDefault());
+	dialog.addEventListener(
+		"change",
+		(/** @type {any} */ { target }) => target.dataset.wish && wish(wishOf(target)),
+	);
+	dialog.addEventListener("input", (/** @type {any} */ { target }) => {
+		if (target.id !== "open-find") return;
+		for (const card of all(".rec", dialog))
+			card.hidden = !card.textContent?.toLowerCase().includes(target.value.toLowerCase());
+	});
+	dialog.addEventListener("keydown", (/** @type {any} */ event) => {
+		const { target, key } = event;
+		const types = target.matches("input");
+		if (key === "Enter" && types) target.id === "open-path" ? DO.path("") : target.blur();
+		if (!event.ctrlKey && !event.metaKey) return key === "Enter" && types && event.preventDefault();
+		if (key === "Enter") void write(true);
+		else if (key === "o") dialog.close();
+		else if (key === "z" && !types && past.length) wish(past.pop() ?? {}, true);
+		else return;
+		event.preventDefault();
+	});
+	dialog.addEventListener("close", () => clearTimeout(timer));
+	store.on(["theme"], draw);
+	addEventListener("resize", draw);
+
+	// The layer lies over the 3D view, which would swallow what is dropped on it.
+	const carries = (/** @type {DragEvent} */ { dataTransfer }) =>
+		dataTransfer?.types.includes("Files");
+	addEventListener("dragenter", (event) => {
+		if (!carries(event)) return;
+		(dialog.open ? dialog : document.body).append(layer);
+		layer.hidden = false;
+	});
+	addEventListener("dragover", (event) => carries(event) && event.preventDefault());
+	layer.addEventListener("dragleave", () => (layer.hidden = true));
+	addEventListener("drop", (event) => {
+		layer.hidden = true;
+		if (!carries(event) || !event.dataTransfer) return;
+		event.preventDefault();
+		void dropped(event.dataTransfer).then(bring);
+	});
+}

@@ -1,0 +1,125 @@
+"""What parameters would change: computed on demand, kept, and given up when somebody works."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.scene.panel.curves import drawing_of, style_of, words_of
+from app.state import sensitivity as module
+from app.state.sensitivity import Curve, Sensitivity, values_to_try
+from app.state.workbench import Workbench
+from tracker import parameters as table
+from tracker import pipeline
+from tracker.evaluation import evaluate_sequence
+from tracker.parameters import PARAMETERS, ParameterError
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.reader import read_sequence
+
+P_D, T_E = "fusion.detection_probability", "fusion.extraction_threshold"
+
+
+@pytest.fixture
+def bench(crossing: Path) -> Workbench:
+    workbench = Workbench()
+    sequence = read_sequence(crossing)
+    workbench.open(sequence, "key", FrameReader(sequence), pipeline.default_parameters(sequence))
+    return workbench
+
+
+@pytest.fixture
+def curves(bench: Workbench) -> Iterator[Sensitivity]:
+    made = Sensitivity(bench)
+    yield made
+    made.close()
+
+
+def until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + 60.0
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize("parameter", PARAMETERS.values(), ids=lambda p: p.key)
+def test_the_values_tried_are_few_allowed_and_hold_the_one_now(parameter: table.Parameter) -> None:
+    values = values_to_try(parameter, parameter.default)
+    assert parameter.default in values
+    assert 2 <= len(values) <= 7
+    assert len(set(values)) == len(values)
+    for value in values:
+        table.with_values(table.RunParameters(), {parameter.key: value})
+
+
+def test_a_curve_is_what_runs_of_these_values_reach(bench: Workbench, curves: Sensitivity) -> None:
+    curves.ask([T_E])
+    until(lambda: not curves.under_way)
+    curve = curves.curves()[T_E]
+    assert curve.whole
+    assert curve.measure == "MOTA"
+    now = bench.snapshot()
+    assert now.sequence is not None
+    assert curve.values == values_to_try(PARAMETERS[T_E], table.value(now.parameters, T_E))
+    last = table.with_values(now.parameters, {T_E: curve.values[-1]})
+    run = pipeline.compute(now.sequence, last)
+    figures = evaluate_sequence(now.sequence, run.tracks).figures
+    mota = next(figure.value for figure in figures if figure.definition.key == "mota")
+    assert curve.scores[-1] == pytest.approx(mota)
+
+
+def test_a_curve_holds_whatever_its_parameter_is_and_is_not_computed_twice(
+    bench: Workbench, curves: Sensitivity, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    curves.ask([T_E])
+    until(lambda: not curves.under_way)
+    bench.set_parameters({T_E: curves.curves()[T_E].values[0]}, "test")
+    assert curves.curves()[T_E].whole
+    monkeypatch.setattr(module.pipeline, "compute", lambda *_, **__: pytest.fail("computed again"))
+    curves.ask([T_E])
+    until(lambda: not curves.under_way)
+    bench.set_parameters({P_D: 0.5}, "test")
+    assert T_E not in curves.curves(), "of other parameters nothing is known"
+
+
+@pytest.mark.parametrize("work", [
+    lambda bench: bench.set_parameters({P_D: 0.5}, "test"),
+    lambda bench: bench.seek(7),
+])  # fmt: skip
+def test_whoever_works_ends_it(
+    bench: Workbench, curves: Sensitivity, monkeypatch: pytest.MonkeyPatch, work: Any
+) -> None:
+    begun: list[bool] = []
+    ended: list[bool] = []
+
+    def compute(*_: Any, cancelled: Callable[[], bool], **__: Any) -> None:
+        begun.append(True)
+        until(cancelled)
+        ended.append(True)
+        raise pipeline.Cancelled
+
+    monkeypatch.setattr(module.pipeline, "compute", compute)
+    curves.ask([P_D, T_E])
+    until(lambda: bool(begun))
+    assert curves.under_way == [P_D, T_E]
+    work(bench)
+    until(lambda: bool(ended) and not curves.under_way)
+    assert curves.curves() == {}
+
+
+def test_what_is_no_parameter_is_refused(curves: Sensitivity) -> None:
+    with pytest.raises(ParameterError):
+        curves.ask(["fusion.nothing"])
+
+
+def test_the_panel_says_it_in_words_and_draws_it() -> None:
+    curve = Curve(P_D, "MOTA", (0.2, 0.5, 0.95), (0.913, None, 0.978), whole=True)
+    assert words_of(curve) == "0.2 … 0.95: MOTA 0.91 … 0.98"
+    assert drawing_of(curve, 0.95).count("<circle") == 1
+    assert 'label[for="x"]' in style_of([(curve, 0.95, ["x"])])
+    flat = Curve(P_D, "tracks", (1, 2), (4.0, 4.0), whole=False)
+    assert words_of(flat) == "1 … 2: tracks 4 throughout, computing"
+    assert words_of(Curve(P_D, "MOTA", (1, 2), (None, None), whole=True)).startswith("no run")

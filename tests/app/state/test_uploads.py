@@ -1,0 +1,105 @@
+"""What files that a page sends may be called, and how they arrive."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from app.state.importing import uploads
+from app.state.importing.desk import Desk
+from app.state.importing.uploads import Announced, Upload, UploadError, safe_path
+
+
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [
+        ("../cam1.mp4", "leads elsewhere"),
+        ("a/../../b.csv", "leads elsewhere"),
+        ("/etc/passwd", "leads elsewhere"),
+        ("a//b.csv", "leads elsewhere"),
+        ("", "leads elsewhere"),
+        ("..\\b.csv", "without backslash and colon"),
+        ("C:/b.csv", "without backslash and colon"),
+        ("a\n.csv", "control characters"),
+        ("x" * 201, "more than 200 bytes"),
+        ("a/" * 10 + "b.csv", "within each other"),
+        ("aux.csv", "not every file system"),
+        ("folder./b.csv", "not every file system"),
+    ],
+)
+def test_names_that_lead_elsewhere_are_refused(path: str, words: str) -> None:
+    with pytest.raises(UploadError, match=words):
+        safe_path(path)
+
+
+def test_ordinary_names_are_taken() -> None:
+    for path in ("cam1.mp4", "session 3/cam_01 (2).mp4", "Größe/ü.csv", "a.b.c"):
+        assert safe_path(path).as_posix() == path
+
+
+def _upload(folder: Path, **files: int) -> Upload:
+    upload = Upload(folder)
+    folder.mkdir()
+    upload.announce([Announced(name, size) for name, size in files.items()])
+    return upload
+
+
+def test_pieces_come_one_after_the_other(tmp_path: Path) -> None:
+    upload = _upload(tmp_path / "files", a=5, b=0)
+    upload.receive(0, 0, b"abc")
+    assert not upload.complete
+    for offset, data, words in ((0, b"x", "from byte 3 on"), (3, b"xyz", "found more")):
+        with pytest.raises(UploadError, match=words):
+            upload.receive(0, offset, data)
+    with pytest.raises(UploadError, match="was announced"):
+        upload.receive(2, 0, b"x")
+    upload.receive(0, 3, b"de")
+    assert upload.complete
+    assert (tmp_path / "files/a").read_bytes() == b"abcde"
+    assert (tmp_path / "files/b").read_bytes() == b""
+
+
+def test_what_has_no_room_is_refused_before_anything_is_sent(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    upload = _upload(tmp_path / "files", a=5)
+    with pytest.raises(UploadError, match="at most 64 GB"):
+        upload.announce([Announced("b", uploads.MOST_BYTES)])
+    with pytest.raises(UploadError, match="among the files already"):
+        upload.announce([Announced("a", 1)])
+    monkeypatch.setattr(uploads, "SPARED_BYTES", 1 << 62)
+    with pytest.raises(UploadError, match=r"has room for 0\.0 GB"):
+        upload.announce([Announced("b", 1)])
+    monkeypatch.setattr(uploads, "MOST_FILES", 1)
+    with pytest.raises(UploadError, match="at most 1 files"):
+        upload.announce([Announced("b", 0)])
+    assert upload.files == 1
+
+
+def test_a_file_cannot_be_a_folder_too(tmp_path: Path) -> None:
+    upload = _upload(tmp_path / "files", a=1)
+    with pytest.raises((UploadError, OSError)):
+        upload.announce([Announced("a/b", 1)])
+
+
+def test_only_what_is_below_the_data_folder_is_opened(tmp_path: Path) -> None:
+    data, other = tmp_path / "data", tmp_path / "other"
+    data.mkdir()
+    (other / "session").mkdir(parents=True)
+    (data / "way-out").symlink_to(other / "session")
+    desk = Desk(data)
+    for path in (str(other / "session"), "../other/session", "way-out"):
+        with pytest.raises(UploadError, match="below the data folder"):
+            desk.begin_from(path)
+    with pytest.raises(UploadError, match="there is no such file or folder"):
+        desk.begin_from("nothing")
+    assert [path.name for path in data.iterdir()] == ["way-out"]
+
+
+def test_the_oldest_import_makes_room(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    drafts = [desk.begin([Announced("a.csv", 1)]) for _ in range(6)]
+    assert [desk.draft(draft.key) is not None for draft in drafts] == [False] * 2 + [True] * 4
+    desk.close()
+    assert list(tmp_path.iterdir()) == []

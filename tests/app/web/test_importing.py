@@ -1,0 +1,199 @@
+"""From files that a page sends, or a folder on the disk, to an open recording."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.web.server import Settings, create_app
+from tests.app.conftest import ADDRESS, wait_until
+from tests.formats.recorded import detections, toml, videos
+
+PIECE = 4096
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """An empty folder of recordings."""
+    folder = tmp_path / "data"
+    folder.mkdir()
+    return folder
+
+
+@pytest.fixture
+def client(data: Path) -> Iterator[TestClient]:
+    """A workbench with nothing open."""
+    app = create_app(Settings(data=data, with_viser=False))
+    with TestClient(app, base_url=ADDRESS) as client:
+        yield client
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    """A recording as other programs leave it: Anipose's calibration and boxes."""
+    folder = tmp_path / "session"
+    folder.mkdir()
+    toml(folder)
+    detections(folder)
+    (folder / "notes.txt").write_text("the door was open\n")
+    return folder
+
+
+def _send(client: TestClient, folder: Path) -> str:
+    paths = sorted(path for path in folder.rglob("*") if path.is_file())
+    announced = [
+        {"path": path.relative_to(folder.parent).as_posix(), "bytes": path.stat().st_size}
+        for path in paths
+    ]
+    begun = client.post("/api/import", json={"files": announced}).json()["draft"]
+    for number, path in enumerate(paths):
+        content = path.read_bytes()
+        for offset in range(0, len(content), PIECE):
+            address = f"/api/import/{begun['key']}/files/{number}?offset={offset}"
+            answer = client.put(address, content=content[offset : offset + PIECE])
+            assert answer.status_code == 204, answer.text
+    assert client.post(f"/api/import/{begun['key']}/arrived").status_code == 200
+    return begun["key"]
+
+
+def _settled(client: TestClient, key: str) -> dict[str, Any]:
+    deadline = time.monotonic() + 60.0
+    while True:
+        info: dict[str, Any] = client.get(f"/api/import/{key}").json()
+        if not info["busy"] and info["phase"] != "reading":
+            return info
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def _wish(client: TestClient, info: dict[str, Any], **changes: Any) -> dict[str, Any]:
+    address = f"/api/import/{info['key']}/wish"
+    answer = client.put(address, json={**info["wish"], **changes})
+    assert answer.status_code == 200, answer.text
+    return _settled(client, info["key"])
+
+
+def test_files_that_are_sent_become_a_recording(
+    client: TestClient, files: Path, data: Path
+) -> None:
+    info = _settled(client, _send(client, files))
+    assert info["phase"] == "settled"
+    assert info["wish"]["name"] == "session"
+    assert [camera["name"] for camera in info["cameras"]] == ["cam1", "cam2", "cam3", "cam4"]
+    assert info["cameras"][0]["detections"] == "cam1.csv"
+    assert {one["label"] for one in info["files"] if not one["format"]} == {"session/notes.txt"}
+    assert {one["status"] for one in info["checks"]} == {"good"}
+    assert len(info["pairs"]) == 6
+    assert not any(pair["odd"] for pair in info["pairs"])
+    plan = info["plan"]
+    assert len(plan["seen"]) == plan["width"] * plan["height"]
+    assert max(plan["seen"]) == 4
+    assert plan["feet"]
+    info = _wish(client, info, name="living room")
+    client.post(f"/api/import/{info['key']}/write", json={"open": True})
+    wait_until(lambda: client.get("/api/state").json()["sequence"] is not None)
+    assert client.get("/api/state").json()["sequence"]["name"] == "living room"
+    assert (data / "living room/files/session/cam1.csv").is_file()
+    assert sorted(path.name for path in data.iterdir()) == ["living room"]
+    cards = client.get("/api/recordings").json()["recordings"]
+    assert (cards[0]["name"], cards[0]["kind"], cards[0]["cameras"]) == ("living room", "recent", 4)
+
+
+def test_a_wish_is_looked_into_and_can_be_taken_back(client: TestClient, files: Path) -> None:
+    info = _settled(client, _send(client, files))
+    other = _wish(client, info, pose="camera-to-world")
+    assert {one["status"] for one in other["checks"]} != {"good"}
+    mend = next(one["mend"] for one in other["checks"] if one["mend"])
+    assert mend["pose"] == "world-to-camera"
+    assert _wish(client, other, **mend)["checks"] == info["checks"]
+    late = _wish(client, info, offsets={"cam2": -0.2})
+    assert late["cameras"][1]["offset"]["steps"] == pytest.approx(-0.2 * info["fps"], abs=1.0)
+    room = [[-2.0, -2.0, 0.0], [2.0, 2.0, 2.0]]
+    small = _wish(client, info, room=room, left_out=["cam4"], half_extents=[0.2, 0.2, 0.8])
+    assert small["room"] == room
+    assert small["suggested"] != room
+    assert small["half_extents"] == [0.2, 0.2, 0.8]
+    assert len(small["cameras"]) == 3
+    wrong = _wish(client, info, names={"cam1": "cam2"})
+    assert (wrong["phase"], 'found "cam2" twice' in wrong["error"]) == ("failed", True)
+    assert _wish(client, info, names={})["phase"] == "settled"
+
+
+def test_pictures_of_cameras_are_shown(client: TestClient, tmp_path: Path) -> None:
+    folder = tmp_path / "filmed"
+    folder.mkdir()
+    toml(folder, size=(320, 180))
+    videos(folder, size=(320, 180), frames=12)
+    info = _settled(client, _send(client, folder))
+    assert info["cameras"][0]["video"] == "cam1.avi"
+    assert (info["cameras"][0]["frames"], info["cameras"][0]["fps"]) == (12, 20.0)
+    address = f"/api/import/{info['key']}/picture"
+    answer = client.get(address, params={"camera": "cam1"})
+    assert answer.headers["content-type"] == "image/jpeg"
+    assert client.get(address, params={"camera": "cam9"}).status_code == 404
+    names = {one["name"]: one for one in info["checks"]}
+    assert "only lenses, places of the cameras and motion" in names["boxes meet in 3D"]["sentence"]
+    assert {"lenses", "cameras above the floor", "views overlap"} <= set(names)
+
+
+def test_a_folder_of_the_disk_is_not_copied(client: TestClient, files: Path, data: Path) -> None:
+    inside = files.rename(data / "walk")
+    videos(inside, frames=60)
+    assert client.get("/api/recordings").json()["folders"] == ["walk"]
+    begun = client.post("/api/import/path", json={"path": "walk"}).json()["draft"]
+    info = _settled(client, begun["key"])
+    assert info["wish"]["name"] == "walk-2"
+    client.post(f"/api/import/{info['key']}/write", json={"open": False})
+    wait_until(lambda: (data / "walk-2").exists())
+    video = data / "walk-2/cam1.avi"
+    assert video.stat().st_ino == (inside / "cam1.avi").stat().st_ino
+    assert client.get("/api/state").json()["sequence"] is None
+    again = client.post("/api/import/path", json={"path": "walk-2/sequence.toml"}).json()
+    assert again == {"draft": None, "first": 0, "recording": str(data / "walk-2")}
+
+
+def test_an_import_that_is_given_up_leaves_nothing(
+    client: TestClient, files: Path, data: Path
+) -> None:
+    key = _send(client, files)
+    assert client.delete(f"/api/import/{key}").status_code == 204
+    answer = client.get(f"/api/import/{key}")
+    assert (answer.status_code, answer.json()["error"]["code"]) == (404, "no_import")
+    wait_until(lambda: not list(data.iterdir()))
+
+
+def test_what_cannot_be_imported_is_told(client: TestClient, data: Path, tmp_path: Path) -> None:
+    outside = client.post("/api/import/path", json={"path": str(tmp_path)}).json()["error"]
+    assert "expected files below the data folder" in outside["message"]
+    bad = client.post("/api/import", json={"files": [{"path": "../a", "bytes": 1}]})
+    assert "leads elsewhere" in bad.json()["error"]["message"]
+    assert list(data.iterdir()) == []
+    folder = tmp_path / "alone"
+    folder.mkdir()
+    detections(folder)
+    info = _settled(client, _send(client, folder))
+    assert (info["phase"], info["cameras"]) == ("failed", [])
+    assert "no calibration was found" in info["error"]
+    written = client.post(f"/api/import/{info['key']}/write", json={})
+    assert "No calibration was found" in written.json()["error"]["message"]
+    toml(folder)
+    text = (folder / "calibration.toml").read_bytes()
+    more = [{"path": "calibration.toml", "bytes": len(text)}]
+    added = client.post(f"/api/import/{info['key']}/files", json={"files": more}).json()
+    early = client.post(f"/api/import/{info['key']}/arrived")
+    assert "are here; drop the rest" in early.json()["error"]["message"]
+    client.put(f"/api/import/{info['key']}/files/{added['first']}", content=text)
+    client.post(f"/api/import/{info['key']}/arrived")
+    assert len(_settled(client, info["key"])["cameras"]) == 4
+
+
+def test_recordings_have_pictures(client: TestClient) -> None:
+    cards = client.get("/api/recordings").json()["recordings"]
+    rooms = [card for card in cards if card["kind"] == "rendered"]
+    assert "room44-3p" in [card["name"] for card in rooms]
+    assert client.get("/api/recordings/picture?name=../secret").status_code == 404

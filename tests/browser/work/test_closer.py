@@ -1,0 +1,169 @@
+"""Looking closer: into a picture, at one track, at what is wrong, and finding it again."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from playwright.sync_api import Browser, FloatRect, Page, expect
+
+from tests.browser.looking import as_at_first, ask, painted, readout, until
+from tests.browser.serving import Server
+
+
+def cell(page: Page, camera: int = 0) -> FloatRect:
+    """Where a picture is."""
+    box = page.locator(".cam").nth(camera).bounding_box()
+    assert box is not None
+    return box
+
+
+def test_the_wheel_magnifies_a_picture_and_a_double_click_goes_back(
+    flat_page: Page, server: Server
+) -> None:
+    page = flat_page
+    as_at_first(server)
+    ask(server, "POST", "seek", {"step": 45})
+    until(page, lambda: readout(page) == "45", "the step")
+    whole = painted(page)[0]
+    box = cell(page)
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.mouse.wheel(0, -500)
+    until(page, lambda: "closer=1%7E2.7" in page.url, "the link has it")
+    page.mouse.move(box["x"] + 4, box["y"] - 60)
+    until(page, lambda: painted(page)[0].tolist() != whole.tolist(), "it is painted")
+    # what is dragged moves, and the drag is no click
+    page.mouse.move(box["x"] + 100, box["y"] + 100)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 60, box["y"] + 80, steps=4)
+    page.mouse.up()
+    page.wait_for_timeout(400)
+    expect(page.locator(".cam[aria-pressed=true]")).to_have_count(0)
+    page.locator(".cam").first.dblclick(position={"x": 5, "y": 5})
+    until(page, lambda: "closer=" not in page.url, "the whole picture again")
+    ask(server, "POST", "select", {"id": None})  # whoever lies under the pointer is chosen
+    page.mouse.move(box["x"] + 4, box["y"] - 60)
+    until(page, lambda: painted(page)[0].tolist() == whole.tolist(), "as it was")
+
+
+def test_a_box_that_is_nobodys_says_who_is_nearest(flat_page: Page, server: Server) -> None:
+    page = flat_page
+    as_at_first(server)
+    for step in range(45, 60):
+        told = server.get(f"/api/step/{step}").json()["cameras"]
+        found = [
+            (camera, m["box"], m)
+            for camera, view in enumerate(told)
+            for m in view["measurements"]
+            if m["track"] is None and m["nearest"] is not None and m["sigmas"] > 3
+        ]
+        if found:
+            break
+    assert found, "every third step has a false box"
+    camera, (left, top, width, height), m = found[0]
+    ask(server, "POST", "seek", {"step": step})
+    until(page, lambda: readout(page) == str(step), "the step")
+    box = cell(page, camera)
+    scale = box["width"] / 192
+    page.mouse.move(box["x"] + (left + width / 2) * scale, box["y"] + (top + height / 2) * scale)
+    card = page.locator(".cam .card:visible")
+    expect(card).to_contain_text("nobody's")
+    expect(card).to_contain_text("σ away")
+    expect(card.locator(".id")).to_have_text(str(m["nearest"]))
+
+
+def test_tracks_are_listed_by_what_is_wrong_with_them(flat_page: Page, server: Server) -> None:
+    page = flat_page
+    as_at_first(server)
+    kinds = page.get_by_role("group", name="Tracks that are listed")
+    rows = page.locator("#panel-tracks tbody tr")
+    expect(kinds.get_by_role("button", name=re.compile("^all 2"))).to_be_visible()
+    worst = kinds.get_by_role("button", name=re.compile("^worst error 1"))
+    worst.click()
+    expect(rows).to_have_count(1)
+    until(page, lambda: "list=worst" in page.url, "the link has it")
+    kinds.get_by_role("button", name=re.compile("^false 0")).click()
+    expect(rows).to_have_count(0)
+    expect(page.get_by_text("No such track")).to_be_visible()
+    kinds.get_by_role("button", name=re.compile("^all")).click()
+    expect(rows).to_have_count(2)
+
+
+def test_alt_and_a_click_show_one_track_alone(flat_page: Page, server: Server) -> None:
+    page = flat_page
+    as_at_first(server)
+    page.locator(".lane").nth(1).click(modifiers=["Alt"])
+    expect(page.locator(".lane")).to_have_count(1)
+    page.locator(".lane").first.click(modifiers=["Alt"])
+    expect(page.locator(".lane")).to_have_count(2)
+    ask(server, "POST", "select", {"id": None})
+
+
+def test_a_and_b_change_places_and_a_link_brings_both(
+    browser: Browser, flat_page: Page, server: Server
+) -> None:
+    page = flat_page
+    as_at_first(server)
+    key = "fusion.detection_probability"
+    ask(server, "POST", "run/pin")
+    ask(server, "PATCH", "parameters", {"changes": {key: 0.6}})
+    server.wait_for_run()
+    page.get_by_role("tab", name="Compare").click()
+    page.get_by_role("button", name="Exchange A and B").click()
+    state = server.wait(lambda state: state["pinned"]["parameters"][key] == 0.6)
+    state = server.wait(lambda state: state["parameters"][key] != 0.6)
+    assert key not in state["changed"]
+    server.wait_for_run()
+    until(page, lambda: f"a.{key}=0.6" in page.url, "the link names run A")
+    link = page.url
+
+    as_at_first(server)
+    context = browser.new_context(viewport={"width": 1440, "height": 900})
+    context.route("**/viser/**", lambda route: route.abort())
+    other = context.new_page()
+    other.goto(link)
+    state = server.wait(lambda state: state["pinned"] is not None)
+    assert state["pinned"]["parameters"][key] == pytest.approx(0.6)
+    server.wait(lambda state: state["changed"] == [])
+    context.close()
+    as_at_first(server)
+
+
+def test_a_step_is_bookmarked_with_a_note_that_stays(flat_page: Page, server: Server) -> None:
+    page = flat_page
+    as_at_first(server)
+    ask(server, "POST", "seek", {"step": 31})
+    until(page, lambda: readout(page) == "31", "the step")
+    page.keyboard.press("Shift+B")
+    note = page.get_by_label("Note of step 31")
+    expect(note).to_be_focused()
+    page.keyboard.type("they meet")
+    page.keyboard.press("Enter")
+    page.reload()
+    expect(page.locator(".cam canvas").first).to_be_visible()
+    page.get_by_role("tab", name="Events").click()
+    expect(page.get_by_label("Note of step 31")).to_have_value("they meet")
+    page.get_by_role("button", name="Go to step 31").first.click()
+    until(page, lambda: readout(page) == "31", "gone there")
+    page.get_by_role("button", name="Forget step 31").click()
+    expect(page.get_by_label("Bookmarks")).to_be_hidden()
+
+
+def test_the_palette_sets_a_parameter_and_goes_to_a_track(flat_page: Page, server: Server) -> None:
+    page = flat_page
+    as_at_first(server)
+    page.keyboard.press("Control+k")
+    page.keyboard.type("detection probability fusion")
+    expect(page.locator("dialog[open] [role=option]").first).to_contain_text("p_D · fusion")
+    page.keyboard.press("Enter")
+    page.keyboard.type("7")
+    expect(page.locator("dialog[open] [role=listbox]")).to_contain_text("… 1")
+    page.keyboard.press("Backspace")
+    page.keyboard.type("0.8")
+    page.keyboard.press("Enter")
+    server.wait(lambda state: state["parameters"]["fusion.detection_probability"] == 0.8)
+    page.keyboard.press("Control+k")
+    page.keyboard.type("track 2")
+    page.get_by_role("option", name=re.compile("^Track 2")).click()
+    server.wait(lambda state: state["selection"] == 2)
+    as_at_first(server)

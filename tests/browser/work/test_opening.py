@@ -1,0 +1,197 @@
+"""The sheet Open…: from files that are dropped to tracks, and recordings found again."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.access.test_accessibility import found
+from tests.browser.conftest import opened
+from tests.browser.serving import Server
+from tests.browser.walkers import write_walkers
+from tests.formats.recorded import detections, toml, videos
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where recordings are, and a person's own files beside it."""
+    return tmp_path_factory.mktemp("opening")
+
+
+@pytest.fixture(scope="module")
+def server(folder: Path) -> Iterator[Server]:
+    """A workbench with a data folder that holds one recording."""
+    write_walkers(folder / "data/walkers")
+    running = Server(folder / "data/walkers", folder / "cache", data=folder / "data")
+    yield running
+    if running.process.poll() is None:
+        running.stop()
+
+
+@pytest.fixture
+def page(browser: Browser, server: Server) -> Iterator[Page]:
+    """The page without the 3D view."""
+    with opened(browser, server, flat=True) as page:
+        yield page
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    """What another program left: videos, boxes, a calibration in centimetres, and a note."""
+    session = tmp_path / "session"
+    session.mkdir()
+    toml(session, scale=100.0, size=(640, 360))
+    videos(session, size=(640, 360))
+    detections(session, size=(640, 360))
+    (session / "notes.txt").write_text("the door was open\n")
+    return session
+
+
+def drop(page: Page, *files: Path) -> None:
+    """Drop files or folders of the disk on the page, as a file manager does."""
+    session = page.context.new_cdp_session(page)
+    data = {"items": [], "files": [str(file) for file in files], "dragOperationsMask": 1}
+    for kind in ("dragEnter", "dragOver", "drop"):
+        session.send("Input.dispatchDragEvent", {"type": kind, "x": 300, "y": 400, "data": data})
+        if kind == "dragOver":
+            expect(page.locator(".drop-layer")).to_be_visible()
+    expect(page.locator(".drop-layer")).to_be_hidden()
+
+
+def settled(page: Page) -> None:
+    """Wait until all checks are done."""
+    expect(page.locator("[data-do=track]")).to_be_enabled(timeout=120_000)
+    expect(page.locator(".opener [aria-label=Checks]")).not_to_contain_text("looking at")
+
+
+def test_dropped_files_become_tracks(
+    page: Page, server: Server, files: Path, folder: Path, screenshots: Path | None
+) -> None:
+    drop(page, files)
+    settled(page)
+    sheet = page.locator("dialog.opener")
+    expect(sheet.locator("tbody tr")).to_have_count(4)
+    expect(sheet.locator("tbody tr").first).to_contain_text("cam1.avi")
+    expect(sheet.locator("tbody tr").first).to_contain_text("60 frames · 20 fps · 640 × 360")
+    expect(sheet).to_contain_text("session/notes.txt is not used")
+    expect(sheet.get_by_role("group", name="Unit").locator("[aria-pressed=true]")).to_have_text(
+        "cm"
+    )
+    if screenshots is not None:
+        page.screenshot(path=screenshots / "open-dropped.png")
+    sheet.locator("#in-name").fill("living room")
+    sheet.locator("#in-name-1").fill("window")
+    page.keyboard.press("Control+Enter")
+    expect(sheet).not_to_be_visible(timeout=120_000)
+    state = server.wait(lambda now: now["sequence"]["name"] == "living room")
+    assert [camera["name"] for camera in state["sequence"]["cameras"]][1] == "window"
+    state = server.wait_for_run()
+    assert state["run"]["done"] == 60
+    assert len(server.get("/api/timeline").json()["tracks"]) >= 3
+    assert (folder / "data/living room/files/session/cam1.avi").is_file()
+
+
+def test_what_is_changed_is_looked_into_again(page: Page, files: Path) -> None:
+    drop(page, files)
+    settled(page)
+    sheet = page.locator("dialog.opener")
+    sheet.get_by_label("Poses").select_option("camera-to-world")
+    settled(page)
+    expect(sheet.get_by_role("button", name="Apply --pose world-to-camera")).to_be_visible()
+    page.locator("h2", has_text="Import").click()
+    page.keyboard.press("Control+z")
+    expect(sheet.get_by_role("button", name="Apply --pose world-to-camera")).to_have_count(0)
+    settled(page)
+    seated = sheet.locator(".choice", has_text="Seated")
+    seated.click()
+    expect(seated).to_have_attribute("aria-pressed", "true")
+    plan = sheet.locator("[data-plan]")
+    before = sheet.get_by_label("Room, to x, metres").input_value()
+    plan.focus()
+    page.keyboard.press("Shift+ArrowRight")
+    moved = f"{float(before) + 0.05:.2f}"
+    expect(sheet.get_by_label("Room, to x, metres")).to_have_value(moved)
+    sheet.get_by_role("button", name="As suggested").click()
+    expect(sheet.get_by_label("Room, to x, metres")).to_have_value(before)
+    late = sheet.get_by_label("cam2 starts late by, frames")
+    late.fill("6")
+    late.press("Enter")
+    expect(sheet.locator("tbody tr").nth(1)).to_contain_text("Apply 0")
+    sheet.get_by_role("button", name="Apply 0").click()
+    expect(late).to_have_value("0")
+    sheet.get_by_role("button", name="Back to recent").click()
+    expect(sheet).to_contain_text("Open a recording")
+
+
+def test_the_sheet_opens_what_is_there(page: Page, server: Server, folder: Path) -> None:
+    page.keyboard.press("Control+o")
+    sheet = page.locator("dialog.opener")
+    own = sheet.locator(".rec", has_text="numbers")
+    expect(own).to_contain_text("2 cameras")
+    expect(own.locator("img")).to_have_js_property("complete", True)
+    expect(sheet.locator(".rec", has_text="room44-3p")).to_be_visible()
+    sheet.get_by_label("Find by name").fill("numb")
+    expect(sheet.locator(".rec", has_text="room44-3p")).to_be_hidden()
+    sheet.get_by_label("Path").fill("/etc")
+    sheet.get_by_role("button", name="Open", exact=True).click()
+    expect(sheet.get_by_role("alert")).to_contain_text("expected files below the data folder")
+    shutil.copytree(folder / "data/walkers", folder / "data/others", dirs_exist_ok=True)
+    sheet.get_by_label("Path").fill("others/sequence.toml")
+    sheet.get_by_label("Path").press("Enter")
+    expect(sheet).not_to_be_visible()
+    server.wait(lambda now: now["sequence"]["opened_as"].endswith("others"))
+    page.keyboard.press("Control+o")
+    expect(sheet).to_be_visible()
+    page.keyboard.press("Escape")
+    expect(sheet).not_to_be_visible()
+
+
+def test_an_upload_is_stopped_cleanly(page: Page, files: Path, folder: Path) -> None:
+    page.route("**/files/**", lambda route: None)  # nothing of it ever arrives
+    drop(page, files)
+    sheet = page.locator("dialog.opener")
+    expect(sheet.get_by_role("progressbar", name="Upload")).to_be_visible()
+    sheet.get_by_role("button", name="Stop").click()
+    expect(sheet).to_contain_text("Open a recording")
+    assert not list((folder / "data").glob(".import-*"))
+
+
+@pytest.mark.data
+def test_a_foreign_recording_is_dropped_and_tracked(
+    page: Page, server: Server, foreign: Path
+) -> None:
+    drop(page, foreign / "pose2sim-multi")
+    settled(page)
+    sheet = page.locator("dialog.opener")
+    expect(sheet.locator("tbody tr")).to_have_count(4)
+    expect(sheet.locator("tbody tr").first).to_contain_text("Qualisys")
+    expect(sheet.locator("tbody tr").first).to_contain_text("mm → m")
+    sheet.get_by_role("button", name="Import and track").click()
+    server.wait(lambda now: now["sequence"]["name"].startswith("pose2sim-multi"))
+    assert server.wait_for_run()["run"]["done"] == 100
+
+
+def test_nothing_serious_stands_in_the_way_of_anybody(page: Page, files: Path) -> None:
+    page.emulate_media(reduced_motion="reduce")  # colours are judged when they have come to rest
+    page.keyboard.press("Control+o")
+    expect(page.locator(".rec").first).to_be_visible()
+    states = {"start": found(page)}
+    drop(page, files)
+    settled(page)
+    for theme in ("light", "dark"):
+        page.locator("html").evaluate(f"page => {{ page.dataset.theme = '{theme}' }}")
+        states[theme] = found(page)
+    assert {name: list_ for name, list_ in states.items() if list_} == {}
+    sheet = page.locator("dialog.opener")
+    for size in ((1280, 720), (1440, 900), (1920, 1080)):
+        page.set_viewport_size({"width": size[0], "height": size[1]})
+        wider = sheet.evaluate(
+            """sheet => [...sheet.querySelectorAll("button, .lab, h2, h3, input, .in-body, .rf")]
+                .filter((part) => part.scrollWidth > part.clientWidth + 1 && part.clientWidth)
+                .map((part) => part.outerHTML.slice(0, 120))"""
+        )
+        assert wider == [], size

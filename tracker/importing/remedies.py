@@ -1,0 +1,59 @@
+"""Remedies of checks as flags of the import that is being checked."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tracker.checks import Check, Remedy
+from tracker.checks.reading import UPS, Reading, upright
+from tracker.checks.readings import upwards
+from tracker.formats.pieces import METRES, Unit, Up
+
+_OTHER = {
+    "world-to-camera": "camera-to-world",
+    "camera-to-world": "world-to-camera",
+    "opencv": "opengl",
+    "opengl": "opencv",
+}
+
+
+def for_import(check: Check, reading: Reading) -> Check:
+    """A check of an imported sequence, its remedies as flags that import the same files rightly.
+
+    A check judges the sequence: to it a calibration that was read with inverted poses, and
+    should not have been, is one with inverted poses.
+
+    Args:
+        check: Of the sequence.
+        reading: As the files were read to make it.
+    """
+    found = [_for_import(remedy, reading) for remedy in check.remedies]
+    return replace(check, remedies=tuple(remedy for remedy in found if remedy is not None))
+
+
+def _for_import(remedy: Remedy, reading: Reading) -> Remedy | None:
+    match remedy.flag:
+        case "--pose":
+            return replace(remedy, value=_OTHER[reading.direction])
+        case "--axes":
+            return replace(remedy, value=_OTHER[reading.axes])
+        case "--unit":
+            return _unit(remedy, reading.unit)
+        case "--up":
+            return replace(remedy, value=_up(remedy.value, reading.up))
+    return remedy
+
+
+def _unit(remedy: Remedy, unit: Unit) -> Remedy | None:
+    """One unit of the file in metres, where it is one that has a name."""
+    wanted = METRES[unit] * next(m for name, m in METRES.items() if name == remedy.value)
+    names = [name for name, metres in METRES.items() if np.isclose(metres, wanted)]
+    return replace(remedy, value=names[0] if names else f"{wanted:g}")
+
+
+def _up(wanted: str, up: Up) -> Up:
+    """The axis of the file that is this axis of the sequence's world."""
+    axis = upright(next(name for name in UPS if name == wanted)).T @ np.array([0.0, 0.0, 1.0])
+    return upwards(upright(up).T @ axis)

@@ -1,0 +1,158 @@
+"""How a rendered sequence is written: whole or not at all, and its ``sequence.toml``."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.camera import Camera
+
+
+class RenderCancelled(Exception):
+    """Rendering was stopped on request; nothing was written."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Marked:
+    """A template: whose, where, and its box (left, top, width, height) in pixels."""
+
+    person: str
+    camera: str
+    step: int
+    box: Float[ndarray, " 4"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Description:
+    """What a ``sequence.toml`` says."""
+
+    name: str
+    description: str
+    fps: float
+    frames: int
+    minimum: Float[ndarray, " 3"]
+    maximum: Float[ndarray, " 3"]
+    entrances: Sequence[tuple[Float[ndarray, " 3"], Float[ndarray, " 3"], str]]
+    """Mean and standard deviation of where people come in, metres, and what is there."""
+    half_extents: Float[ndarray, " 3"]
+    tracked: str
+    """What the target is, in words."""
+    cameras: Sequence[Camera]
+    templates: Sequence[Marked]
+    detections: bool = False
+    """Whether each camera has a file of boxes by its name."""
+
+
+@contextmanager
+def whole_folder(folder: Path) -> Iterator[Path]:
+    """A new folder to write in, which takes its name when all has gone well.
+
+    Until then the files are in a hidden folder beside it, which is removed on any failure.
+
+    Raises:
+        FileExistsError: If ``folder`` exists and is not a sequence folder.
+    """
+    folder = Path(folder)
+    _check_replaceable(folder)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    work = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    try:
+        yield work
+        os.chmod(work, 0o755)
+        _check_replaceable(folder)
+        if folder.exists():
+            old = Path(tempfile.mkdtemp(prefix=f".{folder.name}-old-", dir=folder.parent))
+            folder.rename(old / "old")
+            work.rename(folder)
+            shutil.rmtree(old, ignore_errors=True)
+        else:
+            work.rename(folder)
+    except BaseException:
+        shutil.rmtree(work, ignore_errors=True)
+        raise
+
+
+def _check_replaceable(folder: Path) -> None:
+    if not folder.exists():
+        return
+    if not folder.is_dir() or (any(folder.iterdir()) and not (folder / "sequence.toml").exists()):
+        raise FileExistsError(
+            f"{folder} exists and is not a sequence folder; choose another name or remove it"
+        )
+
+
+def _numbers(values: ndarray) -> str:
+    return "[" + ", ".join(f"{float(v) + 0.0:.12g}" for v in values) + "]"
+
+
+def describe(told: Description) -> str:
+    """The text of the ``sequence.toml``."""
+    lines = [
+        "format = 1",
+        f'name = "{told.name}"',
+        f'description = "{told.description}"',
+        f"fps = {told.fps}",
+        f"frames = {told.frames}",
+        "",
+        "[room]                       # the volume people are tracked in: metres, z up",
+        f"min = {_numbers(told.minimum)}",
+        f"max = {_numbers(told.maximum)}",
+    ]
+    if told.entrances:
+        lines.append(
+            "entrances = [                # where people come in (mean, standard deviation), metres"
+        )
+        for mean, sigma, words in told.entrances:
+            lines.append(
+                f"  {{ position = {_numbers(mean)}, sigma = {_numbers(sigma)} }},   # {words}"
+            )
+        lines.append("]")
+    lines += [
+        "",
+        f"[target]                     # what is tracked: {told.tracked}, as an upright box",
+        f"half_extents = {_numbers(told.half_extents)}",
+    ]
+    for camera in told.cameras:
+        lines += [
+            "",
+            "[[camera]]",
+            f'name = "{camera.name}"',
+            f"image_size = [{camera.image_size[0]}, {camera.image_size[1]}]",
+            f'video = "{camera.name}.avi"',
+        ]
+        if told.detections:
+            lines.append(f'detections = "{camera.name}.csv"')
+        if camera.fisheye:
+            lines.append('lens = "fisheye"')
+        lines += [
+            f"K = [{', '.join(_numbers(row) for row in camera.intrinsics)}]",
+            f"distortion = {_numbers(camera.distortion)}",
+            f"R = [{', '.join(_numbers(row) for row in camera.rotation)}]",
+            f"t = {_numbers(camera.translation)}",
+        ]
+    for marked in told.templates:
+        box = _numbers(np.round(marked.box, 2))
+        lines += [
+            "",
+            "[[template]]                 # a box whose colours are a model of the person",
+            f'name = "{marked.person}"',
+            f'camera = "{marked.camera}"',
+            f"frame = {marked.step}",
+            f"box = {box}     # left, top, width, height in pixels",
+        ]
+    lines += [
+        "",
+        "[ground_truth]               # exact, from the people's poses",
+        'file = "ground_truth.csv"',
+        "",
+    ]
+    return "\n".join(lines)
