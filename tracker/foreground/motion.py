@@ -60,7 +60,9 @@ class MovingForeground:
         self._background = background
         self._parameters = parameters
         self._lag = max(1, round(LAG / step_time))
-        lasting = parameters.motion_memory * background.doubt(parameters)
+        self.doubt = background.doubt(parameters)
+        """How little the background is believed, 0 … 1."""
+        lasting = parameters.motion_memory * self.doubt
         self._memory = min(254, round(lasting / step_time))
 
     def start(self) -> MotionState:
@@ -79,7 +81,7 @@ class MovingForeground:
         if since is None:
             since = np.full(picture.shape[:2], 255, dtype=np.uint8)
         changed = self._changed(before[0], smooth)
-        since = cv2.add(since, 1)
+        since = np.minimum(since, 254) + np.uint8(1)
         since[changed > 0] = 0
         recent = (since <= self._memory).astype(np.uint8)
         after = MotionState(before[-self._lag :], since)
