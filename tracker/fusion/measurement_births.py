@@ -36,8 +36,6 @@ class Evidence:
     """Where each camera's boxes begin, and the end."""
     seeing: Bool[ndarray, " C"] | None = None
     """Which cameras have a frame at this step: others miss nobody; None where all have."""
-    beginning: bool = False
-    """Whether nobody was looked for before: who is found need not have come in just now."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,8 +74,6 @@ class BirthModel:
     """Metres outside the room's volume within which newcomers are taken, too."""
     largest_gap: float
     """Metres by which the rays of two boxes of one target may miss each other."""
-    present: float = 0.0
-    """Expected people who are there when the first step is looked at, besides newcomers."""
 
 
 class MeasurementBirths:
@@ -90,8 +86,7 @@ class MeasurementBirths:
         Λ = λ_b/V ∫ Π_{c sees} p_c g(z_c | x) / κ_c  Π_{c misses} (1 − p_c) dx
 
     and the newcomer's existence is Λ / (1 + Λ): the rule for new tracks of the
-    Poisson multi-Bernoulli filter, taken over all cameras at once; at the first step those
-    who are there already count with the newcomers. The integral
+    Poisson multi-Bernoulli filter, taken over all cameras at once; the integral
     is approximated by Laplace's method, around the place that fits the boxes best. After the
     adaptive birth of Ristic, Clark, Vo and Vo (IEEE TAES 48(2), 2012), with the rule for new
     tracks of Williams (IEEE TAES 51(3), 2015).
@@ -112,9 +107,7 @@ class MeasurementBirths:
         self._room = room
         self._model = model
         p_d = model.detection_probability
-        volume = np.prod(room.maximum - room.minimum)
-        self._log_density = np.log(model.birth_rate / volume)
-        self._log_beginning = np.log((model.birth_rate + model.present) / volume)
+        self._log_density = np.log(model.birth_rate / np.prod(room.maximum - room.minimum))
         self._log_hit = float(np.log(p_d))
         # at p_D = 1 no newcomer is ever missed
         self._log_miss = float(np.log1p(-p_d)) if p_d < 1.0 else -np.inf
@@ -183,16 +176,14 @@ class MeasurementBirths:
             np.zeros(len(kept)),
             fitted.sources[:, kept],
         )
-        existences = expit(self._log_odds(found, fitted.fits[:, kept], evidence))
+        existences = expit(self._log_odds(found, fitted.fits[:, kept], evidence.seeing))
         return Newborns(found.positions, found.covariances, existences, found.sources)
 
     def _log_odds(
-        self, found: Newborns, fits: Float[ndarray, "C N"], evidence: Evidence
+        self, found: Newborns, fits: Float[ndarray, "C N"], seeing: Bool[ndarray, " C"] | None
     ) -> Float[ndarray, " N"]:
         """log Λ of each newcomer, of whose boxes ``fits`` are the log likelihoods."""
-        seeing = evidence.seeing
-        log_density = self._log_beginning if evidence.beginning else self._log_density
-        log_odds = log_density + 1.5 * np.log(2.0 * np.pi)
+        log_odds = self._log_density + 1.5 * np.log(2.0 * np.pi)
         log_odds = log_odds + 0.5 * np.linalg.slogdet(found.covariances)[1]
         for c, camera in enumerate(self._cameras):
             hit = found.sources[c] >= 0

@@ -69,7 +69,6 @@ class FusionModel:
                 gate=self.gate,
                 margin=p.followed_margin,
                 largest_gap=2.0 * float(np.max(sequence.target_half_extents)),
-                present=0.0 if sequence.room.entrances else p.present_people,
             ),
         )
 

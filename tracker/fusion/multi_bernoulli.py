@@ -152,7 +152,6 @@ class MultiBernoulli:
                 Measurements(found.values, found.noises),
                 found.unexplained,
                 seen.starts,
-                beginning=state.next_label == 1,
             )
             proposed, recent = self._model.newborns_and_recent(evidence, seen.boxes, views, recent)
             if proposed is not None:

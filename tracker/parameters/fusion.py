@@ -48,13 +48,6 @@ class FusionParams(Params):
     ] = 0.05
     """Expected number of people who come in at each entrance in one second."""
 
-    present_people: Annotated[
-        float,
-        Field(ge=0.0, le=100.0),
-        ui("γ_0", log=False, step=0.5, advanced=True, published=0.0),
-    ] = 2.0
-    """Expected number of people who are there at the first step, in a room without entrances."""
-
     measurement: Annotated[
         Literal["centre", "box", "box_and_width"], ui("z", published="centre")
     ] = "box"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy import ndarray
@@ -26,9 +24,7 @@ def clutter_of(kind: MeasurementKind) -> float:
     return 1e-8 if kind != "centre" else 1e-6
 
 
-def births(
-    kind: MeasurementKind = "box", margin: float = 0.0, present: float = 0.0
-) -> MeasurementBirths:
+def births(kind: MeasurementKind = "box", margin: float = 0.0) -> MeasurementBirths:
     """With the numbers of the defaults at ten steps a second."""
     return MeasurementBirths(
         CAMERAS,
@@ -41,7 +37,6 @@ def births(
             gate=21.0,
             margin=margin,
             largest_gap=1.0,
-            present=present,
         ),
     )
 
@@ -79,19 +74,6 @@ def test_people_are_found_where_they_stand(kind: MeasurementKind) -> None:
     assert (sure.sources >= 0).sum(axis=0).tolist() == [4, 4]
     sigmas = np.sqrt(np.diagonal(sure.covariances, axis1=1, axis2=2))
     assert (np.abs(sure.positions[order] - places) < 5.0 * sigmas[order]).all()
-
-
-def test_at_the_first_step_those_who_are_there_already_count() -> None:
-    """The odds grow by the ratio of the expected numbers: (λ_b + γ_0) / λ_b."""
-    faint = evidence(watch(np.array([[[0.5, -0.8, 0.85]]]), CAMERAS[:2], miss_rate=0.0, seed=1)[0])
-    faint = replace(faint, starts=np.append(faint.starts, [faint.starts[-1]] * 2))
-    model = births(present=9.0 * BIRTH_RATE)
-
-    def odds(beginning: bool) -> float:
-        found = proposed(model.propose(replace(faint, beginning=beginning)))
-        return float(found.existences[0] / (1.0 - found.existences[0]))
-
-    assert odds(True) / odds(False) == pytest.approx(10.0)
 
 
 @pytest.mark.parametrize("kind", ["centre", "box"])
