@@ -115,8 +115,13 @@ def _ways(half: str) -> Iterable[RunParameters]:
 
 
 def _own(key: MethodKey) -> list[str]:
-    """The methods of this project: another package compiles its kernels when they are called."""
-    return [name for name in METHODS[key] if name not in ORIGINS]
+    """The methods of this project: another package compiles its kernels when they are called, and
+    a detection network has none."""
+    return [
+        name
+        for name in METHODS[key]
+        if name not in ORIGINS and not REGISTERED[key][name].used(RunParameters()).detector
+    ]
 
 
 def _recording(folder: Path) -> Sequence:

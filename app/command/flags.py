@@ -29,6 +29,21 @@ def has_screen() -> bool:
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
+def set_values(items: tuple[str, ...]) -> dict[str, str]:
+    """The values of ``--set`` by key.
+
+    Raises:
+        ParameterError: If one is not KEY=VALUE.
+    """
+    values = {}
+    for item in items:
+        key, mark, text = item.partition("=")
+        if not mark:
+            raise ParameterError("--set", f"expected KEY=VALUE, got {item!r}")
+        values[key.strip()] = text.strip()
+    return values
+
+
 @dataclass
 class Serve:
     """Start the workbench and serve its page on this machine."""
@@ -44,6 +59,8 @@ class Serve:
     """Open the page in a browser; by default where there is a screen."""
     data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None
     """Folder whose folders are sequences that can be chosen on the page."""
+    detector: Annotated[Path | None, arg(metavar="MODEL", help_behavior_hint="(optional)")] = None
+    """A detection network of your own, as ONNX: the method onnx_detector runs it on pictures."""
     library: LibraryFile = None
     """The file that finished runs are kept in."""
     keep: Annotated[int, arg(metavar="INT")] = KEEP
@@ -89,6 +106,8 @@ class Track:
     seed: int = 0
     """Seed of all randomness; the same seed gives the same tracks, but for the last digits on
     processors without fused multiply-add."""
+    detector: Annotated[Path | None, arg(metavar="MODEL", help_behavior_hint="(optional)")] = None
+    """A detection network of your own, as ONNX: the method onnx_detector runs it on pictures."""
     cache: bool = True
     """Take up what the cameras found in an earlier run with the same values, and keep it."""
     library: LibraryFile = None
@@ -108,11 +127,7 @@ class Track:
                 known = ", ".join(PRESETS)
                 raise ParameterError("--preset", f"expected one of {known}, got {self.preset!r}")
             changes.update(PRESETS[self.preset])
-        for item in self.set:
-            key, mark, text = item.partition("=")
-            if not mark:
-                raise ParameterError("--set", f"expected KEY=VALUE, got {item!r}")
-            changes[key.strip()] = text.strip()
+        changes.update(set_values(self.set))
         for key, chosen in (
             ("single_view", self.single_view),
             ("fusion_method", self.fusion_method),
@@ -126,6 +141,24 @@ class Track:
             if value is not None:
                 changes[key] = value
         return changes
+
+
+@dataclass
+class Detect:
+    """Find people with a detection network (ONNX) and write the boxes of every camera as CSV."""
+
+    sequence: Annotated[
+        Positional[str], arg(metavar="SEQUENCE", help="A built-in room's name or a folder.")
+    ]
+    model: Annotated[Path, arg(metavar="MODEL")]
+    """An ONNX file; its layout is found out from the shapes of what it gives."""
+    output: Annotated[Path, arg(aliases=["-o"], metavar="FOLDER")]
+    """Where `CAMERA.csv` is written for each camera, as `detections` of a sequence.toml."""
+    set: Annotated[
+        UseAppendAction[tuple[str, ...]],
+        arg(metavar="KEY=VALUE", help_behavior_hint="(repeatable)"),
+    ] = ()
+    """One parameter, as in --set onnx_detector.score_threshold=0.5; `parameters` lists the keys."""
 
 
 @dataclass
@@ -386,6 +419,7 @@ def _evaluate_with_flags() -> Any:
 Arguments = (
     Serve
     | Track
+    | Detect
     | Evaluate
     | Experiment
     | Benchmark
@@ -410,6 +444,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
     commands: Any = (
         Annotated[Serve, subcommand("serve")]
         | Annotated[track, subcommand("track")]
+        | Annotated[Detect, subcommand("detect")]
         | Annotated[evaluate, subcommand("evaluate")]
         | Annotated[Experiment, subcommand("experiment")]
         | Annotated[Benchmark, subcommand("benchmark")]

@@ -20,6 +20,7 @@ from app.command.flags import (
     Arguments,
     Benchmark,
     Check,
+    Detect,
     Evaluate,
     Experiment,
     ExportCalibration,
@@ -78,6 +79,10 @@ def _run(command: Arguments) -> int:
             return _serve(command)
         case Track():
             _track(command)
+        case Detect():
+            from app.command.detect import detect
+
+            detect(command)
         case Evaluate():
             from app.command.evaluate import evaluate
 
@@ -148,6 +153,10 @@ def _serve(command: Serve, run: int | None = None) -> int:
     place = locate(command.sequence, command.data)
     if place not in rendering.ROOMS:
         library.open_sequence(place)  # what cannot be read is told here, before a page is open
+    if command.detector is not None:
+        from tracker.single_view.onnx.network import Network, Settings
+
+        Network(command.detector, Settings())  # likewise
     listener = _listen(command)
     port = listener.getsockname()[1]
     host = f"[{command.host}]" if ":" in command.host else command.host
@@ -169,6 +178,7 @@ def _serve(command: Serve, run: int | None = None) -> int:
             host=command.host,
             sequence=command.sequence,
             data=command.data,
+            detector=command.detector,
             keep_on_disk=True,
             library=command.library or library_file(),
             keep=command.keep,
@@ -238,6 +248,7 @@ def _track(command: Track) -> None:
 
     with Bar("rendering", "frame") as rendering:
         sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    sequence = library.with_detector(sequence, command.detector)
     for sentence in sequence.warnings:
         say(sentence)
     for found in check(sequence, quick=True):

@@ -74,6 +74,7 @@ class Jobs:
         workbench: Workbench,
         *,
         data: Path | None = None,
+        detector: Path | None = None,
         seed: int = 0,
         cache: StageCache | None = None,
         compiling: Compiling | None = None,
@@ -83,6 +84,7 @@ class Jobs:
         Args:
             workbench: Whom to serve.
             data: Its folders are sequences by name.
+            detector: A network that may be run on the pictures of all of them.
             seed: Of all runs.
             cache: Where columns of runs are kept; in memory only, if none is given.
             compiling: Whom to wait for before the first run;
@@ -90,6 +92,7 @@ class Jobs:
         """
         self._workbench = workbench
         self._data = data
+        self._detector = detector
         self._seed = seed
         self._condition = threading.Condition()
         self._wanted: _Wanted | None = None
@@ -150,6 +153,7 @@ class Jobs:
                 progress=partial(progress, "rendering"),
                 cancelled=cancelled.is_set,
             )
+            sequence = library.with_detector(sequence, self._detector)
             parameters = pipeline.default_parameters(sequence)
             reader = FrameReader(sequence)
             with self._condition:

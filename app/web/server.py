@@ -89,6 +89,8 @@ class Settings:
     """Opened at once, in the background."""
     data: Path | None = None
     """Its folders are sequences that can be chosen."""
+    detector: Path | None = None
+    """A detection network (ONNX) that may be run on the pictures of each."""
     seed: int = 0
     with_viser: bool = True
     keep_on_disk: bool = False
@@ -152,6 +154,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     jobs = app.state.jobs = Jobs(
         workbench,
         data=settings.data,
+        detector=settings.detector,
         seed=settings.seed,
         cache=StageCache.on_disk(in_background) if kept else StageCache(),
         compiling=Compiling(settings.say) if kept else None,

@@ -14,7 +14,7 @@ from tracker.sequences.reader import read_sequence
 
 
 def test_every_method_is_compared_and_all_are_fused_alike() -> None:
-    assert {*ON_PICTURES, ON_BOXES, "none"} == set(METHODS["single_view"])
+    assert {*ON_PICTURES, ON_BOXES, "none", "onnx_detector"} == set(METHODS["single_view"])
     compared = [methods._parameters(name) for name in (*ON_PICTURES, ON_BOXES)]
     assert [p.single_view for p in compared] == [*ON_PICTURES, ON_BOXES]
     assert {p.fusion_method for p in compared} == {methods.FUSION}

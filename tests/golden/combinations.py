@@ -111,6 +111,8 @@ def _single_views(
         if method in _BOXES:
             if sequence.has_detections:
                 yield method, ()
+        elif method == "onnx_detector":
+            continue  # it is somebody's own network
         elif sequence.has_pictures:
             yield method, ()
         elif method == "jpda":

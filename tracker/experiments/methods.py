@@ -32,8 +32,9 @@ ON_BOXES = "detection_phd"
 ON_PICTURES = tuple(
     name
     for name in METHODS["single_view"]
-    if method_of("single_view", name).used(RunParameters()).pictures
+    if (used := method_of("single_view", name).used(RunParameters())).pictures and not used.detector
 )
+"""Those that need nothing else: a detection network is brought by somebody."""
 
 BOXES_RECORDING = "cmc1"
 """A recording with such boxes, and without pictures."""

@@ -21,6 +21,7 @@ from tracker.parameters.foreground import ForegroundParams
 from tracker.parameters.fusion import FusionParams
 from tracker.parameters.jpda import JpdaParams
 from tracker.parameters.methods import Method, MethodKey, Reads, Uses
+from tracker.parameters.onnx_detector import OnnxDetectorParams
 from tracker.parameters.pseudo_particle import PseudoParticleParams
 from tracker.parameters.smoothing import SmoothingParams
 
@@ -59,6 +60,7 @@ __all__ = [
     "JpdaParams",
     "Method",
     "MethodKey",
+    "OnnxDetectorParams",
     "Parameter",
     "ParameterError",
     "Params",

@@ -47,6 +47,8 @@ class Uses:
     """Whether every camera must have pictures."""
     detections: bool = False
     """Whether every camera must have an outside detector's boxes."""
+    detector: bool = False
+    """Whether a detection network must be named, which it runs by itself."""
     templates: Literal["no", "if there", "needed"] = "no"
     """Whether it looks at the colour templates, and whether it can do without any."""
     reads: tuple[Reads, ...] = ()

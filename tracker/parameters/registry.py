@@ -33,6 +33,7 @@ BUILT_IN: dict[MethodKey, tuple[str, ...]] = {
         "tracker.parameters.jpda:METHOD",
         "tracker.parameters.pseudo_particle:METHOD",
         "tracker.parameters.association_matrix:METHOD",
+        "tracker.parameters.onnx_detector:METHOD",
         "tracker.parameters.detections:FILTERED",
         "tracker.parameters.detections:AS_THEY_ARE",
     ),
@@ -53,11 +54,11 @@ SHARED_GROUPS = ("pictures", "foreground", "fusion", "smoothing")
 
 FOLLOWING = ("colour_phd", "none", "jpda")
 """What ``single_view`` is by default follows the recording: the first of these that it has all
-for, else the first that can work on it at all."""
+for."""
 
 FOLLOWS = (
-    "follows the recording: colour_phd with pictures and templates, else none with "
-    "detections, else jpda on what moves"
+    "follows the recording: onnx_detector where a detector is named, else colour_phd with "
+    "pictures and templates, else none with detections, else jpda on what moves"
 )
 """The same in words."""
 

@@ -10,18 +10,19 @@ from tracker.sequences.sequence import Sequence
 def default_parameters(sequence: Sequence) -> RunParameters:
     """The defaults of the definitions, with the single-view method that fits the recording.
 
-    That is the first of :data:`tracker.parameters.registry.FOLLOWING` that has pictures,
-    templates and detections as it wants them, else the first that lacks nothing but templates.
+    That is the detector that is named, if there are pictures; else the first of
+    :data:`tracker.parameters.registry.FOLLOWING` that has pictures, templates and
+    detections as it wants them.
 
     Raises:
         ValueError: If the sequence has neither pictures nor detections.
     """
     defaults = RunParameters()
-    for templates in (sequence.templates, True):
-        for name in FOLLOWING:
-            lacking = _lacks(sequence, defaults, "single_view", name, bool(templates))
-            if lacking is None:
-                return defaults.model_copy(update={"single_view": name})
+    if sequence.detector is not None and sequence.has_pictures:
+        return defaults.model_copy(update={"single_view": "onnx_detector"})
+    for name in FOLLOWING:
+        if _lacks(sequence, defaults, "single_view", name, bool(sequence.templates)) is None:
+            return defaults.model_copy(update={"single_view": name})
     raise ValueError(
         f"{sequence.name}: every camera needs pictures (video or images), or every camera "
         "needs detections; add what is missing to sequence.toml"
@@ -64,6 +65,11 @@ def _lacks(
         return (
             f"{name} needs a detector's boxes of every camera, and {_listed(without)} of "
             f"{sequence.name} has none; name a file of detections in sequence.toml."
+        )
+    if used.detector and sequence.detector is None:
+        return (
+            f"{name} runs a detection network, and none is named; start the program with "
+            "--detector model.onnx."
         )
     if used.templates == "needed" and not templates:
         return (

@@ -106,5 +106,7 @@ def stage_keys(sequence: Sequence, parameters: RunParameters, seed: int) -> dict
     for stage in stages:
         method = parameters.method(CHOSEN_BY[stage])
         values += [numbers_version(stage), method_version(method), stage_values(parameters, stage)]
+        if method.used(parameters).detector and sequence.detector is not None:
+            values.append(sequence.detector.digest)
         keys[stage] = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
     return keys

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 from tracker.folders import cache_folder
 from tracker.sequences.fields import did_you_mean, listed
 from tracker.sequences.reader import FILE, read_sequence, read_summary
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.sequence import DetectorFile, Sequence, SequenceError
 
 DEFAULT_CAMERAS = 2
 """Cameras of a rendered room that is opened by its name."""
@@ -125,6 +126,28 @@ def open_sequence(
             f"{listed(ROOMS)}, or the path of a folder with a {FILE}{hint}"
         )
     return read_sequence(folder)
+
+
+def with_detector(sequence: Sequence, path: Path | None) -> Sequence:
+    """The sequence with a detection network that may be run on its pictures.
+
+    Args:
+        sequence: Any.
+        path: An ONNX file; None leaves the sequence as it is.
+
+    Raises:
+        SequenceError: If the file cannot be read.
+    """
+    if path is None:
+        return sequence
+    try:
+        with path.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()[:16]
+    except OSError as error:
+        raise SequenceError(
+            f"the detector {path} cannot be read ({error.strerror}); name an ONNX file"
+        ) from error
+    return replace(sequence, detector=DetectorFile(path, digest))
 
 
 def _open_room(

@@ -133,6 +133,16 @@ class View:
         return self.looked_at is None or bool(self.looked_at[step])
 
 
+@dataclass(frozen=True, slots=True)
+class DetectorFile:
+    """A detection network that somebody brings."""
+
+    path: Path
+    """An ONNX file."""
+    digest: str
+    """Hash of its content, for cache keys."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Sequence:
     """A recorded multi-view sequence, checked and ready to run."""
@@ -151,6 +161,8 @@ class Sequence:
     ground_truth: GroundTruth | None = None
     digest: str = field(default="")
     """Hash of sequence.toml and of the size and time of every file it names, for cache keys."""
+    detector: DetectorFile | None = None
+    """The network that may be run on its pictures; no part of :attr:`digest`."""
     warnings: tuple[str, ...] = ()
     """What is odd about it but does not keep it from running, one sentence each."""
 

@@ -46,17 +46,10 @@ class DetectorBoxes:
             )
         p, all_boxes = parameters, view.detections
         above = all_boxes.scores >= p.score_threshold
-        self._frames, scores = all_boxes.frames[above], all_boxes.scores[above]
-        boxes = Boxes.from_left_top(all_boxes.boxes[above]).centred
-        sigmas = trust(boxes, p)
-        nearest, farthest = standing_between(
-            view.camera,
-            boxes,
-            float(sequence.target_half_extents[2]),
-            p.depth_sigmas * sigmas[:, 3] / boxes[:, 3],
+        self._frames = all_boxes.frames[above]
+        self._found = judged(
+            sequence, view.camera, all_boxes.boxes[above], all_boxes.scores[above], p
         )
-        plausible = meets(sequence.room, nearest, farthest, p.room_tolerance)
-        self._found = Detected(_within(boxes, view.camera), scores, sigmas, plausible)
         """Of all steps: the judgement of a box asks for no other."""
 
     def at(self, frame: int) -> Detected:
@@ -66,6 +59,34 @@ class DetectorBoxes:
         return Detected(
             found.boxes[rows], found.scores[rows], found.sigmas[rows], found.plausible[rows]
         )
+
+
+def judged(
+    sequence: Sequence,
+    camera: Camera,
+    boxes: Float[ndarray, "N 4"],
+    scores: Float[ndarray, " N"],
+    parameters: DetectionBoxParams,
+) -> Detected:
+    """Boxes of a detector with how far each is to be trusted, and whether its place is possible.
+
+    Args:
+        sequence: Whose room and target they are set against.
+        camera: That they were found in.
+        boxes: left, top, width, height, pixels.
+        scores: 0 … 1.
+        parameters: The trust.
+    """
+    p, centred = parameters, Boxes.from_left_top(boxes).centred
+    sigmas = trust(centred, p)
+    nearest, farthest = standing_between(
+        camera,
+        centred,
+        float(sequence.target_half_extents[2]),
+        p.depth_sigmas * sigmas[:, 3] / centred[:, 3],
+    )
+    plausible = meets(sequence.room, nearest, farthest, p.room_tolerance)
+    return Detected(_within(centred, camera), scores, sigmas, plausible)
 
 
 def _within(boxes: Float[ndarray, "N 4"], camera: Camera) -> Float[ndarray, "N 4"]:

@@ -100,7 +100,11 @@ def recordings(request: Request, desk: AtDesk, bench: Bench) -> Recordings:
     return known.model_copy(update={"sheet": start_sheet(known, open_as)})
 
 
-@router.get("/recordings/picture", response_class=Response, responses={200: JPEG})
+@router.get(
+    "/recordings/picture",
+    response_class=Response,
+    responses={200: JPEG, 204: {"description": "It has no pictures."}},
+)
 def recording_picture(
     request: Request,
     name: Annotated[str, Query(max_length=4096, description="Of the list.")] = "",
@@ -113,9 +117,11 @@ def recording_picture(
     if folder is None:
         entries = library.available(request.app.state.settings.data)
         folder = next((entry.folder for entry in entries if entry.name == name), None)
-    jpeg = None if folder is None else thumbnail(folder)
+    if folder is None:
+        raise ApiError(404, "no_recording", "There is no such recording in the list.")
+    jpeg = thumbnail(folder)
     if jpeg is None:
-        raise ApiError(404, "no_picture", "This recording has no picture.")
+        return Response(status_code=204)
     return Response(jpeg, media_type="image/jpeg", headers={"cache-control": "private, no-cache"})
 
 

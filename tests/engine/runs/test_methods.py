@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.engine.single_view.networks import answering
 from tracker import pipeline, warm_up
 from tracker.parameters import (
     METHODS,
@@ -28,6 +29,7 @@ from tracker.parameters import (
 from tracker.parameters.registry import FOLLOWING, ORIGINS, REGISTERED
 from tracker.runs.fitting import default_parameters, unfit_methods
 from tracker.runs.run import Run
+from tracker.sequences.library import with_detector
 from tracker.sequences.sequence import Sequence
 
 STAGES = ("single_view", "fusion", "smoothing", "tracks")
@@ -37,8 +39,13 @@ CONDITIONS = sorted({key for p in PARAMETERS.values() for key in p.when})
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Sequence:
-    """Two people before two cameras, as pictures and as boxes, with templates."""
-    return warm_up._recording(tmp_path_factory.mktemp("people"))
+    """Two people before two cameras, as pictures and as boxes, with templates and a detector
+    that finds each of them, or nobody, wherever they are."""
+    folder = tmp_path_factory.mktemp("people")
+    boxes = np.zeros((1, 6, 84), np.float32)
+    boxes[0, :, 5], boxes[0, :, 7] = (30, 32, 6, 20, 0.9, 0.1), (50, 32, 6, 20, 0.8, 0.3)
+    model = answering(folder / "model.onnx", {"output0": boxes})
+    return with_detector(warm_up._recording(folder), model)
 
 
 def every_choice() -> Iterator[dict[str, Any]]:
@@ -183,6 +190,8 @@ def without(recording: Sequence, what: str) -> Sequence:
     """The same recording with less."""
     if what == "templates":
         return replace(recording, templates=())
+    if what == "detector":
+        return replace(recording, detector=None)
     gone: dict[str, Any] = {"images": ()} if what == "pictures" else {"detections": None}
     return replace(recording, views=tuple(replace(view, **gone) for view in recording.views))
 
@@ -190,6 +199,11 @@ def without(recording: Sequence, what: str) -> Sequence:
 def test_a_method_that_cannot_work_is_known_with_the_reason(recording: Sequence) -> None:
     defaults = RunParameters()
     assert unfit_methods(recording, defaults) == {key: {} for key in METHODS}
+    own = unfit_methods(replace(recording, detector=None), defaults)["single_view"]
+    assert own == {
+        "onnx_detector": "onnx_detector runs a detection network, and none is named; start the "
+        "program with --detector model.onnx."
+    }
     dark = unfit_methods(without(recording, "pictures"), defaults)["single_view"]
     assert set(dark) >= {"colour_phd", "jpda", "pseudo_particle", "association_matrix"}
     assert set(dark).isdisjoint({"detection_phd", "none"})
@@ -209,19 +223,21 @@ def test_a_method_that_cannot_work_is_known_with_the_reason(recording: Sequence)
     assert "jpda" in unfit_methods(without(recording, "detections"), boxes)["single_view"]
 
 
-@pytest.mark.parametrize("what", ["pictures", "detections", "templates"])
+@pytest.mark.parametrize("what", ["pictures", "detections", "templates", "detector"])
 @pytest.mark.parametrize("name", METHODS["single_view"])
 def test_a_method_fails_just_where_it_is_said_to(recording: Sequence, what: str, name: str) -> None:
     less = replace(without(recording, what), frames=warm_up.EMPTY + 2)
     parameters = RunParameters(single_view=name)
     if name in unfit_methods(less, parameters)["single_view"]:
-        with pytest.raises(ValueError, match=r"pictures|detections|template"):
+        with pytest.raises(ValueError, match=r"pictures|detections|template|detector"):
             pipeline.compute(less, parameters)
     else:
         assert pipeline.compute(less, parameters).complete
 
 
 def test_the_default_follows_the_recording_and_nothing_else_does(recording: Sequence) -> None:
+    assert default_parameters(recording).single_view == "onnx_detector"
+    recording = replace(recording, detector=None)
     first, second, third = FOLLOWING
     assert RunParameters().single_view == first
     for what, expected in (("detections", first), ("templates", second), ("pictures", second)):

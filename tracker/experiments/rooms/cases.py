@@ -70,7 +70,7 @@ def cases() -> tuple[Case, ...]:
     found = []
     for name in METHODS["single_view"]:
         used = method_of("single_view", name).used(RunParameters())
-        if not used.pictures and not used.detections:
+        if used.detector or not (used.pictures or used.detections):
             continue
         if used.templates != "no":
             found.append(Case(name, True))

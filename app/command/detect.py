@@ -1,0 +1,70 @@
+"""``multiview-phd detect``: boxes of a detection network, as CSV for each camera."""
+
+from __future__ import annotations
+
+import csv
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+
+from app.command.flags import Detect, set_values
+from app.command.terminal import Bar, CommandError, say
+
+
+def detect(command: Detect) -> None:
+    """Run a network on all pictures of a sequence and write what it finds.
+
+    What it finds is kept as that of ``track`` is, so tracking with the same model and values
+    begins where this ends.
+
+    Raises:
+        ParameterError: If a value is not as it must be.
+        CommandError: If the folder cannot be written to.
+        ValueError: If the sequence or the model cannot be used.
+    """
+    from app.state.compiling import Compiling
+    from tracker import parameters as table
+    from tracker import pipeline
+    from tracker.boxes import Boxes
+    from tracker.runs.stage_cache import StageCache
+    from tracker.sequences import library
+
+    changes = set_values(command.set)
+    if command.output.exists() and not command.output.is_dir():
+        raise CommandError(f"--output {command.output}: expected a folder, found a file")
+    with Bar("rendering", "frame") as rendering:
+        sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    sequence = library.with_detector(sequence, command.model)
+    if not sequence.has_pictures:
+        raise CommandError(f"{sequence.name}: a detector needs pictures of every camera")
+    parameters = table.with_values(
+        table.RunParameters(), {**changes, "single_view": "onnx_detector"}
+    )
+    with Bar("detecting", "step") as bar, closing(Compiling(say)) as compiling:
+        bar.at(0, sequence.frames)
+        compiling.wait(lambda done, total: None, lambda: False)
+        run = pipeline.compute(
+            sequence,
+            parameters,
+            cache=StageCache.on_disk(),
+            on_progress=lambda _, progress: bar.at(progress.done, progress.total),
+        )
+    command.output.mkdir(parents=True, exist_ok=True)
+    counts = []
+    for number, camera in enumerate(sequence.cameras):
+        views = [step[number] for step in run.views]
+        boxes = np.concatenate([Boxes(view.measurements).left_top for view in views])
+        scores = np.concatenate([view.measurement_scores for view in views])
+        frames = np.repeat(np.arange(len(views)), [len(view.measurements) for view in views])
+        _write(command.output / f"{camera.name}.csv", frames, boxes, scores)
+        counts.append(f"{camera.name} {len(boxes)}")
+    say(f"boxes in {sequence.frames} steps: {', '.join(counts)}; written to {command.output}")
+
+
+def _write(path: Path, frames: np.ndarray, boxes: np.ndarray, scores: np.ndarray) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow(["frame", "left", "top", "width", "height", "score"])
+        for frame, box, score in zip(frames, boxes, scores, strict=True):
+            table.writerow([frame, *(f"{value:.2f}" for value in box), f"{score:.4f}"])

@@ -1,0 +1,404 @@
+"""A detection network: every layout of outputs, the way into its picture and back, bad files."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy import ndarray
+
+from tests.engine.painted import RED, painted_sequence, true_boxes
+from tests.engine.single_view.networks import answering, pooling
+from tests.engine.synthetic import look_at
+from tracker import pipeline
+from tracker.boxes import Boxes
+from tracker.camera import Camera
+from tracker.parameters import RunParameters, with_values
+from tracker.runs.run import stage_keys
+from tracker.sequences.library import with_detector
+from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.single_view.onnx.file import ports_of
+from tracker.single_view.onnx.layouts import proposals
+from tracker.single_view.onnx.network import Network, Settings
+
+SIZE = (64, 64)
+"""Of the networks' pictures: 64 + 16 + 4 cells in YOLO's three grids."""
+CELLS = 84
+
+PERSON, OTHER = (32.0, 30.0, 20.0, 40.0), (12.0, 50.0, 8.0, 10.0)
+"""Centre and size in the network's picture, of who is to be found and of something else."""
+CORNERS = (22.0, 10.0, 42.0, 50.0)
+
+
+def yolo_8(people: float = 0.9, logits: bool = False) -> ndarray:
+    """(1, 4 + 3, N): a person twice, and something of class 2."""
+    table = np.zeros((1, 7, CELLS), np.float32)
+    if logits:
+        table[:, 4:] = -9.0
+    table[0, :, 3] = *PERSON, people, 0.1, 0.0
+    table[0, :, 4] = 32.5, 30.0, 20.0, 40.0, people - 0.2, 0.1, 0.0
+    table[0, :, 9] = *OTHER, 0.1, 0.0, 0.95
+    return table
+
+
+def yolo_5() -> ndarray:
+    """(1, 3 N, 5 + 2) with objectness: what is surely an object need be no person."""
+    table = np.zeros((1, 3 * CELLS, 7), np.float32)
+    table[0, 3] = *PERSON, 0.95, 0.9, 0.1
+    table[0, 9] = *OTHER, 1.0, 0.05, 0.95
+    table[0, 20] = *OTHER, 0.1, 0.99, 0.0
+    return table
+
+
+def end_to_end() -> ndarray:
+    """(1, K, 6): corners, score, class; and rows of zeros."""
+    table = np.zeros((1, 30, 6), np.float32)
+    table[0, 0] = *CORNERS, 0.9, 0.0
+    table[0, 1] = 8.0, 45.0, 16.0, 55.0, 0.95, 7.0
+    return table
+
+
+def yolo_7_end_to_end() -> ndarray:
+    """(K, 7): picture, corners, class, score."""
+    table = np.zeros((2, 7), np.float32)
+    table[0] = 0.0, *CORNERS, 0.0, 0.9
+    table[1] = 0.0, 8.0, 45.0, 16.0, 55.0, 3.0, 0.95
+    return table
+
+
+def shares(box: tuple[float, ...]) -> list[float]:
+    return [value / 64.0 for value in box]
+
+
+def rt_detr() -> ndarray:
+    """(1, N, 4 + C), boxes as shares of the picture."""
+    table = np.zeros((1, 30, 50), np.float32)
+    table[0, 2, :4], table[0, 2, 4] = shares(PERSON), 0.9
+    table[0, 5, :4], table[0, 5, 20] = shares(OTHER), 0.95
+    return table
+
+
+def detr(count: int, person: int, nothing: int | None) -> dict[str, ndarray]:
+    """Logits and boxes; with or without a class for nothing."""
+    logits = np.full((1, 25, count), -8.0, np.float32)
+    boxes = np.full((1, 25, 4), 0.5, np.float32)
+    if nothing is not None:
+        logits[..., nothing] = 8.0
+        logits[0, 2, nothing] = -8.0
+    logits[0, 2, person], boxes[0, 2] = 4.0, shares(PERSON)
+    return {"logits": logits, "pred_boxes": boxes}
+
+
+def named() -> dict[str, ndarray]:
+    """Labels, boxes in pixels and scores."""
+    boxes = np.zeros((1, 6, 4), np.float32)
+    boxes[0, 0], boxes[0, 1] = CORNERS, (8.0, 45.0, 16.0, 55.0)
+    labels = np.array([[0, 5, 3, 3, 3, 3]], np.float32)
+    return {"labels": labels, "boxes": boxes, "scores": np.array([[0.9, 0.95, 0, 0, 0, 0]])}
+
+
+def tensorflow() -> dict[str, ndarray]:
+    """Of TensorFlow's object detection API: rows first, classes from 1."""
+    boxes = np.zeros((1, 6, 4), np.float32)
+    boxes[0, 0] = shares((10.0, 22.0, 50.0, 42.0))
+    return {
+        "detection_boxes": boxes,
+        "detection_classes": np.array([[1, 2, 2, 2, 2, 2]], np.float32),
+        "detection_scores": np.array([[0.9, 0.0, 0, 0, 0, 0]], np.float32),
+    }
+
+
+def ssd() -> ndarray:
+    """(1, 1, N, 7): picture, class from 1, score, corners as shares."""
+    table = np.zeros((1, 1, 4, 7), np.float32)
+    table[0, 0, 0] = 0.0, 1.0, 0.9, *shares(CORNERS)
+    table[0, 0, 1] = 0.0, 15.0, 0.95, 0.1, 0.1, 0.2, 0.2
+    table[0, 0, 2, 0] = -1.0
+    return table
+
+
+def ssd_by_class() -> dict[str, ndarray]:
+    """Boxes and scores of more than a thousand places; the first class is nothing."""
+    boxes = np.full((1, 1200, 4), 0.01, np.float32)
+    scores = np.zeros((1, 1200, 3), np.float32)
+    scores[0, :, 0] = 1.0
+    boxes[0, 7], scores[0, 7] = shares(CORNERS), (0.05, 0.9, 0.05)
+    return {"boxes": boxes, "scores": scores}
+
+
+def centre_net() -> dict[str, ndarray]:
+    """A peak of the first of three classes, and its lower neighbour."""
+    heat, wh = np.zeros((1, 3, 16, 16), np.float32), np.zeros((1, 2, 16, 16), np.float32)
+    offset = np.zeros((1, 2, 16, 16), np.float32)
+    heat[0, 0, 7, 8], heat[0, 0, 7, 9], heat[0, 2, 2, 2] = 0.9, 0.8, 0.95
+    wh[0, :, 7, 8] = 5.0, 10.0
+    offset[0, :, 7, 8] = 0.0, 0.5
+    return {"hm": heat, "wh": wh, "reg": offset}
+
+
+LAYOUTS: dict[str, Mapping[str, ndarray]] = {
+    "YOLOv8": {"output0": yolo_8()},
+    "YOLOv8 with masks": {"output0": yolo_8(), "output1": np.zeros((1, 32, 16, 16))},
+    "YOLOv5": {"output0": yolo_5()},
+    "end to end": {"output0": end_to_end()},
+    "YOLOv7 end to end": {"output": yolo_7_end_to_end()},
+    "RT-DETR, one table": {"output0": rt_detr()},
+    "RT-DETR, logits": detr(80, 0, None),
+    "DETR": detr(92, 1, 91),
+    "labels": named(),
+    "TensorFlow": tensorflow(),
+    "SSD": {"detection_out": ssd()},
+    "SSD by class": ssd_by_class(),
+    "CenterNet": centre_net(),
+}
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_the_person_is_found_in_every_layout(name: str) -> None:
+    found = proposals(LAYOUTS[name], SIZE)
+    best = int(np.argmax(found.scores))
+    assert 0.8 < found.scores[best] < 1.0
+    np.testing.assert_allclose(found.corners[best], CORNERS, atol=1e-4)
+    assert (found.scores > 0.35).sum() == (2 if name.startswith("YOLOv8") else 1)
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_every_layout_passes_through_opencv(name: str, tmp_path: Path) -> None:
+    network = Network(answering(tmp_path / "model.onnx", LAYOUTS[name]), Settings())
+    assert network.size == SIZE
+    found = network.look(np.zeros((64, 64, 3), np.uint8))
+    assert len(found.boxes) == 1
+    np.testing.assert_allclose(found.boxes[0], [21.5, 9.5, 20.0, 40.0], atol=0.02)
+
+
+def test_another_class_is_asked_for() -> None:
+    found = proposals({"output0": yolo_8()}, SIZE, 2)
+    assert found.scores.max() == pytest.approx(0.95)
+    with pytest.raises(ValueError, match="tells 3 classes apart, and class 80 is asked for"):
+        proposals({"output0": yolo_8()}, SIZE, 80)
+
+
+def test_scores_may_be_logits() -> None:
+    found = proposals({"output0": yolo_8(2.0, logits=True)}, SIZE)
+    assert found.scores.max() == pytest.approx(1.0 / (1.0 + np.exp(-2.0)), rel=1e-5)
+
+
+def test_an_unknown_layout_is_named_with_its_shapes() -> None:
+    with pytest.raises(ValueError, match=r"its outputs features \(1, 512\) are of no known layout"):
+        proposals({"features": np.zeros((1, 512))}, SIZE)
+
+
+# ── into the network's picture and back ──────────────────────────────────────
+
+
+@pytest.mark.parametrize("picture", [(128, 64), (64, 128), (32, 48), (200, 200)])
+def test_boxes_come_back_from_the_letterbox(picture: tuple[int, int], tmp_path: Path) -> None:
+    """A box of the network's picture lies at the same place of the scaled one in its middle."""
+    network = Network(answering(tmp_path / "model.onnx", {"output0": end_to_end()}), Settings())
+    height, width = picture
+    found = network.look(np.zeros((height, width, 3), np.uint8))
+    scale = min(64 / width, 64 / height)
+    inner = round(width * scale), round(height * scale)
+    shift = np.array([(64 - inner[0]) // 2, (64 - inner[1]) // 2] * 2)
+    corners = (np.array(CORNERS) - shift) / np.tile([inner[0] / width, inner[1] / height], 2) - 0.5
+    corners = np.clip(corners, -0.5, np.array([width, height] * 2) - 0.5)
+    np.testing.assert_allclose(found.boxes[0, :2], corners[:2], atol=1e-4)
+    np.testing.assert_allclose(found.boxes[0, 2:], corners[2:] - corners[:2], atol=1e-4)
+
+
+def test_it_sees_what_is_in_the_picture(tmp_path: Path) -> None:
+    """A network that finds red: colours are not exchanged, and places agree."""
+    network = Network(pooling(tmp_path / "model.onnx"), Settings())
+    picture = np.zeros((64, 32, 3), np.uint8)
+    picture[16:24, 8:16, 2] = 255  # red, at half the size rows 8 to 11, columns 4 to 7
+    found = network.look(picture)
+    assert found.scores[0] == pytest.approx(1.0, abs=0.02)
+    (left, top, width, height) = found.boxes[0]
+    assert (left + width / 2.0, top + height / 2.0) == pytest.approx((11.5, 19.5), abs=0.1)
+    assert (width, height) == pytest.approx((24.0, 40.0), abs=0.1)
+    picture[..., 0], picture[..., 2] = picture[..., 2].copy(), 0
+    assert len(network.look(picture).boxes) == 0
+
+
+def test_sizes_that_are_left_open_and_channels_last(tmp_path: Path) -> None:
+    path = tmp_path / "model.onnx"
+    answering(path, {"output0": yolo_8()}, open_sizes=True)
+    assert Network(path, Settings(side=96)).size == (96, 96)
+    answering(path, {"output0": yolo_8()}, channels_last=True)
+    network = Network(path, Settings())
+    assert network.size == SIZE
+    assert len(network.look(np.zeros((64, 64, 3), np.uint8)).boxes) == 1
+
+
+@pytest.mark.parametrize(
+    ("values", "mean"), [("unit", 0.4), ("bytes", 102.0), ("signed", -0.2), ("imagenet", -0.2159)]
+)
+def test_what_a_pictures_bytes_become(values: str, mean: float, tmp_path: Path) -> None:
+    """The score of the answer is the mean of what the network is given."""
+    table = end_to_end()
+    table[0, 0, 4] = 1.0
+    network = Network(
+        answering(tmp_path / "m.onnx", {"out": table}, score_is={"out": (0, 0, 4)}),
+        Settings(values=values, score=0.0),  # type: ignore[arg-type]
+    )
+    outputs = network._forward(network._fed(np.full((64, 64, 3), 102, np.uint8)))
+    assert outputs["out"][0, 0, 4] == pytest.approx(1.0 + mean, abs=2e-3)
+
+
+def test_score_and_overlap(tmp_path: Path) -> None:
+    path = answering(tmp_path / "model.onnx", {"output0": yolo_8()})
+    dark = np.zeros((64, 64, 3), np.uint8)
+    assert len(Network(path, Settings(score=0.95)).look(dark).boxes) == 0
+    both = Network(path, Settings(overlap=0.98)).look(dark)
+    np.testing.assert_allclose(both.scores, [0.9, 0.7], atol=1e-5)
+
+
+# ── files that are no such networks ──────────────────────────────────────────
+
+
+def test_bad_files_are_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"cannot be read .*name an ONNX file"):
+        Network(tmp_path / "nowhere.onnx", Settings())
+    for name, data in (("text", b"this is no network"), ("empty", b""), ("zeros", bytes(500))):
+        path = tmp_path / f"{name}.onnx"
+        path.write_bytes(data)
+        with pytest.raises(ValueError, match=rf"^the detector {name}\.onnx cannot be used: "):
+            Network(path, Settings())
+    good = answering(tmp_path / "good.onnx", {"output0": yolo_8()}).read_bytes()
+    (tmp_path / "cut.onnx").write_bytes(good[: len(good) // 2])
+    with pytest.raises(ValueError, match=r"cut\.onnx cannot be used"):
+        Network(tmp_path / "cut.onnx", Settings())
+
+
+def test_a_network_without_a_known_answer_is_told_when_it_is_run(tmp_path: Path) -> None:
+    path = answering(tmp_path / "classes.onnx", {"probabilities": np.zeros((1, 1000))})
+    with pytest.raises(ValueError, match=r"classes\.onnx cannot be used: its outputs probab"):
+        Network(path, Settings()).look(np.zeros((64, 64, 3), np.uint8))
+
+
+def test_inputs_and_outputs_are_read_from_the_file(tmp_path: Path) -> None:
+    path = answering(tmp_path / "m.onnx", {"a": np.zeros((1, 6, 84))}, open_sizes=True)
+    ports = ports_of(path.read_bytes())
+    assert [(p.name, p.shape) for p in ports.inputs] == [("images", (1, 3, 0, 0))]
+    assert [(p.name, p.shape) for p in ports.outputs] == [("a", (1, 6, 84))]
+
+
+# ── as a method ──────────────────────────────────────────────────────────────
+
+STEPS = 6
+
+
+def red_head(folder: Path, camera: Camera, model: Path) -> Sequence:
+    """Somebody in red who walks; and the network that finds red."""
+    path = np.linspace([-0.5, 0.0, 1.2], [0.5, 0.0, 1.2], STEPS)
+    folder.mkdir()
+    return with_detector(painted_sequence(folder, [path], [(RED[1], RED[1])], camera=camera), model)
+
+
+def parameters(**more: float) -> RunParameters:
+    values = {f"onnx_detector.{name}": value for name, value in more.items()}
+    return with_values(RunParameters(), {"single_view": "onnx_detector", **values})
+
+
+def test_what_it_finds_is_tracked_in_full_pixels(tmp_path: Path) -> None:
+    model = pooling(tmp_path / "model.onnx", 256)
+    sequence = red_head(tmp_path / "level", look_at("level", (0.0, -4.0, 1.2)), model)
+    run = pipeline.compute(sequence, parameters(score_threshold=0.25, room_tolerance=100.0))
+    for step, (view,) in enumerate(run.views):
+        (truth,) = true_boxes(sequence, step)
+        distances = np.linalg.norm(view.measurements[:, :2] - truth[:2], axis=1)
+        assert distances.min() < 0.6 * truth[3]
+
+
+def test_a_rolled_camera_is_looked_at_upright(tmp_path: Path) -> None:
+    """The same room through a camera on its side: the same boxes, turned.
+
+    The network's boxes are higher than wide; in the rolled picture they must be wider.
+    """
+    model = pooling(tmp_path / "model.onnx", 256)
+    level = look_at("cam", (0.0, -4.0, 1.2), distortion=np.zeros(5))
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    width, height = level.image_size
+    fx, fy = level.intrinsics[0, 0], level.intrinsics[1, 1]
+    cx, cy = level.intrinsics[0, 2], level.intrinsics[1, 2]
+    rolled = replace(
+        level,
+        image_size=(height, width),
+        intrinsics=np.array([[fy, 0.0, height - 1.0 - cy], [0.0, fx, cx], [0.0, 0.0, 1.0]]),
+        rotation=quarter @ level.rotation,
+        translation=quarter @ level.translation,
+    )
+    plain = red_head(tmp_path / "plain", level, model)
+    turned = tmp_path / "turned"
+    turned.mkdir()
+    for path in plain.views[0].images:
+        picture = cv2.imread(str(path))
+        cv2.imwrite(str(turned / path.name), cv2.rotate(picture, cv2.ROTATE_90_CLOCKWISE))
+    images = tuple(turned / path.name for path in plain.views[0].images)
+    view = replace(plain.views[0], camera=rolled, images=images)
+    on_its_side = replace(plain, views=(view,), digest="rolled")
+    values = parameters(score_threshold=0.25, room_tolerance=100.0)
+    upright, sideways = (pipeline.compute(s, values).views for s in (plain, on_its_side))
+    assert sum(len(step[0].measurements) for step in upright) >= STEPS
+    for (a,), (b,) in zip(upright, sideways, strict=True):
+        expected = np.column_stack(
+            [
+                height - 1.0 - a.measurements[:, 1],
+                a.measurements[:, 0],
+                a.measurements[:, 3],
+                a.measurements[:, 2],
+            ]
+        )
+        # a cell of the heat map is 6 pixels, and its peaks are where the noise is
+        apart = np.abs(expected[:, None, :2] - b.measurements[None, :, :2]).max(axis=2)
+        assert apart.min(axis=0).max() < 13.0
+        assert (b.measurements[:, 2] > b.measurements[:, 3]).all()
+
+
+def test_what_is_kept_depends_on_the_models_content(tmp_path: Path) -> None:
+    one, same, other = (tmp_path / f"{name}.onnx" for name in ("one", "same", "other"))
+    answering(one, {"output0": yolo_8()})
+    answering(same, {"output0": yolo_8()})
+    answering(other, {"output0": yolo_8(0.8)})
+    sequence = red_head(tmp_path / "pictures", look_at("cam", (0.0, -4.0, 1.2)), one)
+    keys = [
+        stage_keys(with_detector(sequence, path), parameters(), 0)["single_view"]
+        for path in (one, same, other)
+    ]
+    assert keys[0] == keys[1] != keys[2]
+    colours = RunParameters(single_view="colour_phd")
+    assert stage_keys(sequence, colours, 0) == stage_keys(
+        with_detector(sequence, other), colours, 0
+    )
+    with pytest.raises(SequenceError, match=r"nowhere\.onnx cannot be read"):
+        with_detector(sequence, tmp_path / "nowhere.onnx")
+
+
+def test_the_command_writes_boxes_that_a_sequence_reads(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from app.command import main as cli
+    from tracker.sequences.rendering import render
+
+    render("room24-2p", tmp_path / "room", frames=3)
+    model = answering(tmp_path / "model.onnx", {"output0": end_to_end()})
+    out = tmp_path / "boxes"
+    command = ["detect", str(tmp_path / "room"), "--model", str(model), "-o", str(out)]
+    assert cli.main(command) == 0
+    assert "cam1 3" in capsys.readouterr().err
+    with (out / "cam2.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["frame"]) for row in rows] == [0, 1, 2]
+    boxes = np.array([[float(row[k]) for k in ("left", "top", "width", "height")] for row in rows])
+    # 360 x 288 as the network's 64 x 64: the picture is 51 lines high there, 6 from the top
+    np.testing.assert_allclose(
+        Boxes.from_left_top(boxes).centred[0, :2], [180.0 - 0.5, 24.0 * 360 / 64 - 0.5], atol=4.0
+    )
+    model.write_bytes(b"no network")
+    assert cli.main(command) == 1
+    assert "model.onnx cannot be used: it is not an ONNX model" in capsys.readouterr().err

@@ -1,0 +1,81 @@
+"""The boxes of a detector that is brought as an ONNX file, found while they are tracked."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy import ndarray
+
+from tracker.parameters import OnnxDetectorParams
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.detector_boxes import judged
+from tracker.single_view.onnx.network import Network, Settings
+from tracker.single_view.protocol import ViewResult
+
+if TYPE_CHECKING:
+    from tracker.parameters import RunParameters
+    from tracker.sequences.frames import Pictures
+
+
+class OnnxDetector:
+    """A detector on the pictures of one camera; what it finds is trusted as boxes of a file are.
+
+    Boxes that contradict the room stay among the measurements and go no further. The
+    pictures are those that stage 1 works on, so people stand upright in them however a
+    camera is turned, and one network serves all cameras.
+    """
+
+    def __init__(
+        self,
+        sequence: Sequence,
+        camera_index: int,
+        parameters: RunParameters,
+        reader: Pictures,
+    ) -> None:
+        """Prepare for one camera.
+
+        Raises:
+            ValueError: If the sequence has no detector or no pictures, or it cannot be used.
+        """
+        model = sequence.detector
+        if model is None:
+            raise ValueError(
+                f"{sequence.name} has no detector; start with --detector model.onnx, or choose "
+                "another single_view"
+            )
+        if not sequence.views[camera_index].has_pictures:
+            name = sequence.views[camera_index].camera.name
+            raise ValueError(
+                f'camera "{name}" of {sequence.name} has no pictures for a detector to look at; '
+                "give it a video or images in sequence.toml"
+            )
+        p = self._parameters = parameters.of(OnnxDetectorParams)
+        self._sequence, self._camera = sequence, sequence.views[camera_index].camera
+        settings = Settings(
+            p.person_class, p.score_threshold, p.suppression_overlap, p.input_side, p.pixel_values
+        )
+        self._network = reader.once(
+            ("onnx_detector", model.digest, settings), lambda: Network(model.path, settings)
+        )
+
+    def start(self) -> None:
+        """There is no state."""
+
+    def step(
+        self, state: None, frame: int, picture: ndarray | None, rng: np.random.Generator
+    ) -> tuple[None, ViewResult]:
+        """The people that the network finds in the picture."""
+        if picture is None:
+            return None, ViewResult.of_no_frame()
+        seen = self._network.look(picture)
+        found = judged(self._sequence, self._camera, seen.boxes, seen.scores, self._parameters)
+        good = found.plausible
+        result = ViewResult.of_boxes(found.boxes[good], found.scores[good], found.sigmas[good])
+        return None, replace(
+            result,
+            measurements=found.boxes,
+            measurement_scores=found.scores,
+            information={"boxes outside the room": float((~good).sum())},
+        )

@@ -1,0 +1,187 @@
+"""A detection network in OpenCV: a picture in, boxes of people in the picture's pixels out."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import cv2
+import numpy as np
+from jaxtyping import Float, UInt8
+from numpy import ndarray
+
+from tracker.single_view.onnx.file import INT64, UINT8, Port, ports_of
+from tracker.single_view.onnx.layouts import FOUND_OUT, proposals
+
+Values = Literal["unit", "imagenet", "signed", "bytes"]
+
+_GREY = 114
+"""Of the borders that fill a picture up to the network's shape, as YOLO's training has it."""
+_IMAGENET_MEAN = np.array([0.485, 0.456, 0.406], np.float32)
+_IMAGENET_DEVIATION = np.array([0.229, 0.224, 0.225], np.float32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """Boxes of people in one picture."""
+
+    boxes: Float[ndarray, "N 4"]
+    """left, top, width, height, pixels of the picture."""
+    scores: Float[ndarray, " N"]
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How a network is fed and read."""
+
+    person: int = FOUND_OUT
+    """Index of the class, or -1 for that of people by the layout."""
+    score: float = 0.35
+    """Boxes with a lower score are left out."""
+    overlap: float = 0.6
+    """Of two boxes whose intersection over union is larger the better stays."""
+    side: int = 640
+    """Of the network's picture, where the file leaves it open; pixels."""
+    values: Values = "unit"
+    """What a picture's bytes become."""
+
+
+class Network:
+    """A model ready to look at pictures; one at a time, whoever asks.
+
+    OpenCV spreads one picture over the cores by itself, so a second copy for another
+    camera would only take memory.
+    """
+
+    def __init__(self, path: Path, settings: Settings) -> None:
+        """Read a model.
+
+        Raises:
+            ValueError: If the file is no ONNX model, or none that takes a picture; a
+                sentence that names it.
+        """
+        self._path, self._settings = path, settings
+        try:
+            data = path.read_bytes()
+            ports = ports_of(data)
+            self._net = cv2.dnn.readNetFromONNX(np.frombuffer(data, np.uint8))
+        except OSError as error:
+            raise ValueError(
+                f"the detector {path} cannot be read ({error.strerror}); name an ONNX file"
+            ) from error
+        except (ValueError, cv2.error) as error:
+            raise ValueError(self._told(f"cannot be used: {_words(error)}")) from error
+        self._picture = self._picture_port(ports.inputs)
+        self._sizes = [p for p in ports.inputs if p is not self._picture]
+        self._names = [port.name for port in ports.outputs]
+        self._lock = threading.Lock()
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the network's own picture."""
+        shape = self._picture.shape
+        height, width = shape[1:3] if self._channels_last else shape[2:4]
+        return width or self._settings.side, height or self._settings.side
+
+    @property
+    def _channels_last(self) -> bool:
+        return self._picture.shape[1] != 3 and self._picture.shape[3] == 3
+
+    def _told(self, words: str) -> str:
+        return (
+            f"the detector {self._path.name} {words}; export it to ONNX again with one picture at "
+            "a time"
+        )
+
+    def _picture_port(self, inputs: tuple[Port, ...]) -> Port:
+        for port in inputs:
+            if len(port.shape) == 4 and 3 in (port.shape[1], port.shape[3]):
+                if port.shape[0] > 1:
+                    raise ValueError(self._told(f"takes {port.shape[0]} pictures at a time"))
+                return port
+        shapes = ", ".join(f"{p.name} {p.shape}" for p in inputs)
+        raise ValueError(
+            self._told(f"takes no picture: expected an input (1, 3, height, width), found {shapes}")
+        )
+
+    def look(self, picture: UInt8[ndarray, "h w 3"]) -> Found:
+        """The people in a picture (blue, green, red).
+
+        It is made as large as fits into the network's picture, without a change of its
+        proportions, in the middle of grey borders; the boxes come back in its own pixels
+        and end where it ends.
+
+        Raises:
+            ValueError: If the network cannot work on it, or its outputs are of no known layout.
+        """
+        width, height = self.size
+        rows, columns = picture.shape[:2]
+        scale = min(width / columns, height / rows)
+        inner = max(1, round(columns * scale)), max(1, round(rows * scale))
+        shift = np.array([(width - inner[0]) // 2, (height - inner[1]) // 2])
+        framed = np.full((height, width, 3), _GREY, np.uint8)
+        flags = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_LINEAR
+        framed[shift[1] : shift[1] + inner[1], shift[0] : shift[0] + inner[0]] = cv2.resize(
+            picture, inner, interpolation=flags
+        )
+        outputs = self._forward(self._fed(framed))
+        s = self._settings
+        try:
+            found = proposals(outputs, (width, height), s.person)
+        except ValueError as error:
+            raise ValueError(f"the detector {self._path.name} cannot be used: {error}") from error
+        kept = found.scores >= s.score
+        corners, scores = found.corners[kept].astype(float), found.scores[kept].astype(float)
+        # where two pixels lie side by side their middles are one apart, and edges lie between
+        factors = np.tile(np.array(inner) / [columns, rows], 2)
+        corners = (corners - np.tile(shift, 2)) / factors - 0.5
+        corners[:, 0::2] = np.clip(corners[:, 0::2], -0.5, columns - 0.5)
+        corners[:, 1::2] = np.clip(corners[:, 1::2], -0.5, rows - 0.5)
+        boxes = np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], axis=1)
+        sound = np.isfinite(boxes).all(axis=1) & (boxes[:, 2:] > 0.5).all(axis=1)
+        boxes, scores = boxes[sound], np.clip(scores[sound], 0.0, 1.0)
+        order = np.argsort(-scores, kind="stable")
+        boxes, scores = boxes[order], scores[order]
+        if not found.suppressed and len(boxes):
+            best = cv2.dnn.NMSBoxes(boxes.tolist(), scores.tolist(), 0.0, s.overlap)
+            stay = np.sort(np.asarray(best, dtype=int).reshape(-1))
+            boxes, scores = boxes[stay], scores[stay]
+        return Found(boxes, scores)
+
+    def _fed(self, framed: UInt8[ndarray, "h w 3"]) -> ndarray:
+        coloured = framed[:, :, ::-1]
+        if self._picture.kind != UINT8:
+            match self._settings.values:
+                case "unit":
+                    coloured = coloured.astype(np.float32) / 255.0
+                case "imagenet":
+                    coloured = (coloured.astype(np.float32) / 255.0 - _IMAGENET_MEAN) / (
+                        _IMAGENET_DEVIATION
+                    )
+                case "signed":
+                    coloured = coloured.astype(np.float32) / 127.5 - 1.0
+                case "bytes":
+                    coloured = coloured.astype(np.float32)
+        if not self._channels_last:
+            coloured = coloured.transpose(2, 0, 1)
+        return np.ascontiguousarray(coloured[None])
+
+    def _forward(self, fed: ndarray) -> dict[str, ndarray]:
+        try:
+            with self._lock:
+                self._net.setInput(fed, self._picture.name)
+                for port in self._sizes:  # the size that boxes come back in, as RT-DETR asks
+                    kind = np.int64 if port.kind == INT64 else np.float32
+                    self._net.setInput(np.array([self.size], kind), port.name)
+                outputs = self._net.forward(self._names)
+                return {n: np.array(o) for n, o in zip(self._names, outputs, strict=True)}
+        except cv2.error as error:
+            raise ValueError(self._told(f"cannot be run: {_words(error)}")) from error
+
+
+def _words(error: Exception) -> str:
+    """What OpenCV says, without where in its sources it says so."""
+    words = " ".join(str(error).split())
+    return words.rsplit("error: ", 1)[-1][:160]
