@@ -191,7 +191,7 @@ class Experiment:
         arg(metavar="NAME", help="Which one.", help_behavior_hint="(optional)"),
     ] = None
     all: FlagCreatePairsOff[bool] = False
-    """Run every one, a quarter of an hour in all."""
+    """Run every one."""
     quick: FlagCreatePairsOff[bool] = False
     """Shortened to what shows the direction of each claim."""
     count: int = 20
@@ -334,7 +334,7 @@ class Benchmark:
         arg(metavar="[NAME …]", help="Which parts; all, if none is named."),
     ] = ()
     short: FlagCreatePairsOff[bool] = False
-    """The form of a minute or two that the checks run."""
+    """The shortened form that the checks run."""
     json: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
     """Write the figures to this file as well, with the machine and the versions."""
     record: FlagCreatePairsOff[bool] = False
