@@ -1,15 +1,18 @@
-"""``multiview-phd evaluate``: a track file against the truth of its sequence."""
+"""``multiview-phd evaluate``: a track file against the truth, or an estimate without one."""
 
 from __future__ import annotations
 
 import json
 import sys
-from typing import Any
+from contextlib import closing
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
 from app.command.flags import Evaluate
 from app.command.terminal import Bar, CommandError, print_table, say
+from app.state.compiling import Compiling
 from tracker import __version__, export
 from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
 from tracker.evaluation.figures import number
@@ -18,9 +21,14 @@ from tracker.parameters import ParameterError
 from tracker.sequences import library
 from tracker.sequences.sequence import Sequence
 
+if TYPE_CHECKING:
+    from tracker.without_truth import Estimate
+
 
 def evaluate(command: Evaluate) -> None:
     """Print the figures, as tables or as JSON, and write the report where one is asked for.
+
+    Without a track file the sequence is tracked in several ways, and how far they agree is said.
 
     Raises:
         ParameterError: If a setting is not as it must be.
@@ -28,6 +36,9 @@ def evaluate(command: Evaluate) -> None:
         ValueError: If a file cannot be read.
         OSError: If the report cannot be written.
     """
+    if command.tracks is None:
+        estimate_without_truth(command)
+        return
     settings = settings_from(command.changes())
     if command.html is not None:
         if command.html.is_dir():
@@ -64,6 +75,79 @@ def evaluate(command: Evaluate) -> None:
         say(line)
     if command.html is not None:
         say(f"the report is in {command.html}")
+
+
+def estimate_without_truth(command: Evaluate) -> None:
+    """Track a sequence with its default parameters, in several ways, and say how far they agree.
+
+    Raises:
+        CommandError: If something is asked for that needs a track file.
+    """
+    given = [name for name in ("html", *command.changes()) if getattr(command, name) is not None]
+    if given:
+        flags = ", ".join(f"--{name.replace('_', '-')}" for name in given)
+        raise CommandError(f"{flags}: expected a track file as well; name it after the sequence")
+
+    from tracker import pipeline
+    from tracker.experiments.laboratory.experiment import Context
+    from tracker.experiments.laboratory.pool import cores
+    from tracker.runs.stage_cache import StageCache
+    from tracker.without_truth import estimate
+    from tracker.without_truth.estimate import WARNING
+
+    with Bar("rendering", "frame") as rendering:
+        sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    with Bar("tracking", "step") as tracking, closing(Compiling(say)) as compiling:
+        tracking.at(0, sequence.frames)
+        compiling.wait(lambda done, total: None, lambda: False)
+        run = pipeline.compute(
+            sequence,
+            pipeline.default_parameters(sequence),
+            cache=StageCache.on_disk(),
+            on_progress=lambda _, progress: tracking.at(progress.done, progress.total),
+        )
+    with Bar("looking in other ways", "step") as looking:
+        told = lambda words, done, total: looking.at(done, total)  # noqa: E731
+        found = estimate(run, Context(processes=cores(), told=told))
+    names = [camera.name for camera in sequence.cameras]
+    if command.json:
+        low, high = found.interval
+        document = {
+            "version": __version__,
+            "sequence": sequence.name,
+            "estimate": found.score,
+            "low": low,
+            "high": high,
+            "backwards": found.backwards,
+            "without": dict(zip(names, found.without, strict=False)),
+            "overlap": dict(zip(names, found.overlaps, strict=False)),
+            "doubts": [asdict(doubt) for doubt in found.doubts],
+        }
+        sys.stdout.write(json.dumps(document, allow_nan=False) + "\n")
+    else:
+        _print_estimate(found, names)
+    say(WARNING)
+
+
+_SHOWN_DOUBTS = 10
+
+
+def _print_estimate(found: Estimate, names: list[str]) -> None:
+    low, high = found.interval
+    rows = [
+        ("IDF1, estimated", number(found.score, 3), f"90 %: {low:.3f} … {high:.3f}"),
+        ("backwards in time", number(found.backwards, 3), "IDF1 by the run as it is"),
+    ]
+    for name, agreed, overlap in zip(names, found.without, found.overlaps, strict=False):
+        words = f"its boxes overlap the others' people by {number(overlap, 2)}"
+        rows.append((f"without {name}", number(agreed, 3), words))
+    print_table(("figure", ">value", "measured with"), rows)
+    if found.doubts:
+        sys.stdout.write("\n")
+        print_table(
+            (">step", "doubtful"),
+            [(str(doubt.step), doubt.why) for doubt in found.doubts[:_SHOWN_DOUBTS]],
+        )
 
 
 def settings_from(changes: dict[str, Any]) -> EvaluationSettings:

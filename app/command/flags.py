@@ -166,14 +166,20 @@ class Detect:
 
 @dataclass
 class Evaluate:
-    """Score a track file against the truth of the sequence that it is of."""
+    """Score a track file against the truth, or, without one, estimate how well ids hold."""
 
     sequence: Annotated[
         Positional[str], arg(metavar="SEQUENCE", help="A built-in room's name or a folder.")
     ]
     tracks: Annotated[
-        Positional[Path], arg(metavar="TRACKS.csv", help="As `track` and the page write it.")
-    ]
+        Positional[Path | None],
+        arg(
+            metavar="TRACKS.csv",
+            help="As `track` and the page write it. Without one nothing needs to be known of the "
+            "truth: the sequence is tracked forward, backwards and without each camera.",
+            help_behavior_hint="(optional)",
+        ),
+    ] = None
     json: FlagCreatePairsOff[bool] = False
     """Print everything as JSON instead of tables."""
     html: Annotated[Path | None, arg(metavar="REPORT.html", help_behavior_hint="(optional)")] = None
@@ -194,7 +200,7 @@ class Experiment:
         arg(metavar="NAME", help="Which one.", help_behavior_hint="(optional)"),
     ] = None
     all: FlagCreatePairsOff[bool] = False
-    """Run every one, a quarter of an hour in all."""
+    """Run every one."""
     quick: FlagCreatePairsOff[bool] = False
     """Shortened to what shows the direction of each claim."""
     count: int = 20
@@ -337,7 +343,7 @@ class Benchmark:
         arg(metavar="[NAME …]", help="Which parts; all, if none is named."),
     ] = ()
     short: FlagCreatePairsOff[bool] = False
-    """The form of a minute or two that the checks run."""
+    """The shortened form that the checks run."""
     json: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
     """Write the figures to this file as well, with the machine and the versions."""
     record: FlagCreatePairsOff[bool] = False

@@ -93,6 +93,8 @@ class RunInfo(Model):
     error: str | None
     kept: int | None
     """Its number in the library that it was taken from; what the cameras found is not there."""
+    smoothed: bool
+    """Whether the people are those of stage 3; else the filter's, as a live system would see."""
     stands_for: str
     """The key that a computation would have, where older code made what is shown; else empty."""
 

@@ -9,8 +9,8 @@ from app.models.base import Model
 Span = tuple[int, int, Literal["seen", "coasting", "long miss"]]
 """First step, last step, and whether any camera saw the target; a long miss is coasting too."""
 
-LaneEvent = tuple[int, int, Literal["birth", "death", "long miss"]]
-"""Step, track and what happened to it."""
+LaneEvent = tuple[int, int, Literal["birth", "death", "long miss", "cut", "joined", "removed"]]
+"""Step, track and what happened to it; the last three by hindsight."""
 
 
 class TrackLife(Model):

@@ -101,7 +101,10 @@ class Evaluator:
             is_new = shown is None or (shown.key, shown.steps) != (scored.key, scored.steps)
             is_new = is_new or (shown is not None and shown.tracks is not scored.tracks)
             if is_new and (scored.key, scored.steps) not in self._failed:
-                over = scored.complete or snapshot.run_state.state != "computing"
+                computing = snapshot.run_state.state == "computing"
+                if scored.complete and computing and run.key == snapshot.run_state.key:
+                    return None, None  # the smoothed people are about to take their place
+                over = scored.complete or not computing
                 if self._newest != (scored.key, over):
                     self._newest, self._newest_since = (scored.key, over), time.monotonic()
                 since = self._newest_since

@@ -66,7 +66,7 @@ def run(context: Context) -> Result:
         for method, parameters in methods().items():
             context.told(f"{method} on {name}", len(measured[name]["methods"]), len(methods()))
             tracked, speed = _timed(context, sequence, parameters, steps)
-            evaluation = evaluate_sequence(sequence, tracked.tracks, settings, steps=steps)
+            evaluation = evaluate_sequence(sequence, tracked.filtered, settings, steps=steps)
             figures: dict[str, Any] = {key: evaluation[key] for key in FIGURES}
             figures["steps_per_second"] = speed
             measured[name]["methods"][method] = figures

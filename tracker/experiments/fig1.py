@@ -40,7 +40,7 @@ def run(context: Context) -> Result:
     """Track the room once and score it as a whole and around the armchair."""
     sequence = runs.room(context, ROOM, QUICK_STEPS if context.quick else None)
     tracked = runs.computed(context, sequence).run
-    whole = evaluate_sequence(sequence, tracked.tracks)
+    whole = evaluate_sequence(sequence, tracked.filtered)
     near = whole.settings.near
     first, last = ARMCHAIR
     rows = []
@@ -136,7 +136,7 @@ def _steps_there(run: Run, person: int) -> np.ndarray:
 def _draw(run: Run, evaluation: Evaluation) -> Figure:
     from tracker.experiments.laboratory import drawing
 
-    sequence, tracks, truth = run.sequence, run.tracks, run.sequence.ground_truth
+    sequence, tracks, truth = run.sequence, run.filtered, run.sequence.ground_truth
     assert truth is not None
     figure = drawing.sheet(
         13.0, 6.6, f"Three people in {sequence.name}: truth (circles) and tracks (lines)"

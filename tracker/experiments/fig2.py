@@ -102,7 +102,7 @@ def _overlaps(run: Run, step: int, camera: int, visible: np.ndarray) -> dict[str
     here = truth.at(step)
     people = truth.ids[here]
     wanted, in_picture = view.project_boxes(truth.positions[here], half)
-    boxes, shown = view.project_boxes(run.tracks.positions[run.tracks.at(step)], half)
+    boxes, shown = view.project_boxes(run.filtered.positions[run.filtered.at(step)], half)
     shared = box_overlaps(wanted[in_picture], boxes[shown])
     rows, columns = assign(1.0 - shared, 1.0 - OVERLAP)
     values = dict(zip(rows.tolist(), shared[rows, columns].tolist(), strict=True))
@@ -141,10 +141,10 @@ def _draw(run: Run) -> Figure:
                 plot.grid(visible=False)
                 for place in camera.project_boxes(truth.positions[truth.at(step)], half)[0]:
                     drawing.box(plot, tuple(place.tolist()), "#ffffff", dashed=True)
-                rows = run.tracks.at(step)
-                boxes, visible = camera.project_boxes(run.tracks.positions[rows], half)
+                rows = run.filtered.at(step)
+                boxes, visible = camera.project_boxes(run.filtered.positions[rows], half)
                 for name, place, shown in zip(
-                    run.tracks.ids[rows].tolist(), boxes.tolist(), visible.tolist(), strict=True
+                    run.filtered.ids[rows].tolist(), boxes.tolist(), visible.tolist(), strict=True
                 ):
                     if shown:
                         drawing.box(plot, tuple(place), drawing.picture_colour(name))

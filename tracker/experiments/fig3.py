@@ -169,7 +169,7 @@ def _one_seed(
         others[f"two cameras by the default, {default.fusion_method}"] = np.stack(
             [errors] * len(sequence.views)
         )
-    return _Errors(_errors(sequence, tracked.tracks, steps), alone(parameters), others)
+    return _Errors(_errors(sequence, tracked.filtered, steps), alone(parameters), others)
 
 
 def _errors(sequence: Sequence, tracks: Trajectories, steps: int) -> Float[ndarray, "P S"]:

@@ -128,7 +128,7 @@ def _measure(context: Context, sequence: Sequence, name: str, steps: int) -> dic
         cancelled=context.cancelled,
     )
     seconds = time.perf_counter() - begin
-    evaluation = evaluate_sequence(sequence, tracked.tracks, steps=tracked.done)
+    evaluation = evaluate_sequence(sequence, tracked.filtered, steps=tracked.done)
     figures: dict[str, Any] = {key: evaluation[key] for key in FIGURES}
     return figures | {"steps": tracked.done, "steps_per_second": tracked.done / seconds}
 

@@ -33,7 +33,7 @@ _QUALITY = 80
 
 
 def code_version() -> str:
-    """Another word for every code that may give other tracks."""
+    """A short hash of all code that may change the tracks of a run."""
     return hashlib.sha256(numbers_version("tracks").encode()).hexdigest()[:12]
 
 

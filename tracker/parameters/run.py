@@ -27,7 +27,7 @@ class SharedParameters(Params):
     fusion_method: str = "multi_bernoulli"
     """Method of stage 2: how the cameras' boxes become 3D positions."""
 
-    smoothing_method: str = "none"
+    smoothing_method: str = "identities"
     """Method of stage 3: the filter's tracks as they are, smoothed, or who is who as well."""
 
     pictures: PictureParams = PictureParams()

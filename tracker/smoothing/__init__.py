@@ -5,6 +5,8 @@ The methods are registered in :mod:`tracker.parameters.registry`.
 
 from tracker.smoothing.protocol import SmoothingMethod, create
 from tracker.smoothing.result import Decision, DecisionKind, Smoothed
-from tracker.smoothing.tracks import tracks_of
+from tracker.smoothing.tracks import names_of, tracks_of
 
-__all__ = ["Decision", "DecisionKind", "Smoothed", "SmoothingMethod", "create", "tracks_of"]
+__all__ = [
+    "Decision", "DecisionKind", "Smoothed", "SmoothingMethod", "create", "names_of", "tracks_of",
+]  # fmt: skip

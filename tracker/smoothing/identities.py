@@ -36,6 +36,9 @@ _AROUND = 0.2
 _SHORTEST = 0.4
 """Seconds of a piece that stands for itself; a shorter one, beside longer ones, is left out."""
 
+_SURE = 1e6
+"""Log odds of chains that were found somebody's already."""
+
 _FASTEST = 3.0
 """Metres a second that nobody in a room exceeds for long."""
 
@@ -48,6 +51,8 @@ class Settled:
     links: Links
     origins: Int[ndarray, " n"]
     """The path before the cuts of which each has most."""
+    had: Bool[ndarray, " N"]
+    """The rows of pieces: the others are of the gaps between them."""
     decisions: list[Decision]
 
 
@@ -56,6 +61,7 @@ def settle(
     fitted: Fitted,
     shared: Shared,
     contested: Float[ndarray, " N"],
+    had: Bool[ndarray, " N"],
     parameters: SmoothingParams,
     looks: Many[Float[ndarray, "B A"]] | None,
 ) -> Settled:
@@ -66,27 +72,41 @@ def settle(
         fitted: The filter's tracks, fitted to their boxes.
         shared: Whose box each is.
         contested: By which share each row's boxes were as well another's, as the filter ran.
+        had: At which rows the filter had the track.
         parameters: When to cut, and what holds together.
         looks: A unit vector for each box of each camera; None where there is none.
     """
-    cut, kept, reasons = _cut(smoother, fitted, shared, contested, parameters)
+    cut, kept, reasons = _cut(smoother, fitted, shared, contested, had, parameters)
     links = pieces.moved(shared.links, kept, len(fitted.paths.states))
     refitted = smoother.fit(cut, links)
     own = Shared(links, shared.chances[:, kept], shared.missed[:, kept], shared.hidden_by[:, kept])
     worths, births, deaths = _odds(smoother, refitted, own, parameters)
-    pairs, stays = _pairs(smoother, refitted.paths, links, births, deaths, parameters, looks)
+    pairs = _goes_on(smoother, refitted.paths, links, parameters, looks)
     following, used = joining.join(worths, births, deaths, pairs.earlier, pairs.later, pairs.gains)
-    chains = joining.chains(following, used)
+    first = joining.chains(following, used)
+    # what goes on by its motion tells more of its looks than each piece alone
+    back = _comes_back(smoother, refitted.paths, links, first, parameters, looks)
+    following, _ = joining.join(
+        np.full(len(first), _SURE), births[[c[0] for c in first]], deaths[[c[-1] for c in first]],
+        back.earlier, back.later, back.gains,
+    )  # fmt: skip
+    chains = [
+        [piece for number in numbers for piece in first[number]]
+        for numbers in joining.chains(following, np.ones(len(first), dtype=bool))
+    ]
+    pairs = pairs.with_more(back.of_ends(first))
     labels = _labels(cut, chains)
     decisions = [*_cuts(cut, fitted.paths, kept, reasons, chains, labels)]
-    decisions += _joins(cut, pairs, births, deaths, chains, labels, stays)
+    decisions += _joins(cut, pairs, chains, labels, _anew(smoother))
     paths, rows = _chained(refitted.paths, chains, labels)
     lengths = np.diff(cut.starts)
     origins = [
         _most(fitted.paths.owners[kept[cut.starts[chain]]], lengths[chain]) for chain in chains
     ]
     links = pieces.moved_to(links, rows)
-    return Settled(paths, links, np.array(origins, dtype=np.int64), decisions)
+    of_piece = np.zeros(len(paths.states), dtype=bool)
+    of_piece[rows[rows >= 0]] = True
+    return Settled(paths, links, np.array(origins, dtype=np.int64), of_piece, decisions)
 
 
 def _cut(
@@ -94,6 +114,7 @@ def _cut(
     fitted: Fitted,
     shared: Shared,
     contested: Float[ndarray, " N"],
+    had: Bool[ndarray, " N"],
     p: SmoothingParams,
 ) -> tuple[Paths, Int[ndarray, " M"], Int[ndarray, " N"]]:
     """The pieces, the row that each of their rows was, and why each row was left out: 0 for not,
@@ -103,8 +124,9 @@ def _cut(
     there, _ = lifetimes(smoother, paths, shared, p)
     reasons = np.zeros(rows, dtype=np.int64)
     fed = np.bincount(shared.links.rows, shared.links.shares, rows) > _FED
-    gaps = _long_gaps(paths, fed, round(p.gap / step_time))
-    reasons[gaps | (there < 0.5)] = 3
+    too_long = round(p.gap / step_time)
+    away = _long_gaps(paths, fed, too_long) | (there < 0.5)
+    reasons[away | _not_bridged(paths, had, away, too_long)] = 3
     around = round(_AROUND / step_time)
     # where boxes err alike for a while, past and future contradict each other by less than it seems
     jumps = np.flatnonzero(fitted.jumps * independence(step_time, p.memory) > p.jump)
@@ -130,14 +152,27 @@ def _cut(
     return cut, kept, reasons
 
 
+def _runs(paths: Paths, flags: Bool[ndarray, " N"]) -> Int[ndarray, " N"]:
+    """The number of the run of equal flags of one path that each row is in."""
+    change = np.ones(len(flags), dtype=bool)
+    change[1:] = (flags[1:] != flags[:-1]) | (np.diff(paths.owners) != 0)
+    return np.asarray(np.cumsum(change) - 1)
+
+
 def _long_gaps(paths: Paths, fed: Bool[ndarray, " N"], longest: int) -> Bool[ndarray, " N"]:
     """The rows of those runs without a box that are longer than ``longest`` steps."""
-    owners = paths.owners
-    change = np.ones(len(fed), dtype=bool)
-    change[1:] = (fed[1:] != fed[:-1]) | (owners[1:] != owners[:-1])
-    run = np.cumsum(change) - 1
-    lengths = np.bincount(run)
-    return np.asarray(~fed & (lengths[run] > longest)) if len(fed) else fed
+    run = _runs(paths, fed)
+    return np.asarray(~fed & (np.bincount(run)[run] > longest)) if len(fed) else fed
+
+
+def _not_bridged(
+    paths: Paths, had: Bool[ndarray, " N"], away: Bool[ndarray, " N"], longest: int
+) -> Bool[ndarray, " N"]:
+    """The rows of the filter's long gaps that the boxes do not lead through from end to end: what
+    it lost and went on only for a while may have gone on as another track."""
+    gaps = _long_gaps(paths, had, longest)
+    run = _runs(paths, had)
+    return np.asarray(gaps & (np.bincount(run, away & gaps)[run] > 0.0)) if len(had) else gaps
 
 
 def _between(paths: Paths, seen: Bool[ndarray, " N"]) -> Bool[ndarray, " N"]:
@@ -154,12 +189,12 @@ def _odds(
     smoother: Smoother, fitted: Fitted, shared: Shared, parameters: SmoothingParams
 ) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"], Float[ndarray, " n"]]:
     """Of each piece: the log odds of its boxes against clutter, of its birth and of its death."""
-    p, step_time, paths = smoother.parameters, smoother.model.step_time, fitted.paths
+    step_time, paths = smoother.model.step_time, fitted.paths
     count = len(paths.labels)
     survival, death = _survival(smoother)
     rows = fitted.odds + independence(step_time, parameters.memory) * misses(shared) + survival
     worths = np.bincount(paths.owners, rows, count) + smoother.log_place
-    births = np.full(count, np.log(p.birth_rate * step_time))
+    births = np.where(paths.firsts <= 0, 0.0, _anew(smoother) - death)
     deaths = np.where(paths.lasts >= smoother.frames - 1, 0.0, death)
     return worths, births, deaths
 
@@ -170,49 +205,84 @@ def _survival(smoother: Smoother) -> tuple[float, float]:
     return float(np.log(survival)), float(np.log1p(-survival))
 
 
-def _pairs(
+def _anew(smoother: Smoother) -> float:
+    """log of the probability that somebody comes at a step, and of that somebody leaves at it."""
+    rate = smoother.parameters.birth_rate * smoother.model.step_time
+    return float(np.log(rate)) + _survival(smoother)[1]
+
+
+def _goes_on(
     smoother: Smoother,
     paths: Paths,
     links: Links,
-    births: Float[ndarray, " n"],
-    deaths: Float[ndarray, " n"],
     p: SmoothingParams,
     looks: Many[Float[ndarray, "B A"]] | None,
-) -> tuple[Pairs, Float[ndarray, " n"]]:
-    """Every pair that may be one person, with its gain, and what a piece gains that begins anew.
-
-    Two pieces may be joined by their motion over a short gap; over a longer one by their looks,
-    as somebody of those who left and is back; and by the label that the filter gave both.
-    """
+) -> Pairs:
+    """Every pair of pieces of which the second may continue the first, with its gain: by their
+    motion over a short gap and their looks, and by the label that the filter gave both."""
     step_time, count = smoother.model.step_time, len(paths.labels)
-    survival, death = _survival(smoother)
-    anew = births + death
+    survival, _ = _survival(smoother)
+    longest = max(round(p.longest / step_time), 1)
     motion = pieces.motion_pairs(
         paths,
         smoother.model.motion,
         smoother.prior,
         smoother.log_place,
-        longest=max(round(p.longest / step_time), 1),
+        longest=longest,
         fastest=_FASTEST * step_time,
     )
-    gains = np.full((count, count), -np.inf)
-    gains[motion.earlier, motion.later] = (
-        motion.gains + motion.gaps * survival + _seen_empty(smoother, paths, motion, p.memory)
-    )
-    if p.appearance > 0.0 and looks is not None and looks[0].shape[1]:
+    told = motion.gains + motion.gaps * survival + _seen_empty(smoother, paths, motion, p.memory)
+    if looks is not None:
         alike = Appearance(paths, links, smoother.cameras, looks, step_time)
-        before = paths.lasts[:, None] < paths.firsts[None, :]
+        told += p.appearance * alike.log_ratio(motion.earlier, motion.later)[0]
+    gains = np.full((count, count), -np.inf)
+    gains[motion.earlier, motion.later] = told
+    one = _same_label(paths)
+    one = one[paths.firsts[one + 1] - paths.lasts[one] <= longest]
+    gains[one, one + 1] = np.maximum(gains[one, one + 1], _anew(smoother)) + p.keeping
+    return _of_table(gains, paths)
+
+
+def _comes_back(
+    smoother: Smoother,
+    paths: Paths,
+    links: Links,
+    chains: list[list[int]],
+    p: SmoothingParams,
+    looks: Many[Float[ndarray, "B A"]] | None,
+) -> Pairs:
+    """Every pair of chains of which the second may be the first, gone for a while and back: one of
+    those who left, by the looks, and by the label that the filter gave pieces of both."""
+    whole, rows = _chained(paths, chains, list(range(len(chains))))
+    anew = _anew(smoother)
+    before = whole.lasts[:, None] < whole.firsts[None, :]
+    gains = np.full(before.shape, -np.inf)
+    if looks is not None:
+        own = pieces.moved_to(links, rows)
+        alike = Appearance(whole, own, smoother.cameras, looks, smoother.model.step_time)
         gone = np.maximum(before.sum(axis=0), 1)
         earlier, later = np.nonzero(before)
         ratio, known = alike.log_ratio(earlier, later)
         earlier, later, ratio = earlier[known], later[known], ratio[known]
-        back = anew[later] - np.log(gone[later])
-        gains[earlier, later] = np.maximum(gains[earlier, later], back) + p.appearance * ratio
-    one = np.flatnonzero(paths.labels[1:] == paths.labels[:-1])
-    gains[one, one + 1] = np.maximum(gains[one, one + 1], anew[one + 1]) + p.keeping
+        gains[earlier, later] = anew - np.log(gone[later]) + p.appearance * ratio
+    chain_of = {piece: number for number, chain in enumerate(chains) for piece in chain}
+    for piece in _same_label(paths).tolist():
+        i, j = chain_of.get(piece, -1), chain_of.get(piece + 1, -1)
+        if min(i, j) >= 0 and before[i, j]:
+            gains[i, j] = max(gains[i, j], anew) + p.keeping
+    return _of_table(gains, whole)
+
+
+def _same_label(paths: Paths) -> Int[ndarray, " K"]:
+    """The pieces after which the filter's track goes on in the next one."""
+    return np.asarray(np.flatnonzero(paths.labels[1:] == paths.labels[:-1]))
+
+
+def _of_table(gains: Float[ndarray, "n n"], paths: Paths) -> Pairs:
+    """The pairs that are possible."""
     earlier, later = np.nonzero(np.isfinite(gains))
     gaps = paths.firsts[later] - paths.lasts[earlier]
-    return Pairs(earlier, later, gaps, gains[earlier, later]), anew
+    return Pairs(earlier, later, gaps, gains[earlier, later])
 
 
 def _seen_empty(
@@ -336,11 +406,9 @@ def _cuts(
 def _joins(
     cut: Paths,
     pairs: Pairs,
-    births: Float[ndarray, " n"],
-    deaths: Float[ndarray, " n"],
     chains: list[list[int]],
     labels: list[int],
-    anew: Float[ndarray, " n"],
+    anew: float,
 ) -> list[Decision]:
     """The joins of what the filter held for two people, with the odds against the best other."""
     gain = {
@@ -357,7 +425,7 @@ def _joins(
         for i, j in pairwise(chain):
             if cut.labels[i] == cut.labels[j]:
                 continue
-            every = np.array([*by_later[j], anew[j]])
+            every = np.array([*by_later[j], anew])
             chances = np.exp(every - logsumexp(every))
             own = float(np.exp(gain[i, j] - logsumexp(every)))
             rest = np.delete(chances, int(np.argmin(np.abs(every - gain[i, j]))))

@@ -11,12 +11,8 @@ from tracker.parameters import SmoothingParams
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Shared, Smoother
 
-_AWAY_FROM_BOXES = 0.3
-"""Existence with which a row beyond a path's ends competes for boxes."""
-
-
-_ENTER = 0.5
-"""Log odds against a track's coming and against its leaving: the filter has found it already."""
+UNSURE = 0.3
+"""Existence with which a row beyond a path's ends, or within its gaps, competes for boxes."""
 
 
 def independence(step_time: float, memory: float) -> float:
@@ -46,11 +42,15 @@ def lifetimes(
     votes = hit * np.bincount(shared.links.rows, shared.links.shares, len(paths.states))
     weight = independence(smoother.model.step_time, parameters.memory)
     survival = min(p.survival_probability, 1.0 - 1e-9)
+    # within the time in which the evidence tells anew; a recording seen backwards is the same
+    steps = 1.0 / weight
+    come = float(np.log(min(p.birth_rate * steps * smoother.model.step_time, 1.0)))
+    leave = float(np.log1p(-(survival**steps)))
     found = presence(
         paths.starts,
-        paths.lasts,
+        paths.firsts,
         weight * (votes + misses(shared)),
-        Habits(float(np.log(survival)), -_ENTER, -parameters.change),
+        Habits(float(np.log(survival)), (come + leave) / 4.0, -parameters.change),
         smoother.frames - 1,
     )
     return found.probabilities, found.odds
@@ -79,7 +79,7 @@ def extended(smoother: Smoother, paths: Paths, steps: int) -> tuple[Paths, Float
         states.append(np.concatenate([head[0][::-1], paths.states[begin:end], tail[0]]))
         covariances.append(np.concatenate([head[1][::-1], paths.covariances[begin:end], tail[1]]))
         firsts.append(int(paths.firsts[i]) - before)
-        own = np.full(len(states[-1]), _AWAY_FROM_BOXES)
+        own = np.full(len(states[-1]), UNSURE)
         own[before : before + end - begin] = 1.0
         existences.append(own)
     longer = Paths.of(paths.labels.tolist(), firsts, states, covariances, motion.dimension)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence as Many
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,6 +90,21 @@ class Pairs:
     """Steps from the end of the one to the beginning of the other, at least 1."""
     gains: Float[ndarray, " P"]
     """log of how much better the second fits as the first's continuation than anywhere."""
+
+    def of_ends(self, chains: Many[Many[int]]) -> Pairs:
+        """Pairs of chains as pairs of the last piece of the one and the first of the other."""
+        first = np.array([chain[0] for chain in chains], dtype=np.int64)
+        last = np.array([chain[-1] for chain in chains], dtype=np.int64)
+        return Pairs(last[self.earlier], first[self.later], self.gaps, self.gains)
+
+    def with_more(self, more: Pairs) -> Pairs:
+        """These and others."""
+        return Pairs(
+            np.concatenate([self.earlier, more.earlier]),
+            np.concatenate([self.later, more.later]),
+            np.concatenate([self.gaps, more.gaps]),
+            np.concatenate([self.gains, more.gains]),
+        )
 
 
 def motion_pairs(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence as Many
 
 import numpy as np
+from jaxtyping import Bool
 from numpy import ndarray
 
 from tracker.fusion.protocol import FusionResult
@@ -16,17 +17,22 @@ _WIDE = 1.0
 """Square metres and (m/s)²: how little is known of a state within a gap, at first."""
 
 
-def read_paths(fused: Many[FusionResult], tracks: Trajectories, dimension: int) -> Paths:
+def read_paths(
+    fused: Many[FusionResult], tracks: Trajectories, dimension: int
+) -> tuple[Paths, Bool[ndarray, " N"]]:
     """One path a label, from the first step at which the fusion had it to its last report.
 
     Where the fusion had lost a label for a while the states are drawn straight through the gap.
+
+    Returns:
+        The paths, and at which of their rows the fusion had them.
     """
     order = np.lexsort((tracks.frames, tracks.labels))
     of_label, frames = tracks.labels[order], tracks.frames[order]
     labels, begins = np.unique(of_label, return_index=True)
     ends = np.append(begins[1:], len(order))
     earlier = _before_their_report(fused, dict(zip(labels.tolist(), frames[begins], strict=True)))
-    firsts, states, covariances = [], [], []
+    firsts, states, covariances, had = [], [], [], []
     for label, begin, end in zip(labels.tolist(), begins, ends, strict=True):
         known = [*earlier.get(label, ()), *zip(
             frames[begin:end].tolist(), tracks.components[order[begin:end]].tolist(), strict=True
@@ -43,10 +49,14 @@ def read_paths(fused: Many[FusionResult], tracks: Trajectories, dimension: int) 
         )
         wide = np.tile(_WIDE * np.eye(dimension), (len(every), 1, 1))
         wide[steps - first] = spread
+        own = np.zeros(len(every), dtype=bool)
+        own[steps - first] = True
+        had.append(own)
         firsts.append(int(first))
         states.append(filled)
         covariances.append(wide)
-    return Paths.of(labels.tolist(), firsts, states, covariances, dimension)
+    paths = Paths.of(labels.tolist(), firsts, states, covariances, dimension)
+    return paths, np.concatenate([np.zeros(0, dtype=bool), *had])
 
 
 def _before_their_report(

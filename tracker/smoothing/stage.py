@@ -56,23 +56,28 @@ class Positions:
         tracks = trajectories.extract(fused, cameras=cameras, extraction_threshold=CONFIRMED)
         if not len(tracks):
             return Smoothed.empty(dimension, cameras)
-        paths = reading.read_paths(fused, tracks, dimension)
+        paths, had = reading.read_paths(fused, tracks, dimension)
+        existences = np.where(had, 1.0, lifetimes.UNSURE)
         links = reading.read_links(fused, paths, smoother.cameras)
         check()
-        paths, links, learnt, decisions = self._named(smoother, paths, links, views, check)
-        fitted, shared, learnt = _settled(smoother, paths, links, p, learnt, check)
+        paths, existences, links, learnt, decisions = self._named(
+            smoother, paths, existences, links, views, check
+        )
+        fitted, shared, learnt = _settled(smoother, paths, existences, links, p, learnt, check)
         return _finished(smoother, fitted, shared, learnt, p, decisions)
 
     def _named(
         self,
         smoother: Smoother,
         paths: Paths,
+        existences: Float[ndarray, " N"],
         links: Links,
         views: Many[tuple[ViewResult, ...]],
         check: Callable[[], None],
-    ) -> tuple[Paths, Links, Calibration | None, list[Decision]]:
-        """The tracks of people, and what was learnt on the way: here the filter's own."""
-        return paths, links, None, []
+    ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, list[Decision]]:
+        """The tracks of people, with which existence each row asks for boxes, and what was learnt
+        on the way: here the filter's own."""
+        return paths, existences, links, None, []
 
 
 class Identities(Positions):
@@ -82,37 +87,42 @@ class Identities(Positions):
         self,
         smoother: Smoother,
         paths: Paths,
+        existences: Float[ndarray, " N"],
         links: Links,
         views: Many[tuple[ViewResult, ...]],
         check: Callable[[], None],
-    ) -> tuple[Paths, Links, Calibration | None, list[Decision]]:
+    ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, list[Decision]]:
         p = self._parameters.smoothing
         contested = pieces.contested(paths, links)
-        fitted, shared, learnt = _settled(smoother, paths, links, p, None, check)
+        fitted, shared, learnt = _settled(smoother, paths, existences, links, p, None, check)
         looks = _looks(views) if p.appearance > 0.0 else None
-        found = identities.settle(smoother, fitted, shared, contested, p, looks)
+        found = identities.settle(smoother, fitted, shared, contested, existences == 1.0, p, looks)
         check()
-        return found.paths, found.links, learnt.of_people(found.origins), found.decisions
+        learnt = learnt.of_people(found.origins)
+        existences = np.where(found.had, 1.0, lifetimes.UNSURE)
+        return found.paths, existences, found.links, learnt, found.decisions
 
 
 def _settled(
     smoother: Smoother,
     paths: Paths,
+    existences: Float[ndarray, " N"],
     links: Links,
     p: SmoothingParams,
     learnt: Calibration | None,
     check: Callable[[], None],
 ) -> tuple[Fitted, Shared, Calibration]:
-    """Tracks fitted to their boxes, boxes shared out by the tracks, in turns."""
+    """Tracks fitted to their boxes, boxes shared out by the tracks that are there, in turns."""
     learnt = learnt or smoother.stated(paths)
     fitted = smoother.fit(paths, links, 2, learnt)
-    shared = smoother.share(fitted.paths, None, learnt)
+    shared = smoother.share(fitted.paths, existences, learnt)
     for _ in range(p.iterations):
         check()
+        existences, _ = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
         if p.learning:
             learnt = smoother.learn(fitted.paths, shared.links, learnt)
         fitted = smoother.fit(fitted.paths, shared.links, 1, learnt)
-        shared = smoother.share(fitted.paths, None, learnt)
+        shared = smoother.share(fitted.paths, existences, learnt)
     return fitted, shared, learnt
 
 
@@ -132,6 +142,11 @@ def _finished(
     fitted = smoother.fit(longer, shared.links, 1, learnt)
     shared = smoother.share(fitted.paths, existences, learnt)
     there, odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
+    import os
+
+    for _ in range(int(os.environ.get("MF", "0"))):
+        shared = smoother.share(fitted.paths, there, learnt)
+        there, odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
     paths, owners = fitted.paths, fitted.paths.owners
     somebody = odds > 0.0
     removed = [

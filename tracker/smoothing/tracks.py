@@ -55,6 +55,29 @@ def tracks_of(
     )
 
 
+def names_of(smoothed: Smoothed, tracks: Trajectories) -> dict[int, int]:
+    """The id of each label that is reported.
+
+    Args:
+        smoothed: What the tracks were made of.
+        tracks: By :func:`tracks_of`.
+    """
+    place = {
+        (frame, *mean): label
+        for frame, mean, label in zip(
+            smoothed.frames.tolist(),
+            smoothed.means[:, :3].tolist(),
+            smoothed.labels.tolist(),
+            strict=True,
+        )
+    }
+    ids, rows = np.unique(tracks.ids, return_index=True)
+    return {
+        place[int(tracks.frames[row]), *tracks.positions[row].tolist()]: int(name)
+        for name, row in zip(ids, rows, strict=True)
+    }
+
+
 def _components(
     smoothed: Smoothed, rows: Int[ndarray, " R"], fused: Many[FusionResult], near: float
 ) -> tuple[Int[ndarray, " R"], Int[ndarray, " R"]]:

@@ -37,6 +37,7 @@ from app.web.tables.markup import (
     vector,
 )
 from app.web.views import steps
+from app.web.views.decisions import words_of
 from app.web.views.timeline import Timelines
 from tracker import parameters as parameter_table
 from tracker.evaluation import Evaluation
@@ -59,7 +60,7 @@ PHASES: dict[RunPhase, str] = {
 }
 """A run's state, as the page words it."""
 
-Kind = Literal["birth", "death", "switch", "long miss"]
+Kind = Literal["birth", "death", "switch", "long miss", "cut", "joined", "removed"]
 
 router = APIRouter(prefix="/api/tables", responses=ERRORS, default_response_class=HTMLResponse)
 
@@ -168,7 +169,7 @@ def event_table(
     bench: Bench,
     kind: Annotated[Kind | None, Query(description="Only these.")] = None,
 ) -> str:
-    """Births, deaths, switches and long misses; each can be gone to."""
+    """Births, deaths, switches, long misses and what hindsight changed; each can be gone to."""
     snapshot = bench.snapshot()
     sequence, run = snapshot.sequence, snapshot.run
     if sequence is None:
@@ -186,6 +187,7 @@ def event_table(
             "No such event",
             "Births, deaths, switches of identity and long misses are listed as they are found.",
         )
+    why = {} if run is None else words_of(run)
     more = len(found) - MOST_EVENTS
     return table(
         "Events",
@@ -194,7 +196,7 @@ def event_table(
             (
                 button(step, "go", f"{step} {track}", label=f"Go to step {step}"),
                 number(step / sequence.fps, 2),
-                what,
+                why.get((step, track, what), what),
                 id_tag(track),
             )
             for step, track, what in found[:MOST_EVENTS]
@@ -207,7 +209,10 @@ def change_table(request: Request, bench: Bench) -> str:
     """What differs from the defaults, each with its reset; and what parameters would change."""
     snapshot = bench.snapshot()
     sensitivity: Sensitivity = request.app.state.sensitivity
-    return _changed(snapshot) + _curves_of(sensitivity.curves())
+    curves = _curves_of(sensitivity.curves())
+    if curves and not parameter_table.changed(snapshot.parameters, snapshot.defaults):
+        return line("All parameters stand at their defaults.") + curves
+    return _changed(snapshot) + curves
 
 
 def _curves_of(curves: Mapping[str, Curve]) -> str:

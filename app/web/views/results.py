@@ -49,7 +49,11 @@ def state_of(snapshot: Snapshot) -> models.State:
 
 def run_of(snapshot: Snapshot) -> models.RunInfo:
     """How far the run is."""
-    return models.RunInfo(**asdict(snapshot.run_state))
+    state, run = snapshot.run_state, snapshot.run
+    smoothed = run is not None and run.key == state.key and run.tracks is not run.filtered
+    if run is not None and state.kept is not None:  # only its people are kept, not the filter's
+        smoothed = run.parameters.smoothing_method != "none"
+    return models.RunInfo(**asdict(state), smoothed=smoothed)
 
 
 def _teaching_of(snapshot: Snapshot) -> models.TeachingInfo:

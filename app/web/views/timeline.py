@@ -18,6 +18,7 @@ from numpy import ndarray
 from app import models
 from app.state.pairs import alike
 from app.state.scores import Scored
+from app.web.views.decisions import decided
 from app.web.views.names import Names
 from tracker.pipeline import Run
 from tracker.sequences.sequence import Sequence
@@ -208,6 +209,8 @@ class Timelines:
             shortest = math.ceil(LONG_MISS * sequence.fps)
             lives, left_out = _lives(spans, window, shortest)
             events = _events(spans, done, shortest)
+            found = [(step, name, one.kind) for step, name, one in decided(run)]
+            events = sorted([*events, *found], key=lambda e: e[:2])[:MOST_EVENTS]
             names = self._names.told(sequence, run)
             for life in lives:
                 life.name = names.get(life.id)

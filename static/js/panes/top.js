@@ -8,6 +8,7 @@ export function mountTop(root, { store, actions }) {
 		facts,
 		single_view,
 		fusion_method,
+		smoothing_method,
 		dot,
 		word,
 		bar,
@@ -18,11 +19,12 @@ export function mountTop(root, { store, actions }) {
 		spoken,
 		csv,
 	} = parts(root);
+	const methods = { single_view, fusion_method, smoothing_method };
 	sequence.addEventListener("change", () => actions.open(sequence.value));
-	for (const [key, select] of Object.entries({ single_view, fusion_method }))
+	for (const [key, select] of Object.entries(methods))
 		select.addEventListener("change", () => actions.change({ [key]: select.value }));
 	// A chosen word leaves the focus to the page, so that Space goes on meaning play.
-	for (const select of [sequence, single_view, fusion_method])
+	for (const select of [sequence, ...Object.values(methods)])
 		select.addEventListener("change", () => select.blur());
 
 	function lists() {
@@ -73,7 +75,7 @@ export function mountTop(root, { store, actions }) {
 		sequence.disabled = link !== "open" || sequences.length === 0;
 		const size = server?.sequence;
 		write(facts, size ? `${size.cameras.length} cameras · ${size.fps} Hz` : "");
-		for (const [key, select] of Object.entries({ single_view, fusion_method })) {
+		for (const [key, select] of Object.entries(methods)) {
 			const now = server?.parameters[key] ?? "";
 			const names = schema?.methods[key] ?? [];
 			const unfit = server?.unfit[key] ?? {};
@@ -139,7 +141,8 @@ const WORDS = {
 };
 
 /** @param {Server.RunInfo} run  @returns {[string, string]} sign and word */
-export const runWords = (run) => WORDS[run.state];
+export const runWords = ({ state, smoothed }) =>
+	state === "done" && smoothed ? ["good", "smoothed"] : WORDS[state];
 
 /** @param {Server.RunInfo} run  @returns {string} speed and time left, or why it does not begin */
 export function rateText({ state, message, steps_per_second: speed, seconds_left: left }) {

@@ -242,6 +242,8 @@ interface Actions {
 	trail: (changes: { seconds?: number; fades?: boolean }) => void;
 	fadeTrails: () => void;
 	toggle: (what: "realTime" | "follow" | "loupe") => void;
+	/** A pane and a kind of file: `cams png`. */
+	keepPicture: (what: string) => Promise<void>;
 	nextTurn: () => void;
 	wholePictures: () => void;
 	arrange: (name: "inspect" | "tune" | "compare") => void;
@@ -299,7 +301,7 @@ interface Lanes {
 /** The steps an axis of `width` CSS pixels shows. */
 type View = { first: number; last: number; width: number };
 
-type LaneEvent = { step: number; id: number; kind: "birth" | "death" | "long miss" | "switch" };
+type LaneEvent = { step: number; id: number; kind: Server.Timeline["events"][0][2] | "switch" };
 
 /** Of the mosaic of pictures. */
 type Cell = { x: number; y: number; width: number; height: number };

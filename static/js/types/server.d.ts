@@ -705,6 +705,8 @@ declare namespace Server {
 		error: string | null;
 		/** Its number in the library that it was taken from; what the cameras found is not there. */
 		kept: number | null;
+		/** Whether the people are those of stage 3; else the filter's, as a live system would see. */
+		smoothed: boolean;
 		/** The key that a computation would have, where older code made what is shown; else empty. */
 		stands_for: string;
 	}
@@ -874,7 +876,7 @@ declare namespace Server {
 		/** Where a run is pinned that is not the shown one. */
 		pinned: PinnedTimeline | null;
 		/** Of all steps, also of those not asked for, in their order. */
-		events: ([number, number, "birth" | "death" | "long miss"])[];
+		events: ([number, number, "birth" | "death" | "long miss" | "cut" | "joined" | "removed"])[];
 		/** How many more live there: the shorter ones, where they are very many. */
 		left_out: number;
 	}

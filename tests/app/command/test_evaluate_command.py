@@ -102,9 +102,22 @@ def test_a_wrong_setting_is_wrong_usage(
     assert run("evaluate", crossing, tracks, *arguments) == (2, "", f"multiview-phd: {words}\n")
 
 
-@pytest.mark.parametrize("arguments", [[], ["room"], ["room", "tracks.csv", "--gates", "1"]])
+@pytest.mark.parametrize("arguments", [[], ["room", "tracks.csv", "--gates", "1"]])
 def test_wrong_usage(run: Runs, arguments: list[str]) -> None:
     assert run("evaluate", *arguments)[0] == 2
+
+
+def test_without_a_track_file_it_says_how_far_other_looks_agree(run: Runs, crossing: Path) -> None:
+    status, stdout, stderr = run("evaluate", crossing, "--json")
+    assert status == 0
+    told = json.loads(stdout)
+    assert 0.0 <= told["low"] <= told["estimate"] <= 1.0
+    assert told["low"] <= told["high"] <= 1.0
+    assert set(told["without"]) == set(told["overlap"]) == {"left", "right", "back"}
+    assert "consistently wrong" in stderr
+    status, _, stderr = run("evaluate", crossing, "--gate", "0.5")
+    assert status == 1
+    assert "--gate: expected a track file as well" in stderr
 
 
 def test_files_that_do_not_fit(run: Runs, crossing: Path, tracks: Path, tmp_path: Path) -> None:

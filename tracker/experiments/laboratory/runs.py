@@ -149,4 +149,4 @@ def fused_again(
     done = pipeline.compute(
         sequence, parameters, seed=run.seed, steps=len(run.views), previous=seen
     )
-    return done.tracks
+    return done.filtered

@@ -32,7 +32,9 @@ class Presence(NamedTuple):
 
 
 @kernel
-def presence(starts: ndarray, lasts: ndarray, votes: ndarray, habits: Habits, end: int) -> Presence:
+def presence(
+    starts: ndarray, firsts: ndarray, votes: ndarray, habits: Habits, end: int
+) -> Presence:
     """How surely a path's person was there at each step, exactly, by Viterbi's recursion both ways.
 
     A person comes once and leaves once, with the probability e^enter each, and may be away in
@@ -42,10 +44,11 @@ def presence(starts: ndarray, lasts: ndarray, votes: ndarray, habits: Habits, en
 
     Args:
         starts: (n + 1,), where each path's rows begin, and the end.
-        lasts: (n,), the last step of each path.
+        firsts: (n,), the first step of each path.
         votes: (N,), log of what each row's evidence says for somebody against nobody.
         habits: Of all.
-        end: The recording's last step: who is there at it has not left.
+        end: The recording's last step: who is there at it has not left, and who is there at its
+            first one has not come.
     """
     stay, enter, change = habits
     chances = np.zeros(len(votes))
@@ -54,14 +57,16 @@ def presence(starts: ndarray, lasts: ndarray, votes: ndarray, habits: Habits, en
         first, count = starts[path], starts[path + 1] - starts[path]
         here, between, gone = np.empty(count), np.empty(count), np.empty(count)
         present, away, left = -np.inf, -np.inf, -np.inf
+        coming = 0.0 if firsts[path] <= 0 else enter
         for k in range(count):
             away, left, present = (
                 max(away, present + change),
                 max(left, present + enter),
-                max(enter, max(away + change, present + stay)) + votes[first + k],
+                max(coming, max(away + change, present + stay)) + votes[first + k],
             )
             here[k], between[k], gone[k] = present, away, left
-        leaving = 0.0 if lasts[path] >= end else enter
+            coming = enter
+        leaving = 0.0 if firsts[path] + count - 1 >= end else enter
         odds[path] = max(present + leaving, left)
         # what can still come, from each state
         if_present, if_never, if_away = leaving, 0.0, -np.inf

@@ -1,0 +1,98 @@
+"""The estimate of identity without truth: all looks, several at a time, and what they say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracker.experiments.laboratory.experiment import Context
+from tracker.experiments.laboratory.pool import Desk, spread
+from tracker.runs.run import Run
+from tracker.trajectories import Trajectories
+from tracker.without_truth.agreement import (
+    Doubt,
+    agreement,
+    compared,
+    differences,
+    doubts,
+)
+from tracker.without_truth.calibration import interval
+from tracker.without_truth.others import Given, Look, looked, looks
+from tracker.without_truth.overlap import overlap
+
+WARNING = (
+    "Runs that agree may all be wrong alike: a tracker can be consistently wrong. "
+    "This is an estimate, not a measurement."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """How well people are told apart, as far as the recording alone can say."""
+
+    score: float
+    """J = IDF1(forward, backwards) × mean over cameras of IDF1(all, all but one), 0 … 1."""
+    backwards: float
+    """IDF1 of the run backwards in time by the run as it is."""
+    without: tuple[float, ...]
+    """IDF1 without each camera; empty where there is only one."""
+    overlaps: tuple[float | None, ...]
+    """Of each camera's boxes with the people that the others found: a low one is a veto."""
+    doubts: tuple[Doubt, ...]
+    """The moments at which the runs disagree, the most doubtful first."""
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Between these IDF1 lay in nine of ten of the runs by which J was calibrated."""
+        return interval(self.score)
+
+
+def estimate(run: Run, context: Context | None = None) -> Estimate:
+    """Look at a run's recording in the other ways, and see how far they agree.
+
+    Args:
+        run: Its boxes of stage 1 are used as they are, its steps as far as they go.
+        context: How many processes at a time; whom to tell; whom to ask.
+
+    Raises:
+        tracker.pipeline.Cancelled: If the context said so.
+        ValueError: If the run has no step yet.
+    """
+    if not run.done:
+        raise ValueError(f"{run.sequence.name}: the run has no step yet; compute it first")
+    context = context or Context()
+    sequence, steps = run.sequence, run.done
+    given = Given(sequence, run.parameters, run.seed, tuple(run.views[:steps]))
+    ways = looks(len(sequence.views))
+    found = spread(
+        _work,
+        [(given, way) for way in ways],
+        context,
+        words="looking in other ways",
+        steps=steps * len(ways),
+    )
+    half = sequence.target_half_extents
+    comparisons = [compared(run.tracks, other, steps, half) for other in found]
+    agreed = [agreement(one) for one in comparisons]
+    backwards, without = agreed[0], tuple(agreed[1:])
+    score = backwards * (float(np.mean(without)) if without else 1.0)
+    named = [
+        (way.words(sequence), differences(one, sequence.step_time))
+        for way, one in zip(ways, comparisons, strict=True)
+    ]
+    return Estimate(
+        score,
+        backwards,
+        without,
+        tuple(
+            overlap(tracks, sequence.cameras[c], half, [step[c] for step in given.views])
+            for c, tracks in enumerate(found[1:])
+        ),
+        doubts(named, sequence.step_time),
+    )
+
+
+def _work(item: tuple[Given, Look], desk: Desk) -> Trajectories:
+    given, way = item
+    return looked(given, way, desk.advance, desk.cancelled)
