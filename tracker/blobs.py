@@ -1,4 +1,4 @@
-"""Connected pieces of a foreground mask: what a camera has instead of a detector.
+"""Connected components of a foreground mask (pieces): what a camera has instead of a detector.
 
 Boxes are ``centre_x, centre_y, half_width, half_height`` in pixels, where the centre
 of the first pixel is (0, 0): a piece of one pixel has half sizes of one half.

@@ -53,7 +53,12 @@ class Camera:
     def from_projection(
         name: str, image_size: tuple[int, int], projection: Float[ndarray, "3 4"]
     ) -> Camera:
-        """Split P = K [R | t] (world metres to pixels) into its parts.
+        """Split P = K [R | t] into its parts, by an RQ decomposition.
+
+        Args:
+            name: Of the camera.
+            image_size: Width and height, pixels.
+            projection: P, world metres to pixels, up to scale; without distortion.
 
         Raises:
             ValueError: If the left 3×3 part of P is singular.

@@ -41,10 +41,17 @@ def bin_map(picture: UInt8[ndarray, "h w 3"], space: ColourSpaceName) -> UInt16[
     × 16 saturations where the pixel is coloured and 16 values where it is not
     (272 bins), so that brightness counts only where there is no colour. ``hsi``
     takes 16 hues × 4 saturations × 4 intensities where it is coloured and 8
-    intensities where it is not (264 bins), of the levels' five upper bits:
+    intensities where it is not (264 bins), of the five upper bits of each level 0 … 255:
 
         I = (R + G + B) / 3,  S = 1 - min(R, G, B) / I,
         cos H = (2R - G - B) / (2 sqrt((R - G)² + (R - B)(G - B)))
+
+    (Gonzalez, Woods, *Digital Image Processing*, §6.2). A pixel is coloured where saturation and
+    value reach :data:`LEAST_SATURATION` and :data:`LEAST_VALUE`.
+
+    Args:
+        picture: BGR, 0 … 255.
+        space: Which bins.
 
     Raises:
         ValueError: If there is no such space.
@@ -93,13 +100,26 @@ _HSI_BINS = _hsi_bins()
 def distance(
     first: Float[ndarray, "*N bins"], second: Float[ndarray, "*N bins"]
 ) -> Float[ndarray, "*N"]:
-    """Bhattacharyya distance sqrt(1 - Σ_u sqrt(p(u) q(u))): 0 for equal, 1 for disjoint ones."""
+    """Bhattacharyya distance sqrt(1 - Σ_u sqrt(p(u) q(u))) of histograms, as in [CRM03].
+
+    Args:
+        first: Histograms p, each summing to 1; any number of leading axes.
+        second: Histograms q.
+
+    Returns:
+        0 for equal histograms, 1 for disjoint ones or where one is empty.
+    """
     coefficient = np.sqrt(first * second).sum(axis=-1)
     return np.asarray(np.sqrt(np.clip(1.0 - coefficient, 0.0, 1.0)))
 
 
 def likelihood(distances: Float[ndarray, " N"], sigma: float) -> Float[ndarray, " N"]:
-    """l_z = N(D; 0, σ²), the colour likelihood of [ZW21]."""
+    """l_z = N(D; 0, σ²), the colour likelihood of [ZW21] §2.1.
+
+    Args:
+        distances: Bhattacharyya distances D, 0 … 1.
+        sigma: σ > 0, in units of D.
+    """
     return np.exp(-0.5 * (distances / sigma) ** 2) / (sigma * math.sqrt(2.0 * math.pi))
 
 
@@ -174,6 +194,12 @@ def histograms(
 
     With the Epanechnikov kernel a pixel weighs 1 - r², r being 1 on the ellipse
     inscribed in the box ([CRM03]): the middle counts, the corners do not.
+
+    Args:
+        bins: :func:`bin_map` of the picture.
+        boxes: Pixels; what lies outside the picture does not count.
+        space: Of ``bins``.
+        kernel: The weight of a pixel by its place in the box.
     """
     boxes = np.ascontiguousarray(boxes, dtype=float)
     result: ndarray = images.box_histograms(

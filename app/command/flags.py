@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 import tyro
 from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subcommand
 
-from app.command.library_flags import LibraryCommand, LibraryFile, Runs
+from app.command.library_flags import Bundle, FormatName, LibraryCommand, LibraryFile, Runs
 from tracker import parameters as table
 from tracker.library import KEEP
 from tracker.parameters import FOLLOWS, METHODS, PRESETS, Parameter, ParameterError
@@ -49,7 +49,8 @@ class Serve:
     """Start the workbench and serve its page on this machine."""
 
     sequence: Annotated[
-        Positional[str], arg(metavar="[SEQUENCE]", help="A built-in room's name or a folder.")
+        Positional[str],
+        arg(metavar="[SEQUENCE]", help="A built-in room's name, a folder, or a bundle (.zip)."),
     ] = DEFAULT_SEQUENCE
     host: str = "127.0.0.1"
     """Address to listen on. Anything but this machine's own lets others change what you see."""
@@ -69,13 +70,15 @@ class Serve:
 
 @dataclass
 class Track:
-    """Track the people of a sequence and write their tracks as CSV."""
+    """Track the people of a sequence and write their tracks, as CSV or in another form."""
 
     sequence: Annotated[
         Positional[str], arg(metavar="SEQUENCE", help="A built-in room's name or a folder.")
     ]
     output: Annotated[Path, arg(aliases=["-o"])]
     """The file to write. It appears when it is complete."""
+    format: FormatName = None
+    """Its form; `runs export` lists them."""
     single_view: Annotated[
         str | None,
         arg(metavar="|".join(METHODS["single_view"]), help_behavior_hint=f"({FOLLOWS})"),
@@ -197,7 +200,7 @@ class Experiment:
         arg(metavar="NAME", help="Which one.", help_behavior_hint="(optional)"),
     ] = None
     all: FlagCreatePairsOff[bool] = False
-    """Run every one, a quarter of an hour in all."""
+    """Run every one."""
     quick: FlagCreatePairsOff[bool] = False
     """Shortened to what shows the direction of each claim."""
     count: int = 20
@@ -340,7 +343,7 @@ class Benchmark:
         arg(metavar="[NAME …]", help="Which parts; all, if none is named."),
     ] = ()
     short: FlagCreatePairsOff[bool] = False
-    """The form of a minute or two that the checks run."""
+    """The shortened form that the checks run."""
     json: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
     """Write the figures to this file as well, with the machine and the versions."""
     record: FlagCreatePairsOff[bool] = False
@@ -437,6 +440,7 @@ Arguments = (
     | Render
     | Parameters
     | Runs
+    | Bundle
     | LibraryCommand
 )
 
@@ -462,6 +466,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         | Annotated[Render, subcommand("render")]
         | Annotated[Parameters, subcommand("parameters")]
         | Annotated[Runs, subcommand("runs")]
+        | Annotated[Bundle, subcommand("bundle")]
         | Annotated[LibraryCommand, subcommand("library")]
     )
     parsed: Arguments = tyro.cli(

@@ -13,6 +13,14 @@ LibraryFile = Annotated[
     arg(metavar="FILE", help_behavior_hint="(default: $MULTIVIEW_PHD_LIBRARY, or your own)"),
 ]
 
+FormatName = Annotated[
+    Literal["csv", "motchallenge", "json", "parquet", "trc", "gltf", "rerun", "html", "mp4"] | None,
+    arg(
+        metavar="csv|motchallenge|json|parquet|trc|gltf|rerun|html|mp4",
+        help_behavior_hint="(default: by the suffix, else csv)",
+    ),
+]
+
 _RUN = arg(metavar="RUN", help="Its number, or its name.")
 _RUNS = arg(metavar="RUN …", help="Their numbers or names.")
 
@@ -51,6 +59,28 @@ class OpenRun(OfLibrary):
     """Port to listen on."""
     open: bool = True
     """Open the page in a browser."""
+
+
+@dataclass
+class ExportRun(OfLibrary):
+    """Write a run's tracks in a form of your choice.
+
+    csv: one row a person a step · motchallenge: a folder for TrackEval · json · parquet · trc: for
+    OpenSim · gltf: boxes that move (.glb) · rerun: for its viewer (.rrd) · html: the report · mp4:
+    the cameras with boxes, the room from above, lanes.
+    """
+
+    run: Annotated[Positional[str], _RUN]
+    output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
+    """The file to write, of motchallenge the folder. It appears when it is complete."""
+    format: FormatName = None
+    """Its form."""
+    first: int = 0
+    """Of a video the first step."""
+    last: Annotated[int | None, arg(metavar="INT", help_behavior_hint="(default: the end)")] = None
+    """Of a video the last step."""
+    speed: float = 1.0
+    """Of a video: 0.5 is half as fast as it was."""
 
 
 @dataclass
@@ -99,6 +129,7 @@ RunsAction = (
     Annotated[ListRuns, subcommand("list")]
     | Annotated[ShowRun, subcommand("show")]
     | Annotated[OpenRun, subcommand("open")]
+    | Annotated[ExportRun, subcommand("export")]
     | Annotated[RenameRun, subcommand("rename")]
     | Annotated[StarRun, subcommand("star")]
     | Annotated[DeleteRuns, subcommand("delete")]
@@ -109,9 +140,20 @@ RunsAction = (
 
 @dataclass
 class Runs:
-    """What is kept of runs: list, show, open, rename, star, delete, compare."""
+    """What is kept of runs: list, show, open, export, rename, star, delete, compare."""
 
     action: OmitSubcommandPrefixes[RunsAction] = field(default_factory=ListRuns)
+
+
+@dataclass
+class Bundle(OfLibrary):
+    """Put a kept run into one ZIP file that `serve FILE.zip` shows on any machine, read only."""
+
+    run: Annotated[Positional[str], _RUN]
+    output: Annotated[Path, arg(aliases=["-o"], metavar="FILE.zip")]
+    """The file to write. It appears when it is complete."""
+    videos: FlagCreatePairsOff[bool] = False
+    """Take small videos along."""
 
 
 @dataclass

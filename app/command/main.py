@@ -10,9 +10,11 @@ import errno
 import os
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +37,7 @@ from app.command.flags import (
     parse,
     show,
 )
-from app.command.library_flags import LibraryCommand, OpenRun, Runs
+from app.command.library_flags import Bundle, LibraryCommand, OpenRun, Runs
 from app.command.terminal import Bar, CommandError, check_data, print_table, say
 from tracker import parameters as table
 from tracker.folders import library_file
@@ -107,6 +109,10 @@ def _run(command: Arguments) -> int:
             from app.command.runs import runs
 
             return runs(command, _serve_run)
+        case Bundle():
+            from app.command.runs import bundle
+
+            bundle(command)
         case LibraryCommand():
             from app.command.runs import check
 
@@ -138,7 +144,17 @@ def _serve_run(command: OpenRun, result: Result) -> int:
     return _serve(serve, result.run.id)
 
 
-def _serve(command: Serve, run: int | None = None) -> int:
+def _serve_bundle(command: Serve) -> int:
+    from tracker.library.bundle import unpack_bundle
+
+    with tempfile.TemporaryDirectory(prefix="multiview-phd-bundle-") as folder:
+        result = unpack_bundle(Path(command.sequence), Path(folder))
+        return _serve(replace(command, sequence=result.place, keep=0), result)
+
+
+def _serve(command: Serve, run: int | Result | None = None) -> int:
+    if run is None and command.sequence.lower().endswith(".zip"):
+        return _serve_bundle(command)
     if not 0 <= command.port <= 65535:
         raise ParameterError(
             "--port", f"expected 0 (any that is free) to 65535, got {command.port}"
@@ -148,6 +164,7 @@ def _serve(command: Serve, run: int | None = None) -> int:
     from app.state.jobs import locate
     from app.web import server
     from app.web.security import is_loopback
+    from tracker.library.records import Result
     from tracker.sequences import library, rendering
 
     place = locate(command.sequence, command.data)
@@ -180,7 +197,7 @@ def _serve(command: Serve, run: int | None = None) -> int:
             data=command.data,
             detector=command.detector,
             keep_on_disk=True,
-            library=command.library or library_file(),
+            library=None if isinstance(run, Result) else command.library or library_file(),
             keep=command.keep,
             run=run,
             say=say,
@@ -233,13 +250,17 @@ def _track(command: Track) -> None:
     _check_seed(command.seed)
     _check_keep(command.keep)
     output = command.output
-    if output.is_dir():
+    from tracker.writing.registry import format_of, save
+    from tracker.writing.written import Options, Written
+
+    form = format_of(output, command.format)
+    if output.is_dir() and not form.folder:
         raise CommandError(f"--output {output}: expected a file to write, found a folder")
     if not output.parent.is_dir():
         raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
 
     from app.state.compiling import Compiling
-    from tracker import export, pipeline
+    from tracker import pipeline
     from tracker.checks import check
     from tracker.runs.outcome import why_no_tracks
     from tracker.runs.stage_cache import StageCache
@@ -248,6 +269,7 @@ def _track(command: Track) -> None:
     with Bar("rendering", "frame") as rendering:
         sequence = library.open_sequence(command.sequence, progress=rendering.at)
     sequence = library.with_detector(sequence, command.detector)
+    form.check(sequence)
     for sentence in sequence.warnings:
         say(sentence)
     for found in check(sequence, quick=True):
@@ -272,7 +294,9 @@ def _track(command: Track) -> None:
             on_progress=told,
         )
     seconds = time.perf_counter() - begin
-    export.save_tracks_csv(output, sequence, run.tracks, parameters, command.seed)
+    with Bar("writing", "step") as writing:
+        written = Written(sequence, run.tracks, parameters, command.seed)
+        save(output, form, written, Options(progress=writing.at))
     targets = len(set(run.tracks.ids.tolist()))
     kept = "" if "single_view" in stages else "; stage 1 was kept from an earlier run"
     say(

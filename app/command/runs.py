@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from app.command.library_flags import (
+    Bundle,
     CollectRuns,
     DeleteRuns,
     DiffRuns,
+    ExportRun,
     LibraryCommand,
     ListRuns,
     OfLibrary,
@@ -22,7 +24,7 @@ from app.command.library_flags import (
     ShowRun,
     StarRun,
 )
-from app.command.terminal import CommandError, print_table, say
+from app.command.terminal import Bar, CommandError, print_table, say
 from tracker.folders import library_file
 from tracker.library import KEEP, repair
 from tracker.library.records import HEADLINES, KeptRun, Result
@@ -50,6 +52,8 @@ def runs(command: Runs, serve: Callable[[OpenRun, Result], int]) -> int:
                 _show(library, action)
             case OpenRun():
                 result = library.result(library.find(action.run).id)
+            case ExportRun():
+                _export(library, action)
             case RenameRun():
                 run = library.find(action.run)
                 library.rename(run.id, action.name)
@@ -70,6 +74,32 @@ def runs(command: Runs, serve: Callable[[OpenRun, Result], int]) -> int:
                 else:
                     say(f"{gone} runs gone, {freed / 1e6:.1f} MB freed")
     return serve(action, result) if isinstance(action, OpenRun) else 0
+
+
+def bundle(command: Bundle) -> None:
+    """Write a kept run as one ZIP file.
+
+    Raises:
+        LibraryError: If the library, or the run, is not as it must be.
+    """
+    from tracker.library.bundle import write_bundle
+    from tracker.sequences import library as sequences
+
+    output = command.output
+    if output.suffix.lower() != ".zip":
+        raise CommandError(f"--output {output}: expected the name of a .zip file")
+    if not output.absolute().parent.is_dir():
+        raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
+    with _library(command) as library:
+        result = library.result(library.find(command.run).id)
+    with Bar("rendering", "frame") as rendering:
+        sequence = sequences.open_sequence(result.place, progress=rendering.at)
+    write_bundle(output, result, sequence, videos=command.videos)
+    size = output.stat().st_size
+    if command.json:
+        _print({"run": result.run.id, "file": str(output), "bytes": size})
+    else:
+        say(f"{result.run.title}, {size / 1e6:.1f} MB, written to {output}")
 
 
 def check(command: LibraryCommand) -> int:
@@ -171,6 +201,26 @@ def _show(library: Library, command: ShowRun) -> None:
         "note": run.note,
     }
     print_table(("what", "value"), list(facts.items()))
+
+
+def _export(library: Library, command: ExportRun) -> None:
+    from tracker.sequences import library as sequences
+    from tracker.writing.registry import format_of, save
+    from tracker.writing.written import Options, Written
+
+    form = format_of(command.output, command.format)
+    result = library.result(library.find(command.run).id)
+    with Bar("rendering", "frame") as rendering:
+        sequence = sequences.open_sequence(result.place, progress=rendering.at)
+    done = None if result.run.steps >= sequence.frames else result.run.steps
+    written = Written(sequence, result.kept.tracks, result.parameters, result.run.seed, done)
+    with Bar("writing", "step") as writing:
+        options = Options(command.first, command.last, command.speed, writing.at)
+        save(command.output, form, written, options)
+    if command.json:
+        _print({"run": result.run.id, "format": form.name, "file": str(command.output)})
+    else:
+        say(f"{result.run.title} as {form.word}, written to {command.output}")
 
 
 def _delete(library: Library, command: DeleteRuns) -> None:

@@ -20,8 +20,8 @@ _LOOKS_SECONDS = 0.1
 class Compiling:
     """Compiles beside the program, whose interpreter stays free; what is ready is on disk.
 
-    The first run waits for the loops over pixels, a few seconds. Until the others are there
-    they run as plain Python, slower and with the same numbers.
+    The first run waits for the loops over pixels only. Until the others are there they run as
+    plain Python, slower and with the same numbers.
     """
 
     def __init__(self, say: Callable[[str], None] = lambda words: None) -> None:

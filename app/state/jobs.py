@@ -25,6 +25,7 @@ from app.state.workbench import Workbench
 from tracker import pipeline
 from tracker.library.keeping import run_from
 from tracker.library.records import Result
+from tracker.parameters import RunParameters
 from tracker.pipeline import Cancelled, Progress, Run
 from tracker.runs.stage_cache import StageCache
 from tracker.sequences import library
@@ -78,6 +79,7 @@ class Jobs:
         seed: int = 0,
         cache: StageCache | None = None,
         compiling: Compiling | None = None,
+        computes: bool = True,
     ) -> None:
         """Begin to follow the workbench.
 
@@ -89,6 +91,7 @@ class Jobs:
             cache: Where columns of runs are kept; in memory only, if none is given.
             compiling: Whom to wait for before the first run;
                 closed with this.
+            computes: Whether runs are computed at all, rather than only shown.
         """
         self._workbench = workbench
         self._data = data
@@ -99,6 +102,7 @@ class Jobs:
         self._under_way: _Wanted | None = None
         self._cache = cache or StageCache()
         self._compiling = compiling
+        self._computes = computes
         self._opening: threading.Event | None = None
         self._openings: list[threading.Thread] = []
         self._closed = False
@@ -154,7 +158,9 @@ class Jobs:
                 cancelled=cancelled.is_set,
             )
             sequence = library.with_detector(sequence, self._detector)
-            parameters = pipeline.default_parameters(sequence)
+            parameters = RunParameters()
+            if self._computes:  # else neither pictures nor boxes are needed
+                parameters = pipeline.default_parameters(sequence)
             reader = FrameReader(sequence)
             with self._condition:
                 if cancelled.is_set():
@@ -254,7 +260,7 @@ class Jobs:
     def _ask(self, *, again: bool = False) -> None:
         with self._condition:
             snapshot = self._workbench.snapshot()
-            if snapshot.sequence is None or self._closed:
+            if snapshot.sequence is None or self._closed or not self._computes:
                 return
             key = pipeline.stage_keys(snapshot.sequence, snapshot.parameters, self._seed)["tracks"]
             newest = self._wanted or self._under_way

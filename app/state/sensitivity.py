@@ -97,7 +97,7 @@ class Sensitivity:
         self._closed = False
         self._curves: dict[tuple[str, str], Curve] = {}
         self._last: Run | None = None
-        """Stages are taken from it where the shown run is not finished."""
+        """Stages are taken from it where the shown run is not finished; not kept for longer."""
         self._listeners: list[Callable[[], None]] = []
         self._unsubscribe = workbench.subscribe(self._on_change)
         self._thread = threading.Thread(target=self._work, name="sensitivity", daemon=True)
@@ -193,6 +193,8 @@ class Sensitivity:
             with self._condition:
                 if cancelled is self._cancelled and self._wanted[:1] == [key]:
                     self._wanted = self._wanted[1:]
+                if not self._wanted:
+                    self._last = None
             self._tell()
 
     def _compute(self, key: str, cancelled: threading.Event) -> None:

@@ -187,3 +187,31 @@ async def _refuse(
     ]
     await send({"type": "http.response.start", "status": status, "headers": headers})
     await send({"type": "http.response.body", "body": payload})
+
+
+LOOKING = ("/api/seek", "/api/select", "/api/layers", "/api/view", "/api/theme", "/api/exports")
+"""What may be written to where a run is only looked at: how it is looked at, and its export."""
+
+
+class OnlyLooking:
+    """Refuses every change of what is shown."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer, or refuse."""
+        if (
+            scope["type"] == "http"
+            and scope["method"] not in READING
+            and scope["path"].startswith("/api/")
+            and scope["path"] not in LOOKING
+        ):
+            detail = ErrorDetail(
+                code="read_only",
+                message="This run came in a bundle and is only looked at: nothing can be changed.",
+                hint="Serve its sequence folder, or another recording, to compute.",
+            )
+            await _refuse(scope, receive, send, 403, detail)
+            return
+        await self._app(scope, receive, send)

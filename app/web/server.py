@@ -24,6 +24,7 @@ from app.paths import static_folder
 from app.state import opening_step
 from app.state.compiling import Compiling
 from app.state.evaluator import Evaluator
+from app.state.exporter import Exporter
 from app.state.history import History
 from app.state.importing.desk import Desk
 from app.state.jobs import Jobs, in_background
@@ -37,19 +38,21 @@ from app.web import api, gateway, stream, teaching_routes
 from app.web.evaluation import routes as evaluation
 from app.web.gateway import Gateway
 from app.web.importing import routes as importing
+from app.web.library import export_routes
 from app.web.library import routes as library
 from app.web.manual import Manual
 from app.web.pictures import foreground, likelihood_routes
 from app.web.pictures.jpegs import Pictures
 from app.web.pictures.likelihood import Likelihoods
 from app.web.pictures.swatches import Swatches
-from app.web.security import CONTENT_POLICY, Guard, allowed_hosts, is_loopback
+from app.web.security import CONTENT_POLICY, Guard, OnlyLooking, allowed_hosts, is_loopback
 from app.web.stream import Stream
 from app.web.tables import tables, teaching_tables
 from app.web.views.timeline import Timelines
 from tracker import __version__
 from tracker.folders import settings_folder
 from tracker.library import KEEP
+from tracker.library.records import Result
 from tracker.pipeline import Cancelled
 from tracker.runs.stage_cache import StageCache
 
@@ -71,6 +74,7 @@ ROUTERS = (
     evaluation.router,
     importing.router,
     library.router,
+    export_routes.router,
     stream.router,
     gateway.router,
 )
@@ -99,8 +103,9 @@ class Settings:
     """The file that keeps runs; None: they are not kept."""
     keep: int = KEEP
     """How many untouched runs stay in it."""
-    run: int | None = None
-    """A run of it that is shown at once, instead of a sequence."""
+    run: int | Result | None = None
+    """A run of it that is shown at once, instead of a sequence; or one that lies elsewhere, which
+    is only looked at: nothing is computed, and nothing can be changed."""
     say: Callable[[str], None] = lambda words: None
     """Told what somebody in front of the terminal should know."""
 
@@ -121,6 +126,8 @@ def create_app(settings: Settings) -> FastAPI:
         hosts=allowed_hosts(settings.host),
         addresses_are_fine=not is_loopback(settings.host),
     )
+    if isinstance(settings.run, Result):
+        app.add_middleware(OnlyLooking)
     errors.install(app)
     for router in ROUTERS:
         app.include_router(router)
@@ -150,14 +157,15 @@ class _PageFiles(StaticFiles):
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     settings: Settings = app.state.settings
     workbench = app.state.workbench = Workbench()
-    kept = settings.keep_on_disk
+    kept, looked_at = settings.keep_on_disk, isinstance(settings.run, Result)
     jobs = app.state.jobs = Jobs(
         workbench,
         data=settings.data,
         detector=settings.detector,
         seed=settings.seed,
         cache=StageCache.on_disk(in_background) if kept else StageCache(),
-        compiling=Compiling(settings.say) if kept else None,
+        compiling=Compiling(settings.say) if kept and not looked_at else None,
+        computes=not looked_at,
     )
     pictures = app.state.pictures = Pictures(workbench)
     app.state.timelines = Timelines()
@@ -176,6 +184,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         workbench, settings_folder() / "recent.json" if kept else None
     )
     evaluator = app.state.evaluator = Evaluator(workbench)
+    exporter = app.state.exporter = Exporter()
     sensitivity = app.state.sensitivity = Sensitivity(workbench, settings.seed)
     keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep)
     told = app.state.stream = Stream(workbench)
@@ -188,7 +197,11 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         # the page is served meanwhile; requests for the 3D view wait
         starting = asyncio.create_task(_start_viser(room, door, workbench))
     if settings.run is not None:
-        result = keeper.library().result(settings.run)
+        result = (
+            settings.run
+            if isinstance(settings.run, Result)
+            else keeper.library().result(settings.run)
+        )
         opening = jobs.open(result.place)
         library.then_show(opening, jobs, workbench, result).add_done_callback(
             _say_failure(result.run.title)
@@ -208,7 +221,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         await asyncio.gather(
             *(
                 asyncio.to_thread(part.close)
-                for part in (keeper, jobs, evaluator, sensitivity, room)
+                for part in (exporter, keeper, jobs, evaluator, sensitivity, room)
             )
         )
 

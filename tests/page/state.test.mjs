@@ -327,6 +327,9 @@ test("pictures that are alike lie side by side, the last row in the middle", () 
   assert.ok(Math.abs(c.x + c.width / 2 - 720) <= 1);
   assert.ok(Math.abs(a.x + b.x + b.width - 1440) <= 2);
   assert.ok(a.height * 2 + 12 >= 796, "as high as there is room");
+  const spare = { width: 473, most: 270, gap: 4, sparing: true };
+  const row = mosaic([1.22, 1.22, 1.22], null, spare);
+  assert.ok(row.cells.every(({ y }) => y === row.cells[0].y) && row.height < 140);
 });
 
 test("what a camera tells of its people is one line of words", () => {

@@ -106,7 +106,7 @@ def _span(frames: Int[ndarray, " D"], steps: Int[ndarray, " S"]) -> tuple[ndarra
 
 
 def in_world(pose: Pose, directions: Float[ndarray, "N 3"]) -> Float[ndarray, "N 3"]:
-    """Directions in camera axes, in world axes."""
+    """Unit directions given in camera axes, turned into world axes."""
     return np.asarray(directions @ pose.rotation)
 
 

@@ -18,7 +18,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 FINE = 0.1
-"""Steps between the offsets that are tried at last."""
+"""Steps between the offsets of the final, fine search."""
 
 _AROUND = 2.5  # steps on either side of the best whole offset that are searched finely
 _RIPPLE = 10  # fine offsets in a step: boxes between two steps are less noisy than those at one
@@ -56,7 +56,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Offset:
-    """How late one camera is."""
+    """The time offset found for one camera."""
 
     steps: float
     curve: Curve

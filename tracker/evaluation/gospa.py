@@ -59,7 +59,7 @@ def gospa_parts(
 
 
 def gospa(comparison: Comparison, *, cutoff: float, order: float) -> Gospa:
-    """GOSPA of each step; see :func:`gospa_parts`."""
+    """GOSPA of each step, with the order and the units of :func:`gospa_parts`."""
     parts = [gospa_parts(d, cutoff=cutoff, order=order) for d in comparison.distances]
     near = np.array([part[0] for part in parts], dtype=float)
     missed = np.array([part[1] for part in parts], dtype=np.int64)

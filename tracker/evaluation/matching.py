@@ -111,6 +111,12 @@ def to_rows(
     Left out are rows outside the steps 0 … ``steps`` − 1, rows whose position is
     not finite, and every row after the first that repeats an id within a step.
 
+    Args:
+        frames: The step of each row, in any order.
+        ids: The target of each row.
+        positions: World metres.
+        steps: Number of steps.
+
     Returns:
         The rows, and for each the index of the column entry that it came from.
     """
@@ -138,7 +144,7 @@ class Measure:
     def between(
         self, first: Float[ndarray, "N 3"], second: Float[ndarray, "N 3"]
     ) -> Float[ndarray, " N"]:
-        """The distance of each pair of positions."""
+        """The distance of each pair of positions (world metres), in the unit of the distance."""
         apart = first - second
         if self.distance == "ground":
             return np.asarray(np.hypot(apart[:, 0], apart[:, 1]))
@@ -173,7 +179,15 @@ def distances_by_step(
 def assign(
     distances: Float[ndarray, "G E"], gate: float
 ) -> tuple[Int[ndarray, " M"], Int[ndarray, " M"]]:
-    """The pairs of one step: rows and columns of the distance matrix, at most one of each."""
+    """The pairs of one step by the module's protocol; none for an empty side.
+
+    Args:
+        distances: Of every person (rows) to every estimate (columns).
+        gate: Largest distance of a pair, in the same unit.
+
+    Returns:
+        Rows and columns of the pairs, each at most once.
+    """
     if not distances.size:
         none = np.zeros(0, dtype=np.int64)
         return none, none

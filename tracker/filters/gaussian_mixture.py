@@ -162,7 +162,7 @@ def predict(
 
 
 def prune(mixture: GaussianMixture, threshold: float) -> Int[ndarray, " K"]:
-    """Indices of the components whose weight is at least ``threshold``, in order."""
+    """Indices of the components whose weight is at least the threshold T, in order ([VM06]_)."""
     return (mixture.weights >= threshold).nonzero()[0]
 
 

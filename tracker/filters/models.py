@@ -32,7 +32,7 @@ class Motion:
 
     @staticmethod
     def of(parameters: FusionParams, step_time: float) -> Motion:
-        """The motion model that the parameters name."""
+        """The motion model that the parameters name, for steps of ``step_time`` seconds."""
         if parameters.motion == "random_walk":
             noise = random_walk_noise(parameters.motion_sigma, step_time, 3)
             return Motion(np.eye(3), noise, 0.0)
@@ -49,11 +49,14 @@ class Motion:
         return len(self.transition)
 
     def predict(self, mixture: GaussianMixture, survival_probability: float) -> GaussianMixture:
-        """Every component one step ahead."""
+        """Every component one step ahead: :func:`tracker.filters.gaussian_mixture.predict`."""
         return gaussian_mixture.predict(mixture, self.transition, self.noise, survival_probability)
 
     def at_rest(self, mixture: GaussianMixture) -> GaussianMixture:
-        """Components over positions as components over the whole state: velocity 0, unsure."""
+        """Components over positions (metres) as components over the whole state.
+
+        The velocity is 0 with the standard deviation :attr:`start_velocity` along each axis.
+        """
         extra = self.dimension - mixture.dimension
         if extra == 0:
             return mixture

@@ -152,8 +152,12 @@ class AdaptiveForeground:
     ) -> tuple[AdaptiveState, Segmentation]:
         """Segment one picture and let the background follow it.
 
-        A picture that shows nothing, or nothing of the scene, has no foreground and
-        leaves the background as it is.
+        A blank picture, or one of which most differs from the background, has no foreground
+        and leaves the background as it is.
+
+        Args:
+            state: After the picture before.
+            picture: BGR, of the background's size.
         """
         p = self._parameters
         shown = cv2.convertScaleAbs(state.background, alpha=1.0 / 256.0)
@@ -184,7 +188,15 @@ class AdaptiveForeground:
 
 
 def clean(mask: UInt8[ndarray, "h w"], minimum_area: int) -> UInt8[ndarray, "h w"]:
-    """Drop pieces of fewer pixels, then close gaps and cracks (3×3)."""
+    """Drop connected components of fewer pixels, then close gaps (morphological closing, 3×3).
+
+    Args:
+        mask: Foreground is what is not 0.
+        minimum_area: Pixels.
+
+    Returns:
+        1 on the foreground, 0 elsewhere.
+    """
     left, top, width, height = cv2.boundingRect(mask)
     cleaned = np.zeros_like(mask)
     if width == 0:

@@ -1,4 +1,4 @@
-"""What every foreground model gives, and the one face by which they can be exchanged."""
+"""What every foreground model gives, and the interface by which they can be exchanged."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ _PARTS = np.array(
 
 
 def integral(mask: UInt8[ndarray, "h w"]) -> Int[ndarray, "h1 w1"]:
-    """Sums above and to the left of each corner, for :func:`box_shares`."""
+    """The integral image: sums above and to the left of each pixel corner (h + 1, w + 1)."""
     sums: ndarray = cv2.integral(mask)
     return sums
 
@@ -31,6 +31,10 @@ def box_shares(sums: Int[ndarray, "h1 w1"], edges: Float[ndarray, "N 4"]) -> Flo
 
     Of a rectangle partly outside the picture only what is inside counts; wholly
     outside the share is 0.
+
+    Args:
+        sums: :func:`integral` of the mask.
+        edges: Left, top, right, bottom, pixels, not rounded.
     """
     shares: ndarray = images.box_means(sums, np.ascontiguousarray(edges, dtype=float))
     return shares

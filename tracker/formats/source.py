@@ -1,7 +1,7 @@
 """One file to be recognised and read: its content on demand, within limits of size and depth.
 
 Files come from anywhere. Whatever is read here is bounded in memory and time, executes
-nothing and follows no reference to another file; what does not fit gets a sentence.
+nothing and follows no reference to another file; what breaks a limit is an error in one sentence.
 """
 
 from __future__ import annotations

@@ -37,12 +37,18 @@ def seeing(views: Many[ViewResult]) -> Int[ndarray, " S"] | None:
 
 
 def boxes_of(seen: CameraBoxes, cameras: Int[ndarray, " S"]) -> CameraBoxes:
-    """The boxes of all cameras as those of the ones that have a frame: the others have none."""
+    """The boxes of all C cameras, listed for the S cameras that have a frame: others have none."""
     return seen._replace(starts=np.append(seen.starts[:-1][cameras], seen.starts[-1]))
 
 
 def spread(record: Record, cameras: Int[ndarray, " S"], count: int) -> Record:
-    """What some cameras said of the components as what all C said: the others nothing, p_D 0."""
+    """The record of some cameras extended to all C: the others gave no evidence, with p_D 0.
+
+    Args:
+        record: Of the cameras that had a frame.
+        cameras: Their indices.
+        count: C.
+    """
     every = Record.blank(count, record.sources.shape[1])
     if len(cameras):
         every.detection_probabilities[cameras] = record.detection_probabilities
@@ -73,7 +79,7 @@ Recent = tuple[Glimpse, ...]
 
 
 def remember(recent: Recent, glimpse: Glimpse, step_time: float) -> Recent:
-    """The last steps at the end of this one."""
+    """The last steps at the end of this one: as many as lie within :data:`LONGEST` seconds."""
     return (glimpse, *recent)[: int(LONGEST / step_time + 1e-9)]
 
 
@@ -124,7 +130,12 @@ def _last(
 
 
 def of_this_step(found: Newborns, blind: Bool[ndarray, " C"]) -> Newborns:
-    """Those newcomers to whom a box of this step belongs, with the boxes of this step alone."""
+    """The newcomers with a box of this step; boxes of earlier frames are no sources of theirs.
+
+    Args:
+        found: Proposed from this step's boxes and remembered ones.
+        blind: Which cameras have no frame now, so that their boxes were remembered.
+    """
     now = (found.sources[~blind] >= 0).any(axis=0)
     sources = np.where(blind[:, None], -1, found.sources)
     return replace(found, sources=sources).take(np.flatnonzero(now))

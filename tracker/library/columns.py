@@ -1,9 +1,9 @@
-"""A run's tracks as bytes: each column by itself, as what changes from row to row, compressed.
+"""A run's tracks as bytes: each column delta-encoded, byte-shuffled and compressed by zlib.
 
-Rows are put in the order of tracks and then steps, where neighbours differ little; of each
-number what differs from the one before is kept, byte planes apart, by zlib, whose checksum
-tells a damaged one. Positions are exact; existence and standard deviations are rounded to
-float32, and p_D to a thousandth.
+Rows are sorted by track and then step, so that neighbours differ little; of each number the
+difference from the one before is kept (delta encoding), its bytes separated by significance
+(byte shuffling). zlib's checksum detects damage. Positions are exact; existence and standard
+deviations are rounded to float32, and p_D to a thousandth.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class KeptTracks:
 
     tracks: Trajectories
     detection_probabilities: Float[ndarray, "N C"]
-    """p_D that each camera was given for each row."""
+    """p_D of each camera for each row."""
 
 
 def pack(kept: KeptTracks) -> bytes:

@@ -33,7 +33,7 @@ _QUALITY = 80
 
 
 def code_version() -> str:
-    """Another word for every code that may give other tracks."""
+    """A short hash of all code that may change the tracks of a run."""
     return hashlib.sha256(numbers_version("tracks").encode()).hexdigest()[:12]
 
 
@@ -90,8 +90,10 @@ def kept_of(run: Run) -> KeptTracks:
     probabilities = np.zeros(tracks.seen.shape)
     for step in range(run.done):
         rows = tracks.at(step)
+        components = tracks.components[rows]
+        own = components >= 0  # what was put into a gap has none
         known = run.fused[step].detection_probabilities
-        probabilities[rows] = known[:, tracks.components[rows]].T
+        probabilities[rows][own] = known[:, components[own]].T
     return KeptTracks(tracks, probabilities)
 
 

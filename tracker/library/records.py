@@ -49,17 +49,23 @@ class KeptRun(NamedTuple):
     began: float
     """Seconds since 1970."""
     seconds: float
+    """How long its computation took."""
     steps: int
     single_view: str
     fusion_method: str
     changes_json: str
     seed: int
     version: str
+    """Of the program."""
     code: str
+    """Hash of the code that computes, as in the keys of stages."""
     source: str
+    """Who computed it: ``track``, ``page``, or ``bundle`` where it was taken from a file."""
     targets: int
     """How many tracks."""
     mota: float | None
+    """As the following figures (OSPA and position error in metres), None where it is not defined
+    or the recording has no truth."""
     idf1: float | None
     hota: float | None
     ospa: float | None

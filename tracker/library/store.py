@@ -203,7 +203,7 @@ class Library:
             if row is None:
                 raise LibraryError(f"{self.path}: the tracks of run {number} are not there")
             values, figures = _inflated(row[0]), _inflated(row[1])
-            parameters, unknown = _parameters(values)
+            parameters, unknown = parameters_of(values)
             kept = columns.unpack(row[2])
             place, key, digest, machine = row[3:]
             return Result(
@@ -413,7 +413,7 @@ def _inflated(data: bytes) -> dict[str, Any]:
         raise ValueError(str(error)) from None
 
 
-def _parameters(values: dict[str, Any]) -> tuple[RunParameters, tuple[str, ...]]:
+def parameters_of(values: dict[str, Any]) -> tuple[RunParameters, tuple[str, ...]]:
     """The parameters that were written, and the keys that this version does not take."""
     try:
         return RunParameters.model_validate(values), ()

@@ -1,4 +1,4 @@
-"""What a parameter's definition is made of: a checked group and each number's face."""
+"""What a parameter's definition is made of: a checked group, and how each number is presented."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def ui(
     when: Mapping[str, tuple[Any, ...]] = NO_CONDITION,
     essential: bool = False,
 ) -> Any:
-    """What a parameter's face needs beyond its range and help.
+    """How a parameter is presented, beyond its range and help.
 
     Args:
         symbol: As the formulas write it, for instance ``p_S``.

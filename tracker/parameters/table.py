@@ -16,7 +16,7 @@ from tracker.parameters.run import RunParameters
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter as its faces see it."""
+    """One parameter with all that slider, flag, schema and manual need of it."""
 
     key: str
     """``group.name``, for instance ``fusion.survival_probability``."""

@@ -18,7 +18,11 @@ from tracker.sequences.sequence import SequenceError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
-    """Named columns of finite numbers, N rows in the file's order."""
+    """Named columns of finite numbers, N rows in the file's order.
+
+    Every method that checks a column raises :class:`SequenceError` at the first bad row, with file,
+    line and column, what was expected and what was found.
+    """
 
     where: str
     """The file, as messages begin."""

@@ -49,7 +49,11 @@ def shown(value: Any) -> str:
 
 
 class Fields:
-    """One table of the file. Unknown fields are refused at once, the others when they are read."""
+    """One table of the file. Unknown fields are refused at once, the others when they are read.
+
+    Every method that reads a field raises :class:`SequenceError` where its value is not as
+    expected, with file, field, what was expected and what was found.
+    """
 
     def __init__(self, where: str, values: Any, known: Iterable[str]) -> None:
         """Wrap one table.

@@ -1,4 +1,4 @@
-"""The boxes of an outside detector: how far to trust them, and which contradict the room."""
+"""The boxes of an outside detector: their measurement noise, and which contradict the room."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Detected:
 
 
 class DetectorBoxes:
-    """The ``detections`` of one camera, with the trust that the parameters state."""
+    """The ``detections`` of one camera, with the measurement noise that the parameters state."""
 
     def __init__(
         self, sequence: Sequence, camera_index: int, parameters: DetectionBoxParams
@@ -106,7 +106,15 @@ def _within(boxes: Float[ndarray, "N 4"], camera: Camera) -> Float[ndarray, "N 4
 
 
 def trust(boxes: Float[ndarray, "N 4"], parameters: DetectionBoxParams) -> Float[ndarray, "N 4"]:
-    """Standard deviations of centre and half sizes: shares of the box, and a floor in pixels."""
+    """Measurement noise of boxes: a share of their size and a constant, added in quadrature.
+
+    Args:
+        boxes: centre_x, centre_y, half_width, half_height, pixels.
+        parameters: The shares, and the constant in pixels.
+
+    Returns:
+        Standard deviations of the same four numbers, pixels.
+    """
     p = parameters
     half_width, half_height = boxes[:, 2], boxes[:, 3]
     shares = [
@@ -158,7 +166,14 @@ def standing_between(
 def meets(
     room: Room, starts: Float[ndarray, "N 3"], ends: Float[ndarray, "N 3"], margin: float
 ) -> Bool[ndarray, " N"]:
-    """Whether each straight way comes within ``margin`` metres of the room's volume."""
+    """Whether each segment comes within ``margin`` metres of the room's volume, axis by axis.
+
+    Args:
+        room: Its volume counts.
+        starts: World metres.
+        ends: World metres.
+        margin: Metres by which the volume is widened on all sides.
+    """
     low, high = room.minimum - margin, room.maximum + margin
     way = ends - starts
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class DetectionBoxes:
-    """The boxes of the sequence's ``detections``, with the trust that the parameters state.
+    """The boxes of the sequence's ``detections``, with the noise that the parameters state.
 
     Boxes that contradict the room stay among the measurements and go no further.
     """

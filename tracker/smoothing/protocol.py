@@ -1,4 +1,4 @@
-"""The face of every smoothing method: all steps of the filter in, tracks with hindsight out."""
+"""The interface of every smoothing method: all steps of the filter in, smoothed tracks out."""
 
 from __future__ import annotations
 

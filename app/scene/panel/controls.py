@@ -187,6 +187,7 @@ class Controls:
                     "What would each change?",
                     hint="Runs the recording with a few other values of each parameter listed "
                     "here, in the background, until somebody works again.",
+                    color="gray",
                 )
             button.on_click(partial(self._ask_curves, copy))
         self._curves = self._server.gui.add_html("")

@@ -157,7 +157,8 @@ def _label(known: Known, piece: DetectionPiece) -> str:
     """The file or series that a piece is of; of files that are a camera each, this file."""
     for one in known.taken:
         if any(own is piece for own in one.pieces):
-            return one.label if len(one.pieces) == 1 else piece.source.name
+            sources = {own.source for own in one.pieces if isinstance(own, DetectionPiece)}
+            return one.label if len(sources) == 1 else piece.source.name
     return piece.source.name
 
 

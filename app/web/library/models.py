@@ -68,7 +68,8 @@ class KeptRunInfo(Model):
     fusion_method: str
     changes: list[ChangeInfo]
     seed: int
-    version: str
+    program: str
+    """Its version."""
     older_code: bool
     """Whether another version of the program made it: computing it again may give other tracks."""
     source: str
@@ -139,12 +140,13 @@ def run_info(run: KeptRun, changes: list[ChangeInfo], older_code: bool) -> KeptR
     told: dict[str, Any] = {
         name: getattr(run, name)
         for name in KeptRunInfo.model_fields
-        if name not in ("changes", "older_code", "star", "tags", "steps_per_second")
+        if name not in ("changes", "older_code", "program", "star", "tags", "steps_per_second")
     }
     return KeptRunInfo(
         **told,
         changes=changes,
         older_code=older_code,
+        program=run.version,
         star=bool(run.star),
         tags=run.tags,
         steps_per_second=round(run.steps_per_second, 1),

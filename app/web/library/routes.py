@@ -7,13 +7,14 @@ from concurrent.futures import Future
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi.responses import HTMLResponse
 
 from app.errors import ApiError, sentence
 from app.models import State
 from app.state.keeper import Keeper
 from app.web.dependencies import ERRORS, Bench, Work, nothing_open
-from app.web.library import models, preview
+from app.web.library import drawing, models, preview
 from app.web.views import results
 from tracker import parameters as table
 from tracker.library.errors import LibraryError
@@ -139,6 +140,25 @@ def run(number: int, opened: Opened) -> models.Preview:
         people=preview.people(tracks, result.run.steps),
         courses=preview.courses(tracks, fps),
     )
+
+
+@router.get("/runs/{number}/drawn", response_class=HTMLResponse)
+def drawn(number: int, opened: Opened) -> str:
+    """One kept run in small, as a part of the page."""
+    told = run(number, opened)
+    return drawing.preview(told.run, told.frames, told.tracks, told.people, told.courses)
+
+
+@router.get("/compared", response_class=HTMLResponse)
+def compared(
+    opened: Opened,
+    runs: Annotated[list[int], Query(max_length=12, description="Their numbers.")],
+) -> str:
+    """Kept runs side by side, as a part of the page."""
+    try:
+        return drawing.comparison([_info(opened.run(number)) for number in runs])
+    except LibraryError as error:
+        raise no_library(error) from None
 
 
 @router.patch("/runs/{number}")

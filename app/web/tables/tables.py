@@ -209,7 +209,10 @@ def change_table(request: Request, bench: Bench) -> str:
     """What differs from the defaults, each with its reset; and what parameters would change."""
     snapshot = bench.snapshot()
     sensitivity: Sensitivity = request.app.state.sensitivity
-    return _changed(snapshot) + _curves_of(sensitivity.curves())
+    curves = _curves_of(sensitivity.curves())
+    if curves and not parameter_table.changed(snapshot.parameters, snapshot.defaults):
+        return line("All parameters stand at their defaults.") + curves
+    return _changed(snapshot) + curves
 
 
 def _curves_of(curves: Mapping[str, Curve]) -> str:

@@ -26,8 +26,9 @@ export function strands(people, switches) {
  * @param {Pen} pen
  * @param {Scores} scores
  * @param {Server.TrackLife[]} tracks  in the order of the lanes
+ * @param {number | null} selection  whose strands stand out
  */
-export function drawBraid({ g, row, view, ink }, { evaluation, series }, tracks) {
+export function drawBraid({ g, row, view, ink }, { evaluation, series }, tracks, selection) {
 	const all = strands(evaluation.per_person, series.switches);
 	const carrying = new Set(all.flatMap(({ parts }) => parts.map(({ track }) => track)));
 	const order = tracks.map(({ id }) => id).filter((id) => carrying.has(id));
@@ -59,7 +60,9 @@ export function drawBraid({ g, row, view, ink }, { evaluation, series }, tracks)
 					open = here;
 				}
 			});
-			stroke(g, ink.id(own), lost ? 0.75 : 2, lost ? [1, 3] : []);
+			const meant = selection === null || parts.some(({ track }) => track === selection);
+			g.globalAlpha = meant ? 1 : 0.25;
+			stroke(g, ink.id(own), lost ? 0.75 : order.length > 12 ? 1 : 2, lost ? [1, 3] : []);
 		}
 	}
 	g.restore();

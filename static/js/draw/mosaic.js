@@ -6,16 +6,17 @@
 /**
  * @param {number[]} aspects  width by height of each camera
  * @param {number | null} large  index of the large one; null for all alike
- * @param {{width: number, most: number, gap: number}} room  `most` is the height that may be used
+ * @param {{width: number, most: number, gap: number, sparing?: boolean}} room  `most` is the height
+ * that may be used; sparing: what is not used of it is wanted elsewhere
  * @returns {{cells: Cell[], height: number}} cells relative to the mosaic, its height with the gaps
  * around
  */
-export function mosaic(aspects, large, { width, most, gap }) {
+export function mosaic(aspects, large, { width, most, gap, sparing }) {
 	if (aspects.length === 0) return { cells: [], height: 0 };
 	const inner = Math.max(1, width - 2 * gap);
 	const tall = Math.max(1, most - 2 * gap);
 	return large === null || aspects.length === 1 || large >= aspects.length
-		? alike(aspects, inner, tall, gap)
+		? alike(aspects, inner, tall, gap, sparing ? 1.3 : 1)
 		: oneLarge(aspects, large, inner, tall, gap);
 }
 
@@ -26,8 +27,9 @@ export function mosaic(aspects, large, { width, most, gap }) {
  * @param {number} inner
  * @param {number} tall
  * @param {number} gap
+ * @param {number} worth  how many times larger pictures must be with another row of them
  */
-function alike(aspects, inner, tall, gap) {
+function alike(aspects, inner, tall, gap, worth) {
 	const widest = Math.max(...aspects);
 	const grids = aspects.map((_, index) => {
 		const columns = index + 1;
@@ -35,8 +37,8 @@ function alike(aspects, inner, tall, gap) {
 		const width = (inner - gap * (columns - 1)) / columns;
 		return { columns, rows, height: Math.min((tall - gap * (rows - 1)) / rows, width / widest) };
 	});
-	const { columns, rows, height } = grids.reduce((best, grid) =>
-		grid.height > best.height + 0.5 ? grid : best,
+	const { columns, rows, height } = grids.reduceRight((best, grid) =>
+		grid.height > best.height * worth + 0.5 ? grid : best,
 	);
 	const width = height * widest;
 	const cells = aspects.map((aspect, index) => {

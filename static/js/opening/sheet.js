@@ -1,7 +1,7 @@
 /** The sheet that opens recordings: by a key, by a drop anywhere, from files or from the disk. */
 import { all, h, one } from "../elements/dom.js";
 import { ApiError, getJson, request, sendJson } from "../state/api.js";
-import { drawCurve, mountPlan } from "./plan.js";
+import { mountPlan } from "./plan.js";
 import { announced, chosen, dropped, send } from "./upload.js";
 
 const ASK_AGAIN = 400;
@@ -88,19 +88,9 @@ export function mountOpening({ store, actions }) {
 					all("button, input, select", dialog)[at]
 				)?.focus();
 			for (const image of all("img", dialog)) image.onerror = () => image.remove();
+			for (const plan of all("[data-plan]", dialog))
+				mountPlan(plan, structuredClone(info?.room ?? []), (room) => wish({ room }));
 		}
-		draw();
-	}
-
-	function draw() {
-		const now = info;
-		if (!now) return;
-		for (const curve of all("[data-curve]", dialog)) {
-			const found = now.cameras[Number(curve.dataset.curve)].offset;
-			drawCurve(/** @type {any} */ (curve), found, Number(curve.dataset.late));
-		}
-		for (const plan of all("[data-plan]", dialog))
-			mountPlan(/** @type {any} */ (plan), now, (room) => wish({ room }));
 	}
 
 	/** @param {Partial<Server.ImportWish>} changes @param {boolean} [undone] */
@@ -252,17 +242,19 @@ export function mountOpening({ store, actions }) {
 		event.preventDefault();
 	});
 	dialog.addEventListener("close", () => clearTimeout(timer));
-	store.on(["theme"], draw);
-	addEventListener("resize", draw);
 
 	// The layer lies over the 3D view, which would swallow what is dropped on it.
 	const carries = (/** @type {DragEvent} */ { dataTransfer }) =>
 		dataTransfer?.types.includes("Files");
-	addEventListener("dragenter", (event) => {
+	const cover = (/** @type {DragEvent} */ event) => {
 		if (!carries(event)) return;
 		(dialog.open ? dialog : document.body).append(layer);
 		layer.hidden = false;
-	});
+	};
+	addEventListener("dragenter", cover);
+	// Whoever comes in over the 3D view is first heard of there.
+	const frame = one("iframe");
+	frame.addEventListener("load", () => frame.contentWindow?.addEventListener("dragenter", cover));
 	addEventListener("dragover", (event) => carries(event) && event.preventDefault());
 	layer.addEventListener("dragleave", () => (layer.hidden = true));
 	addEventListener("drop", (event) => {

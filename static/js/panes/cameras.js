@@ -94,7 +94,7 @@ export function mountCameras(root, { store, actions, playback }) {
 		const { cells: found, height } = mosaic(
 			cameras().map((c) => c.width / c.height),
 			large,
-			{ width: root.clientWidth, most: own ? body.clientHeight : natural, gap: 4 },
+			{ width: root.clientWidth, most: own ? body.clientHeight : natural, gap: 4, sparing: !own },
 		);
 		places = found;
 		if (!own) body.style.height = `${height || Math.round(natural)}px`;

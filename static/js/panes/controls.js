@@ -87,6 +87,8 @@ export function pressed(event, store, actions) {
 	if (key === "Space" && target.closest?.("button, a, summary, input, [role=button]")) return false;
 	const command = commandFor(key, store.get().singleKeys);
 	if (!command) return false;
+	// What a key means of the clock and the panes holds where they are.
+	if (store.get().place !== "tune" && command.group !== "Page") return false;
 	event.preventDefault();
 	// What is being typed is kept first.
 	if (types && key !== "Ctrl+k") target.blur();

@@ -157,7 +157,8 @@ export function mountTimeline(root, context) {
 		drawRuler(ruler, range, store.get().bookmarks);
 		// Each plot has its row, whether there is something to plot or not.
 		const scores = scoresOf(store.get());
-		if (!braided.hidden && scores) drawBraid(row(token("h-strip")), scores, shownTracks());
+		if (!braided.hidden && scores)
+			drawBraid(row(token("h-strip")), scores, sorted.tracks, selection);
 		const [counts, costs, distances] = [0, 1, 2].map(() => row(token("h-strip")));
 		if (timeline) drawCardinality(counts, timeline);
 		if (series && !scored.hidden) {
@@ -364,6 +365,7 @@ export function mountTimeline(root, context) {
 		}, 200);
 	});
 	listLanes();
+	addEventListener("panes", draw);
 	new ResizeObserver(resize).observe(plot);
 	resize();
 }

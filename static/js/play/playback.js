@@ -12,6 +12,11 @@ import { createPictures, mapNames, pictureName, PICTURE_BUDGET } from "./picture
 
 const RESULTS_KEPT = 600;
 
+/** A seek further than this many steps is a jump. */
+const JUMP = 12;
+/** After a jump nothing else is read for so long, milliseconds: who jumps again needs all there is. */
+const STILL = 200;
+
 /** How many steps of the shown run are there. @param {Readonly<PageState>} state */
 export function shownDone({ basis, run, timeline }) {
 	return run && basis === run.key ? run.done : (timeline?.done ?? 0);
@@ -29,6 +34,10 @@ export function createPlayback(store, sendSeek) {
 	let lastSent = -1;
 	/** Since when, and for how long, the 3D view is left alone while it plays, milliseconds. */
 	let [sentAt, wait] = [0, 0];
+	/** Around which step was read last, and since when that is.  */
+	let [around, jumpedAt] = [0, -Infinity];
+	/** @type {Timer} */
+	let settling;
 
 	const pictures = createPictures(() => {
 		store.set({ loaded: store.get().loaded + 1 });
@@ -74,12 +83,12 @@ export function createPlayback(store, sendSeek) {
 		return samples || trails ? `?samples=${Boolean(samples)}&trails=${Boolean(trails)}${long}` : "";
 	};
 
-	/** Try again after something failed that may come back. */
-	function later() {
+	/** Try again after something failed that may come back. @param {number} [soon]  milliseconds */
+	function later(soon = 500) {
 		setTimeout(() => {
 			windowDirty = true;
 			ask();
-		}, 500);
+		}, soon);
 	}
 
 	function ask() {
@@ -103,7 +112,14 @@ export function createPlayback(store, sendSeek) {
 		);
 		const how = { frames: sequence.frames, fps: sequence.fps, speed, direction: playing };
 		const most = Math.min(400, Math.floor((PICTURE_BUDGET * 0.9) / Math.max(1, bytes)));
-		const steps = prefetchWindow(step, { ...how, most });
+		if (Math.abs(step - around) > JUMP) {
+			jumpedAt = performance.now();
+			clearTimeout(settling);
+			settling = setTimeout(later, STILL, 0);
+		}
+		around = step;
+		const still = playing || performance.now() - jumpedAt >= STILL;
+		const steps = still ? prefetchWindow(step, { ...how, most }) : [step];
 		pictures.want(
 			steps.flatMap((k) => {
 				const result = results.get(resultName(basis, k, queryNow()));

@@ -312,6 +312,7 @@ export function createActions({ store, seek, send, receive }) {
 			if (name === "compare") actions.showTab("compare");
 		},
 		toggle: (what) => store.set({ [what]: !store.get()[what] }),
+		async keepPicture() {},
 		nextTurn() {
 			const { turn } = store.get();
 			store.set({ turn: turn === "page" ? "centre" : turn === "centre" ? "off" : "page" });

@@ -6,6 +6,7 @@
 /** @type {{name: string, word: string, tip: string}[]} */
 export const PLACES = [
 	{ name: "tune", word: "Tune", tip: "3D, pictures and parameters on one clock" },
+	{ name: "library", word: "Library", tip: "Recordings and runs that are kept" },
 ];
 
 /** The place that a hash names; the first one where it names none. @param {string} hash */

@@ -242,6 +242,8 @@ interface Actions {
 	trail: (changes: { seconds?: number; fades?: boolean }) => void;
 	fadeTrails: () => void;
 	toggle: (what: "realTime" | "follow" | "loupe") => void;
+	/** A pane and a kind of file: `cams png`. */
+	keepPicture: (what: string) => Promise<void>;
 	nextTurn: () => void;
 	wholePictures: () => void;
 	arrange: (name: "inspect" | "tune" | "compare") => void;

@@ -232,6 +232,19 @@ declare namespace Server {
 		switches: Switch[];
 	}
 
+	/** How far the newest export is. */
+	interface ExportInfo {
+		number: number;
+		state: "idle" | "writing" | "done" | "failed" | "cancelled";
+		format: string;
+		/** Of the file. */
+		name: string;
+		done: number;
+		/** 0 while it is not known. */
+		total: number;
+		error: string | null;
+	}
+
 	/** The box associated with a track, as the single-view stage gave it to the fusion. */
 	interface Feeding {
 		box: [number, number, number, number];
@@ -260,6 +273,20 @@ declare namespace Server {
 		source: string;
 		/** Whether a short table shows it. */
 		headline: boolean;
+	}
+
+	/** A form that tracks leave in. */
+	interface FormatInfo {
+		name: string;
+		word: string;
+		help: string;
+		/** Whether range and speed say how much of it is written. */
+		video: boolean;
+	}
+
+	/** All forms. */
+	interface FormatList {
+		formats: FormatInfo[];
 	}
 
 	/** A group of parameters. */
@@ -429,7 +456,8 @@ declare namespace Server {
 		fusion_method: string;
 		changes: ChangeInfo[];
 		seed: number;
-		version: string;
+		/** Its version. */
+		program: string;
 		/** Whether another version of the program made it: computing it again may give other tracks. */
 		older_code: boolean;
 		source: string;

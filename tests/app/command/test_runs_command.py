@@ -74,6 +74,33 @@ def test_runs_are_named_starred_deleted_and_taken_back(run: Runs, path: Path) ->
     assert asked(run, "list", "--recording", "nowhere", *at) == []
 
 
+def test_a_kept_run_is_exported_as_track_writes_it(
+    run: Runs, crossing: Path, path: Path, tmp_path: Path
+) -> None:
+    first, second = tmp_path / "first.json", tmp_path / "second.json"
+    assert run("track", crossing, "-o", first, "--library", path)[0] == 0
+    told = asked(run, "export", "1", "-o", second, "--library", path)
+    assert told == {"run": 1, "format": "json", "file": str(second)}
+    a, b = (json.loads(file.read_text(encoding="utf-8")) for file in (first, second))
+    for one, other in zip(a["tracks"], b["tracks"], strict=True):
+        assert one["positions"] == other["positions"]
+        assert one["boxes"] == other["boxes"]
+    assert a["run"] == b["run"]
+    folder = tmp_path / "mot"
+    line = ["runs", "export", "1", "-o", folder, "--format", "motchallenge", "--library", path]
+    assert run(*line)[0] == 0
+    assert list(folder.rglob("gt.txt")) != []
+
+
+def test_what_a_form_needs_is_told_before_any_work(
+    run: Runs, crossing: Path, path: Path, tmp_path: Path
+) -> None:
+    status, _, err = run("track", crossing, "-o", tmp_path / "film.mp4", "--library", path)
+    assert status == 1
+    assert "no pictures to make a video of" in err
+    assert not path.exists()
+
+
 def test_two_runs_are_set_against_each_other(run: Runs, path: Path) -> None:
     values = with_values(RunParameters(), {"fusion.clutter_rate": 4.0}).model_dump(mode="json")
     with filled(path, 1) as library:

@@ -100,8 +100,12 @@ def test_files_that_are_sent_become_a_recording(
     assert client.get("/api/state").json()["sequence"]["name"] == "living room"
     assert (data / "living room/files/session/cam1.csv").is_file()
     assert sorted(path.name for path in data.iterdir()) == ["living room"]
-    cards = client.get("/api/recordings").json()["recordings"]
-    assert (cards[0]["name"], cards[0]["kind"], cards[0]["cameras"]) == ("living room", "recent", 4)
+
+    def last() -> tuple[str, str, int]:
+        card = client.get("/api/recordings").json()["recordings"][0]
+        return card["name"], card["kind"], card["cameras"]
+
+    wait_until(lambda: last() == ("living room", "recent", 4))
 
 
 def test_a_wish_is_looked_into_and_can_be_taken_back(client: TestClient, files: Path) -> None:

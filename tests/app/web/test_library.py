@@ -160,6 +160,20 @@ def test_the_preview_has_what_is_drawn(kept: TestClient) -> None:
         assert np.hypot(*ways.T).min() < 0.3
 
 
+def test_what_is_drawn_says_what_there_is_and_is_escaped(kept: TestClient) -> None:
+    number, other = (run["id"] for run in runs_of(kept))
+    kept.patch(f"/api/library/runs/{number}", json={"note": '"><script>', "name": "<b>x"})
+    text = kept.get(f"/api/library/runs/{number}/drawn").text
+    assert f"Lanes of run {number}: 2 tracks over 120 steps" in text
+    assert "0.95 → " in text
+    assert text.count("<polyline") == 3
+    assert "<script" not in text
+    told = kept.get("/api/library/compared", params={"runs": [number, other]}).text
+    assert "&lt;b&gt;x" in told
+    assert "MOTA" in told
+    assert kept.get("/api/library/compared", params={"runs": [999]}).status_code == 409
+
+
 def test_runs_stay_when_the_recording_is_gone(kept: TestClient, data: Path, path: Path) -> None:
     with Library(path) as library:
         library._connection.execute("UPDATE recordings SET place = place || '-gone'")

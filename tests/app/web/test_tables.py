@@ -113,6 +113,20 @@ def test_changes_are_listed_with_their_reset(client: TestClient) -> None:
     wait_until(run_is(client, "done"))
 
 
+def test_what_a_parameter_would_change_is_listed(client: TestClient) -> None:
+    assert "What parameters would change" not in get(client, "changes")
+    key = "fusion.extraction_threshold"
+    assert client.post("/api/sensitivity", json={"keys": [key]}).status_code == 200
+    assert client.post("/api/sensitivity", json={"keys": ["fusion.x"]}).status_code == 422
+    wait_until(lambda: "What parameters would change" in get(client, "changes"))
+    html = get(client, "changes")
+    assert "All parameters stand at their defaults." in html
+    stage, name, _, score = cells(html, "What parameters would change")[0]
+    assert stage == "fusion"
+    assert name.startswith("Extraction threshold")
+    assert -1.0 <= float(score) <= 1.0
+
+
 def test_the_comparison_is_the_evaluations(client: TestClient) -> None:
     alone = get(client, "compare")
     assert "no run to compare with" in alone

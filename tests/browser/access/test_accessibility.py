@@ -72,7 +72,7 @@ def test_nothing_serious_in_any_state(themed: tuple[Page, str], server: Server) 
         "select => { select.append(new Option('gone', 'gone')); select.value = 'gone';"
         " select.dispatchEvent(new Event('change')); }"
     )
-    expect(page.locator(".note")).to_be_visible()
+    expect(page.locator(".note[role=alert]")).to_be_visible()
     states["failure"] = found(page)
     as_at_first(server)
     assert {name: list_ for name, list_ in states.items() if list_} == {}

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
+from xml.etree import ElementTree
 
+import cv2
 import pytest
 from playwright.sync_api import Browser, FloatRect, Page, expect
 
@@ -167,3 +170,35 @@ def test_the_palette_sets_a_parameter_and_goes_to_a_track(flat_page: Page, serve
     page.get_by_role("option", name=re.compile("^Track 2")).click()
     server.wait(lambda state: state["selection"] == 2)
     as_at_first(server)
+
+
+def test_a_pane_is_kept_as_it_is_drawn(flat_page: Page, server: Server, tmp_path: Path) -> None:
+    page = flat_page
+    as_at_first(server)
+    ask(server, "POST", "seek", {"step": 45})
+    until(page, lambda: readout(page) == "45", "the step")
+    before = painted(page)[0].tolist()
+
+    def keep(words: str) -> Path:
+        page.keyboard.press("Control+k")
+        page.keyboard.type(f"picture of the {words}")
+        with page.expect_download() as download:
+            page.keyboard.press("Enter")
+        path = tmp_path / download.value.suggested_filename
+        download.value.save_as(path)
+        return path
+
+    cameras = ElementTree.parse(keep("cameras as svg")).getroot()
+    spaces = {"": "http://www.w3.org/2000/svg"}
+    assert len(cameras.findall(".//image", spaces)) == 2
+    told = server.get("/api/step/45").json()["cameras"]
+    boxes = [track for camera in told for track in camera["tracks"] if track["visible"]]
+    labels = [text.text for text in cameras.findall(".//svg//text", spaces)]
+    assert sorted(labels) == sorted(str(track["id"]) for track in boxes)
+    timeline = cv2.imread(str(keep("timeline as png")))
+    assert timeline is not None
+    box = page.locator(".time").bounding_box()
+    assert box is not None
+    assert timeline.shape[1] == 2 * box["width"]
+    assert timeline.std() > 10.0
+    until(page, lambda: painted(page)[0].tolist() == before, "the page is as it was")

@@ -20,7 +20,12 @@ ColumnCase = Literal["new", "continues", "merges"]
 
 
 def distances(before: Float[ndarray, "I 2"], now: Float[ndarray, "J 2"]) -> Float[ndarray, "I J"]:
-    """How far each object is from where each was expected, pixels."""
+    """Distance between where each object was expected and where each one is now, pixels.
+
+    Args:
+        before: Expected centres of the objects of the step before, pixels.
+        now: Centres of this step's objects.
+    """
     return np.asarray(np.linalg.norm(before[:, None] - now[None, :], axis=2))
 
 
@@ -43,7 +48,12 @@ def decide_by_distance(
 def box_overlaps(
     before: Float[ndarray, "I 4"], now: Float[ndarray, "J 4"]
 ) -> Float[ndarray, "I J"]:
-    """Pixels that the boxes of two objects share; centres and half sizes."""
+    """Area that the boxes of two objects share, square pixels.
+
+    Args:
+        before: Objects of the step before: centre and half sizes, pixels.
+        now: This step's.
+    """
     low = np.maximum((before[:, :2] - before[:, 2:])[:, None], (now[:, :2] - now[:, 2:])[None, :])
     high = np.minimum((before[:, :2] + before[:, 2:])[:, None], (now[:, :2] + now[:, 2:])[None, :])
     return np.asarray(np.prod(np.clip(high - low, 0.0, None), axis=2))

@@ -39,7 +39,10 @@ def object_histograms(
 def coefficients(
     first: Float[ndarray, "I bins"], second: Float[ndarray, "J bins"]
 ) -> Float[ndarray, "I J"]:
-    """Bhattacharyya coefficients Σ_u sqrt(p(u) q(u)): 1 for equal, 0 for disjoint ones."""
+    """Bhattacharyya coefficients Σ_u sqrt(p(u) q(u)) of all pairs of histograms ([CRM03]).
+
+    1 for equal, 0 for disjoint ones; each histogram sums to 1.
+    """
     return np.asarray(np.sqrt(first) @ np.sqrt(second).T)
 
 

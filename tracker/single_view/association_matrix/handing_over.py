@@ -142,7 +142,7 @@ class _Step:
         self.sources[column].add(row)
 
     def take_back(self) -> None:
-        """Objects that continue nobody may be somebody who was lost, near and of his colours."""
+        """Continue interrupted tracks with free objects that are near and of their colours."""
         if not self.unknown or not self.lost:
             return
         p = self.parameters
@@ -173,13 +173,13 @@ class _Step:
         self.unknown = [one for index, one in enumerate(self.unknown) if index not in taken]
 
     def name_newcomers(self) -> None:
-        """Everything else is somebody new."""
+        """Start a track at every object that is left."""
         for column in self.unknown:
             self.labels[column] = [self.next_label]
             self.next_label += 1
 
     def result(self) -> tuple[Situation, list[ViewEvent]]:
-        """Objects and tracks after this step; who is gone for too long has ended."""
+        """Objects and tracks after this step; those interrupted for too long have ended."""
         objects: list[MovingObject] = []
         tracks: dict[int, Track] = {}
         for column in range(self.seen.size):
@@ -204,14 +204,14 @@ class _Step:
         return after, self.events
 
     def _sure(self, track: Track) -> bool:
-        """Whether he was alone for long enough to be somebody."""
+        """Whether a track was alone in its object for long enough to be confirmed."""
         return track.age >= self.parameters.confirmation_steps
 
     def _settled(self, labels: list[int]) -> list[int]:
-        """Of those who come together the sure ones; of unsure ones alone the oldest.
+        """Of tracks that merge the confirmed ones; where none is, the oldest alone.
 
-        A piece of somebody that comes off for a moment is no second person when it is
-        one with him again.
+        A piece that splits off a person for a moment is not a second person once it has
+        merged with him again.
         """
         if len(labels) < 2:
             return labels

@@ -1,4 +1,4 @@
-"""Pieces of one person put together again: shirts like the wall cut heads from legs."""
+"""Pieces of one person put together again: a shirt like the wall parts head and legs."""
 
 from __future__ import annotations
 

@@ -2,8 +2,8 @@
 
 A piece of foreground shows all of a person, what is tracked may be a part of it: a
 target's box begins at the crown, and its size is known from the calibrated camera. How
-many targets a piece shows is believed beforehand; of whom nothing is known,
-:mod:`~tracker.single_view.jpda.crowns` finds.
+many targets a piece shows is known from its tracks; without such a prior
+:mod:`~tracker.single_view.jpda.crowns` finds them.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BoxSizes
 
 SIZES = 6
-"""So many sizes of targets are tried at each place: the best are averaged, so more only cost."""
+"""Sizes of targets that are tried at each place; the best are averaged, so few are enough."""
 
 STRIDE = 2
-"""Pixels between the columns of a piece of foreground in which crowns are looked for: the
-best are averaged, so all of them only cost."""
+"""Pixels between the columns of a piece of foreground in which crowns are looked for; the best
+are averaged, so not every column is needed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -32,7 +32,7 @@ def associate(
     Args:
         found: How the measurements lie to the predictions.
         possible: What lies in whose gate: the validation matrix without its column of false
-            alarms, turned.
+            alarms, transposed.
         area: Of the picture, square pixels.
         parameters: P_D, P_G, which joint events, and what is known of Φ.
 
@@ -48,7 +48,7 @@ def associate(
         densities = densities * np.sqrt(np.linalg.det(found.covariances))
         clutter = 1.0 / p.gate_volume
     detected = np.where(possible, p.detection_probability * densities, 0.0)
-    # a density can be so small that it is 0 inside its gate; the pair stays possible
+    # a density may underflow to 0 inside its gate; the pair stays possible
     detected[possible] = np.maximum(detected[possible], np.finfo(float).tiny)
     miss = 1.0 - p.detection_probability * p.gate_probability
     for members, shared in association.clusters(possible):

@@ -15,7 +15,7 @@ from numpy import ndarray
 from tracker.assignment import linear_sum_assignment
 
 UNREACHED = 1e6
-"""Instead of −ln β, where it is 0; more than those of all others together."""
+"""Cost of a pair in place of −ln β where β is 0: more than all other costs together."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

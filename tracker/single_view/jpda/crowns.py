@@ -1,13 +1,12 @@
-"""Targets in a foreground mask of whom nothing is known: the tops of its pieces.
+"""Targets in a foreground mask, without any prior of where they are: the tops of its pieces.
 
-People stand; what a camera sees of them from the side has their crown on top, however
-many of them one piece of foreground shows and whatever hides their legs. Of a target
-whose height above the floor is roughly known the calibrated camera tells the size.
+People stand; seen from the side, the crown of the head is on top, however many people one
+connected piece of foreground shows and whatever hides their legs. The calibrated camera gives
+the size of a target whose height above the floor is roughly known.
 
-Of pieces of which it is known how many people they show,
-:mod:`~tracker.single_view.association_matrix.silhouettes` finds as
-many: it takes poorer boxes of those who are expected, and no more than very good ones of
-others.
+Where the number of people in each piece is known from tracks,
+:mod:`~tracker.single_view.association_matrix.silhouettes` looks for that number: it accepts
+poorer boxes for those who are expected, and only very good ones beyond.
 
 Boxes are ``centre_x, centre_y, half_width, half_height`` in pixels.
 """

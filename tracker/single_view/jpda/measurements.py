@@ -85,7 +85,7 @@ class Source(Protocol):
         ...
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
-        """How far boxes of this size are to be trusted, pixels."""
+        """Measurement noise of boxes of this size: standard deviations of their numbers, pixels."""
         ...
 
 

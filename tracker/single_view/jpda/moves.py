@@ -50,7 +50,7 @@ def move(
         hidden &= ~((cases.own == cases.shared) & _alike(targets, cases, seen, p.same_size))
     if p.five_cases and p.occlusion == "inside":
         matrix = _one_each(targets, cases, matrix, p.least_probability)
-    # whom the update by all associations is not for
+    # occluded and missed targets take no part in the update by all associations
     matrix = np.where((hidden | cases.missed)[:, None], 0.0, matrix)
     moved = kalman.update(targets, found, matrix)
     moved = replace(moved, half_sizes=_sizes(targets, cases, hidden, matrix, seen, p))
@@ -62,7 +62,7 @@ def move(
             alone = (hidden & (cases.shared >= 0) & _in_piece(cases.shared, j, seen)).sum() == 1
             one = _behind(targets, int(t), j, seen, p.one_side, alone=bool(alone))
         moved = _put(moved, int(t), one)
-    # who is measured by himself is hidden by nobody, even if he stands still for it
+    # a target with a measurement of its own is not occluded, even where it takes a shared place
     lost = hidden & ((cases.own != cases.shared) | (p.occlusion == "inside"))
     return Moved(
         replace(
@@ -90,10 +90,10 @@ def _one_each(
 ) -> Float[ndarray, "n M"]:
     """The matrix with a single 1 in the rows of targets that take one measurement alone.
 
-    That are those in front of others, those which come out of an occlusion, and those whose
-    measurement may as well be another's: where two are in one place the mean over all
-    associations would keep both between the two. And those whose measurement was found
-    outside their gate.
+    These are targets in front of others; targets that come out of an occlusion; targets whose
+    measurement may as well be another's, since for two at one place the mean over all
+    associations would keep both between the two (track coalescence); and targets whose
+    measurement was found outside their gate.
     """
     there = np.flatnonzero(cases.own >= 0)
     leapt = matrix[there, cases.own[there]] == 0.0
@@ -138,17 +138,17 @@ def _at_rest(targets: Targets, t: int, j: int, seen: Measured, p: JpdaParams) ->
 def _behind(
     targets: Targets, t: int, j: int, seen: Measured, one_side: float, *, alone: bool
 ) -> Targets:
-    """One occluded target: it goes on inside its piece.
+    """One occluded target: it is predicted on inside its piece.
 
-    Where the boxes measured in a piece leave one of its edges over, and only one target is
-    hidden there, that edge is the target's.
+    Where the boxes measured in a piece leave one of its edges free, and only one target is
+    hidden there, that edge is taken for the target's.
     """
     one = targets.take(np.array([t]))
     piece, half_sizes = seen.pieces[j], one.half_sizes[0]
     room = np.maximum(piece[2:] - half_sizes, 0.0)
     low, high = piece[:2] - room, piece[:2] + room
     place = np.clip(one.positions[0], low, high)
-    # no innovation while it is inside; how far it may be off, the piece tells
+    # no innovation while it is inside; the extent of the piece is the measurement noise
     unsure = np.hypot(room, seen.sigmas[j, :2])
     if alone:
         edges = _left_over(
@@ -169,10 +169,11 @@ def _left_over(
     half_sizes: Float[ndarray, " 2"],
     one_side: float,
 ) -> Int[ndarray, " 2"]:
-    """Which edge of a piece the boxes shown in it do not reach, across and down.
+    """Which edge of a piece the boxes measured in it leave free, so that it is a hidden target's.
 
-    −1 the lower one, 1 the upper one, 0 neither: where both are left over one target cannot
-    explain them, nor what it would have to be torn off from the others for.
+    Returns:
+        For x and y: −1 the lower edge, 1 the upper one; 0 neither, since one target explains
+        neither a margin on both sides nor one that is wider than the target.
     """
     before = (shown[:, :2] - shown[:, 2:]).min(axis=0) - (piece[:2] - piece[2:])
     after = (piece[:2] + piece[2:]) - (shown[:, :2] + shown[:, 2:]).max(axis=0)

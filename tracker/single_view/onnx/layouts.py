@@ -11,9 +11,10 @@ Known are, with C classes and N boxes that the network proposes:
 - SSD [LAE16]: (1, 1, N, 7): picture, class, score, two corners; or boxes and scores by class;
 - CenterNet [ZWK19]: heat map (1, C, h, w), sizes (1, 2, h, w) and offsets (1, 2, h, w).
 
-[JCS22] Jocher et al., "ultralytics/yolov5", 2022. [CMS20] Carion et al., "End-to-End Object
-Detection with Transformers", ECCV 2020. [ZLX24] Zhao et al., "DETRs Beat YOLOs on Real-time
-Object Detection", CVPR 2024. [LAE16] Liu et al., "SSD: Single Shot MultiBox Detector", ECCV 2016.
+[JCS22] Jocher et al., "ultralytics/yolov5", 2022.
+[CMS20] Carion et al., "End-to-End Object Detection with Transformers", ECCV 2020.
+[ZLX24] Zhao et al., "DETRs Beat YOLOs on Real-time Object Detection", CVPR 2024.
+[LAE16] Liu et al., "SSD: Single Shot MultiBox Detector", ECCV 2016.
 [ZWK19] Zhou, Wang, Krähenbühl, "Objects as Points", 2019.
 """
 

@@ -15,7 +15,7 @@ from tracker.single_view.pseudo_particle.track_management import Targets
 
 
 def vacancies(targets: Targets, persons: int, per_person: int) -> Int[ndarray, " A"]:
-    """Whom a mode may be besides the targets: each person as often as there may be more."""
+    """The persons that a newcomer may be, each as often as more targets may look like that one."""
     taken = np.bincount(targets.persons, minlength=persons)
     return np.repeat(np.arange(persons), np.maximum(per_person - taken, 0))
 

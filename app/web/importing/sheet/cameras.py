@@ -14,6 +14,7 @@ from app.web.importing.sheet.building import (
     small,
     wishing,
 )
+from app.web.importing.sheet.drawing import curve_picture
 from app.web.tables.markup import Cell, Markup, joined
 
 HEADS = ("Camera", "Video", "Calibration", "Starts late by, frames", "Detections", "Ready")
@@ -115,7 +116,7 @@ def _sync(info: ImportInfo, number: int) -> Markup:
         if found is None
         else f"Agreement over the offset, best {late + found.steps:.1f} frames late"
     )
-    curve = element("canvas", role="img", aria_label=words, data_curve=number, data_late=late)
+    curve = curve_picture(found, late, words)
     return element("div", stepper, curve, class_="sync")
 
 

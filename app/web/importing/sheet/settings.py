@@ -17,6 +17,7 @@ from app.web.importing.sheet.building import (
     small,
     wishing,
 )
+from app.web.importing.sheet.drawing import plan_picture
 from app.web.tables.markup import Cell, Markup, joined
 from tracker.sequences.sequence import PRESETS
 
@@ -49,10 +50,8 @@ def room_part(info: ImportInfo) -> Markup:
     words = ", ".join(
         f"{axis} {info.room[0][k]:g} to {info.room[1][k]:g} m" for k, axis in enumerate(AXES)
     )
-    plan = element(
-        "canvas", role="img", tabindex=0, data_plan=True,
-        aria_label=f"Room from above, {words}. Arrows move its near faces, with Shift the far ones",
-    )  # fmt: skip
+    keys = "Arrows move its near faces, with Shift the far ones"
+    plan = plan_picture(info, f"Room from above, {words}. {keys}")
     fields: list[Markup] = []
     for axis, letter in enumerate(AXES):
         fields += [element("span", letter), *(_face(info, end, axis) for end in (0, 1))]

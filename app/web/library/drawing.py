@@ -1,0 +1,171 @@
+"""A kept run in small and runs side by side, as parts of the page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from app.colours import track_index
+from app.models import TrackLife
+from app.web.library.models import ChangeInfo, Course, KeptRunInfo
+from app.web.tables.markup import (
+    Cell,
+    Markup,
+    escaped,
+    id_tag,
+    joined,
+    number,
+    quiet,
+    symbol,
+    table,
+)
+
+MOST_LANES = 6
+
+_FIGURES = (
+    ("MOTA", "mota", 3, 1), ("IDF1", "idf1", 3, 1), ("HOTA", "hota", 3, 1),
+    ("OSPA, m", "ospa", 3, -1), ("Position error, m", "position_error", 3, -1),
+    ("Missed", "misses", 0, -1), ("False", "false_positives", 0, -1),
+    ("Identity switches", "id_switches", 0, -1), ("Tracks", "targets", 0, 0),
+)  # fmt: skip
+"""Word, field, digits, and which end is the better: 0 for neither."""
+
+
+def preview(
+    run: KeptRunInfo,
+    frames: int,
+    tracks: Sequence[TrackLife],
+    people: Sequence[float],
+    courses: Sequence[Course],
+) -> str:
+    """Lanes, people, ways from above, and what differs."""
+    return (
+        f'<div class="pv-lanes">{_lanes(run, frames, tracks)}{_people(people)}</div>'
+        f'<div class="pv-top">{_ways(courses)}</div>'
+        f'<dl class="pv-facts">{_facts(run)}</dl>'
+    )
+
+
+def comparison(runs: Sequence[KeptRunInfo]) -> str:
+    """A table of what differs between runs, and of their figures, the best of each bold."""
+    rows: list[tuple[Cell, ...]] = []
+    for word, values in (
+        ("Single view", [run.single_view for run in runs]),
+        ("Fusion", [run.fusion_method for run in runs]),
+        ("Seed", [str(run.seed) for run in runs]),
+        ("Program", [_program(run) for run in runs]),
+    ):
+        if len(set(values)) > 1:
+            rows.append((word, *values))
+    known = {change.key: change for run in runs for change in run.changes}
+    for key, change in known.items():
+        own = [next((c.value for c in run.changes if c.key == key), change.default) for run in runs]
+        rows.append((_named(change), *own))
+    for word, name, digits, sign in _FIGURES:
+        values_of = [getattr(run, name) for run in runs]
+        there = [sign * value for value in values_of if value is not None]
+        best = max(there, default=0) if sign and len(there) > 1 else None
+        alone = there.count(best) == 1 if best is not None else False
+        rows.append(
+            (
+                word,
+                *(
+                    Markup(f'<b class="top1">{number(value, digits)}</b>')
+                    if alone and value is not None and sign * value == best
+                    else number(value, digits)
+                    for value in values_of
+                ),
+            )
+        )
+    return table("Runs side by side", ("What", *(f"#{title_of(run)}" for run in runs)), rows)
+
+
+def title_of(run: KeptRunInfo) -> str:
+    """Its name, else its number."""
+    return run.name or f"Run {run.id}"
+
+
+def _program(run: KeptRunInfo) -> str:
+    return f"{run.program}, older code" if run.older_code else run.program
+
+
+def _named(change: ChangeInfo) -> Markup:
+    return Markup(f'<span title="{escaped(change.key)}">{symbol(change.symbol).html}</span>')
+
+
+def _facts(run: KeptRunInfo) -> str:
+    note = Markup(
+        f'<input class="addnote" aria-label="Note" placeholder="add a note" '
+        f'value="{escaped(run.note)}">'
+    )
+    error = "–" if run.position_error is None else f"{number(run.position_error, 3)} m"
+    facts: list[tuple[Cell, Cell]] = [
+        ("Note", note),
+        *((_named(c), joined(quiet(f"{c.default} → "), c.value)) for c in run.changes),
+        ("Missed", number(run.misses, 0)),
+        ("False", number(run.false_positives, 0)),
+        ("Identity switches", number(run.id_switches, 0)),
+        ("Position error", error),
+        ("Seed", run.seed),
+        ("Program", _program(run)),
+    ]
+    return "".join(
+        f"<dt>{joined(word).html}</dt><dd>{joined(value).html}</dd>" for word, value in facts
+    )
+
+
+def _lanes(run: KeptRunInfo, frames: int, tracks: Sequence[TrackLife]) -> str:
+    longest = sorted(tracks, key=lambda t: t.first - t.last)[:MOST_LANES]
+    lanes = []
+    for track in sorted(longest, key=lambda t: t.first):
+        parts = "".join(
+            f'<i class="{kind.replace(" ", "-")}" style="left:{100 * first / frames:.2f}%;'
+            f'width:{100 * (last + 1 - first) / frames:.2f}%"></i>'
+            for first, last, kind in track.spans
+        )
+        colour = f"--c:var(--id-{track_index(track.id) + 1})"
+        lanes.append(f'{id_tag(track.id).html}<div style="{colour}">{parts}</div>')
+    more = len(tracks) - len(longest)
+    under = f'<span></span><span class="q">and {more} more</span>' if more else ""
+    words = f"Lanes of run {run.id}: {len(tracks)} tracks over {frames} steps"
+    ends = f"<span></span><span class='ends'><span>0</span><span>{frames - 1}</span></span>"
+    return (
+        f'<div class="lines" role="img" aria-label="{escaped(words)}">{ends}{"".join(lanes)}'
+        f"{under}</div>"
+    )
+
+
+def _people(people: Sequence[float]) -> str:
+    most = max([1.0, *people])
+    points = " ".join(
+        f"{at},{most - count:g}" for k, count in enumerate(people) for at in (k, k + 1)
+    )
+    return (
+        f'<div class="crowd"><span>People<br><span class="q">0–{most:.0f}</span></span>'
+        f'<svg viewBox="0 0 {max(1, len(people))} {most:g}" preserveAspectRatio="none" role="img" '
+        f'aria-label="People over time, at most {most:.0f}"><polyline points="{points}"/></svg>'
+        "</div>"
+    )
+
+
+def _ways(courses: Sequence[Course]) -> str:
+    points = np.array([p for course in courses for p in course.points]).reshape(-1, 2)
+    if not len(points):
+        return ""
+    # a stray point far away does not make all others small
+    (left, low), (right, high) = np.percentile(points, [0.5, 99.5], axis=0)
+    side = max(right - left, high - low, 1.0)
+    pad = 0.06 * side
+    lines = []
+    for course in courses:
+        n = track_index(course.id) + 1
+        way = " ".join(f"{x:g},{-y:g}" for x, y in course.points)
+        x, y = course.points[-1]
+        lines.append(
+            f'<g style="--c:var(--id-{n})"><polyline points="{way}"/>'
+            f'<circle cx="{x:g}" cy="{-y:g}" r="{side / 60:.3f}"/></g>'
+        )
+    box = f"{left - pad:.2f} {-high - pad:.2f} {right - left + 2 * pad:.2f} "
+    box += f"{high - low + 2 * pad:.2f}"
+    return f'<svg viewBox="{box}" role="img" aria-label="Ways from above">{"".join(lines)}</svg>'

@@ -1,0 +1,157 @@
+"""The HTTP routes by which runs leave: begun, watched, stopped, fetched."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Depends, Request
+from fastapi.responses import FileResponse
+from pydantic import Field
+
+from app.errors import ApiError, sentence
+from app.models import Model
+from app.state.exporter import Exporter
+from app.web.dependencies import ERRORS, Bench
+from app.web.library.routes import Kept, no_library
+from tracker.library.errors import LibraryError
+from tracker.sequences import library as sequences
+from tracker.writing.registry import FORMATS
+from tracker.writing.written import Options, Written
+
+router = APIRouter(prefix="/api/exports", responses=ERRORS)
+
+
+class FormatInfo(Model):
+    """A form that tracks leave in."""
+
+    name: str
+    word: str
+    help: str
+    video: bool
+    """Whether range and speed say how much of it is written."""
+
+
+class FormatList(Model):
+    """All forms."""
+
+    formats: list[FormatInfo]
+
+
+class ExportRequest(Model):
+    """What is wanted."""
+
+    format: str
+    run: int | None = None
+    """Its number in the library; null for the one that is shown."""
+    first: int = Field(default=0, ge=0)
+    """Of a video."""
+    last: int | None = Field(default=None, ge=0)
+    speed: float = Field(default=1.0, gt=0)
+
+
+class ExportInfo(Model):
+    """How far the newest export is."""
+
+    number: int
+    state: Literal["idle", "writing", "done", "failed", "cancelled"]
+    format: str
+    name: str
+    """Of the file."""
+    done: int
+    total: int
+    """0 while it is not known."""
+    error: str | None
+
+
+def _exporter(request: Request) -> Exporter:
+    exporter: Exporter = request.app.state.exporter
+    return exporter
+
+
+Out = Annotated[Exporter, Depends(_exporter)]
+
+
+@router.get("/formats")
+def formats() -> FormatList:
+    """Every form that tracks leave in."""
+    return FormatList(
+        formats=[
+            FormatInfo(name=f.name, word=f.word, help=f.help, video=f.needs_pictures)
+            for f in FORMATS.values()
+        ]
+    )
+
+
+@router.get("")
+def export(exporter: Out) -> ExportInfo:
+    """How far the newest export is."""
+    return ExportInfo(**asdict(exporter.now))
+
+
+@router.post("")
+def begin(wish: ExportRequest, exporter: Out, keeper: Kept, bench: Bench) -> ExportInfo:
+    """Begin to write a run, instead of what is under way."""
+    if wish.format not in FORMATS:
+        raise ApiError(
+            422,
+            "no_format",
+            f"format: expected one of {', '.join(FORMATS)}, got {wish.format!r}",
+            field="format",
+        )
+    form = FORMATS[wish.format]
+    options = Options(wish.first, wish.last, wish.speed)
+    now = bench.snapshot()
+    if wish.run is None:
+        run, sequence = now.run, now.sequence
+        if run is None or sequence is None or run.done == 0:
+            raise ApiError(
+                409,
+                "nothing_computed",
+                "There are no tracks yet: nothing has been computed.",
+                hint="Wait for the run's first steps, or start it again.",
+            )
+        done = run.done
+        rows = slice(0, run.tracks.at(done).start)
+        columns = (getattr(run.tracks, name)[rows] for name in type(run.tracks).__slots__)
+        named = now.named(run.sequence)
+        written = Written(named, type(run.tracks)(*columns), run.parameters, run.seed, done)
+        try:
+            form.check(sequence)
+        except ValueError as error:
+            raise ApiError(422, "cannot_export", sentence(error), field="format") from None
+        return ExportInfo(**asdict(exporter.start(form, lambda: written, named.name, options)))
+    try:
+        result = keeper.library().result(wish.run)
+    except LibraryError as error:
+        raise no_library(error) from None
+
+    def make() -> Written:
+        sequence = sequences.open_sequence(result.place)
+        return Written(
+            sequence, result.kept.tracks, result.parameters, result.run.seed, result.run.steps
+        )
+
+    name = f"{result.run.recording_name}-{result.run.name or result.run.id}"
+    return ExportInfo(**asdict(exporter.start(form, make, name, options)))
+
+
+@router.delete("")
+def stop(exporter: Out) -> ExportInfo:
+    """Stop the export under way; nothing of it is left."""
+    exporter.cancel()
+    return ExportInfo(**asdict(exporter.now))
+
+
+@router.get(
+    "/file",
+    response_class=FileResponse,
+    responses={200: {"content": {"application/octet-stream": {}}, "description": "The file."}},
+)
+def file(exporter: Out) -> FileResponse:
+    """What the newest export wrote."""
+    path = exporter.file
+    if path is None:
+        raise ApiError(409, "nothing_written", "No export is finished.", hint="Begin one by POST.")
+    media = FORMATS[exporter.now.format].media
+    return FileResponse(path, media_type=media, filename=path.name)

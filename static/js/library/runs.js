@@ -1,0 +1,145 @@
+/** The table of a recording's runs. */
+import { h, icon } from "../elements/dom.js";
+import { grid } from "../elements/grid.js";
+import { figure, partsOf, when } from "./words.js";
+
+/** Figures with a bar: what the bar is from and to, and which end is the better. */
+const FIGURES = /** @type {const} */ ([
+	["mota", "MOTA", 0.6, 1, 1],
+	["idf1", "IDF1", 0.6, 1, 1],
+	["hota", "HOTA", 0.6, 1, 1],
+	["ospa", "OSPA m", 0.2, 0, -1],
+]);
+
+const PILLS = 3;
+
+/** @param {Server.ChangeInfo} change */
+export function symbol({ symbol }) {
+	const [letter, index] = partsOf(symbol);
+	return h("span", { class: "q" }, letter, index ? h("sub", {}, index) : null);
+}
+
+/** @param {Server.KeptRunInfo} run */
+function pills(run) {
+	if (!run.changes.length) return h("span", { class: "q" }, "–");
+	const all = run.changes.map(({ key, value }) => `${key} ${value}`).join("\n");
+	const shown = run.changes
+		.slice(0, PILLS)
+		.map((change) => h("span", { class: "pc" }, symbol(change), " ", change.value));
+	const more = run.changes.length - PILLS;
+	return h("span", { title: all }, shown, more > 0 ? h("span", { class: "pc" }, `+${more}`) : null);
+}
+
+/**
+ * @param {object} on
+ * @param {(run: Server.KeptRunInfo) => void} on.focus
+ * @param {(run: Server.KeptRunInfo) => void} on.open
+ * @param {(run: Server.KeptRunInfo) => void} on.star
+ * @param {(run: Server.KeptRunInfo) => void} on.tick
+ */
+export function runsTable(on) {
+	/** @type {Set<number>} */
+	let ticked = new Set();
+	/** @type {Record<string, number | null>} the best of each column */
+	const best = {};
+
+	/** @type {Column<Server.KeptRunInfo>[]} */
+	const columns = [
+		{
+			word: "",
+			kind: "ck",
+			cell: (run) =>
+				h("input", {
+					type: "checkbox",
+					tabindex: -1,
+					"aria-label": `Choose run ${run.id}`,
+					checked: ticked.has(run.id),
+					onclick: (event) => (event.stopPropagation(), on.tick(run)),
+				}),
+		},
+		{
+			word: "Run",
+			by: (run) => run.id,
+			cell: (run) => [
+				h(
+					"button",
+					{
+						class: `st${run.star ? " on" : ""}`,
+						tabindex: -1,
+						"aria-label": "Star",
+						"aria-pressed": String(run.star),
+						onclick: (event) => (event.stopPropagation(), on.star(run)),
+					},
+					icon("i-star", run.star ? "s full" : "s"),
+				),
+				h("b", {}, run.name || String(run.id)),
+				run.name ? h("span", { class: "q" }, ` ${run.id}`) : null,
+				run.older_code
+					? h(
+							"span",
+							{ class: "q", title: "Another version of the program made it" },
+							" older code",
+						)
+					: null,
+			],
+		},
+		{ word: "When", kind: "q", by: (run) => run.began, cell: (run) => when(run.began) },
+		{
+			word: "Methods",
+			cell: (run) => [run.single_view, h("span", { class: "q" }, " › "), run.fusion_method],
+		},
+		{ word: "Differs from default", kind: "chs", cell: pills },
+		...FIGURES.map(([key, word, from, to]) => ({
+			word,
+			kind: "num met",
+			by: (/** @type {Server.KeptRunInfo} */ run) => run[key] ?? -Infinity,
+			cell: (/** @type {Server.KeptRunInfo} */ run) => {
+				const value = run[key];
+				const share = value === null ? 0 : (value - from) / (to - from);
+				return [
+					h("span", { class: value !== null && value === best[key] ? "top1" : "" }, figure(value)),
+					h("i", { class: "mb", "--v": Math.max(0.02, Math.min(1, share)) }),
+				];
+			},
+		})),
+		{ word: "Tracks", kind: "num", by: (run) => run.targets, cell: (run) => run.targets },
+		{
+			word: "Steps/s",
+			kind: "num",
+			by: (run) => run.steps_per_second,
+			cell: (run) => (run.steps_per_second ? Math.round(run.steps_per_second) : "–"),
+		},
+		{ word: "Note", kind: "q note-cell", cell: (run) => run.note },
+	];
+	const table = grid("Runs", columns, {
+		key: (run) => run.id,
+		by: "When",
+		down: true,
+		choose: on.focus,
+		open: on.open,
+		attributes: (run) => ({ "data-run": run.id }),
+	});
+
+	return {
+		element: table.element,
+		/**
+		 * @param {Server.KeptRunInfo[]} runs
+		 * @param {Set<number>} chosen
+		 * @param {number | null} focused
+		 */
+		show(runs, chosen, focused) {
+			ticked = chosen;
+			for (const [key, , , , sign] of FIGURES) {
+				const values = runs.map((run) => run[key]).filter((value) => value !== null);
+				best[key] = values.length > 1 ? sign * Math.max(...values.map((v) => sign * v)) : null;
+			}
+			table.show(runs);
+			table.each((run, row) => {
+				row.ariaSelected = String(run.id === focused);
+				row.classList.toggle("picked-row", chosen.has(run.id));
+				if (run.id === focused) row.tabIndex = 0;
+				else if (focused !== null) row.tabIndex = -1;
+			});
+		},
+	};
+}

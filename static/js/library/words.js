@@ -1,0 +1,64 @@
+/** How the library words things. Touches no page. */
+
+const DAY = 86_400_000;
+
+/**
+ * When something was, as short as it is clear.
+ * @param {number} seconds  since 1970
+ * @param {Date} [now]
+ */
+export function when(seconds, now = new Date()) {
+	const date = new Date(seconds * 1000);
+	const midnight = new Date(now.getFullYear(), now.getMonth(), now.getDate());
+	const days = Math.ceil((midnight.getTime() - date.getTime()) / DAY);
+	if (days <= 0) return date.toLocaleTimeString("en-GB", { hour: "2-digit", minute: "2-digit" });
+	if (days === 1) return "yesterday";
+	if (days < 7) return date.toLocaleDateString("en-GB", { weekday: "long" });
+	return date.toLocaleDateString("en-GB", { day: "numeric", month: "short", year: "numeric" });
+}
+
+/** @param {number} count @param {string} word */
+export const many = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`;
+
+/** @param {number} bytes */
+export const size = (bytes) =>
+	bytes < 1e6
+		? `${Math.ceil(bytes / 1e3)} kB`
+		: bytes < 1e9
+			? `${(bytes / 1e6).toFixed(1)} MB`
+			: `${(bytes / 1e9).toFixed(1)} GB`;
+
+/** @param {number | null} value @param {number} [digits] */
+export const figure = (value, digits = 3) => (value === null ? "–" : value.toFixed(digits));
+
+/** @param {Server.KeptRunInfo} run */
+export const titleOf = (run) => run.name || `Run ${run.id}`;
+
+/** What a recording is. @param {Server.RecordingInfo} recording */
+export function factsOf({ cameras, frames, fps, boxes_only: boxes, people, missing }) {
+	if (missing) return missing;
+	const seconds = fps ? Math.round(frames / fps) : 0;
+	const long =
+		seconds >= 60
+			? `${Math.floor(seconds / 60)} min${seconds % 60 ? ` ${seconds % 60} s` : ""}`
+			: `${seconds} s`;
+	return [
+		many(cameras, "camera"),
+		boxes ? "boxes only" : seconds ? long : frames ? many(frames, "step") : "",
+		people === null ? "" : "truth",
+	]
+		.filter(Boolean)
+		.join(" · ");
+}
+
+/** Whether all words of a text are in some of the texts. @param {string} text @param {string[]} of */
+export function has(text, of) {
+	const all = of.join(" ").toLowerCase();
+	return text
+		.toLowerCase()
+		.split(/\s+/)
+		.every((word) => all.includes(word));
+}
+
+/** A parameter's symbol with its index set low: p_D. @param {string} symbol */
+export const partsOf = (symbol) => /** @type {[string, string]} */ (symbol.split("_", 2));

@@ -1,0 +1,126 @@
+"""The place Library: runs are kept, found again, compared, exported, deleted, opened again."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.browser.looking import ask
+from tests.browser.serving import Server
+
+P_D = "fusion.detection_probability"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def two_runs(server: Server) -> None:
+    """The default, and another p_D, which is shown."""
+    kept(server, 1)
+    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.8}})
+    kept(server, 2)
+
+
+def kept(server: Server, count: int) -> list[dict]:
+    """The runs of the open recording, once there are so many."""
+    deadline = time.monotonic() + 120.0
+    while time.monotonic() < deadline:
+        for recording in server.get("/api/library").json()["recordings"]:
+            if recording["runs"] >= count:
+                runs = server.get(f"/api/library/recordings/{recording['id']}/runs").json()
+                listed: list[dict] = runs["runs"]
+                return listed
+        time.sleep(0.1)
+    raise AssertionError(f"{count} runs were not kept")
+
+
+@pytest.fixture
+def library(flat_page: Page) -> Page:
+    """The place with its two runs."""
+    flat_page.get_by_role("link", name="Library").click()
+    expect(flat_page.locator("tr[data-run]")).to_have_count(2)
+    return flat_page
+
+
+def test_runs_are_listed_with_what_differs(library: Page, screenshots: Path | None) -> None:
+    rows = library.locator("tr[data-run]")
+    expect(rows.nth(0)).to_contain_text("0.8")
+    expect(library.locator("main")).to_be_hidden()
+    expect(library.locator(".item[aria-selected=true]")).to_contain_text("2 cameras")
+    expect(library.get_by_role("img", name="Lanes of run 2")).to_be_visible()
+    if screenshots:
+        for theme in ("dark", "light"):
+            library.emulate_media(color_scheme=theme)  # type: ignore[arg-type]
+            library.screenshot(path=screenshots / f"library-{theme}.png")
+
+
+def test_keys_choose_star_name_and_delete(library: Page, server: Server) -> None:
+    first = library.locator('tr[data-run="1"]')
+    first.focus()
+    library.keyboard.press("s")
+    expect(first.get_by_role("button", name="Star")).to_have_attribute("aria-pressed", "true")
+    library.keyboard.press("F2")
+    library.keyboard.type("baseline")
+    library.keyboard.press("Enter")
+    expect(first).to_contain_text("baseline 1")
+    first.focus()
+    library.keyboard.press("Space")
+    expect(library.get_by_text("1 chosen")).to_be_visible()
+    library.keyboard.press("Delete")
+    expect(library.locator("tr[data-run]")).to_have_count(1)
+    expect(library.get_by_role("status").filter(has_text="Run 1 deleted")).to_be_visible()
+    library.keyboard.press("Control+z")
+    expect(library.locator("tr[data-run]")).to_have_count(2)
+    assert kept(server, 2)[1]["name"] == "baseline"
+    library.keyboard.press("Escape")
+    expect(library.locator("main")).to_be_visible()
+
+
+def test_finding_leaves_what_matches(library: Page) -> None:
+    library.keyboard.press("/")
+    library.keyboard.type("no such run")
+    expect(library.locator("tr[data-run]:visible")).to_have_count(0)
+    expect(library.get_by_text("No run matches")).to_be_visible()
+
+
+def test_runs_stand_side_by_side(library: Page) -> None:
+    library.keyboard.press("Control+a")
+    library.get_by_role("button", name="Compare").click()
+    dialog = library.get_by_role("dialog", name="Runs side by side")
+    expect(dialog).to_contain_text("0.95")
+    expect(dialog.get_by_role("row", name="MOTA")).to_be_visible()
+    library.keyboard.press("Escape")
+    expect(dialog).to_have_count(0)
+
+
+def test_a_run_leaves_as_a_file(library: Page) -> None:
+    library.locator('tr[data-run="1"] input').click()
+    library.get_by_role("button", name="Export", exact=True).click()
+    with library.expect_download() as saved:
+        library.get_by_role("menuitem", name="JSON").click()
+    told = json.loads(Path(saved.value.path()).read_text(encoding="utf-8"))
+    assert told["tracks"] != []
+    assert saved.value.suggested_filename.endswith(".json")
+
+
+def test_a_run_is_opened_as_it_was_without_computing(library: Page, server: Server) -> None:
+    library.locator('tr[data-run="1"]').click()
+    expect(library.get_by_role("img", name="Lanes of run 1")).to_be_visible()
+    library.get_by_role("button", name="Open in Tune").click()
+    expect(library.locator("main")).to_be_visible()
+    expect(library.get_by_text("is shown as it was")).to_be_visible()
+    state = server.get("/api/state").json()
+    assert (state["run"]["kept"], state["parameters"][P_D]) == (1, 0.95)
+    library.get_by_role("button", name="Compute again").click()
+    state = server.wait(lambda state: state["run"]["kept"] is None)
+    server.wait_for_run()
+
+
+def test_a_run_is_pinned_as_a(library: Page, server: Server) -> None:
+    library.locator('tr[data-run="2"]').click()
+    expect(library.get_by_role("img", name="Lanes of run 2")).to_be_visible()
+    library.get_by_role("button", name="Pin as A").click()
+    server.wait(lambda state: state["pinned"] is not None)
+    ask(server, "DELETE", "run/pin")

@@ -1,0 +1,229 @@
+"""One run in one ZIP file that opens anywhere: recording, tracks, parameters, report, small videos.
+
+``run.json`` says what it is; ``tracks.bin`` is as the library keeps it, ``tracks.csv`` for
+everybody else; ``sequence/`` is an ordinary sequence folder, whose videos, where they are taken
+along, show step k in frame k at their size and a low rate of bits.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import stat
+import tempfile
+import zipfile
+from fractions import Fraction
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+import tomlkit
+
+from tracker import __version__, export
+from tracker.library import columns
+from tracker.library.errors import LibraryError
+from tracker.library.records import KeptRun, Result
+from tracker.library.store import parameters_of
+from tracker.sequences.clock import FIELDS as CLOCK
+from tracker.sequences.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+
+FORMAT = 1
+MANIFEST, TRACKS, FOLDER = "run.json", "tracks.bin", "sequence"
+
+MOST_FILES = 10_000
+MOST_BYTES = 8 << 30
+"""Of what an archive unpacks to: a small file can claim to hold more than any disk."""
+
+_QUALITY = {"preset": "veryfast", "crf": "32"}
+_ANEW = ("video", "images", "first_frame", "detections", "detections_first_frame",
+         "detected_steps", *CLOCK)  # fmt: skip
+"""Fields of a camera that are written anew, by steps; its calibration stays as it is."""
+
+
+def write_bundle(path: Path, result: Result, sequence: Sequence, *, videos: bool = False) -> None:
+    """Write the archive: wholly or not at all.
+
+    Args:
+        path: A ``.zip`` file, replaced if it is there.
+        result: The run.
+        sequence: Its recording.
+        videos: Whether small videos are taken along.
+
+    Raises:
+        OSError: If it cannot be written.
+    """
+    temporary = path.with_name(f".{path.name}.part")
+    try:
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            _fill(folder, result, sequence, videos)
+            with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+                for file in sorted(p for p in folder.rglob("*") if p.is_file()):
+                    archive.write(file, file.relative_to(folder).as_posix())
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _fill(folder: Path, result: Result, sequence: Sequence, videos: bool) -> None:
+    run = result.run
+    manifest = {
+        "format": FORMAT,
+        "program": f"multiview-phd {__version__}",
+        "run": run._asdict(),
+        "key": result.key,
+        "digest": result.digest,
+        "machine": result.machine,
+        "parameters": result.values,
+        "figures": result.figures,
+    }
+    text = json.dumps(manifest, indent=1, ensure_ascii=False)
+    (folder / MANIFEST).write_text(text, encoding="utf-8")
+    (folder / TRACKS).write_bytes(columns.pack(result.kept))
+    tracks = result.kept.tracks
+    with (folder / "tracks.csv").open("w", encoding="utf-8", newline="") as stream:
+        export.write_tracks_csv(stream, sequence, tracks, result.parameters, run.seed)
+    if sequence.ground_truth is not None:
+        from tracker.evaluation import evaluate_sequence
+        from tracker.evaluation.report.page import report_html  # brings plotly
+
+        evaluation = evaluate_sequence(sequence, tracks, steps=run.steps)
+        report = report_html(sequence, tracks, result.parameters, evaluation, seed=run.seed)
+        (folder / "report.html").write_text(report, encoding="utf-8")
+    _write_sequence(folder / FOLDER, sequence, videos)
+
+
+def _write_sequence(folder: Path, sequence: Sequence, videos: bool) -> None:
+    """The recording as a folder of its own, everything by steps."""
+    folder.mkdir()
+    text = (sequence.folder / "sequence.toml").read_text(encoding="utf-8-sig")
+    document = tomlkit.parse(text).unwrap()
+    document |= {"name": sequence.name, "fps": sequence.fps, "frames": sequence.frames}
+    room = sequence.room
+    document["room"] = {
+        "min": room.minimum.tolist(),
+        "max": room.maximum.tolist(),
+        "entrances": [
+            {"position": e.position.tolist(), "sigma": e.sigma.tolist()} for e in room.entrances
+        ],
+    }
+    document["target"] = {"half_extents": sequence.target_half_extents.tolist()}
+    cameras: list[dict[str, Any]] = []
+    for index, (view, stated) in enumerate(zip(sequence.views, document["camera"], strict=True)):
+        camera = {name: value for name, value in stated.items() if name not in _ANEW}
+        camera["image_size"] = list(view.camera.image_size)
+        if view.detections is not None:
+            camera["detections"] = f"camera{index + 1}.csv"
+            boxes = view.detections
+            rows = np.column_stack([boxes.frames, boxes.boxes, boxes.scores]).tolist()
+            _write_csv(
+                folder / camera["detections"], "frame,left,top,width,height,score",
+                (f"{int(row[0])}," + ",".join(f"{v:.9g}" for v in row[1:]) for row in rows),
+            )  # fmt: skip
+        if videos and view.has_pictures:
+            camera["video"] = f"camera{index + 1}.mp4"
+            _write_video(folder / camera["video"], sequence, index)
+        cameras.append(camera)
+    document["camera"] = cameras
+    if not videos:
+        document.pop("template", None)
+    document.pop("ground_truth", None)
+    truth = sequence.ground_truth
+    if truth is not None:
+        document["ground_truth"] = {"file": "truth.csv"}
+        rows = zip(
+            truth.frames.tolist(), truth.ids.tolist(), truth.positions.tolist(),
+            truth.valid.astype(int).tolist(), strict=True,
+        )  # fmt: skip
+        _write_csv(
+            folder / "truth.csv", "frame,id,x,y,z,valid",
+            (f"{f},{n}," + ",".join(f"{v:.9g}" for v in p) + f",{ok}" for f, n, p, ok in rows),
+        )  # fmt: skip
+    (folder / "sequence.toml").write_text(tomlkit.dumps(document), encoding="utf-8")
+
+
+def _write_csv(path: Path, head: str, rows: Any) -> None:
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(head + "\n")
+        file.writelines(row + "\n" for row in rows)
+
+
+def _write_video(path: Path, sequence: Sequence, camera: int) -> None:
+    import av
+
+    width, height = sequence.views[camera].camera.image_size
+    even = (width + width % 2, height + height % 2)
+    with FrameReader(sequence) as reader, av.open(str(path), "w", format="mp4") as file:
+        rate = Fraction(sequence.fps).limit_denominator(1000)
+        stream = file.add_stream("libx264", rate=rate, options=_QUALITY)
+        stream.width, stream.height = width, height
+        # an odd size cannot be halved, as the usual kind of colours is
+        stream.pix_fmt = "yuv420p" if even == (width, height) else "yuv444p"
+        nothing = np.zeros((height, width, 3), dtype=np.uint8)
+        for picture in reader.iterate(camera):
+            shown = nothing if picture is None else np.ascontiguousarray(picture)
+            file.mux(stream.encode(av.VideoFrame.from_ndarray(shown, format="bgr24")))
+        file.mux(stream.encode())
+
+
+def unpack_bundle(path: Path, folder: Path) -> Result:
+    """Unpack an archive into an empty folder, and read its run.
+
+    Nothing is written outside the folder, whatever names the archive has.
+
+    Args:
+        path: As :func:`write_bundle` writes it.
+        folder: Where to.
+
+    Raises:
+        LibraryError: If it is no bundle, is damaged, of a newer version, or climbs out.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            _check_names(path, archive)
+            archive.extractall(folder)
+        manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        if manifest["format"] != FORMAT:
+            raise LibraryError(
+                f"{path}: expected a bundle of format {FORMAT}, found {manifest['format']!r}; "
+                "update the program"
+            )
+        run = KeptRun(**manifest["run"])
+        parameters, unknown = parameters_of(manifest["parameters"])
+        return Result(
+            run=run,
+            place=str(folder / FOLDER),
+            key=str(manifest["key"]),
+            digest=str(manifest["digest"]),
+            machine=str(manifest["machine"]),
+            parameters=parameters,
+            unknown=unknown,
+            values=manifest["parameters"],
+            figures=manifest["figures"],
+            kept=columns.unpack((folder / TRACKS).read_bytes()),
+        )
+    except LibraryError:
+        raise
+    except (zipfile.BadZipFile, OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise LibraryError(
+            f"{path}: expected a bundle as `multiview-phd bundle` writes it ({error})"
+        ) from None
+
+
+def _check_names(path: Path, archive: zipfile.ZipFile) -> None:
+    entries = archive.infolist()
+    if len(entries) > MOST_FILES or sum(entry.file_size for entry in entries) > MOST_BYTES:
+        raise LibraryError(
+            f"{path}: expected at most {MOST_FILES} files of {MOST_BYTES >> 30} GiB together, "
+            f"found {len(entries)} of {sum(entry.file_size for entry in entries) / 2**30:.1f} GiB"
+        )
+    for entry in entries:
+        name = entry.filename.replace("\\", "/")
+        place = PurePosixPath(name)
+        is_link = stat.S_ISLNK(entry.external_attr >> 16)
+        if place.is_absolute() or ".." in place.parts or ":" in name or is_link:
+            raise LibraryError(
+                f"{path}: {entry.filename!r} leads out of its folder; nothing was unpacked"
+            )

@@ -1,0 +1,22 @@
+"""The track file, as the program itself reads it back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tracker import export
+from tracker.writing.written import Options, Written
+
+
+def write(path: Path, written: Written, options: Options) -> None:
+    """Write the file."""
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        export.write_tracks_csv(
+            stream,
+            written.sequence,
+            written.tracks,
+            written.parameters,
+            written.seed,
+            done=written.done,
+        )
+    options.at(written.steps, written.steps)

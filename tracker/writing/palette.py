@@ -1,0 +1,16 @@
+"""The colour of a track, the same as on the page and in the report."""
+
+from __future__ import annotations
+
+from functools import cache
+
+Rgb = tuple[int, int, int]
+
+
+@cache
+def rgb(number: int) -> Rgb:
+    """Red, green and blue, 0 … 255, of an id, for dark surfaces."""
+    from tracker.evaluation.report.figures import DARK_IDS  # brings plotly
+
+    text = DARK_IDS[(number - 1) % len(DARK_IDS)]
+    return int(text[1:3], 16), int(text[3:5], 16), int(text[5:7], 16)
