@@ -262,6 +262,7 @@ def _track(command: Track) -> None:
     from app.state.compiling import Compiling
     from tracker import pipeline
     from tracker.checks import check
+    from tracker.runs.gates import notices
     from tracker.runs.outcome import why_no_tracks
     from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
@@ -305,6 +306,8 @@ def _track(command: Track) -> None:
     )
     if (reason := why_no_tracks(run)) is not None:
         say(reason)
+    for sentence in notices(run):
+        say(sentence)
     if command.keep:
         _keep(command, run, began, seconds)
 

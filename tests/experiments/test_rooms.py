@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tracker.experiments import EXPERIMENTS, Context, RandomRooms, Unavailable
-from tracker.experiments.rooms import experiment as rooms
+from tracker.experiments.rooms import experiment
 from tracker.experiments.rooms.cases import Case, cases, key_of
 from tracker.experiments.rooms.causes import causes_of, worst_of
 from tracker.experiments.rooms.kept import FILE, keep_row, read_rows
@@ -27,6 +27,22 @@ def test_every_method_is_run_with_templates_where_it_looks_at_them() -> None:
     assert ("jpda", False) in named
     assert ("detection_phd", False) in named
     assert ("jpda", True) not in named
+
+
+def test_what_is_judged_is_the_usual_method_on_pictures_or_the_best() -> None:
+    boxes, motion, worse = (Case(n, False) for n in ("none", "jpda", "association_matrix"))
+    taught = Case("colour_phd", True)
+    found = {
+        boxes: [row(0, 1.0)],
+        worse: [row(0, 0.3)],
+        motion: [row(0, 0.85)],
+        taught: [row(0, 0.6)],
+    }
+    with_templates, without = experiment._findings(found)
+    assert with_templates.claim.startswith("colour_phd, with templates: found ≥ 0.95")
+    assert with_templates.verdict == "worse"
+    assert without.claim.startswith("jpda, without templates: found ≥ 0.8 ")
+    assert without.verdict == "better"
 
 
 def test_a_key_depends_on_the_case_and_on_how_much_is_tracked() -> None:
@@ -77,7 +93,7 @@ def test_what_is_kept_is_not_measured_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On a detector's boxes; then with a row changed by hand."""
-    monkeypatch.setattr(rooms, "QUICK_ROOMS", 1)
+    monkeypatch.setattr(experiment, "QUICK_ROOMS", 1)
     context = Context(output=tmp_path, rooms=RandomRooms(first=71, methods=ON_BOXES), quick=True)
     first = EXPERIMENTS["rooms"].run(context)
     (case,) = first.numbers["cases"].values()

@@ -1,8 +1,9 @@
 """What in a picture is not the background.
 
 Two models, exchangeable behind :class:`ForegroundModel`: one learnt once from the clip
-(:mod:`~tracker.foreground.exposure`), and one whose thresholds and background follow
-the pictures (:mod:`~tracker.foreground.adaptive`).
+(:mod:`~tracker.foreground.exposure`), with a memory of motion where people stay
+(:mod:`~tracker.foreground.motion`), and one whose thresholds and background follow the
+pictures (:mod:`~tracker.foreground.adaptive`).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from numpy import ndarray
 
 from tracker.foreground.adaptive import AdaptiveForeground, first_background
 from tracker.foreground.exposure import BackgroundModel, LearntForeground, tone_curve
+from tracker.foreground.motion import MovingForeground
 from tracker.foreground.segmentation import ForegroundModel, Segmentation, pack, unpack
 from tracker.foreground.shares import box_shares, integral, shape_scores, shape_shares
 from tracker.parameters.foreground import ForegroundParams
@@ -24,6 +26,7 @@ __all__ = [
     "BackgroundModel",
     "ForegroundModel",
     "LearntForeground",
+    "MovingForeground",
     "Segmentation",
     "box_shares",
     "first_background",
@@ -42,7 +45,12 @@ half of them, and each takes time before the first step."""
 
 
 def learn(
-    sequence: Sequence, camera_index: int, reader: Pictures, parameters: ForegroundParams
+    sequence: Sequence,
+    camera_index: int,
+    reader: Pictures,
+    parameters: ForegroundParams,
+    *,
+    motion: bool = False,
 ) -> ForegroundModel | None:
     """The chosen foreground model of one camera; None where it has not a single picture.
 
@@ -51,6 +59,8 @@ def learn(
         camera_index: Which one.
         reader: Of its pictures.
         parameters: Which model, and its numbers.
+        motion: Whether what moved lately counts where the background is not to be believed, for
+            who knows nothing else of people.
     """
 
     def pictures() -> list[UInt8[ndarray, "h w 3"]]:
@@ -70,4 +80,8 @@ def learn(
     background = reader.once(
         ("background", camera_index), lambda: BackgroundModel.learn(pictures(), reader.check)
     )
-    return None if background is None else LearntForeground(background, parameters)
+    if background is None:
+        return None
+    if motion and background.doubt(parameters) > 0.0 and parameters.motion_memory > 0.0:
+        return MovingForeground(background, parameters, sequence.step_time)
+    return LearntForeground(background, parameters)

@@ -31,6 +31,15 @@ SAMPLED_PIXELS = 6000
 MEDIAN_VALUES = 50_000
 """Values of a picture of which medians are taken between two looks at whether to stop."""
 
+OFTEN = 0.3
+"""Share of the pictures in which a pixel that is only passed by seldom shows who passes."""
+
+AWAY = 24
+"""On the scale 16 √level: what differs more than this from the median shows something else."""
+
+LEAST_CHANGING = 0.005
+"""Of the picture: of fewer changing pixels nothing is said."""
+
 _ROOTS = np.rint(16.0 * np.sqrt(np.arange(256))).clip(0, 255).astype(np.uint8)
 
 
@@ -43,6 +52,15 @@ class BackgroundModel:
     spread: UInt8[ndarray, "h w"]
     """Typical (median) deviation of a background pixel once exposures are aligned, on the
     scale of 16 √level."""
+    restlessness: float = 0.0
+    """Share of the pixels that change at all which are away from their median in more than
+    :data:`OFTEN` of the pictures."""
+
+    def doubt(self, parameters: ForegroundParams) -> float:
+        """How little the median is to be believed, 0 … 1: people who stay made it."""
+        low, high = parameters.restless_from, parameters.restless_to
+        u = float(np.clip((self.restlessness - low) / max(high - low, 1e-6), 0.0, 1.0))
+        return u * u * (3.0 - 2.0 * u)
 
     @staticmethod
     def learn(
@@ -69,7 +87,7 @@ class BackgroundModel:
         reference = median(aligned, check)
         roots = cv2.LUT(reference, _ROOTS)
         deviations = [_largest(cv2.absdiff(cv2.LUT(picture, _ROOTS), roots)) for picture in aligned]
-        return BackgroundModel(reference, median(deviations, check))
+        return BackgroundModel(reference, median(deviations, check), _restlessness(deviations))
 
     def foreground(
         self, picture: UInt8[ndarray, "h w 3"], parameters: ForegroundParams
@@ -131,6 +149,26 @@ def tone_curve(
         mapped = levels + np.interp(levels, centres, rising - centres)
         curve[0, :, channel] = np.clip(np.rint(mapped), 0, 255)
     return curve
+
+
+def square_roots(picture: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w 3"]:
+    """16 √level, whose noise is the same in dark and light."""
+    return np.asarray(cv2.LUT(picture, _ROOTS), dtype=np.uint8)
+
+
+def _restlessness(deviations: list[UInt8[ndarray, "h w"]]) -> float:
+    """Share of the changing pixels that are often away from their median.
+
+    Args:
+        deviations: Of each picture from the median, on the scale 16 √level.
+    """
+    counts = np.zeros(deviations[0].shape, dtype=np.int64)
+    for deviation in deviations:
+        counts += deviation > AWAY
+    ever = counts >= 2
+    if ever.mean() < LEAST_CHANGING:
+        return 0.0
+    return float((counts[ever] > OFTEN * len(deviations)).mean())
 
 
 def _inverse(curve: UInt8[ndarray, "1 256 3"]) -> UInt8[ndarray, "1 256 3"]:

@@ -89,6 +89,11 @@ class ColourPeakParams(Params):
     ] = 0.5
     """Standard deviation of a peak's half sizes: colour alone hardly tells them."""
 
+    sigma_height: Annotated[
+        float, Field(ge=5.0, le=1000.0), ui("h_σ", unit="px", log=True, advanced=True)
+    ] = 60.0
+    """Half height beyond which a peak's deviations grow no more: a large target shows details."""
+
     size_jitter: Annotated[float, Field(ge=0.0, le=1.0), ui("σ_s", step=0.01, advanced=True)] = 0.1
     """Spread of the samples' sizes around what a target has at a place: people differ."""
 

@@ -27,6 +27,30 @@ class ForegroundParams(Params):
     ] = 24.0
     """Learnt: a pixel that differs more than this from the background is foreground."""
 
+    restless_from: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("u_0", step=0.01, advanced=True, when=_LEARNT)
+    ] = 0.2
+    """Learnt: with this share of the changing pixels often away from their median, doubt begins."""
+
+    restless_to: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("u_1", step=0.01, advanced=True, when=_LEARNT)
+    ] = 0.32
+    """Learnt: and with this share the median is not believed, for people stay in front of it."""
+
+    motion_memory: Annotated[
+        float,
+        Field(ge=0.0, le=4.0),
+        ui("T_m", unit="s", step=0.1, published=0.0, when=_LEARNT),
+    ] = 0.6
+    """Learnt: where the median is not believed, what changed within this time is foreground."""
+
+    motion_threshold: Annotated[
+        float,
+        Field(ge=2.0, le=128.0),
+        ui("θ_m", unit="16 √level", step=1.0, advanced=True, when=_LEARNT),
+    ] = 14.0
+    """Learnt: a pixel that differs more than this from a tenth of a second ago changed."""
+
     background_centre: Annotated[
         float,
         Field(ge=0.0, le=50.0),

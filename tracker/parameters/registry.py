@@ -52,13 +52,13 @@ BUILT_IN: dict[MethodKey, tuple[str, ...]] = {
 SHARED_GROUPS = ("pictures", "foreground", "fusion", "smoothing")
 """Groups of parameters that are no single method's."""
 
-FOLLOWING = ("colour_phd", "none")
+FOLLOWING = ("colour_phd", "none", "jpda")
 """What ``single_view`` is by default follows the recording: the first of these that it has all
-for, else the first that can work on it at all."""
+for."""
 
 FOLLOWS = (
     "follows the recording: onnx_detector where a detector is named, else colour_phd with "
-    "pictures and templates, else none with detections, else colour_phd"
+    "pictures and templates, else none with detections, else jpda on what moves"
 )
 """The same in words."""
 

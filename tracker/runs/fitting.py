@@ -12,7 +12,7 @@ def default_parameters(sequence: Sequence) -> RunParameters:
 
     That is the detector that is named, if there are pictures; else the first of
     :data:`tracker.parameters.registry.FOLLOWING` that has pictures, templates and
-    detections as it wants them, else the first that lacks nothing but templates.
+    detections as it wants them.
 
     Raises:
         ValueError: If the sequence has neither pictures nor detections.
@@ -20,11 +20,9 @@ def default_parameters(sequence: Sequence) -> RunParameters:
     defaults = RunParameters()
     if sequence.detector is not None and sequence.has_pictures:
         return defaults.model_copy(update={"single_view": "onnx_detector"})
-    for templates in (sequence.templates, True):
-        for name in FOLLOWING:
-            lacking = _lacks(sequence, defaults, "single_view", name, bool(templates))
-            if lacking is None:
-                return defaults.model_copy(update={"single_view": name})
+    for name in FOLLOWING:
+        if _lacks(sequence, defaults, "single_view", name, bool(sequence.templates)) is None:
+            return defaults.model_copy(update={"single_view": name})
     raise ValueError(
         f"{sequence.name}: every camera needs pictures (video or images), or every camera "
         "needs detections; add what is missing to sequence.toml"

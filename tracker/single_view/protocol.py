@@ -13,6 +13,14 @@ import numpy as np
 from jaxtyping import Float, Float16, Int, UInt8
 from numpy import ndarray
 
+CANDIDATES, DROPPED = "candidates", "dropped for "
+"""Names in a result's information: how many places were looked at more closely, and, followed
+by the name of a gate, how many of them fell there."""
+
+TRUST, DOUBT = "trust in the foreground", "doubt in the background"
+"""And how far the foreground was believed about people with templates, and how little the
+background, 0 … 1."""
+
 EventKind = Literal["new", "vanished", "returned", "occluded", "merged", "split"]
 
 

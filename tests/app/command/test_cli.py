@@ -330,7 +330,32 @@ def test_render_refuses_what_it_cannot_do(run: Runs, tmp_path: Path) -> None:
     status, _, stderr = run("render", "room24-2p", tmp_path / "new", "--cameras", 7)
     assert status == 2
     assert "--cameras: expected 2 or 3, got 7" in stderr
+    status, _, stderr = run("render", "room24-2p", tmp_path / "new", "--random", 3)
+    assert status == 2
+    assert "expected FOLDER alone with --random, got room24-2p" in stderr
+    status, _, stderr = run("render", tmp_path / "new")
+    assert status == 2
+    assert "expected NAME FOLDER, got" in stderr
+    status, _, stderr = run("render", tmp_path / "new", "--random", "-1")
+    assert status == 2
+    assert "--random: expected a whole number from 0, got -1" in stderr
     assert not (tmp_path / "new").exists()
+
+
+def test_render_draws_a_room_by_its_seed(
+    run: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from tracker.sequences import rendering
+
+    real = rendering.render_random
+    monkeypatch.setattr(
+        rendering, "render_random", lambda *args, **kwargs: real(*args, frames=2, **kwargs)
+    )
+    status, _, stderr = run("render", "--random", 71, tmp_path / "room", "--detections")
+    assert status == 0, stderr
+    cameras = rendering.choose(71).cameras
+    assert f"random room 71 with {cameras} cameras, written to" in stderr
+    assert read_sequence(tmp_path / "room").has_detections
 
 
 @pytest.mark.full

@@ -238,11 +238,11 @@ def test_a_method_fails_just_where_it_is_said_to(recording: Sequence, what: str,
 def test_the_default_follows_the_recording_and_nothing_else_does(recording: Sequence) -> None:
     assert default_parameters(recording).single_view == "onnx_detector"
     recording = replace(recording, detector=None)
-    first, second = FOLLOWING
+    first, second, third = FOLLOWING
     assert RunParameters().single_view == first
     for what, expected in (("detections", first), ("templates", second), ("pictures", second)):
         found = default_parameters(without(recording, what))
         assert found.single_view == expected
         assert set(changed(found)) <= {"single_view"}
     untaught = without(without(recording, "templates"), "detections")
-    assert default_parameters(untaught) == RunParameters()
+    assert default_parameters(untaught) == RunParameters(single_view=third)

@@ -90,6 +90,51 @@ def pooling(path: Path, side: int = 32) -> Path:
     return _written(path, helper.make_graph(nodes, "pooling", [picture], ports, weights))
 
 
+def sized(path: Path, kind: int) -> Path:
+    """RT-DETR as its authors export it: the size that boxes are told in is a second input.
+
+    One person fills the middle quarter of the picture.
+
+    Args:
+        path: Where to write it.
+        kind: Of that input's numbers, ONNX's.
+    """
+    weights = {
+        "boxes_zero": np.zeros((1, 1, 1), np.float32),
+        "rows_zero": np.zeros((1, 6), np.float32),
+        "three": np.ones(3, np.int64),
+        "two": np.ones(2, np.int64),
+        "four": np.array([1, 1, 4], np.int64),
+        "shares": np.tile(np.array([0.25, 0.25, 0.75, 0.75], np.float32), (1, 6, 1)),
+        "score": np.array([[0.9, 0.1, 0.0, 0.0, 0.0, 0.0]], np.float32),
+        "label": np.array([[0.0, 3.0, 3.0, 3.0, 3.0, 3.0]], np.float32),
+    }
+    node = helper.make_node
+    nodes = [
+        node("ReduceMean", ["images"], ["mean"], keepdims=1, axes=[1, 2, 3]),
+        node("Reshape", ["mean", "three"], ["mean_3"]),
+        node("Mul", ["mean_3", "boxes_zero"], ["nothing_3"]),
+        node("Cast", ["orig_target_sizes"], ["size"], to=TensorProto.FLOAT),
+        node("Concat", ["size", "size"], ["size_twice"], axis=1),
+        node("Reshape", ["size_twice", "four"], ["factors"]),
+        node("Mul", ["shares", "factors"], ["pixels"]),
+        node("Add", ["pixels", "nothing_3"], ["boxes"]),
+        node("Reshape", ["mean", "two"], ["mean_2"]),
+        node("Mul", ["mean_2", "rows_zero"], ["nothing_2"]),
+        node("Add", ["score", "nothing_2"], ["scores"]),
+        node("Add", ["label", "nothing_2"], ["labels"]),
+    ]
+    value = helper.make_tensor_value_info
+    inputs = [
+        value("images", TensorProto.FLOAT, [1, 3, 64, 64]),
+        value("orig_target_sizes", kind, [1, 2]),
+    ]
+    shapes = {"labels": [1, 6], "boxes": [1, 6, 4], "scores": [1, 6]}
+    outputs = [value(name, TensorProto.FLOAT, shape) for name, shape in shapes.items()]
+    tensors = [numpy_helper.from_array(values, name) for name, values in weights.items()]
+    return _written(path, helper.make_graph(nodes, "sized", inputs, outputs, tensors))
+
+
 def _written(path: Path, graph: onnx.GraphProto) -> Path:
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)])
     model.ir_version = IR

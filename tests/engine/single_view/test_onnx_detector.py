@@ -11,9 +11,10 @@ import cv2
 import numpy as np
 import pytest
 from numpy import ndarray
+from onnx import TensorProto
 
 from tests.engine.painted import RED, painted_sequence, true_boxes
-from tests.engine.single_view.networks import answering, pooling
+from tests.engine.single_view.networks import answering, pooling, sized
 from tests.engine.synthetic import look_at
 from tracker import pipeline
 from tracker.boxes import Boxes
@@ -233,6 +234,14 @@ def test_sizes_that_are_left_open_and_channels_last(tmp_path: Path) -> None:
     network = Network(path, Settings())
     assert network.size == SIZE
     assert len(network.look(np.zeros((64, 64, 3), np.uint8)).boxes) == 1
+
+
+@pytest.mark.parametrize("kind", [TensorProto.INT64, TensorProto.FLOAT])
+def test_a_network_that_asks_for_the_size_is_told_it(kind: int, tmp_path: Path) -> None:
+    found = Network(sized(tmp_path / "m.onnx", kind), Settings()).look(
+        np.zeros((32, 32, 3), np.uint8)
+    )
+    np.testing.assert_allclose(found.boxes, [[7.5, 7.5, 16.0, 16.0]], atol=1e-4)
 
 
 @pytest.mark.parametrize(

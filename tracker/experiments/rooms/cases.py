@@ -40,6 +40,12 @@ class Case:
     """Whether the marked boxes are there."""
 
     @property
+    def on_pictures(self) -> bool:
+        """Whether it looks at pictures and not at boxes that come with the room."""
+        used = method_of("single_view", self.method).used(RunParameters())
+        return used.pictures and not used.detections
+
+    @property
     def name(self) -> str:
         """As the tables name it."""
         return f"{self.method}, {'with' if self.templates else 'without'} templates"

@@ -155,20 +155,20 @@ def _worst_in_words(case: Case, rows: list[dict[str, Any]]) -> str:
 
 
 def _findings(found: dict[Case, list[dict[str, Any]]]) -> tuple[Finding, ...]:
-    """Of the method that a recording gets by itself, with templates and without."""
+    """Of the method on pictures that a recording gets by itself, with templates and without; where
+    it can do nothing without them, of the one that finds most."""
     findings = []
     for templates in (True, False):
-        default = next(
-            (
-                case
-                for name in FOLLOWING
-                for case in found
-                if case.method == name and case.templates == templates and "detection" not in name
-            ),
-            None,
-        )
-        if default is None or not found[default]:
+        judged = [
+            case
+            for case, rows in found.items()
+            if rows and case.templates == templates and case.on_pictures
+        ]
+        if not judged:
             continue
+        usual = [case for name in FOLLOWING for case in judged if case.method == name]
+        best = max(judged, key=lambda case: _spread_of(found[case], "found_share", 0.1)[0])
+        default = usual[0] if usual else best
         least, least_tenth, most, most_tenth = ASKED[templates]
         shares = _spread_of(found[default], "found_share", 0.1)
         false = _spread_of(found[default], "false_per_step", 0.9)

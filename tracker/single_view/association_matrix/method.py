@@ -79,7 +79,9 @@ class AssociationMatrix:
         self._parameters = parameters.of(AssociationMatrixParams)
         foreground = parameters.foreground
         self._minimum_area = foreground.minimum_area
-        self._foreground: ForegroundModel | None = learn(sequence, camera_index, reader, foreground)
+        self._foreground: ForegroundModel | None = learn(
+            sequence, camera_index, reader, foreground, motion=True
+        )
         reader.check()
         self._silhouettes = Silhouettes(view.camera, sequence.room, sequence.target_half_extents)
 

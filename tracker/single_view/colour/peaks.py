@@ -20,6 +20,7 @@ from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.appearance import Appearance, Scene
+from tracker.single_view.protocol import CANDIDATES, DROPPED, TRUST
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,7 +104,7 @@ class PeakFinder:
         samples = self._sample(intensity, scene, rng)
         scores, _, _ = self._score(scene, samples)
         candidates = self._climb(samples, scores)
-        boxes, distances = self._accept(scene, candidates)
+        boxes, distances, dropped = self._accept(scene, candidates)
         return state, Peaks(
             boxes=boxes,
             scores=np.exp(-0.5 * (distances / self._parameters.likelihood_sigma) ** 2),
@@ -113,16 +114,19 @@ class PeakFinder:
             ),
             mask=scene.mask,
             information={
-                "peaks before acceptance": float(len(candidates)),
+                CANDIDATES: float(len(candidates)),
+                **{DROPPED + gate: float(count) for gate, count in dropped.items()},
                 "least distance": float(distances.min()) if len(distances) else 1.0,
                 "foreground share": scene.foreground_share,
+                TRUST: float(self._appearance.trust.mean()),
             },
         )
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
-        """Standard deviations of peaks: proportional to the box."""
+        """Standard deviations of peaks: proportional to the box, and no more of a large one."""
         p = self._parameters
         half_sizes = np.maximum(boxes[:, 2:], 0.5)
+        half_sizes = half_sizes * np.minimum(1.0, p.sigma_height / half_sizes[:, 1:])
         return np.concatenate([p.centre_sigma * half_sizes, p.size_sigma * half_sizes], axis=1)
 
     def _sample(
@@ -197,18 +201,28 @@ class PeakFinder:
 
     def _accept(
         self, scene: Scene, candidates: Float[ndarray, "M 4"]
-    ) -> tuple[Float[ndarray, "K 4"], Float[ndarray, " K"]]:
-        """The peaks that look enough like a person, and their distances; one at each place."""
+    ) -> tuple[Float[ndarray, "K 4"], Float[ndarray, " K"], dict[str, int]]:
+        """The peaks that look enough like a person, and their distances; one at each place.
+        How many others fell at which gate."""
         p = self._parameters
         scores, distances, inside = self._score(scene, candidates)
         best, nearest, person = scores.max(axis=1), distances.min(axis=1), scores.argmax(axis=1)
-        good = best >= -0.5 * (p.acceptance_distance / p.likelihood_sigma) ** 2
+        coloured = nearest <= p.acceptance_distance
+        likely = best >= -0.5 * (p.acceptance_distance / p.likelihood_sigma) ** 2
+        covered = np.ones(len(candidates), dtype=bool)
         if scene.mask is not None:
-            good &= inside >= p.acceptance_foreground * self._trusted(person)
+            covered = inside >= p.acceptance_foreground * self._trusted(person)
+        good = likely & covered
         kept: list[int] = []
         for i in np.argsort(-best, kind="stable"):
             apart = (candidates[kept, :2] - candidates[i, :2]) / candidates[kept, 2:]
             least = np.where(person[kept] == person[i], p.same_person_distance, p.merge_distance)
             if good[i] and np.all((apart**2).sum(axis=1) >= least**2):
                 kept.append(int(i))
-        return candidates[kept], nearest[kept]
+        dropped = {
+            "colour": int((~good & ~coloured).sum()),
+            "foreground": int((~good & coloured & ~covered).sum()),
+            "surroundings": int((~good & coloured & covered).sum()),
+            "another at its place": int(good.sum()) - len(kept),
+        }
+        return candidates[kept], nearest[kept], dropped

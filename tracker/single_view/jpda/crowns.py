@@ -38,6 +38,8 @@ class Crowns:
     """Share of foreground in each box."""
     pieces: Float[ndarray, "N 4"]
     """The box of the piece of foreground that each is the top of."""
+    dropped: dict[str, int]
+    """How many other tops fell at which gate."""
 
 
 class TargetSizes:
@@ -127,7 +129,8 @@ def crowns(
     boxes = np.concatenate([np.zeros((0, 4)), *found])
     owners = np.repeat(np.arange(pieces.size), [len(tops) for tops in found])
     inside, above, beside = shape_shares(integral(closed), boxes)
-    good = (inside >= p.least_inside) & (above <= p.most_above) & (beside <= p.most_beside)
+    full = inside >= p.least_inside
+    good = full & (above <= p.most_above) & (beside <= p.most_beside)
     kept: list[int] = []
     for i in np.argsort(boxes[:, 1] - boxes[:, 3], kind="stable").tolist():
         apart = boxes[i, :2] - boxes[kept, :2]
@@ -135,7 +138,12 @@ def crowns(
         same = (across < p.shoulder_across) & (apart[:, 1] < p.shoulder_down * boxes[kept, 3])
         if good[i] and not same.any():
             kept.append(i)
-    return Crowns(boxes[kept], inside[kept], pieces.boxes[owners[kept]])
+    dropped = {
+        "foreground": int((~full).sum()),
+        "surroundings": int((full & ~good).sum()),
+        "another's shoulders": int(good.sum()) - len(kept),
+    }
+    return Crowns(boxes[kept], inside[kept], pieces.boxes[owners[kept]], dropped)
 
 
 def _tops(pieces: Blobs, piece: int, sizes: TargetSizes, top_reach: float) -> Float[ndarray, "N 4"]:

@@ -15,7 +15,7 @@ from numpy import ndarray
 from tracker.blobs import blobs
 from tracker.boxes import Boxes
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.foreground import ForegroundModel, box_shares, integral, learn
+from tracker.foreground import ForegroundModel, MovingForeground, box_shares, integral, learn
 from tracker.parameters import (
     ColourPhdParams,
     DetectionBoxParams,
@@ -27,6 +27,7 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.peaks import PeakFinder
 from tracker.single_view.detector_boxes import DetectorBoxes, trust
 from tracker.single_view.jpda.crowns import TargetSizes, crowns
+from tracker.single_view.protocol import CANDIDATES, DOUBT, DROPPED
 
 if TYPE_CHECKING:
     from tracker.parameters import RunParameters
@@ -127,7 +128,9 @@ class _Foreground:
     ) -> None:
         self._parameters = parameters
         self._minimum_area = foreground.minimum_area
-        self._model: ForegroundModel | None = learn(sequence, camera_index, reader, foreground)
+        self._model: ForegroundModel | None = learn(
+            sequence, camera_index, reader, foreground, motion=True
+        )
         camera = sequence.views[camera_index].camera
         self._sizes = (
             TargetSizes(
@@ -151,6 +154,10 @@ class _Foreground:
         if picture is None or self._model is None:
             return state, Measured.nothing()
         state, found = self._model.step(state, picture)
+        information = {
+            "foreground share": float(found.mask.mean()),
+            DOUBT: self._model.doubt if isinstance(self._model, MovingForeground) else 0.0,
+        }
         if self._sizes is None:
             boxes = blobs(found.mask, self._minimum_area).boxes
             pieces = boxes
@@ -158,13 +165,15 @@ class _Foreground:
         else:
             targets = crowns(found.mask, self._sizes, self._minimum_area, self._parameters)
             boxes, pieces, scores = targets.boxes, targets.pieces, targets.inside
+            information[CANDIDATES] = float(len(boxes) + sum(targets.dropped.values()))
+            information |= {DROPPED + gate: float(n) for gate, n in targets.dropped.items()}
         return state, Measured(
             boxes,
             scores,
             self.sigmas(boxes),
             pieces,
             mask=found.mask,
-            information={"foreground share": float(found.mask.mean())},
+            information=information,
         )
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:

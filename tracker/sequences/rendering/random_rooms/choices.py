@@ -101,6 +101,7 @@ class Choices:
             "turned": self.turned,
             "mounting": self.mounting,
             "target": self.target,
+            "boxes marked": f"{self.templates} a person",
             "people": "1" if self.people == 1 else "2–3" if self.people <= 3 else "4–8",
             "all stay": yes[stays],
             "still people": "none" if not still else "all" if still == self.people else "some",

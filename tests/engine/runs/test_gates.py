@@ -1,0 +1,58 @@
+"""A run tells what its cameras looked at, where it fell, and what was not believed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.engine.painted import GREEN, RED, painted_sequence
+from tests.engine.synthetic import walk
+from tracker import pipeline
+from tracker.parameters import RunParameters, with_values
+from tracker.runs.gates import count_gates, notices
+from tracker.runs.run import Run
+from tracker.sequences.sequence import Sequence
+
+STEPS = 10
+
+
+def film(folder: Path, *, stays: bool) -> Sequence:
+    seat = np.tile([0.35, -0.3, 1.0], (STEPS, 1))
+    path = seat if stays else walk((-0.8, 0.0, 1.0), (0.6, 0.3, 1.05), STEPS)
+    return painted_sequence(folder, [path], [RED if stays else GREEN])
+
+
+def run_of(sequence: Sequence, **changes: object) -> Run:
+    keys = {name.replace("__", "."): value for name, value in changes.items()}
+    return pipeline.compute(sequence, with_values(RunParameters(), keys))
+
+
+def test_candidates_are_passed_on_or_fall_at_a_gate(tmp_path: Path) -> None:
+    (told,) = count_gates(run_of(film(tmp_path, stays=False)))
+    assert told.pictures == STEPS
+    assert told.passed > 0.8
+    assert told.candidates == pytest.approx(told.passed + sum(told.dropped.values()))
+    assert f"{told.passed:.1f} passed on" in str(told)
+
+
+def test_a_gate_that_lets_nobody_through_is_named(tmp_path: Path) -> None:
+    run = run_of(film(tmp_path, stays=False), colour_phd__acceptance_distance=0.05)
+    (told,) = count_gates(run)
+    assert told.passed == 0.0
+    assert told.dropped["colour"] >= 0.9 * told.candidates
+    assert any('camera "left"' in one and "for colour" in one for one in notices(run))
+
+
+def test_a_background_made_by_who_stays_is_told(tmp_path: Path) -> None:
+    run = run_of(film(tmp_path, stays=True))
+    assert count_gates(run)[0].trust == 0.0
+    assert any('background of "left"' in one and "templates" in one for one in notices(run))
+
+
+def test_of_the_foreground_alone_tops_are_counted(tmp_path: Path) -> None:
+    run = run_of(film(tmp_path, stays=False), single_view="jpda", jpda__least_inside=1.0)
+    (told,) = count_gates(run)
+    assert told.candidates > 0.5
+    assert told.dropped["foreground"] > 0.5
