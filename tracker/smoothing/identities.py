@@ -238,8 +238,7 @@ def _goes_on(
     gains = np.full((count, count), -np.inf)
     gains[motion.earlier, motion.later] = told
     one = _same_label(paths)
-    one = one[paths.firsts[one + 1] - paths.lasts[one] <= longest]
-    gains[one, one + 1] = np.maximum(gains[one, one + 1], _anew(smoother)) + p.keeping
+    gains[one, one + 1] += p.keeping
     return _of_table(gains, paths)
 
 
