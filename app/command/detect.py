@@ -23,7 +23,7 @@ def detect(command: Detect) -> None:
         CommandError: If the folder cannot be written to.
         ValueError: If the sequence or the model cannot be used.
     """
-    from app.state.compiling import Compiling
+    from app.state.workers.compiling import Compiling
     from tracker import parameters as table
     from tracker import pipeline
     from tracker.boxes import Boxes

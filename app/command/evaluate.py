@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from app.command.flags import Evaluate
 from app.command.terminal import Bar, CommandError, print_table, say
-from app.state.compiling import Compiling
+from app.state.workers.compiling import Compiling
 from tracker import __version__, export
 from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
 from tracker.evaluation.figures import number

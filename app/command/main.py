@@ -161,7 +161,7 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
         )
     check_data(command.data)
     _check_keep(command.keep)
-    from app.state.jobs import locate
+    from app.state.workers.jobs import locate
     from app.web import server
     from app.web.security import is_loopback
     from tracker.library.records import Result
@@ -259,7 +259,7 @@ def _track(command: Track) -> None:
     if not output.parent.is_dir():
         raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
 
-    from app.state.compiling import Compiling
+    from app.state.workers.compiling import Compiling
     from tracker import pipeline
     from tracker.checks import check
     from tracker.runs.gates import notices

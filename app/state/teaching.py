@@ -18,7 +18,7 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 from app.errors import sentence
-from app.state.drafts import Drafts
+from app.state.kept.drafts import Drafts
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
 from tracker import pipeline

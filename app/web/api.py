@@ -11,9 +11,9 @@ from fastapi import APIRouter, Query, Request, Response
 
 from app import models
 from app.errors import ApiError, sentence
-from app.state.history import History
-from app.state.sensitivity import Sensitivity
+from app.state.kept.history import History
 from app.state.teaching import Teaching
+from app.state.workers.sensitivity import Sensitivity
 from app.web.dependencies import (
     ERRORS,
     FOR_EVER,

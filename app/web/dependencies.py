@@ -8,9 +8,9 @@ from typing import Annotated, Any
 from fastapi import Depends, Query, Request
 
 from app.errors import ApiError, ErrorBody
-from app.state.jobs import Jobs
-from app.state.presets import OwnPresets
+from app.state.kept.presets import OwnPresets
 from app.state.workbench import Workbench
+from app.state.workers.jobs import Jobs
 from app.web.views.timeline import BUCKETS, Window
 
 FOR_EVER = "private, max-age=31536000, immutable"

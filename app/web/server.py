@@ -22,18 +22,18 @@ from app import errors
 from app.errors import sentence
 from app.paths import static_folder
 from app.state import opening_step
-from app.state.compiling import Compiling
-from app.state.evaluator import Evaluator
-from app.state.exporter import Exporter
-from app.state.history import History
 from app.state.importing.desk import Desk
-from app.state.jobs import Jobs, in_background
-from app.state.keeper import Keeper
-from app.state.presets import OwnPresets
-from app.state.recents import Recents
-from app.state.sensitivity import Sensitivity
+from app.state.kept.history import History
+from app.state.kept.presets import OwnPresets
+from app.state.kept.recents import Recents
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench
+from app.state.workers.compiling import Compiling
+from app.state.workers.evaluator import Evaluator
+from app.state.workers.exporter import Exporter
+from app.state.workers.jobs import Jobs, in_background
+from app.state.workers.keeper import Keeper
+from app.state.workers.sensitivity import Sensitivity
 from app.web import api, gateway, stream, teaching_routes
 from app.web.evaluation import routes as evaluation
 from app.web.gateway import Gateway

@@ -26,7 +26,7 @@ from tracker.kernels.pictures.foreground import (
     two_classes,
     update_background,
 )
-from tracker.parameters.foreground import ForegroundParams
+from tracker.parameters.groups.foreground import ForegroundParams
 
 ITERATIONS = 20
 """Of the c-means at most; the thresholds usually come to rest well before."""

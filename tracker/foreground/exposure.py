@@ -20,7 +20,7 @@ from numpy import ndarray
 from tracker.foreground.segmentation import Segmentation
 from tracker.kernels.pictures import images
 from tracker.kernels.pictures.foreground import level_medians, upper_medians
-from tracker.parameters.foreground import ForegroundParams
+from tracker.parameters.groups.foreground import ForegroundParams
 
 LEVELS = 16
 """Levels of the source at which a tone curve is measured; between them it is interpolated."""

@@ -17,7 +17,7 @@ from numpy import ndarray
 
 from tracker.foreground.exposure import BackgroundModel, square_roots
 from tracker.foreground.segmentation import Segmentation
-from tracker.parameters.foreground import ForegroundParams
+from tracker.parameters.groups.foreground import ForegroundParams
 
 LAG = 0.1
 """Seconds between two pictures that are compared: within it a moving hand leaves its place."""

@@ -13,17 +13,17 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from tracker.parameters.association_matrix import AssociationMatrixParams
-from tracker.parameters.colour_phd import ColourPeakParams, ColourPhdParams
 from tracker.parameters.definition import Params, Stage, ui
-from tracker.parameters.detections import DetectionBoxParams, DetectionPhdParams
-from tracker.parameters.foreground import ForegroundParams
-from tracker.parameters.fusion import FusionParams
-from tracker.parameters.jpda import JpdaParams
+from tracker.parameters.groups.association_matrix import AssociationMatrixParams
+from tracker.parameters.groups.colour_phd import ColourPeakParams, ColourPhdParams
+from tracker.parameters.groups.detections import DetectionBoxParams, DetectionPhdParams
+from tracker.parameters.groups.foreground import ForegroundParams
+from tracker.parameters.groups.fusion import FusionParams
+from tracker.parameters.groups.jpda import JpdaParams
+from tracker.parameters.groups.onnx_detector import OnnxDetectorParams
+from tracker.parameters.groups.pseudo_particle import PseudoParticleParams
+from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.parameters.methods import Method, MethodKey, Reads, Uses
-from tracker.parameters.onnx_detector import OnnxDetectorParams
-from tracker.parameters.pseudo_particle import PseudoParticleParams
-from tracker.parameters.smoothing import SmoothingParams
 
 if TYPE_CHECKING:
     from tracker.parameters.changing import (

@@ -29,22 +29,22 @@ ENTRY_POINTS: dict[MethodKey, str] = {
 
 BUILT_IN: dict[MethodKey, tuple[str, ...]] = {
     "single_view": (
-        "tracker.parameters.colour_phd:METHOD",
-        "tracker.parameters.jpda:METHOD",
-        "tracker.parameters.pseudo_particle:METHOD",
-        "tracker.parameters.association_matrix:METHOD",
-        "tracker.parameters.onnx_detector:METHOD",
-        "tracker.parameters.detections:FILTERED",
-        "tracker.parameters.detections:AS_THEY_ARE",
+        "tracker.parameters.groups.colour_phd:METHOD",
+        "tracker.parameters.groups.jpda:METHOD",
+        "tracker.parameters.groups.pseudo_particle:METHOD",
+        "tracker.parameters.groups.association_matrix:METHOD",
+        "tracker.parameters.groups.onnx_detector:METHOD",
+        "tracker.parameters.groups.detections:FILTERED",
+        "tracker.parameters.groups.detections:AS_THEY_ARE",
     ),
     "fusion_method": (
-        "tracker.parameters.fusion:SEQUENTIAL_PHD",
-        "tracker.parameters.fusion:MULTI_BERNOULLI",
+        "tracker.parameters.groups.fusion:SEQUENTIAL_PHD",
+        "tracker.parameters.groups.fusion:MULTI_BERNOULLI",
     ),
     "smoothing_method": (
-        "tracker.parameters.smoothing:NONE",
-        "tracker.parameters.smoothing:POSITIONS",
-        "tracker.parameters.smoothing:IDENTITIES",
+        "tracker.parameters.groups.smoothing:NONE",
+        "tracker.parameters.groups.smoothing:POSITIONS",
+        "tracker.parameters.groups.smoothing:IDENTITIES",
     ),
 }
 """Where the descriptions of this project's methods stand, in the order of their lists."""

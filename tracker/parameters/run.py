@@ -8,12 +8,12 @@ from pydantic import create_model
 from pydantic.fields import FieldInfo
 
 from tracker.parameters.definition import Params
-from tracker.parameters.foreground import ForegroundParams
-from tracker.parameters.fusion import FusionParams
+from tracker.parameters.groups.foreground import ForegroundParams
+from tracker.parameters.groups.fusion import FusionParams
+from tracker.parameters.groups.pictures import PictureParams
+from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.parameters.methods import Method, MethodKey
-from tracker.parameters.pictures import PictureParams
 from tracker.parameters.registry import REGISTERED
-from tracker.parameters.smoothing import SmoothingParams
 
 _Group = TypeVar("_Group", bound=Params)
 

@@ -29,9 +29,9 @@ from app.scene.panel.sliders import (
 )
 from app.scene.panel.topics import TOPICS, Topic, topic_of
 from app.scene.worker import LatestWorker
-from app.state.sensitivity import Sensitivity
 from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
+from app.state.workers.sensitivity import Sensitivity
 from tracker import parameters as table
 from tracker.parameters import MethodKey, Parameter, ParameterError, RunParameters
 

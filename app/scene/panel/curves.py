@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from app.scene.panel.sliders import number_text
-from app.state.sensitivity import Curve
+from app.state.workers.sensitivity import Curve
 
 WIDTH, HEIGHT = 64, 14
 """Of the drawing, pixels."""

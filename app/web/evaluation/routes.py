@@ -8,9 +8,9 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 
 from app.errors import ApiError
 from app.models import State
-from app.state.evaluator import Evaluator
 from app.state.scores import Scored
 from app.state.snapshot import Snapshot
+from app.state.workers.evaluator import Evaluator
 from app.web.dependencies import ERRORS, Bench, Part, file_name, nothing_open
 from app.web.evaluation import messages, models
 from app.web.views import results

@@ -13,7 +13,7 @@ from app.errors import ApiError, sentence
 from app.state.importing.desk import Desk
 from app.state.importing.draft import Draft
 from app.state.importing.uploads import Announced, UploadError
-from app.state.recents import Recents, thumbnail
+from app.state.kept.recents import Recents, thumbnail
 from app.web.dependencies import ERRORS, Bench, Work
 from app.web.importing.models import (
     AnnouncedFiles,

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from app.errors import ApiError, sentence
 from app.models import Model
-from app.state.exporter import Exporter
+from app.state.workers.exporter import Exporter
 from app.web.dependencies import ERRORS, Bench
 from app.web.library.routes import Kept, no_library
 from tracker.library.errors import LibraryError

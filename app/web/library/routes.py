@@ -12,7 +12,7 @@ from fastapi.responses import HTMLResponse
 
 from app.errors import ApiError, sentence
 from app.models import State
-from app.state.keeper import Keeper
+from app.state.workers.keeper import Keeper
 from app.web.dependencies import ERRORS, Bench, Work, nothing_open
 from app.web.library import drawing, models, preview
 from app.web.views import results

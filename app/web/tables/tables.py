@@ -12,11 +12,11 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 
 from app.models import CameraTrack, LaneEvent, Step
-from app.state.evaluator import Evaluator
-from app.state.history import History
+from app.state.kept.history import History
 from app.state.scores import Scored
-from app.state.sensitivity import Curve, Sensitivity
 from app.state.snapshot import RunPhase, RunState, Snapshot
+from app.state.workers.evaluator import Evaluator
+from app.state.workers.sensitivity import Curve, Sensitivity
 from app.web.dependencies import ERRORS, Bench, nothing_open
 from app.web.evaluation import messages
 from app.web.evaluation.models import Comparison

@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from app.state.compiling import WORDS, Compiling
-from app.state.jobs import Jobs
 from app.state.workbench import Workbench
+from app.state.workers.compiling import WORDS, Compiling
+from app.state.workers.jobs import Jobs
 from tests.app.conftest import wait_until
 from tracker import warm_up
 from tracker.kernels import compilation

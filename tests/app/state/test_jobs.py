@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.state.jobs import Jobs
 from app.state.snapshot import Event, Notice, Snapshot
 from app.state.workbench import Workbench
+from app.state.workers.jobs import Jobs
 from tests.app.conftest import wait_until
 from tests.app.folders import write_crossing
 from tracker import pipeline

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
-from app.state.presets import LONGEST_NAME, OwnPresets
+from app.state.kept.presets import LONGEST_NAME, OwnPresets
 from app.state.snapshot import Event, Notice
 from app.state.workbench import Workbench
 from tests.app.conftest import run_is, wait_until

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from app.scene.panel.curves import drawing_of, style_of, words_of
-from app.state import sensitivity as module
-from app.state.sensitivity import Curve, Sensitivity, values_to_try
 from app.state.workbench import Workbench
+from app.state.workers import sensitivity as module
+from app.state.workers.sensitivity import Curve, Sensitivity, values_to_try
 from tracker import parameters as table
 from tracker import pipeline
 from tracker.evaluation import evaluate_sequence

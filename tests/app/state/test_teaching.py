@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.state.drafts import Drafts
+from app.state.kept.drafts import Drafts
 from app.state.workbench import Workbench
 from app.web.server import Settings, create_app
 from app.web.views import results

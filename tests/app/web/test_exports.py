@@ -12,7 +12,7 @@ import av
 import pytest
 from starlette.testclient import TestClient
 
-from app.state.exporter import Exporter
+from app.state.workers.exporter import Exporter
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tests.library.written import written

@@ -20,7 +20,7 @@ from tests.engine.synthetic import ROOM as SMALL_ROOM
 from tracker.camera import Camera
 from tracker.foreground import pack, unpack
 from tracker.parameters import RunParameters, with_values
-from tracker.parameters.pictures import PictureParams
+from tracker.parameters.groups.pictures import PictureParams
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence, Template, View
 from tracker.single_view.box_sizes import upright_boxes

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
-from tracker.parameters.colour_phd import ColourPeakParams
 from tracker.parameters.definition import Params, ui
+from tracker.parameters.groups.colour_phd import ColourPeakParams
 from tracker.parameters.methods import Method, Reads, Uses
 
 if TYPE_CHECKING:

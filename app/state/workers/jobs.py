@@ -19,9 +19,9 @@ from functools import partial
 from pathlib import Path
 
 from app.errors import sentence
-from app.state.compiling import WORDS, Compiling
 from app.state.snapshot import Change, Opening, Snapshot
 from app.state.workbench import Workbench
+from app.state.workers.compiling import WORDS, Compiling
 from tracker import pipeline
 from tracker.library.keeping import run_from
 from tracker.library.records import Result

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.errors import sentence
-from app.state.jobs import CLOSING_SECONDS, be_nice
 from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
+from app.state.workers.jobs import CLOSING_SECONDS, be_nice
 from tracker import parameters as table
 from tracker import pipeline
 from tracker.evaluation import EvaluationSettings, evaluate_sequence

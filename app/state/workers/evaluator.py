@@ -9,10 +9,10 @@ from collections import OrderedDict
 from dataclasses import replace
 
 from app.errors import sentence
-from app.state.jobs import CLOSING_SECONDS, be_nice
 from app.state.scores import Scored
 from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
+from app.state.workers.jobs import CLOSING_SECONDS, be_nice
 from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
 from tracker.trajectories import Trajectories
 

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from app.state.importing.draft import small_jpeg
-from app.state.json_files import write_json
+from app.state.kept.json_files import write_json
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
 from tracker.folders import cache_folder

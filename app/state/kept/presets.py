@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from app.state.json_files import write_json
+from app.state.kept.json_files import write_json
 from app.state.snapshot import Presets
 from app.state.workbench import Workbench
 from tracker import parameters as table

@@ -7,7 +7,7 @@ import json
 import logging
 from pathlib import Path
 
-from app.state.json_files import write_json
+from app.state.kept.json_files import write_json
 from tracker.sequences.writing.teaching import Values, changes
 
 logger = logging.getLogger("app")

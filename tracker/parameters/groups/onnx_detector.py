@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from tracker.parameters.definition import ui
-from tracker.parameters.detections import DetectionBoxParams
+from tracker.parameters.groups.detections import DetectionBoxParams
 from tracker.parameters.methods import Method, Reads, Uses
 
 

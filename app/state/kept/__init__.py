@@ -1,0 +1,1 @@
+"""What outlives a start, and what can be taken back: presets, drafts, recent recordings, undo."""
