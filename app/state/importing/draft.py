@@ -21,7 +21,7 @@ from app.state.importing.wish import Wish, options_of
 from tracker.formats.pieces import FormatError, ImagesPiece, VideoPiece
 from tracker.importing.gathering import Taken, gather
 from tracker.importing.settling import Settled, SettledView, settle
-from tracker.importing.writing import write
+from tracker.importing.writing import FILE, write
 from tracker.pipeline import Cancelled
 from tracker.sequences.video import VideoDecoder, VideoError, index_video, read_image
 
@@ -78,6 +78,7 @@ class Draft:
         self._known = Known("uploading" if source is None else "reading", Wish(name=name))
         self._gathered = False
         self._stop = threading.Event()
+        self._given_up = False
         self._pictures: dict[str, bytes | None] = {}
         if source is not None:
             self._look_again()
@@ -200,8 +201,15 @@ class Draft:
             copied = wish.copy and self.upload is None
             told = write(settled, self.folder, wish.name, copy=copied)
             self.folder.replace(place)
-        except (FormatError, OSError) as error:
-            self._tell(phase="settled", error=f"it cannot be written: {sentence(error)}")
+        except Exception as error:
+            if not isinstance(error, ValueError | OSError):
+                logger.exception("writing an import failed")
+            with self._lock:
+                # else it could not be tried again under another name
+                (self.folder / FILE).unlink(missing_ok=True)
+                self._tell(phase="settled", error=f"it cannot be written: {sentence(error)}")
+                if self._given_up:
+                    shutil.rmtree(self.folder, ignore_errors=True)
             return
         self._tell(phase="written", folder=place, told=tuple(told))
         then(place)
@@ -210,6 +218,7 @@ class Draft:
         """Give it up; what was uploaded for it is removed."""
         with self._lock:
             self._stop.set()
+            self._given_up = True
             if self._known.phase not in ("writing", "written"):
                 shutil.rmtree(self.folder, ignore_errors=True)
 
