@@ -79,7 +79,7 @@ class Draft:
         self._gathered = False
         self._stop = threading.Event()
         self._given_up = False
-        self._pictures: dict[str, bytes | None] = {}
+        self._pictures: dict[Path, bytes | None] = {}
         if source is not None:
             self._look_again()
 
@@ -167,9 +167,14 @@ class Draft:
         )
         if view is None:
             return None
-        if camera not in self._pictures:
-            self._pictures[camera] = _middle(view)
-        return self._pictures[camera]
+        video, images = view.matched.video, view.matched.images
+        # a camera may be given other pictures, by a wish or by further files
+        key = video.path if video else images.files[0] if images else None
+        if key is None:
+            return None
+        if key not in self._pictures:
+            self._pictures[key] = _middle(view)
+        return self._pictures[key]
 
     def write(self, then: Callable[[Path], object]) -> None:
         """Write it as a recording, in the background.
