@@ -106,15 +106,34 @@ class Draft:
             if not same and self._gathered:
                 self._look_again()
 
+    def check_open(self) -> None:
+        """Nothing can come to it once it is being written.
+
+        Raises:
+            FormatError: If it is, or was.
+        """
+        if self._known.phase in ("writing", "written"):
+            raise FormatError("this recording is being written already; import the rest by itself")
+
     def arrived(self) -> None:
-        """All files are there."""
+        """All files are there.
+
+        Raises:
+            FormatError: If it is being written.
+        """
         with self._lock:
+            self.check_open()
             self._gathered = False
             self._look_again()
 
     def awaits(self) -> None:
-        """More files are to come."""
+        """More files are to come.
+
+        Raises:
+            FormatError: If it is being written.
+        """
         with self._lock:
+            self.check_open()
             self._stop.set()
             self._tell(phase="uploading", busy=False)
 
@@ -143,8 +162,9 @@ class Draft:
                 wish, taken, gathered = self._known.wish, self._known.taken, self._gathered
             if not gathered:
                 taken = tuple(gather([self.source]))
-                self._gathered = not stop.is_set()
-                tell(taken=taken)
+                with self._lock:
+                    tell(taken=taken)
+                    self._gathered = True
             settled = settle(taken, options_of(wish, taken))
             tell(settled=settled, phase="settled", error="")
             for looked in look_into(settled, wish.name, stop.is_set):
@@ -155,8 +175,9 @@ class Draft:
         except Exception as error:
             if not isinstance(error, ValueError | OSError):
                 logger.exception("looking into an import failed")
-            if not stop.is_set():
-                self._tell(phase="failed", busy=False, error=sentence(error))
+            with self._lock:
+                if not stop.is_set():
+                    self._tell(phase="failed", busy=False, error=sentence(error))
 
     def picture(self, camera: str) -> bytes | None:
         """The middle picture of a camera, by its name in the calibration, as JPEG."""

@@ -155,6 +155,7 @@ def add(wish: AnnouncedFiles, draft: Own) -> Begun:
     with _complaining():
         if draft.upload is None:
             raise UploadError("files cannot be added to a folder on the disk; put them there")
+        draft.check_open()
         first = draft.upload.announce([Announced(file.path, file.bytes) for file in wish.files])
         draft.awaits()
     return Begun(draft=info_of(draft), first=first)
