@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import threading
 import time
 from collections.abc import Callable
@@ -59,7 +60,8 @@ class Recents:
 
     def all(self) -> list[Recent]:
         """Those that are still there, the last one first."""
-        return [one for one in self._list if (Path(one.folder) / FILE).is_file()]
+        # of the module, for a method fails at a folder that may not be read any more
+        return [one for one in self._list if os.path.isfile(Path(one.folder) / FILE)]
 
     def _on_change(self, change: Change) -> None:
         sequence = self._workbench.snapshot().sequence

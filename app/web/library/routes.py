@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Annotated
@@ -83,7 +84,8 @@ def library(request: Request, keeper: Kept) -> models.LibraryInfo:
 
 def _recording(recording: Recording) -> models.RecordingInfo:
     missing = None
-    if recording.kind == "folder" and not (Path(recording.place) / FILE).is_file():
+    # of the module, for a method fails at a folder that may not be read any more
+    if recording.kind == "folder" and not os.path.isfile(Path(recording.place) / FILE):
         missing = f"there is no {FILE} in {recording.place} any more"
     return models.RecordingInfo(
         id=recording.id,
