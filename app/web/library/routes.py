@@ -22,6 +22,7 @@ from tracker.library.errors import LibraryError
 from tracker.library.keeping import code_version, recording_of
 from tracker.library.records import KeptRun, Recording, Result
 from tracker.library.store import Library
+from tracker.pipeline import Cancelled
 from tracker.sequences import library as sequences
 from tracker.sequences.reader import FILE
 
@@ -214,6 +215,8 @@ async def open_run(number: int, opened: Opened, bench: Bench, jobs: Work) -> Sta
                 await asyncio.wait_for(asyncio.shield(future), OPENING_SECONDS)
             except TimeoutError:
                 future.add_done_callback(lambda done: done.cancelled() or done.exception())
+    except Cancelled as error:
+        raise ApiError(409, "superseded", f"{result.run.title}: {error}.") from None
     except (ValueError, OSError) as error:
         raise ApiError(
             422,
