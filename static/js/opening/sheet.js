@@ -2,7 +2,7 @@
 import { all, h, one } from "../elements/dom.js";
 import { ApiError, getJson, request, sendJson } from "../state/api.js";
 import { mountPlan } from "./plan.js";
-import { announced, chosen, dropped, send } from "./upload.js";
+import { ANNOUNCED, announced, chosen, dropped, send } from "./upload.js";
 
 const ASK_AGAIN = 400;
 const SCROLLING = ".cams-scroll, .in-scroll, .open-list";
@@ -17,6 +17,8 @@ export function mountOpening({ store, actions }) {
 	let past = [];
 	/** @type {AbortController | null} */
 	let sending = null;
+	/** What was dropped and is on its way: all is looked into when the last of it is here. */
+	let under = 0;
 	let [shown, trouble, turns] = ["", "", 0];
 	/** What is being wished; writing comes after it. */
 	let wishing = Promise.resolve();
@@ -128,14 +130,27 @@ export function mountOpening({ store, actions }) {
 		void attempt(async () => {
 			const more = info?.uploaded ? info : null;
 			if (!more) await giveUp();
-			const path = more ? `/api/import/${more.key}/files` : "/api/import";
-			const { draft, first } = await sendJson("POST", path, announced(files));
-			take(draft);
-			const begun = performance.now();
-			let sent = 0;
-			sending = new AbortController();
+			let path = more ? `/api/import/${more.key}/files` : "/api/import";
+			/** @type {number[]} */
+			const numbers = [];
+			async function announce() {
+				const some = files.slice(numbers.length, numbers.length + ANNOUNCED);
+				const { draft, first } = await sendJson("POST", path, announced(some));
+				path = `/api/import/${draft.key}/files`;
+				numbers.push(...some.map((_, k) => first + k));
+				take(draft);
+				return draft;
+			}
+			const own = (sending ??= new AbortController());
+			under += 1;
+			/** @type {Server.ImportInfo} */
+			let draft;
 			try {
-				await send(draft.key, first, files, sending.signal, (bytes) => {
+				draft = await announce();
+				while (numbers.length < files.length) draft = await announce();
+				const begun = performance.now();
+				let sent = 0;
+				await send(draft.key, numbers, files, own.signal, (bytes) => {
 					sent += bytes;
 					const speed = sent / 1e3 / (performance.now() - begun + 1);
 					const part = (draft.received + sent) / draft.bytes;
@@ -150,10 +165,12 @@ export function mountOpening({ store, actions }) {
 				});
 			} catch (error) {
 				// What cannot be finished leaves nothing behind.
-				await giveUp();
+				if (numbers.length && sending === own) await giveUp();
 				throw error;
+			} finally {
+				under -= 1;
 			}
-			take(await sendJson("POST", `/api/import/${draft.key}/arrived`));
+			if (!under) take(await sendJson("POST", `/api/import/${draft.key}/arrived`));
 		});
 	}
 
