@@ -5,6 +5,7 @@ import { mountPlan } from "./plan.js";
 import { ANNOUNCED, announced, chosen, dropped, send } from "./upload.js";
 
 const ASK_AGAIN = 400;
+const CONTROLS = "button, input, select, [tabindex]";
 const SCROLLING = ".cams-scroll, .in-scroll, .open-list";
 
 /** @param {Context} context */
@@ -79,16 +80,13 @@ export function mountOpening({ store, actions }) {
 		const types = held instanceof HTMLInputElement && held.value !== held.defaultValue;
 		if ((dialog.contains(held) && types) || one("[data-held]", dialog)) return;
 		if (html !== shown) {
-			const at = all("button, input, select", dialog).findIndex((control) => control === held);
+			const at = all(CONTROLS, dialog).findIndex((control) => control === held);
 			const scrolled = all(SCROLLING, dialog).map(({ scrollTop }) => scrollTop);
 			dialog.innerHTML = shown = html;
 			dialog.classList.toggle("wide", Boolean(info));
 			all(SCROLLING, dialog).forEach((part, k) => (part.scrollTop = scrolled[k] ?? 0));
 			if (at >= 0)
-				(
-					(held?.id && document.getElementById(held.id)) ||
-					all("button, input, select", dialog)[at]
-				)?.focus();
+				((held?.id && document.getElementById(held.id)) || all(CONTROLS, dialog)[at])?.focus();
 			for (const image of all("img", dialog)) image.onerror = () => image.remove();
 			for (const plan of all("[data-plan]", dialog))
 				mountPlan(plan, structuredClone(info?.room ?? []), (room) => wish({ room }));
