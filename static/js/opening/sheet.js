@@ -276,6 +276,8 @@ export function mountOpening({ store, actions }) {
 		layer.hidden = true;
 		if (!carries(event) || !event.dataTransfer) return;
 		event.preventDefault();
-		void dropped(event.dataTransfer).then(bring);
+		void dropped(event.dataTransfer).then(bring, ({ message }) =>
+			actions.note("error", "What was dropped cannot be read", message),
+		);
 	});
 }
