@@ -248,8 +248,11 @@ export function mountLibrary(root, { store, actions }) {
 	async function choose(one, again = false) {
 		if (!again) chosen.clear();
 		recording = one;
-		runs =
+		const found =
 			one && one.id !== null ? (await getJson(`/api/library/recordings/${one.id}/runs`)).runs : [];
+		// Another one was chosen meanwhile.
+		if (recording !== one) return;
+		runs = found;
 		for (const id of chosen) if (!runs.some((run) => run.id === id)) chosen.delete(id);
 		const there = runs.some(({ id }) => id === focused);
 		await focus(there && again ? focused : (runs[0]?.id ?? null));
