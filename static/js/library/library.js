@@ -160,15 +160,21 @@ export function mountLibrary(root, { store, actions }) {
 		);
 	}
 
-	function show() {
-		if (!library) return;
+	/** Those that are neither of another name nor without a star, where that is asked for. */
+	function listed() {
 		const text = find.value.trim();
-		const matching = runs.filter(
+		return runs.filter(
 			(run) =>
 				(!starred || run.star) &&
 				(!text ||
 					has(text, [recording?.name ?? "", titleOf(run), run.note, ...run.tags, run.single_view])),
 		);
+	}
+
+	function show() {
+		if (!library) return;
+		const text = find.value.trim();
+		const matching = listed();
 		const kinds = /** @type {const} */ ([
 			["Own", "folder"],
 			["Rendered rooms", "rendered"],
@@ -380,7 +386,7 @@ export function mountLibrary(root, { store, actions }) {
 		},
 		F2: rename,
 		Delete: () => void remove(),
-		"Ctrl+a": () => (runs.forEach(({ id }) => chosen.add(id)), show()),
+		"Ctrl+a": () => (listed().forEach(({ id }) => chosen.add(id)), show()),
 		"Ctrl+z": () => void takeBack(),
 		"/": () => find.focus(),
 	};
