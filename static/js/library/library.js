@@ -179,6 +179,7 @@ export function mountLibrary(root, { store, actions }) {
 			["Own", "folder"],
 			["Rendered rooms", "rendered"],
 		]);
+		const walked = list.contains(document.activeElement);
 		fill(
 			list,
 			kinds.flatMap(([word, kind]) => {
@@ -191,6 +192,9 @@ export function mountLibrary(root, { store, actions }) {
 				return found.length ? [head, ...found.map(item)] : [];
 			}),
 		);
+		// The items are new: who walks through them by arrows goes on from the chosen one.
+		if (walked)
+			/** @type {HTMLElement | null} */ (list.querySelector('[aria-selected="true"]'))?.focus();
 		const kept = library.recordings.reduce((sum, one) => sum + one.runs, 0);
 		fill(
 			foot,
