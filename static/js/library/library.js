@@ -20,6 +20,8 @@ export function mountLibrary(root, { store, actions }) {
 	const chosen = new Set();
 	/** @type {number | null} */
 	let focused = null;
+	/** @type {number | null} whose preview is there */
+	let drawn = null;
 	/** @type {Server.Deleted | null} */
 	let deleted = null;
 	let starred = false;
@@ -275,6 +277,7 @@ export function mountLibrary(root, { store, actions }) {
 		show();
 		const run = focusedRun();
 		if (!run) {
+			drawn = null;
 			fill(head);
 			return fill(body, h("p", { class: "blank" }, "A run that is chosen is shown here in small."));
 		}
@@ -291,6 +294,9 @@ export function mountLibrary(root, { store, actions }) {
 		const answer = await request(`/api/library/runs/${id}/drawn`).catch((error) => error);
 		const text = answer instanceof Error ? "" : await answer.text();
 		if (id !== focused) return;
+		// Whoever writes a note is not disturbed.
+		if (id === drawn && body.contains(document.activeElement)) return;
+		drawn = text ? id : null;
 		if (text) body.innerHTML = text;
 		else fill(body, h("p", { class: "blank" }, answer.message));
 	}
