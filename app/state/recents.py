@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import secrets
 import threading
 import time
 from collections.abc import Callable
@@ -114,7 +115,8 @@ def thumbnail(folder: Path, cancelled: Callable[[], bool] = lambda: False) -> by
             picture = next((one for one in found if one is not None), None)
         jpeg = None if picture is None else small_jpeg(picture)
         place.parent.mkdir(parents=True, exist_ok=True)
-        partial = place.with_suffix(".part")
+        # a name of its own: two tabs may ask at once
+        partial = place.with_suffix(f".{secrets.token_hex(4)}.part")
         partial.write_bytes(jpeg or b"")
         partial.replace(place)
         return jpeg
