@@ -304,7 +304,11 @@ export function mountLibrary(root, { store, actions }) {
 	async function compare() {
 		const dialog = /** @type {any} */ (one(".compare"));
 		const numbers = ofChosen().map(({ id }) => `runs=${id}`);
-		const answer = await request(`/api/library/compared?${numbers.join("&")}`);
+		const answer = await request(`/api/library/compared?${numbers.join("&")}`).catch(
+			(error) => error,
+		);
+		if (answer instanceof Error)
+			return actions.note("error", "The runs cannot be compared", answer.message);
 		dialog.innerHTML = await answer.text();
 		dialog.onclick = () => dialog.close();
 		dialog.showModal();
