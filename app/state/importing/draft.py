@@ -135,6 +135,8 @@ class Draft:
         with self._lock:
             self.check_open()
             self._stop.set()
+            # else a wish would have it settled while files are on their way
+            self._gathered = False
             self._tell(phase="uploading", busy=False)
 
     def _tell(self, **changes: object) -> None:
@@ -214,7 +216,7 @@ class Draft:
             if place.exists():
                 raise FormatError(f"there is a recording {place.name} already; choose another name")
             self._stop.set()
-            self._tell(phase="writing", busy=False)
+            self._tell(phase="writing", busy=False, error="")
         arguments = (known.taken, known.wish, place, then)
         threading.Thread(target=self._write, args=arguments, name="import", daemon=True).start()
 
