@@ -227,7 +227,7 @@ class Draft:
             # what was wished last may not have been looked into yet
             settled = settle(taken, options_of(wish, taken))
             copied = wish.copy and self.upload is None
-            told = write(settled, self.folder, wish.name, copy=copied)
+            told = write(settled, self.folder, wish.name or place.name, copy=copied)
             self.folder.replace(place)
         except Exception as error:
             if not isinstance(error, ValueError | OSError):
