@@ -29,6 +29,7 @@ def detect(command: Detect) -> None:
     from tracker.boxes import Boxes
     from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
+    from tracker.writing.placing import file_names
 
     changes = set_values(command.set)
     if command.output.exists() and not command.output.is_dir():
@@ -52,12 +53,13 @@ def detect(command: Detect) -> None:
         )
     command.output.mkdir(parents=True, exist_ok=True)
     counts = []
-    for number, camera in enumerate(sequence.cameras):
+    files = file_names([camera.name for camera in sequence.cameras])
+    for number, (camera, file) in enumerate(zip(sequence.cameras, files, strict=True)):
         views = [step[number] for step in run.views]
         boxes = np.concatenate([Boxes(view.measurements).left_top for view in views])
         scores = np.concatenate([view.measurement_scores for view in views])
         frames = np.repeat(np.arange(len(views)), [len(view.measurements) for view in views])
-        _write(command.output / f"{camera.name}.csv", frames, boxes, scores)
+        _write(command.output / f"{file}.csv", frames, boxes, scores)
         counts.append(f"{camera.name} {len(boxes)}")
     say(f"boxes in {sequence.frames} steps: {', '.join(counts)}; written to {command.output}")
 

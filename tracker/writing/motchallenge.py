@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
+from tracker.writing.placing import file_names
 from tracker.writing.written import Options, Written
 
 BENCHMARK, SPLIT, TRACKER = "multiview", "train", "multiview-phd"
@@ -37,7 +38,8 @@ def write(folder: Path, written: Written, options: Options) -> None:
     name = "".join(c if c.isalnum() or c in "-_" else "-" for c in sequence.name)
     half = sequence.target_half_extents
     truth = sequence.ground_truth
-    parts = [(GROUND, -1), *((camera.name, k) for k, camera in enumerate(sequence.cameras))]
+    names = file_names([GROUND, *(camera.name for camera in sequence.cameras)])
+    parts = [(part, k - 1) for k, part in enumerate(names)]
     for done, (part, index) in enumerate(parts):
         options.at(done, len(parts))
         one = f"{name}-{part}"

@@ -5,9 +5,18 @@ from __future__ import annotations
 import os
 import secrets
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+
+
+def file_names(names: Sequence[str]) -> list[str]:
+    """Names of cameras as names of files: each its own, none that leads into another folder."""
+    found: list[str] = []
+    for name in names:
+        plain = "".join(c if c.isprintable() and c not in "/\\" else "-" for c in name)
+        found.append(plain if plain not in found else f"{plain}-{len(found) + 1}")
+    return found
 
 
 @contextmanager

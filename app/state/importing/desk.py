@@ -66,8 +66,11 @@ class Desk:
         Raises:
             UploadError: If it is not there, or not below a folder that may be opened.
         """
-        given = Path(path).expanduser()
-        place = (self._data / given).resolve()
+        try:
+            given = Path(path).expanduser()
+            place = (self._data / given).resolve()
+        except (ValueError, RuntimeError) as error:  # a null byte, no such person, a circle
+            raise UploadError(f"{path!r}: is no path ({error}); check it") from None
         if place.name == FILE:
             place = place.parent
         if (place / FILE).is_file():
@@ -88,7 +91,8 @@ class Desk:
         return sorted(
             path.name
             for path in self._data.iterdir()
-            if path.is_dir() and not path.name.startswith(".") and not (path / FILE).is_file()
+            # of the module, for a method fails at a folder that may not be read
+            if path.is_dir() and not path.name.startswith(".") and not os.path.isfile(path / FILE)
         )
 
     def free(self) -> int:

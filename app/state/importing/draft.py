@@ -21,7 +21,7 @@ from app.state.importing.wish import Wish, options_of
 from tracker.formats.pieces import FormatError, ImagesPiece, VideoPiece
 from tracker.importing.gathering import Taken, gather
 from tracker.importing.settling import Settled, SettledView, settle
-from tracker.importing.writing import write
+from tracker.importing.writing import FILE, write
 from tracker.pipeline import Cancelled
 from tracker.sequences.video import VideoDecoder, VideoError, index_video, read_image
 
@@ -78,7 +78,8 @@ class Draft:
         self._known = Known("uploading" if source is None else "reading", Wish(name=name))
         self._gathered = False
         self._stop = threading.Event()
-        self._pictures: dict[str, bytes | None] = {}
+        self._given_up = False
+        self._pictures: dict[Path, bytes | None] = {}
         if source is not None:
             self._look_again()
 
@@ -105,16 +106,37 @@ class Draft:
             if not same and self._gathered:
                 self._look_again()
 
+    def check_open(self) -> None:
+        """Nothing can come to it once it is being written.
+
+        Raises:
+            FormatError: If it is, or was.
+        """
+        if self._known.phase in ("writing", "written"):
+            raise FormatError("this recording is being written already; import the rest by itself")
+
     def arrived(self) -> None:
-        """All files are there."""
+        """All files are there.
+
+        Raises:
+            FormatError: If it is being written.
+        """
         with self._lock:
+            self.check_open()
             self._gathered = False
             self._look_again()
 
     def awaits(self) -> None:
-        """More files are to come."""
+        """More files are to come.
+
+        Raises:
+            FormatError: If it is being written.
+        """
         with self._lock:
+            self.check_open()
             self._stop.set()
+            # else a wish would have it settled while files are on their way
+            self._gathered = False
             self._tell(phase="uploading", busy=False)
 
     def _tell(self, **changes: object) -> None:
@@ -142,8 +164,9 @@ class Draft:
                 wish, taken, gathered = self._known.wish, self._known.taken, self._gathered
             if not gathered:
                 taken = tuple(gather([self.source]))
-                self._gathered = not stop.is_set()
-                tell(taken=taken)
+                with self._lock:
+                    tell(taken=taken)
+                    self._gathered = True
             settled = settle(taken, options_of(wish, taken))
             tell(settled=settled, phase="settled", error="")
             for looked in look_into(settled, wish.name, stop.is_set):
@@ -154,8 +177,9 @@ class Draft:
         except Exception as error:
             if not isinstance(error, ValueError | OSError):
                 logger.exception("looking into an import failed")
-            if not stop.is_set():
-                self._tell(phase="failed", busy=False, error=sentence(error))
+            with self._lock:
+                if not stop.is_set():
+                    self._tell(phase="failed", busy=False, error=sentence(error))
 
     def picture(self, camera: str) -> bytes | None:
         """The middle picture of a camera, by its name in the calibration, as JPEG."""
@@ -166,9 +190,14 @@ class Draft:
         )
         if view is None:
             return None
-        if camera not in self._pictures:
-            self._pictures[camera] = _middle(view)
-        return self._pictures[camera]
+        video, images = view.matched.video, view.matched.images
+        # a camera may be given other pictures, by a wish or by further files
+        key = video.path if video else images.files[0] if images else None
+        if key is None:
+            return None
+        if key not in self._pictures:
+            self._pictures[key] = _middle(view)
+        return self._pictures[key]
 
     def write(self, then: Callable[[Path], object]) -> None:
         """Write it as a recording, in the background.
@@ -187,7 +216,7 @@ class Draft:
             if place.exists():
                 raise FormatError(f"there is a recording {place.name} already; choose another name")
             self._stop.set()
-            self._tell(phase="writing", busy=False)
+            self._tell(phase="writing", busy=False, error="")
         arguments = (known.taken, known.wish, place, then)
         threading.Thread(target=self._write, args=arguments, name="import", daemon=True).start()
 
@@ -198,10 +227,17 @@ class Draft:
             # what was wished last may not have been looked into yet
             settled = settle(taken, options_of(wish, taken))
             copied = wish.copy and self.upload is None
-            told = write(settled, self.folder, wish.name, copy=copied)
+            told = write(settled, self.folder, wish.name or place.name, copy=copied)
             self.folder.replace(place)
-        except (FormatError, OSError) as error:
-            self._tell(phase="settled", error=f"it cannot be written: {sentence(error)}")
+        except Exception as error:
+            if not isinstance(error, ValueError | OSError):
+                logger.exception("writing an import failed")
+            with self._lock:
+                # else it could not be tried again under another name
+                (self.folder / FILE).unlink(missing_ok=True)
+                self._tell(phase="settled", error=f"it cannot be written: {sentence(error)}")
+                if self._given_up:
+                    shutil.rmtree(self.folder, ignore_errors=True)
             return
         self._tell(phase="written", folder=place, told=tuple(told))
         then(place)
@@ -210,6 +246,7 @@ class Draft:
         """Give it up; what was uploaded for it is removed."""
         with self._lock:
             self._stop.set()
+            self._given_up = True
             if self._known.phase not in ("writing", "written"):
                 shutil.rmtree(self.folder, ignore_errors=True)
 

@@ -123,11 +123,15 @@ class Upload:
                 "below the data folder and open it by its path"
             )
         self._check_room(sum(file.bytes for file in files))
+        made: list[Path] = []
         for path, file in zip(paths, files, strict=True):
-            path.parent.mkdir(parents=True, exist_ok=True)
             try:
+                path.parent.mkdir(parents=True, exist_ok=True)
                 path.touch(exist_ok=False)
+                made.append(path)
             except OSError as error:  # a file where another one needs a folder
+                for other in made:
+                    other.unlink(missing_ok=True)
                 raise UploadError(f"{file.path!r}: cannot be written ({error.strerror})") from None
         self._files += files
         self._paths += paths
@@ -166,6 +170,8 @@ class Upload:
                 f"{file.path}: expected {file.bytes:,} bytes as announced, found more; it was "
                 "changed meanwhile: drop it again"
             )
-        with self._paths[number].open("ab") as stream:
+        # by its place: of a piece that the disk had no room for, a part may be there already
+        with self._paths[number].open("r+b") as stream:
+            stream.seek(offset)
             stream.write(data)
         self._received[number] += len(data)

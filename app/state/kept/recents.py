@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import secrets
 import threading
 import time
 from collections.abc import Callable
@@ -59,7 +61,8 @@ class Recents:
 
     def all(self) -> list[Recent]:
         """Those that are still there, the last one first."""
-        return [one for one in self._list if (Path(one.folder) / FILE).is_file()]
+        # of the module, for a method fails at a folder that may not be read any more
+        return [one for one in self._list if os.path.isfile(Path(one.folder) / FILE)]
 
     def _on_change(self, change: Change) -> None:
         sequence = self._workbench.snapshot().sequence
@@ -112,7 +115,8 @@ def thumbnail(folder: Path, cancelled: Callable[[], bool] = lambda: False) -> by
             picture = next((one for one in found if one is not None), None)
         jpeg = None if picture is None else small_jpeg(picture)
         place.parent.mkdir(parents=True, exist_ok=True)
-        partial = place.with_suffix(".part")
+        # a name of its own: two tabs may ask at once
+        partial = place.with_suffix(f".{secrets.token_hex(4)}.part")
         partial.write_bytes(jpeg or b"")
         partial.replace(place)
         return jpeg

@@ -73,6 +73,7 @@ class Exporter:
         """
         self.cancel()
         with self._lock:
+            self._cancelled.set()  # of one that another page began since
             self._forget()
             self._cancelled = cancelled = threading.Event()
             self._folder = Path(tempfile.mkdtemp(prefix="multiview-phd-export-"))

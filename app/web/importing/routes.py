@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
+from urllib.parse import quote
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 
@@ -85,7 +86,7 @@ def recordings(request: Request, desk: AtDesk, bench: Bench) -> Recordings:
         RecordingCard(
             name=entry.name, opens=entry.name, kind=entry.kind, description=entry.description,
             cameras=entry.cameras, frames=entry.frames, fps=0.0, opened=0.0,
-            picture=f"/api/recordings/picture?name={entry.name}" if entry.ready else "",
+            picture=f"/api/recordings/picture?name={quote(entry.name)}" if entry.ready else "",
         )
         for entry in library.available(data)
         if str(entry.folder.absolute()) not in listed and entry.error is None
@@ -155,6 +156,7 @@ def add(wish: AnnouncedFiles, draft: Own) -> Begun:
     with _complaining():
         if draft.upload is None:
             raise UploadError("files cannot be added to a folder on the disk; put them there")
+        draft.check_open()
         first = draft.upload.announce([Announced(file.path, file.bytes) for file in wish.files])
         draft.awaits()
     return Begun(draft=info_of(draft), first=first)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Annotated
@@ -21,6 +22,7 @@ from tracker.library.errors import LibraryError
 from tracker.library.keeping import code_version, recording_of
 from tracker.library.records import KeptRun, Recording, Result
 from tracker.library.store import Library
+from tracker.pipeline import Cancelled
 from tracker.sequences import library as sequences
 from tracker.sequences.reader import FILE
 
@@ -83,7 +85,8 @@ def library(request: Request, keeper: Kept) -> models.LibraryInfo:
 
 def _recording(recording: Recording) -> models.RecordingInfo:
     missing = None
-    if recording.kind == "folder" and not (Path(recording.place) / FILE).is_file():
+    # of the module, for a method fails at a folder that may not be read any more
+    if recording.kind == "folder" and not os.path.isfile(Path(recording.place) / FILE):
         missing = f"there is no {FILE} in {recording.place} any more"
     return models.RecordingInfo(
         id=recording.id,
@@ -212,6 +215,8 @@ async def open_run(number: int, opened: Opened, bench: Bench, jobs: Work) -> Sta
                 await asyncio.wait_for(asyncio.shield(future), OPENING_SECONDS)
             except TimeoutError:
                 future.add_done_callback(lambda done: done.cancelled() or done.exception())
+    except Cancelled as error:
+        raise ApiError(409, "superseded", f"{result.run.title}: {error}.") from None
     except (ValueError, OSError) as error:
         raise ApiError(
             422,

@@ -1,5 +1,5 @@
 /** Steps that somebody marked, each with a note: kept in this browser for each recording. */
-import { fill, h, icon } from "../elements/dom.js";
+import { all, fill, h, icon } from "../elements/dom.js";
 
 const nameOf = (/** @type {string} */ recording) => `bookmarks ${recording}`;
 
@@ -26,6 +26,12 @@ export function mountBookmarks(root, { store, actions, playback }) {
 	function list() {
 		const { bookmarks } = store.get();
 		root.hidden = bookmarks.length === 0;
+		// A note that was just written stands there already, and a list that is drawn anew takes the
+		// button away on which its writer is pressing.
+		const notes = all("input", root);
+		const same = (/** @type {Bookmark} */ { step, note }, /** @type {number} */ k) =>
+			notes[k].id === `note-${step}` && notes[k].value === note;
+		if (notes.length === bookmarks.length && bookmarks.every(same)) return;
 		const held = document.activeElement?.id;
 		fill(
 			root,

@@ -1,6 +1,6 @@
 /** Runs leave: a menu of forms, then each is written by the server and saved by the browser. */
 import { fill, h, icon } from "../elements/dom.js";
-import { getJson, sendJson } from "../state/api.js";
+import { getJson } from "../state/api.js";
 
 const ASKS_MS = 250;
 
@@ -65,9 +65,12 @@ export function exportMenu({ actions, chosen, say }) {
 			const { number } = now;
 			while (now.state === "writing" && now.number === number) {
 				const share = now.total ? ` ${Math.round((100 * now.done) / now.total)} %` : "";
-				say(`Run ${run} as ${form.word}${share}`, () => void sendJson("DELETE", "/api/exports"));
+				say(`Run ${run} as ${form.word}${share}`, () => void actions.ask("DELETE", "exports"));
 				await new Promise((resolve) => setTimeout(resolve, ASKS_MS));
-				now = await getJson("/api/exports");
+				now = await getJson("/api/exports").catch((error) => ({
+					state: "failed",
+					error: error.message,
+				}));
 			}
 			say("");
 			if (now.state === "failed")

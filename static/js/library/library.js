@@ -20,6 +20,8 @@ export function mountLibrary(root, { store, actions }) {
 	const chosen = new Set();
 	/** @type {number | null} */
 	let focused = null;
+	/** @type {number | null} whose preview is there */
+	let drawn = null;
 	/** @type {Server.Deleted | null} */
 	let deleted = null;
 	let starred = false;
@@ -160,19 +162,26 @@ export function mountLibrary(root, { store, actions }) {
 		);
 	}
 
-	function show() {
-		if (!library) return;
+	/** Those that are neither of another name nor without a star, where that is asked for. */
+	function listed() {
 		const text = find.value.trim();
-		const matching = runs.filter(
+		return runs.filter(
 			(run) =>
 				(!starred || run.star) &&
 				(!text ||
 					has(text, [recording?.name ?? "", titleOf(run), run.note, ...run.tags, run.single_view])),
 		);
+	}
+
+	function show() {
+		if (!library) return;
+		const text = find.value.trim();
+		const matching = listed();
 		const kinds = /** @type {const} */ ([
 			["Own", "folder"],
 			["Rendered rooms", "rendered"],
 		]);
+		const walked = list.contains(document.activeElement);
 		fill(
 			list,
 			kinds.flatMap(([word, kind]) => {
@@ -185,6 +194,9 @@ export function mountLibrary(root, { store, actions }) {
 				return found.length ? [head, ...found.map(item)] : [];
 			}),
 		);
+		// The items are new: who walks through them by arrows goes on from the chosen one.
+		if (walked)
+			/** @type {HTMLElement | null} */ (list.querySelector('[aria-selected="true"]'))?.focus();
 		const kept = library.recordings.reduce((sum, one) => sum + one.runs, 0);
 		fill(
 			foot,
@@ -248,8 +260,11 @@ export function mountLibrary(root, { store, actions }) {
 	async function choose(one, again = false) {
 		if (!again) chosen.clear();
 		recording = one;
-		runs =
+		const found =
 			one && one.id !== null ? (await getJson(`/api/library/recordings/${one.id}/runs`)).runs : [];
+		// Another one was chosen meanwhile.
+		if (recording !== one) return;
+		runs = found;
 		for (const id of chosen) if (!runs.some((run) => run.id === id)) chosen.delete(id);
 		const there = runs.some(({ id }) => id === focused);
 		await focus(there && again ? focused : (runs[0]?.id ?? null));
@@ -262,6 +277,7 @@ export function mountLibrary(root, { store, actions }) {
 		show();
 		const run = focusedRun();
 		if (!run) {
+			drawn = null;
 			fill(head);
 			return fill(body, h("p", { class: "blank" }, "A run that is chosen is shown here in small."));
 		}
@@ -278,6 +294,9 @@ export function mountLibrary(root, { store, actions }) {
 		const answer = await request(`/api/library/runs/${id}/drawn`).catch((error) => error);
 		const text = answer instanceof Error ? "" : await answer.text();
 		if (id !== focused) return;
+		// Whoever writes a note is not disturbed.
+		if (id === drawn && body.contains(document.activeElement)) return;
+		drawn = text ? id : null;
 		if (text) body.innerHTML = text;
 		else fill(body, h("p", { class: "blank" }, answer.message));
 	}
@@ -285,7 +304,11 @@ export function mountLibrary(root, { store, actions }) {
 	async function compare() {
 		const dialog = /** @type {any} */ (one(".compare"));
 		const numbers = ofChosen().map(({ id }) => `runs=${id}`);
-		const answer = await request(`/api/library/compared?${numbers.join("&")}`);
+		const answer = await request(`/api/library/compared?${numbers.join("&")}`).catch(
+			(error) => error,
+		);
+		if (answer instanceof Error)
+			return actions.note("error", "The runs cannot be compared", answer.message);
 		dialog.innerHTML = await answer.text();
 		dialog.onclick = () => dialog.close();
 		dialog.showModal();
@@ -377,7 +400,7 @@ export function mountLibrary(root, { store, actions }) {
 		},
 		F2: rename,
 		Delete: () => void remove(),
-		"Ctrl+a": () => (runs.forEach(({ id }) => chosen.add(id)), show()),
+		"Ctrl+a": () => (listed().forEach(({ id }) => chosen.add(id)), show()),
 		"Ctrl+z": () => void takeBack(),
 		"/": () => find.focus(),
 	};

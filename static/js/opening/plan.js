@@ -46,7 +46,7 @@ export function mountPlan(svg, room, put) {
 		const { x, y } = new DOMPoint(clientX, clientY).matrixTransform(svg.getScreenCTM().inverse());
 		move(held, [x + left, bottom + high - y][held[0]]);
 	};
-	svg.onpointerup = () => {
+	svg.onpointerup = svg.onpointercancel = () => {
 		delete svg.dataset.held;
 		if (held) put(room);
 		held = null;
@@ -55,9 +55,16 @@ export function mountPlan(svg, room, put) {
 		const by = { ArrowLeft: -0.05, ArrowRight: 0.05, ArrowDown: -0.05, ArrowUp: 0.05 }[event.key];
 		if (!by) return;
 		event.preventDefault();
+		svg.dataset.held = "";
 		const [axis, end] = [/Left|Right/.test(event.key) ? 0 : 1, event.shiftKey ? 1 : 0];
 		move([axis, end], room[end][axis] + by);
 	};
-	svg.onkeyup = (/** @type {KeyboardEvent} */ { key }) => key.startsWith("Arrow") && put(room);
+	svg.onkeyup = (/** @type {KeyboardEvent} */ { key }) => {
+		if (!key.startsWith("Arrow")) return;
+		delete svg.dataset.held;
+		put(room);
+	};
+	// The key may be let go elsewhere.
+	svg.onblur = () => delete svg.dataset.held;
 	place();
 }

@@ -2,9 +2,10 @@
 import { all, h, one } from "../elements/dom.js";
 import { ApiError, getJson, request, sendJson } from "../state/api.js";
 import { mountPlan } from "./plan.js";
-import { announced, chosen, dropped, send } from "./upload.js";
+import { ANNOUNCED, announced, chosen, dropped, send } from "./upload.js";
 
 const ASK_AGAIN = 400;
+const CONTROLS = "button, input, select, [tabindex]";
 const SCROLLING = ".cams-scroll, .in-scroll, .open-list";
 
 /** @param {Context} context */
@@ -17,6 +18,8 @@ export function mountOpening({ store, actions }) {
 	let past = [];
 	/** @type {AbortController | null} */
 	let sending = null;
+	/** What was dropped and is on its way: all is looked into when the last of it is here. */
+	let under = 0;
 	let [shown, trouble, turns] = ["", "", 0];
 	/** What is being wished; writing comes after it. */
 	let wishing = Promise.resolve();
@@ -77,16 +80,13 @@ export function mountOpening({ store, actions }) {
 		const types = held instanceof HTMLInputElement && held.value !== held.defaultValue;
 		if ((dialog.contains(held) && types) || one("[data-held]", dialog)) return;
 		if (html !== shown) {
-			const at = all("button, input, select", dialog).findIndex((control) => control === held);
+			const at = all(CONTROLS, dialog).findIndex((control) => control === held);
 			const scrolled = all(SCROLLING, dialog).map(({ scrollTop }) => scrollTop);
 			dialog.innerHTML = shown = html;
 			dialog.classList.toggle("wide", Boolean(info));
 			all(SCROLLING, dialog).forEach((part, k) => (part.scrollTop = scrolled[k] ?? 0));
 			if (at >= 0)
-				(
-					(held?.id && document.getElementById(held.id)) ||
-					all("button, input, select", dialog)[at]
-				)?.focus();
+				((held?.id && document.getElementById(held.id)) || all(CONTROLS, dialog)[at])?.focus();
 			for (const image of all("img", dialog)) image.onerror = () => image.remove();
 			for (const plan of all("[data-plan]", dialog))
 				mountPlan(plan, structuredClone(info?.room ?? []), (room) => wish({ room }));
@@ -128,14 +128,27 @@ export function mountOpening({ store, actions }) {
 		void attempt(async () => {
 			const more = info?.uploaded ? info : null;
 			if (!more) await giveUp();
-			const path = more ? `/api/import/${more.key}/files` : "/api/import";
-			const { draft, first } = await sendJson("POST", path, announced(files));
-			take(draft);
-			const begun = performance.now();
-			let sent = 0;
-			sending = new AbortController();
+			let path = more ? `/api/import/${more.key}/files` : "/api/import";
+			/** @type {number[]} */
+			const numbers = [];
+			async function announce() {
+				const some = files.slice(numbers.length, numbers.length + ANNOUNCED);
+				const { draft, first } = await sendJson("POST", path, announced(some));
+				path = `/api/import/${draft.key}/files`;
+				numbers.push(...some.map((_, k) => first + k));
+				take(draft);
+				return draft;
+			}
+			const own = (sending ??= new AbortController());
+			under += 1;
+			/** @type {Server.ImportInfo} */
+			let draft;
 			try {
-				await send(draft.key, first, files, sending.signal, (bytes) => {
+				draft = await announce();
+				while (numbers.length < files.length) draft = await announce();
+				const begun = performance.now();
+				let sent = 0;
+				await send(draft.key, numbers, files, own.signal, (bytes) => {
 					sent += bytes;
 					const speed = sent / 1e3 / (performance.now() - begun + 1);
 					const part = (draft.received + sent) / draft.bytes;
@@ -150,10 +163,12 @@ export function mountOpening({ store, actions }) {
 				});
 			} catch (error) {
 				// What cannot be finished leaves nothing behind.
-				await giveUp();
+				if (numbers.length && sending === own) await giveUp();
 				throw error;
+			} finally {
+				under -= 1;
 			}
-			take(await sendJson("POST", `/api/import/${draft.key}/arrived`));
+			if (!under) take(await sendJson("POST", `/api/import/${draft.key}/arrived`));
 		});
 	}
 
@@ -261,6 +276,8 @@ export function mountOpening({ store, actions }) {
 		layer.hidden = true;
 		if (!carries(event) || !event.dataTransfer) return;
 		event.preventDefault();
-		void dropped(event.dataTransfer).then(bring);
+		void dropped(event.dataTransfer).then(bring, ({ message }) =>
+			actions.note("error", "What was dropped cannot be read", message),
+		);
 	});
 }

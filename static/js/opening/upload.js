@@ -4,6 +4,9 @@ import { request } from "../state/api.js";
 /** Bytes of a piece: as much as the server takes at once. */
 const PIECE = 1 << 20;
 
+/** Files that are announced at once, so that their names fit into what the server takes. */
+export const ANNOUNCED = 2000;
+
 /** Files on their way at once. */
 const AT_ONCE = 3;
 
@@ -51,12 +54,12 @@ export const announced = (files) => ({
 /**
  * Send files piece by piece.
  * @param {string} key  of the import
- * @param {number} first  number of the first of them
+ * @param {number[]} numbers  of them, as the server counts
  * @param {Dropped[]} files
  * @param {AbortSignal} signal
  * @param {(bytes: number) => void} tell  how many more are there
  */
-export async function send(key, first, files, signal, tell) {
+export async function send(key, numbers, files, signal, tell) {
 	let next = 0;
 	async function work() {
 		while (next < files.length) {
@@ -65,7 +68,7 @@ export async function send(key, first, files, signal, tell) {
 			const { file } = files[number];
 			for (let offset = 0; offset < file.size; offset += PIECE) {
 				const body = file.slice(offset, offset + PIECE);
-				const path = `/api/import/${key}/files/${first + number}?offset=${offset}`;
+				const path = `/api/import/${key}/files/${numbers[number]}?offset=${offset}`;
 				await request(path, { method: "PUT", body, signal });
 				tell(body.size);
 			}

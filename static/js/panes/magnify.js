@@ -76,6 +76,8 @@ export function mountMagnifier(body, store) {
 		fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
 	});
 	body.addEventListener("pointermove", (event) => {
+		// It may have been let go outside, before anything was captured.
+		if (!event.buttons) fingers.delete(event.pointerId);
 		const before = fingers.get(event.pointerId);
 		const spot = spotOf(event);
 		if (!before || !spot) return;

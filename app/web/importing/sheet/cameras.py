@@ -65,7 +65,9 @@ def _row(info: ImportInfo, number: int) -> Markup:
         f"in-name-{number}", f"Name of {camera.key}", camera.name, {"names": names}, maxlength=60
     )
     blank = element("span", icon("folder"), class_="blank")
-    address = f"/api/import/{info.key}/picture?camera={quote(camera.key, safe='')}"
+    # the file is named for the browser, which shows an address that it has shown before as it was
+    query = f"camera={quote(camera.key, safe='')}&of={quote(camera.video, safe='')}"
+    address = f"/api/import/{info.key}/picture?{query}"
     picture = element("img", src=address, alt="") if camera.video else None
     shot = element("span", blank, picture, class_="shot")
     frames = f"{camera.frames} frames · {camera.fps:g} fps · " if camera.frames else ""
