@@ -263,6 +263,7 @@ def test_score_and_overlap(tmp_path: Path) -> None:
     path = answering(tmp_path / "model.onnx", {"output0": yolo_8()})
     dark = np.zeros((64, 64, 3), np.uint8)
     assert len(Network(path, Settings(score=0.95)).look(dark).boxes) == 0
+    assert len(Network(path, Settings()).with_settings(Settings(score=0.95)).look(dark).boxes) == 0
     both = Network(path, Settings(overlap=0.98)).look(dark)
     np.testing.assert_allclose(both.scores, [0.9, 0.7], atol=1e-5)
 
