@@ -37,7 +37,8 @@ def write(folder: Path, written: Written, options: Options) -> None:
     name = "".join(c if c.isalnum() or c in "-_" else "-" for c in sequence.name)
     half = sequence.target_half_extents
     truth = sequence.ground_truth
-    parts = [(GROUND, -1), *((camera.name, k) for k, camera in enumerate(sequence.cameras))]
+    cameras = [camera.name.replace("/", "-").replace("\\", "-") for camera in sequence.cameras]
+    parts = [(GROUND, -1), *((camera, k) for k, camera in enumerate(cameras))]
     for done, (part, index) in enumerate(parts):
         options.at(done, len(parts))
         one = f"{name}-{part}"
@@ -135,5 +136,5 @@ def _chosen(rows: list[str], mask: ndarray) -> Iterable[str]:
 
 def _save(path: Path, lines: Iterable[str]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", encoding="ascii", errors="replace", newline="\n") as file:
+    with path.open("w", encoding="utf-8", newline="\n") as file:
         file.writelines(lines)
