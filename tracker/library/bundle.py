@@ -117,10 +117,12 @@ def _write_sequence(folder: Path, sequence: Sequence, videos: bool) -> None:
             camera["detections"] = f"camera{index + 1}.csv"
             boxes = view.detections
             rows = np.column_stack([boxes.frames, boxes.boxes, boxes.scores]).tolist()
-            _write_csv(
-                folder / camera["detections"], "frame,left,top,width,height,score",
-                (f"{int(row[0])}," + ",".join(f"{v:.9g}" for v in row[1:]) for row in rows),
-            )  # fmt: skip
+            lines = [f"{int(row[0])}," + ",".join(f"{v:.9g}" for v in row[1:]) for row in rows]
+            if view.looked_at is not None:  # a step without a picture is no step without people
+                camera["detected_steps"] = "listed"
+                nobody = np.setdiff1d(np.flatnonzero(view.looked_at), boxes.frames)
+                lines += [f"{step},,,,," for step in nobody.tolist()]
+            _write_csv(folder / camera["detections"], "frame,left,top,width,height,score", lines)
         if videos and view.has_pictures:
             camera["video"] = f"camera{index + 1}.mp4"
             _write_video(folder / camera["video"], sequence, index)
