@@ -179,6 +179,13 @@ def test_what_is_no_bundle_is_told(bundle: tuple[Path, Result], tmp_path: Path) 
         archive.writestr("run.json", json.dumps({"format": 99}))
     with pytest.raises(LibraryError, match="expected a bundle of format 1, found 99"):
         unpack_bundle(path, tmp_path / "c")
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("run.json", "{}" * 5000)
+    spoilt = bytearray(path.read_bytes())
+    spoilt[45:50] = b"\xff" * 5  # within what is compressed
+    path.write_bytes(spoilt)
+    with pytest.raises(LibraryError, match="expected a bundle"):
+        unpack_bundle(path, tmp_path / "d")
 
 
 def test_the_command(run: Runs, tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ import shutil
 import stat
 import tempfile
 import zipfile
+import zlib
 from fractions import Fraction
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -34,6 +35,12 @@ MANIFEST, TRACKS, FOLDER = "run.json", "tracks.bin", "sequence"
 MOST_FILES = 10_000
 MOST_BYTES = 8 << 30
 """Of what an archive unpacks to: a small file can claim to hold more than any disk."""
+
+_UNREADABLE = (
+    OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, NotImplementedError,
+    RuntimeError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+"""What the standard library raises of an archive that is none, or of a spoilt or locked one."""
 
 _QUALITY = {"preset": "veryfast", "crf": "32"}
 _ANEW = ("video", "images", "first_frame", "detections", "detections_first_frame",
@@ -207,7 +214,7 @@ def unpack_bundle(path: Path, folder: Path) -> Result:
         )
     except LibraryError:
         raise
-    except (zipfile.BadZipFile, OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except _UNREADABLE as error:
         shutil.rmtree(folder, ignore_errors=True)
         raise LibraryError(
             f"{path}: expected a bundle as `multiview-phd bundle` writes it ({error})"
