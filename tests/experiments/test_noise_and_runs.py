@@ -75,8 +75,8 @@ def test_no_picture_stays_no_picture(pictures: Sequence) -> None:
 def test_fusing_again_with_all_cameras_gives_the_same_tracks(crossing: Sequence) -> None:
     run = pipeline.compute(crossing, pipeline.default_parameters(crossing))
     again = runs.fused_again(run, range(len(crossing.views)))
-    np.testing.assert_array_equal(again.positions, run.tracks.positions)
-    np.testing.assert_array_equal(again.ids, run.tracks.ids)
+    np.testing.assert_array_equal(again.positions, run.filtered.positions)
+    np.testing.assert_array_equal(again.ids, run.filtered.ids)
 
 
 @pytest.mark.parametrize("cameras", [[0], [1], [2, 0]])
@@ -90,8 +90,8 @@ def test_fusing_again_is_a_run_of_the_sequence_with_these_cameras(
     assert fewer.digest != crossing.digest
     expected = pipeline.compute(fewer, parameters)
     found = runs.fused_again(run, cameras)
-    np.testing.assert_array_equal(found.positions, expected.tracks.positions)
-    np.testing.assert_array_equal(found.frames, expected.tracks.frames)
+    np.testing.assert_array_equal(found.positions, expected.filtered.positions)
+    np.testing.assert_array_equal(found.frames, expected.filtered.frames)
     assert found.seen.shape[1] == len(cameras)
     other = with_values(parameters, {"fusion.extraction_threshold": 0.9})
     assert len(runs.fused_again(run, cameras, other)) <= len(found)

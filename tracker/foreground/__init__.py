@@ -82,6 +82,8 @@ def learn(
     )
     if background is None:
         return None
-    if motion and background.doubt(parameters) > 0.0 and parameters.motion_memory > 0.0:
-        return MovingForeground(background, parameters, sequence.step_time)
+    if motion:
+        moving = MovingForeground(background, parameters, sequence.step_time)
+        if moving.memory > 0:
+            return moving
     return LearntForeground(background, parameters)

@@ -63,7 +63,8 @@ class MovingForeground:
         self.doubt = background.doubt(parameters)
         """How little the background is believed, 0 … 1."""
         lasting = parameters.motion_memory * self.doubt
-        self._memory = min(254, round(lasting / step_time))
+        self.memory = min(254, round(lasting / step_time))
+        """Pictures for which a change counts; with 0 this is the background alone."""
 
     def start(self) -> MotionState:
         """Nothing has moved yet."""
@@ -83,7 +84,7 @@ class MovingForeground:
         changed = self._changed(before[0], smooth)
         since = np.minimum(since, 254) + np.uint8(1)
         since[changed > 0] = 0
-        recent = (since <= self._memory).astype(np.uint8)
+        recent = (since < self.memory).astype(np.uint8)
         after = MotionState(before[-self._lag :], since)
         return after, Segmentation(cv2.max(mask, recent), np.full(3, p.threshold))
 

@@ -29,12 +29,12 @@ class ForegroundParams(Params):
 
     restless_from: Annotated[
         float, Field(ge=0.0, le=1.0), ui("u_0", step=0.01, advanced=True, when=_LEARNT)
-    ] = 0.2
+    ] = 0.25
     """Learnt: with this share of the changing pixels often away from their median, doubt begins."""
 
     restless_to: Annotated[
         float, Field(ge=0.0, le=1.0), ui("u_1", step=0.01, advanced=True, when=_LEARNT)
-    ] = 0.32
+    ] = 0.35
     """Learnt: and with this share the median is not believed, for people stay in front of it."""
 
     motion_memory: Annotated[
