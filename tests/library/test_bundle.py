@@ -6,6 +6,7 @@ import json
 import stat
 import zipfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from tracker.library.records import Result
 from tracker.library.store import Library
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.reader import read_sequence
+from tracker.sequences.sequence import Detections
 
 
 def kept(folder: Path, library: Path) -> Result:
@@ -68,6 +70,27 @@ def test_everything_comes_back(bundle: tuple[Path, Result], tmp_path: Path) -> N
     np.testing.assert_allclose(there.ground_truth.positions, here.ground_truth.positions)
     assert "MOTA" in (tmp_path / "elsewhere" / "report.html").read_text(encoding="utf-8")
     assert (tmp_path / "elsewhere" / "tracks.csv").is_file()
+
+
+def test_a_camera_without_a_picture_is_blind_elsewhere_too(tmp_path: Path) -> None:
+    folder = write_crossing(tmp_path / "crossing", 60)
+    sequence = read_sequence(folder)
+    looked_at = np.arange(60) % 7 != 3
+    view = sequence.views[0]
+    assert view.detections is not None
+    chosen = looked_at[view.detections.frames] & (view.detections.frames > 5)
+    every = view.detections
+    boxes = Detections(every.frames[chosen], every.boxes[chosen], every.scores[chosen])
+    odd = replace(view, detections=boxes, looked_at=looked_at)
+    path = tmp_path / "run.zip"
+    result = kept(folder, tmp_path / "library.sqlite3")
+    write_bundle(path, result, replace(sequence, views=(odd, *sequence.views[1:])))
+    there = read_sequence(Path(unpack_bundle(path, tmp_path / "elsewhere").place)).views
+    assert there[0].looked_at is not None
+    np.testing.assert_array_equal(there[0].looked_at, looked_at)
+    assert there[0].detections is not None
+    np.testing.assert_array_equal(there[0].detections.frames, boxes.frames)
+    assert there[1].looked_at is None
 
 
 def test_small_videos_show_the_same_steps(tmp_path: Path) -> None:
@@ -156,6 +179,13 @@ def test_what_is_no_bundle_is_told(bundle: tuple[Path, Result], tmp_path: Path) 
         archive.writestr("run.json", json.dumps({"format": 99}))
     with pytest.raises(LibraryError, match="expected a bundle of format 1, found 99"):
         unpack_bundle(path, tmp_path / "c")
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("run.json", "{}" * 5000)
+    spoilt = bytearray(path.read_bytes())
+    spoilt[45:50] = b"\xff" * 5  # within what is compressed
+    path.write_bytes(spoilt)
+    with pytest.raises(LibraryError, match="expected a bundle"):
+        unpack_bundle(path, tmp_path / "d")
 
 
 def test_the_command(run: Runs, tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import contextlib
 import io
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
@@ -82,6 +83,24 @@ def test_parquet(tmp_path: Path) -> None:
     assert left.null_count == int((~there).sum())
     facts = json.loads(pq.read_schema(path).metadata[b"multiview-phd"])
     assert facts["parameters"]["fusion.survival_probability"] == "0.97"
+
+
+def test_trc_into_a_file_of_any_name(tmp_path: Path) -> None:
+    save(tmp_path / "Küche.trc", FORMATS["trc"], WRITTEN)
+    first = (tmp_path / "Küche.trc").read_text(encoding="ascii").split("\n")[0]
+    assert first.endswith("K?che.trc")
+
+
+def test_motchallenge_of_any_name(tmp_path: Path) -> None:
+    (first, *others) = WRITTEN.sequence.views
+    strange = replace(first, camera=replace(first.camera, name="../../über"))
+    sequence = replace(WRITTEN.sequence, name="Küche", views=(strange, *others))
+    save(tmp_path / "mot", FORMATS["motchallenge"], replace(WRITTEN, sequence=sequence))
+    assert [path.name for path in tmp_path.iterdir()] == ["mot"]
+    home = tmp_path / "mot" / "gt" / "mot_challenge"
+    (names,) = (home / "seqmaps").iterdir()
+    _, *listed = names.read_text(encoding="utf-8").split()
+    assert sorted(listed) == sorted(path.name for path in (home / "multiview-train").iterdir())
 
 
 def test_trc(tmp_path: Path) -> None:

@@ -46,8 +46,11 @@ def test_the_same_run_computed_again_is_one_run(path: Path) -> None:
         number = library.keep(RECORDING, run(0, began=5000.0))
         assert [r.id for r in library.runs()] == [number, 2]
         library.delete([number])
-        library.keep(RECORDING, run(0))
+        library.keep(RECORDING, run(0, figures={"mota": 0.5}))
         assert len(library.runs()) == 2
+        # scored by another gate: the list says what the run says
+        result = library.result(number)
+        assert (result.run.mota, result.run.idf1, result.figures) == (0.5, None, {"mota": 0.5})
 
 
 def test_untouched_runs_beyond_the_budget_fall_out_and_others_never(path: Path) -> None:

@@ -15,6 +15,7 @@ from tracker import pipeline
 from tracker.experiments.laboratory.experiment import Context
 from tracker.parameters import RunParameters
 from tracker.pipeline import Cancelled
+from tracker.single_view.protocol import ViewResult
 from tracker.trajectories import Trajectories
 from tracker.without_truth import estimate
 from tracker.without_truth.agreement import agreement, compared, differences, doubts
@@ -126,6 +127,8 @@ def test_boxes_elsewhere_are_a_veto() -> None:
     assert other is not None
     assert own > other + 0.2
     assert overlap(Trajectories.empty(3), camera, half, []) is None
+    # where it had no frame it contradicts nobody
+    assert overlap(run.tracks, camera, half, [ViewResult.of_no_frame()] * 40) is None
 
 
 def test_the_record_is_what_the_interval_is_made_of() -> None:

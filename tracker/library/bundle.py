@@ -36,11 +36,11 @@ MOST_FILES = 10_000
 MOST_BYTES = 8 << 30
 """Of what an archive unpacks to: a small file can claim to hold more than any disk."""
 
-_NO_BUNDLE = (
-    zipfile.BadZipFile, zlib.error, OSError, EOFError, ValueError, KeyError, TypeError,
-    AttributeError,
-    RuntimeError,  # encrypted, or compressed in a way that is not known
+_UNREADABLE = (
+    OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, NotImplementedError,
+    RuntimeError, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
+"""What the standard library raises of an archive that is none, or of a spoilt or locked one."""
 
 _QUALITY = {"preset": "veryfast", "crf": "32"}
 _ANEW = ("video", "images", "first_frame", "detections", "detections_first_frame",
@@ -124,10 +124,12 @@ def _write_sequence(folder: Path, sequence: Sequence, videos: bool) -> None:
             camera["detections"] = f"camera{index + 1}.csv"
             boxes = view.detections
             rows = np.column_stack([boxes.frames, boxes.boxes, boxes.scores]).tolist()
-            _write_csv(
-                folder / camera["detections"], "frame,left,top,width,height,score",
-                (f"{int(row[0])}," + ",".join(f"{v:.9g}" for v in row[1:]) for row in rows),
-            )  # fmt: skip
+            lines = [f"{int(row[0])}," + ",".join(f"{v:.9g}" for v in row[1:]) for row in rows]
+            if view.looked_at is not None:  # a step without a picture is no step without people
+                camera["detected_steps"] = "listed"
+                nobody = np.setdiff1d(np.flatnonzero(view.looked_at), boxes.frames)
+                lines += [f"{step},,,,," for step in nobody.tolist()]
+            _write_csv(folder / camera["detections"], "frame,left,top,width,height,score", lines)
         if videos and view.has_pictures:
             camera["video"] = f"camera{index + 1}.mp4"
             _write_video(folder / camera["video"], sequence, index)
@@ -212,7 +214,7 @@ def unpack_bundle(path: Path, folder: Path) -> Result:
         )
     except LibraryError:
         raise
-    except _NO_BUNDLE as error:
+    except _UNREADABLE as error:
         shutil.rmtree(folder, ignore_errors=True)
         raise LibraryError(
             f"{path}: expected a bundle as `multiview-phd bundle` writes it ({error})"

@@ -153,7 +153,10 @@ def run_from(sequence: Sequence, result: Result, *, key: str) -> Run:
     Raises:
         ValueError: If the recording has another number of cameras now.
     """
-    keys = {**stage_keys(sequence, result.parameters, result.run.seed), "tracks": key}
+    # what it has in place of its stages must never be taken over by a computation
+    known = stage_keys(sequence, result.parameters, result.run.seed)
+    keys = {stage: f"{one}-kept-{result.run.id}" for stage, one in known.items()}
+    keys["tracks"] = key
     run = Run(sequence, result.parameters, result.run.seed, keys)
     tracks = result.kept.tracks
     cameras = len(sequence.views)

@@ -247,6 +247,12 @@ class Library:
                 connection.execute(
                     "UPDATE runs SET began = ?, deleted = NULL WHERE id = ?", (new.began, number)
                 )
+                if new.figures:  # scored anew, perhaps by another gate: the list tells the same
+                    told_of = ", ".join(f"{name} = ?" for name in HEADLINES)
+                    figures = [new.figures.get(name) for name in HEADLINES]
+                    connection.execute(
+                        f"UPDATE runs SET {told_of} WHERE id = ?", (*figures, number)
+                    )
             connection.execute(
                 "INSERT OR REPLACE INTO results VALUES (?, ?, ?, ?)", (number, *packed)
             )

@@ -73,6 +73,11 @@ def why_no_tracks(run: Run) -> str | None:
             f"{head}: boxes of different cameras meet nowhere in [room]; multiview-phd check tells "
             "how the calibration is meant, or which camera is late"
         )
+    if len(run.filtered):
+        return (
+            f"{head}: the smoothing took all that the filter reported for nobody; choose "
+            "--smoothing none to see it"
+        )
     return (
         f"{head}, the surest with existence {n.surest:.2f}, below the extraction threshold or "
         "outside [room]; see [target], [room] and multiview-phd check"

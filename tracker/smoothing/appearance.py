@@ -39,6 +39,9 @@ _SAME, _OTHER = (0.15, 0.15), (0.8, 0.15)
 _COMPARED = 5
 """Distances of each kind from which the recording's own are taken."""
 
+_AT_ONCE = 2048
+"""Pairs whose looks are in memory together: of a long recording there are millions."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Models:
@@ -50,7 +53,12 @@ class Models:
 
     def distances(self, one: ndarray, other: ndarray) -> Float[ndarray, "P C"]:
         """(1 − cos) / 2 of pairs in each camera: 0 for the same looks, 1 for opposite ones."""
-        cosines = np.einsum("pca,pca->pc", self.vectors[one], self.vectors[other])
+        cosines = np.empty((len(one), self.vectors.shape[1]))
+        for first in range(0, len(one), _AT_ONCE):
+            some = slice(first, first + _AT_ONCE)
+            cosines[some] = np.einsum(
+                "pca,pca->pc", self.vectors[one[some]], self.vectors[other[some]]
+            )
         return np.asarray((1.0 - cosines) / 2.0)
 
 

@@ -142,11 +142,6 @@ def _finished(
     fitted = smoother.fit(longer, shared.links, 1, learnt)
     shared = smoother.share(fitted.paths, existences, learnt)
     there, odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
-    import os
-
-    for _ in range(int(os.environ.get("MF", "0"))):
-        shared = smoother.share(fitted.paths, there, learnt)
-        there, odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
     paths, owners = fitted.paths, fitted.paths.owners
     somebody = odds > 0.0
     removed = [

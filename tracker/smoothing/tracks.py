@@ -36,8 +36,9 @@ def tracks_of(
     chosen &= bounds.contain(smoothed.means[:, :3])
     rows = np.flatnonzero(chosen)
     known = dict(ids)
-    for label in smoothed.labels[rows].tolist():
-        known.setdefault(label, max(known.values(), default=0) + 1)
+    for label in dict.fromkeys(smoothed.labels[rows].tolist()):
+        if label not in known:
+            known[label] = max(known.values(), default=0) + 1
     numbers = np.array([known[label] for label in smoothed.labels[rows].tolist()], dtype=np.int64)
     rows = rows[np.lexsort((numbers, smoothed.frames[rows]))]
     numbers = np.array([known[label] for label in smoothed.labels[rows].tolist()], dtype=np.int64)

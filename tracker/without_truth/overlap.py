@@ -25,7 +25,7 @@ def overlap(
         2 Σ_pairs IoU / (boxes + people in the picture)
 
     with the best pairs of each step: 1 where every box lies on a person and the other way round.
-    None without both.
+    None without both. A step at which the camera had no frame says nothing.
 
     Args:
         tracks: Found without this camera.
@@ -35,6 +35,8 @@ def overlap(
     """
     total, count = 0.0, 0
     for step, view in enumerate(views):
+        if view.blind:
+            continue
         boxes = view.boxes
         drawn, visible = camera.project_boxes(tracks.positions[tracks.at(step)], half_extents)
         drawn = drawn[visible]

@@ -137,5 +137,5 @@ def _chosen(rows: list[str], mask: ndarray) -> Iterable[str]:
 
 def _save(path: Path, lines: Iterable[str]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", encoding="ascii", errors="replace", newline="\n") as file:
+    with path.open("w", encoding="utf-8", newline="\n") as file:
         file.writelines(lines)

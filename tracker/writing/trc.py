@@ -23,7 +23,7 @@ def write(path: Path, written: Written, options: Options) -> None:
         "DataRate": fps, "CameraRate": fps, "NumFrames": steps, "NumMarkers": len(ids),
         "Units": "m", "OrigDataRate": fps, "OrigDataStartFrame": 1, "OrigNumFrames": steps,
     }  # fmt: skip
-    with path.open("w", encoding="ascii", newline="\n") as file:
+    with path.open("w", encoding="ascii", errors="replace", newline="\n") as file:
         file.write(f"PathFileType\t4\t(X/Y/Z)\t{path.name.split('.', 2)[-1]}\n")
         file.write("\t".join(facts) + "\n" + "\t".join(map(str, facts.values())) + "\n")
         file.write("Frame#\tTime\t" + "".join(f"person{number}\t\t\t" for number in ids) + "\n")

@@ -159,6 +159,15 @@ LAYOUTS: dict[str, Mapping[str, ndarray]] = {
 }
 
 
+def test_lists_of_any_length_and_without_names() -> None:
+    nobody = {"labels": np.zeros(0), "boxes": np.zeros((0, 4)), "scores": np.zeros(0)}
+    assert len(proposals(nobody, SIZE).scores) == 0
+    # where people are all that is seen, their class is 0 in every row
+    two = np.array([CORNERS, (8.0, 45.0, 16.0, 55.0)])
+    people = {"12": two, "14": np.zeros(2), "13": np.array([0.9, 0.4])}
+    np.testing.assert_allclose(proposals(people, SIZE).scores, [0.9, 0.4])
+
+
 @pytest.mark.parametrize("name", LAYOUTS)
 def test_the_person_is_found_in_every_layout(name: str) -> None:
     found = proposals(LAYOUTS[name], SIZE)
@@ -263,6 +272,7 @@ def test_score_and_overlap(tmp_path: Path) -> None:
     path = answering(tmp_path / "model.onnx", {"output0": yolo_8()})
     dark = np.zeros((64, 64, 3), np.uint8)
     assert len(Network(path, Settings(score=0.95)).look(dark).boxes) == 0
+    assert len(Network(path, Settings()).with_settings(Settings(score=0.95)).look(dark).boxes) == 0
     both = Network(path, Settings(overlap=0.98)).look(dark)
     np.testing.assert_allclose(both.scores, [0.9, 0.7], atol=1e-5)
 

@@ -180,15 +180,17 @@ def _named(arrays: Mapping[str, ndarray], size: tuple[int, int], wanted: int) ->
         return None
     table = arrays[boxes].reshape(-1, 4)
     rest = {
-        name: a.reshape(-1)
-        for name, a in arrays.items()
-        if name != boxes and a.size == len(table) and len(table)
+        name: a.reshape(-1) for name, a in arrays.items() if name != boxes and a.size == len(table)
     }
     if len(rest) < 2:
         return None
+    if not len(table):  # nobody is in the picture
+        return Proposals(table, np.zeros(0, np.float32), True)
+    # who has no name is told by its numbers, also where people are all that is seen
+    whole = [n for n, a in rest.items() if np.array_equal(a, np.round(a))]
     labels = next(
         (n for n in rest if "label" in n or "class" in n),
-        next((n for n, a in rest.items() if np.array_equal(a, np.round(a)) and a.max() > 1), None),
+        next((n for n in whole if rest[n].max() > 1 or len(whole) == 1), None),
     )
     scores = next((n for n in rest if "score" in n or "conf" in n), None)
     scores = scores or next((n for n in rest if n != labels), None)

@@ -56,9 +56,11 @@ class OnnxDetector:
         settings = Settings(
             p.person_class, p.score_threshold, p.suppression_overlap, p.input_side, p.pixel_values
         )
-        self._network = reader.once(
-            ("onnx_detector", model.digest, settings), lambda: Network(model.path, settings)
+        # no slider has a say in what is loaded, for what was made once stays
+        network = reader.once(
+            ("onnx_detector", model.digest), lambda: Network(model.path, Settings())
         )
+        self._network = network.with_settings(settings)
 
     def start(self) -> None:
         """There is no state."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import threading
 from dataclasses import dataclass
 from pathlib import Path
@@ -77,6 +78,12 @@ class Network:
         self._sizes = [p for p in ports.inputs if p is not self._picture]
         self._names = [port.name for port in ports.outputs]
         self._lock = threading.Lock()
+
+    def with_settings(self, settings: Settings) -> Network:
+        """The same model, fed and read otherwise; it is in memory once."""
+        other = copy.copy(self)
+        other._settings = settings
+        return other
 
     @property
     def size(self) -> tuple[int, int]:
