@@ -2,6 +2,7 @@
 import { one } from "./elements/dom.js";
 import { mountSide } from "./inspector/side.js";
 import { mountTeach } from "./inspector/teach.js";
+import { mountDoor } from "./opening/door.js";
 import { mountCameras } from "./panes/cameras.js";
 import { mountControls, pressed } from "./panes/controls.js";
 import { mountKeep } from "./panes/keep.js";
@@ -66,12 +67,12 @@ mountSide(one(".side"), context);
 mountTimeline(one(".time"), context);
 mountTeach(one(".mosaic"), context);
 mountSheets(context);
+mountDoor(context);
 mountLayout(context);
 mountKeep(context);
 mountControls(context);
-// What nobody sees at first is read when the page is there.
+// Read when the page is there.
 void import("./library/library.js").then(({ mountLibrary }) => mountLibrary(one(".lib"), context));
-void import("./opening/sheet.js").then(({ mountOpening }) => mountOpening(context));
 
 // Also for a click inside the 3D view, which the server hears of first.
 const still = matchMedia("(prefers-reduced-motion: reduce)");

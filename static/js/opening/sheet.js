@@ -11,7 +11,6 @@ const SCROLLING = ".cams-scroll, .in-scroll, .open-list";
 /** @param {Context} context */
 export function mountOpening({ store, actions }) {
 	const dialog = /** @type {any} */ (one("dialog.opener"));
-	const layer = one(".drop-layer");
 	/** @type {Server.ImportInfo | null} */
 	let info = null;
 	/** Wishes to go back to, newest last.  @type {Server.ImportWish[]} */
@@ -223,12 +222,6 @@ export function mountOpening({ store, actions }) {
 		track: () => void write(true),
 	};
 
-	actions.openSheet = () => {
-		if (dialog.open) return dialog.close();
-		dialog.showModal();
-		if (info) take(info);
-		else void attempt(start);
-	};
 	dialog.addEventListener("click", (/** @type {any} */ { target }) => {
 		if (target === dialog) return dialog.close();
 		const button = target.closest("button");
@@ -257,27 +250,17 @@ export function mountOpening({ store, actions }) {
 		event.preventDefault();
 	});
 	dialog.addEventListener("close", () => clearTimeout(timer));
-
-	// The layer lies over the 3D view, which would swallow what is dropped on it.
-	const carries = (/** @type {DragEvent} */ { dataTransfer }) =>
-		dataTransfer?.types.includes("Files");
-	const cover = (/** @type {DragEvent} */ event) => {
-		if (!carries(event)) return;
-		(dialog.open ? dialog : document.body).append(layer);
-		layer.hidden = false;
+	return {
+		toggle() {
+			if (dialog.open) return dialog.close();
+			dialog.showModal();
+			if (info) take(info);
+			else void attempt(start);
+		},
+		/** What was dropped. @param {any[]} entries */
+		take: (entries) =>
+			dropped(entries).then(bring, ({ message }) =>
+				actions.note("error", "What was dropped cannot be read", message),
+			),
 	};
-	addEventListener("dragenter", cover);
-	// Whoever comes in over the 3D view is first heard of there.
-	const frame = one("iframe");
-	frame.addEventListener("load", () => frame.contentWindow?.addEventListener("dragenter", cover));
-	addEventListener("dragover", (event) => carries(event) && event.preventDefault());
-	layer.addEventListener("dragleave", () => (layer.hidden = true));
-	addEventListener("drop", (event) => {
-		layer.hidden = true;
-		if (!carries(event) || !event.dataTransfer) return;
-		event.preventDefault();
-		void dropped(event.dataTransfer).then(bring, ({ message }) =>
-			actions.note("error", "What was dropped cannot be read", message),
-		);
-	});
 }

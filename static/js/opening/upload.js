@@ -13,10 +13,8 @@ const AT_ONCE = 3;
 /** Files of the system and of editors, which nobody means. @param {string} path */
 const meant = (path) => !path.split("/").some((part) => part.startsWith("."));
 
-/** What was dropped, folders with all in them. @param {DataTransfer} transfer @returns {Promise<Dropped[]>} */
-export async function dropped(transfer) {
-	// Entries are gone as soon as the event is over: all are taken first.
-	const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.());
+/** What was dropped, folders with all in them. @param {any[]} entries @returns {Promise<Dropped[]>} */
+export async function dropped(entries) {
 	/** @type {Dropped[]} */
 	const found = [];
 	/** @param {any} entry @param {string} above */

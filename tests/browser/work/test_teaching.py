@@ -45,6 +45,8 @@ def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(
     until(page, lambda: readout(page) == "20", "twenty steps on")
     httpx2.patch(server.address + "api/parameters", json={"changes": {"single_view": "colour_phd"}})
     server.wait(lambda state: state["run"]["state"] == "failed")  # there is no template yet
+    # which the page says above the pictures: they have moved when it is there
+    expect(page.get_by_text("The run stopped at step")).to_be_visible(timeout=20_000)
     page.keyboard.press("c")
     expect(page.locator(".mosaic")).to_have_class(re.compile("drawing"), timeout=20_000)
     expect(page.get_by_text("Drag a box around a person.")).to_be_visible(timeout=20_000)

@@ -36,7 +36,7 @@ def test_a_pinned_run_is_compared_with_the_engines_figures(flat_page: Page, serv
         pipeline.compute(sequence, parameters, seed=0)
         for parameters in (defaults, with_values(defaults, {P_D: 0.3}))
     ]
-    assert runs[0].tracks.frames.tolist() != runs[1].tracks.frames.tolist()
+    assert runs[0].tracks.positions.tolist() != runs[1].tracks.positions.tolist()
     rows = compare(*(evaluate_sequence(sequence, run.tracks) for run in runs))
     body = page.get_by_role("table", name="Figures").locator("tbody tr")
     expect(body).to_have_count(len(rows))
