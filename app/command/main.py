@@ -37,6 +37,7 @@ from app.command.flags import (
     parse,
     show,
 )
+from app.command.interruption import between_steps
 from app.command.library_flags import Bundle, LibraryCommand, OpenRun, Runs
 from app.command.terminal import Bar, CommandError, check_data, print_table, say
 from tracker import parameters as table
@@ -284,15 +285,20 @@ def _track(command: Track) -> None:
         stages.add(progress.stage)
         tracking.at(progress.done, progress.total)
 
-    with Bar("tracking", "step") as tracking, closing(Compiling(say)) as compiling:
+    with (
+        Bar("tracking", "step") as tracking,
+        closing(Compiling(say)) as compiling,
+        between_steps() as interrupted,
+    ):
         tracking.at(0, sequence.frames)
-        compiling.wait(lambda done, total: None, lambda: False)
+        compiling.wait(lambda done, total: None, interrupted)
         run = pipeline.compute(
             sequence,
             parameters,
             seed=command.seed,
             cache=StageCache.on_disk() if command.cache else None,
             on_progress=told,
+            cancelled=interrupted,
         )
     seconds = time.perf_counter() - begin
     with Bar("writing", "step") as writing:
