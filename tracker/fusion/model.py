@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
+from tracker import association
 from tracker.filters import gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion import sight, visibility
@@ -16,6 +17,7 @@ from tracker.fusion.sight import Glimpse, Recent
 from tracker.fusion.target_model import ExpectedBoxes, TargetModel
 from tracker.fusion.visibility import Visibility
 from tracker.kernels import linear_algebra
+from tracker.kernels.labelled.camera_update import CameraRule
 from tracker.kernels.labelled.step import CameraBoxes
 from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
@@ -111,6 +113,26 @@ class FusionModel:
             weights=occluders[hiding],
             strength=self.parameters.occlusion,
             near=self.near,
+        )
+
+    def camera_rule(self, least_told: float) -> CameraRule:
+        """How one camera's boxes are shared among the components.
+
+        Args:
+            least_told: Association probability from which a pair is told.
+        """
+        p = self.parameters
+        return CameraRule(
+            gate=self.gate,
+            soft=p.edge == "soft",
+            detection_probability=p.detection_probability,
+            confirmed=CONFIRMED,
+            near=self.near,
+            strength=p.occlusion,
+            worth_telling=visibility.WORTH_TELLING,
+            tolerance=association.TOLERANCE,
+            iterations=association.ITERATIONS,
+            least_told=least_told,
         )
 
     def newborns(self, evidence: Evidence) -> tuple[GaussianMixture, Newborns] | None:

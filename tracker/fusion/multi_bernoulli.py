@@ -15,11 +15,10 @@ import numpy as np
 from jaxtyping import Int
 from numpy import ndarray
 
-from tracker import association
 from tracker.camera import stacked
 from tracker.filters import gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion import memory, reidentification, sight, visibility
+from tracker.fusion import memory, reidentification, sight
 from tracker.fusion.measurement_births import Evidence, Newborns
 from tracker.fusion.memory import Memory
 from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
@@ -29,7 +28,7 @@ from tracker.fusion.reidentification import Identities
 from tracker.fusion.sight import Recent
 from tracker.kernels.gating import Measurements
 from tracker.kernels.labelled import step as step_kernels
-from tracker.kernels.labelled.camera_update import CameraRule, Tracks
+from tracker.kernels.labelled.camera_update import Tracks
 from tracker.kernels.labelled.step import KeepingRule, StepModel
 from tracker.kernels.lens import Calibrations
 from tracker.sequences.sequence import Sequence
@@ -86,18 +85,7 @@ class MultiBernoulli:
         self._seen_by: dict[bytes, tuple[StepModel, Calibrations]] = {}
         """Model and cameras where some have no frame, by those that have."""
         self._target = target.target(motion.dimension)
-        self._camera_rule = CameraRule(
-            gate=model.gate,
-            soft=p.edge == "soft",
-            detection_probability=p.detection_probability,
-            confirmed=CONFIRMED,
-            near=model.near,
-            strength=p.occlusion,
-            worth_telling=visibility.WORTH_TELLING,
-            tolerance=association.TOLERANCE,
-            iterations=association.ITERATIONS,
-            least_told=WORTH_TELLING,
-        )
+        self._camera_rule = model.camera_rule(WORTH_TELLING)
         low, high = model.followed
         self._keeping_rule = KeepingRule(
             p.pruning_threshold, low, high, p.max_components, model.near, CONFIRMED

@@ -9,10 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker import association
-from tracker.fusion import visibility
-from tracker.fusion.model import CONFIRMED, FusionModel
-from tracker.kernels.labelled.camera_update import CameraRule
+from tracker.fusion.model import FusionModel
 from tracker.kernels.measurement import ExpectedBoxes as SeenBoxes
 from tracker.kernels.smoothing import evidence, passes
 from tracker.parameters import FusionParams
@@ -93,19 +90,8 @@ class Smoother:
             CameraBoxes.of([step[c] for step in views], model.target, parameters.measurement_sigma)
             for c in range(len(model.cameras))
         ]
-        motion, p = model.motion, parameters
-        self._rule = CameraRule(
-            gate=model.gate,
-            soft=p.edge == "soft",
-            detection_probability=p.detection_probability,
-            confirmed=CONFIRMED,
-            near=model.near,
-            strength=p.occlusion,
-            worth_telling=visibility.WORTH_TELLING,
-            tolerance=association.TOLERANCE,
-            iterations=association.ITERATIONS,
-            least_told=_LEAST,
-        )
+        motion = model.motion
+        self._rule = model.camera_rule(_LEAST)
         self.prior = np.zeros((motion.dimension, motion.dimension))
         self.prior[:3, :3] = START_SIGMA**2 * np.eye(3)
         self.prior[3:, 3:] = max(motion.start_velocity, 1e-6) ** 2 * np.eye(motion.dimension - 3)
