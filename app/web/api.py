@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import io
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +9,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 
 from app import models
-from app.errors import ApiError, sentence
+from app.errors import ApiError
 from app.state.kept.history import History
 from app.state.teaching import Teaching
 from app.state.workers.sensitivity import Sensitivity
@@ -24,15 +23,12 @@ from app.web.dependencies import (
     file_name,
     nothing_open,
 )
+from app.web.opening import begun, told_in_the_answer
 from app.web.pictures.jpegs import Pictures
 from app.web.views import results, steps
 from app.web.views.timeline import Timelines
 from tracker import export
-from tracker.pipeline import Cancelled
 from tracker.sequences import library
-
-OPENING_SECONDS = 1.0
-"""How long a request to open waits, so that what fails at once is told in the answer."""
 
 router = APIRouter(prefix="/api", responses=ERRORS)
 
@@ -72,21 +68,12 @@ def sequences(request: Request) -> models.SequenceList:
 @router.post("/sequence")
 async def open_sequence(wish: models.OpenRequest, bench: Bench, jobs: Work) -> models.State:
     """Open another sequence, in the background where it takes longer; ``opening`` says so."""
-    future = asyncio.wrap_future(jobs.open(wish.name))
-    try:
-        await asyncio.wait_for(asyncio.shield(future), OPENING_SECONDS)
-    except TimeoutError:
-        future.add_done_callback(lambda done: done.cancelled() or done.exception())
-    except Cancelled as error:
-        raise ApiError(409, "superseded", f"{wish.name}: {error}.") from None
-    except (ValueError, OSError) as error:
-        raise ApiError(
-            422,
-            "cannot_open",
-            sentence(error),
-            field="name",
-            hint="What was open still is. GET /api/sequences lists what there is.",
-        ) from None
+    with told_in_the_answer(
+        wish.name,
+        field="name",
+        hint="What was open still is. GET /api/sequences lists what there is.",
+    ):
+        await begun(jobs.open(wish.name))
     return results.state_of(bench.snapshot())
 
 

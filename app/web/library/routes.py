@@ -16,18 +16,15 @@ from app.models import State
 from app.state.workers.keeper import Keeper
 from app.web.dependencies import ERRORS, Bench, Work, nothing_open
 from app.web.library import drawing, models, preview
+from app.web.opening import begun, told_in_the_answer
 from app.web.views import results
 from tracker import parameters as table
 from tracker.library.errors import LibraryError
 from tracker.library.keeping import code_version, recording_of
 from tracker.library.records import KeptRun, Recording, Result
 from tracker.library.store import Library
-from tracker.pipeline import Cancelled
 from tracker.sequences import library as sequences
 from tracker.sequences.reader import FILE
-
-OPENING_SECONDS = 1.0
-"""How long a request to open waits, so that what fails at once is told in the answer."""
 
 router = APIRouter(prefix="/api/library", responses=ERRORS)
 
@@ -206,25 +203,15 @@ async def open_run(number: int, opened: Opened, bench: Bench, jobs: Work) -> Sta
     result = await asyncio.to_thread(_result, opened, number)
     now = bench.snapshot()
     place = "" if now.saved is None else recording_of(now.saved, now.opened_as).place
-    try:
+    with told_in_the_answer(
+        result.run.title,
+        field="number",
+        hint="What was open still is; its tracks can be exported all the same.",
+    ):
         if place == result.place:
             jobs.show_kept(result)
         else:
-            future = asyncio.wrap_future(then_show(jobs.open(result.place), jobs, bench, result))
-            try:
-                await asyncio.wait_for(asyncio.shield(future), OPENING_SECONDS)
-            except TimeoutError:
-                future.add_done_callback(lambda done: done.cancelled() or done.exception())
-    except Cancelled as error:
-        raise ApiError(409, "superseded", f"{result.run.title}: {error}.") from None
-    except (ValueError, OSError) as error:
-        raise ApiError(
-            422,
-            "cannot_open",
-            sentence(error),
-            field="number",
-            hint="What was open still is; its tracks can be exported all the same.",
-        ) from None
+            await begun(then_show(jobs.open(result.place), jobs, bench, result))
     return results.state_of(bench.snapshot())
 
 
