@@ -13,7 +13,6 @@ from typing import Literal
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from tracker.camera import Camera
 
@@ -63,6 +62,8 @@ def _save_opencv(path: Path, cameras: Sequence[Camera], keys: Sequence[str]) -> 
 
 
 def _table(key: str, camera: Camera) -> str:
+    from scipy.spatial.transform import Rotation  # a server starts without it
+
     vector = Rotation.from_matrix(camera.rotation).as_rotvec()
     return "\n".join(
         [

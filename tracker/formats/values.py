@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
-from scipy.spatial.transform import Rotation
 
 from tracker.formats.pieces import Lens
 from tracker.formats.source import SourceFile
@@ -92,6 +91,8 @@ def rotation(file: SourceFile, field: str, value: Any) -> Float[ndarray, "3 3"]:
     Raises:
         FormatError: If it is neither, or a reflection.
     """
+    from scipy.spatial.transform import Rotation  # a server starts without it
+
     found = numbers(file, field, value)
     if len(found) == 3:
         return np.asarray(Rotation.from_rotvec(found).as_matrix())

@@ -16,7 +16,6 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
-from scipy.spatial.transform import Rotation
 
 from tracker.formats.pieces import CalibrationPiece, Convention, Lens, Piece, RawCamera
 from tracker.formats.protocol import Certainty, Kind
@@ -154,6 +153,8 @@ def _lenses(file: SourceFile) -> dict[str, _Lens]:
 
 
 def _camera(file: SourceFile, row: str, lenses: dict[str, _Lens]) -> RawCamera:
+    from scipy.spatial.transform import Rotation  # a server starts without it
+
     words = row.split(maxsplit=9)
     name, key = words[9], words[8]
     w, x, y, z, *translation = numbers(file, f"image {name}", words[1:8]).tolist()

@@ -16,7 +16,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import scipy.io
 
 from tracker.formats.calibration.camera_fields import cameras, has_cameras
 from tracker.formats.pieces import CalibrationPiece, Convention, Piece, RawCamera, Unit
@@ -60,6 +59,8 @@ def read(file: SourceFile) -> Iterator[Piece]:
 
 
 def _load(file: SourceFile) -> dict[str, Any]:
+    import scipy.io  # a server starts without it
+
     data = file.bytes(MOST_BYTES)
     if data.startswith(b"MATLAB 7.3"):
         raise file.error('is of version 7.3 (HDF5), expected 7 or older; save it with "-v7"')

@@ -16,7 +16,6 @@ from collections.abc import Iterator
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
-from scipy.spatial.transform import Rotation
 
 from tracker.formats.pieces import CalibrationPiece, Convention, Piece, RawCamera
 from tracker.formats.protocol import Certainty, Kind
@@ -49,6 +48,8 @@ def read(file: SourceFile) -> Iterator[Piece]:
 
 
 def _camera(file: SourceFile, element: ElementTree.Element) -> RawCamera:
+    from scipy.spatial.transform import Rotation  # a server starts without it
+
     def value(tag: str, field: str) -> float:
         child = element.find(tag)
         text = None if child is None else child.get(field)
