@@ -7,9 +7,7 @@ value of every parameter, in words that ``multiview-phd track --set`` takes back
 from __future__ import annotations
 
 import csv
-import os
 import re
-import secrets
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +19,7 @@ from numpy import ndarray
 
 from tracker import __version__
 from tracker.parameters import METHODS, PARAMETERS, RunParameters, value
+from tracker.placing import replacing
 from tracker.sequences.csv_columns import read_columns
 from tracker.sequences.sequence import Sequence, SequenceError
 from tracker.trajectories import Trajectories
@@ -136,26 +135,12 @@ def save_tracks_csv(
         OSError: With a sentence, if the file cannot be written.
     """
     path = Path(path)
-    if path.is_dir():
-        raise IsADirectoryError(f"{path}: expected a file to write, found a folder; add a name")
-    if not path.parent.is_dir():
-        raise FileNotFoundError(f"{path}: there is no folder {path.parent} to write it to")
-    if path.exists() and not path.is_file():
+    if not path.is_dir() and path.exists() and not path.is_file():
         with path.open("w", encoding="utf-8", newline="") as stream:
             write_tracks_csv(stream, sequence, tracks, parameters, seed, done=done)
         return
-    path = path.resolve()  # a symbolic link stays, and what it names is replaced
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
-    try:
-        with temporary.open("x", encoding="utf-8", newline="") as stream:
-            write_tracks_csv(stream, sequence, tracks, parameters, seed, done=done)
-            stream.flush()
-            os.fsync(stream.fileno())
-        temporary.replace(path)
-    except OSError as error:
-        raise OSError(f"{path}: cannot be written ({error.strerror or error})") from None
-    finally:
-        temporary.unlink(missing_ok=True)
+    with replacing(path) as temporary, temporary.open("x", encoding="utf-8", newline="") as stream:
+        write_tracks_csv(stream, sequence, tracks, parameters, seed, done=done)
 
 
 def read_tracks_csv(path: Path | str) -> TrackFile:

@@ -29,7 +29,7 @@ def detect(command: Detect) -> None:
     from tracker.boxes import Boxes
     from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
-    from tracker.writing.placing import file_names
+    from tracker.placing import file_names
 
     changes = set_values(command.set)
     if command.output.exists() and not command.output.is_dir():

@@ -14,6 +14,7 @@ from numpy import ndarray
 
 from tracker.formats.pieces import FormatError
 from tracker.importing.settling import Settled, SettledView
+from tracker.placing import replacing
 from tracker.sequences.sequence import Detections, GroundTruth
 
 FILE = "sequence.toml"
@@ -64,9 +65,8 @@ def write(settled: Settled, folder: Path, name: str, *, copy: bool = False) -> l
         "",
     ]
     text = "\n".join(head) + "\n" + "\n".join(tables) + truth
-    partial = folder / f".{FILE}.part"
-    partial.write_text(text, encoding="utf-8")
-    partial.replace(folder / FILE)
+    with replacing(folder / FILE) as temporary:
+        temporary.write_text(text, encoding="utf-8")
     return told
 
 

@@ -25,6 +25,7 @@ from tracker.library import columns
 from tracker.library.errors import LibraryError
 from tracker.library.records import KeptRun, Result
 from tracker.library.store import parameters_of
+from tracker.placing import replacing, zip_folder
 from tracker.sequences.clock import FIELDS as CLOCK
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
@@ -58,19 +59,12 @@ def write_bundle(path: Path, result: Result, sequence: Sequence, *, videos: bool
         videos: Whether small videos are taken along.
 
     Raises:
-        OSError: If it cannot be written.
+        OSError: With a sentence, if it cannot be written.
     """
-    temporary = path.with_name(f".{path.name}.part")
-    try:
-        with tempfile.TemporaryDirectory() as name:
-            folder = Path(name)
-            _fill(folder, result, sequence, videos)
-            with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
-                for file in sorted(p for p in folder.rglob("*") if p.is_file()):
-                    archive.write(file, file.relative_to(folder).as_posix())
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with replacing(path) as temporary, tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        _fill(folder, result, sequence, videos)
+        zip_folder(folder, temporary)
 
 
 def _fill(folder: Path, result: Result, sequence: Sequence, videos: bool) -> None:

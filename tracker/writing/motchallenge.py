@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.writing.placing import file_names
+from tracker.placing import file_names
 from tracker.writing.written import Options, Written
 
 BENCHMARK, SPLIT, TRACKER = "multiview", "train", "multiview-phd"

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import importlib
 import shutil
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from tracker.placing import filling, replacing, zip_folder
 from tracker.sequences.sequence import Sequence
-from tracker.writing.placing import filling, replacing
 from tracker.writing.written import Options, Written
 
 
@@ -154,9 +153,7 @@ def save(
             folder.mkdir()
             try:
                 module.write(folder, written, options)
-                with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
-                    for file in sorted(p for p in folder.rglob("*") if p.is_file()):
-                        archive.write(file, file.relative_to(folder))
+                zip_folder(folder, temporary)
             finally:
                 shutil.rmtree(folder, ignore_errors=True)
     else:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import secrets
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -24,6 +22,7 @@ from tracker.evaluation.report.tables import (
 )
 from tracker.evaluation.result import Evaluation
 from tracker.parameters import RunParameters
+from tracker.placing import replacing
 from tracker.sequences.sequence import Sequence
 
 _HERE = Path(__file__).parent
@@ -54,20 +53,9 @@ def write_report(
     Raises:
         OSError: With a sentence, if the file cannot be written.
     """
-    path = Path(path)
-    if path.is_dir():
-        raise IsADirectoryError(f"{path}: expected a file to write, found a folder; add a name")
-    if not path.parent.is_dir():
-        raise FileNotFoundError(f"{path}: there is no folder {path.parent} to write it to")
     text = report_html(sequence, tracks, parameters, evaluation, reference=reference, seed=seed)
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
-    try:
+    with replacing(Path(path)) as temporary:
         temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
-    except OSError as error:
-        raise OSError(f"{path}: cannot be written ({error.strerror or error})") from None
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def report_html(

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import os
-import secrets
 from pathlib import Path
 from typing import Any
 
 from tracker import __version__
 from tracker.experiments.laboratory.experiment import Experiment, Result
+from tracker.placing import replacing
 
 
 def can_draw() -> bool:
@@ -65,10 +64,6 @@ def write(
 
         contents[folder / f"{experiment.name}.png"] = png(result.figure)
     for path, content in contents.items():
-        temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
-        try:
+        with replacing(path) as temporary:
             temporary.write_bytes(content)
-            os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
     return list(contents)
