@@ -27,9 +27,9 @@ def detect(command: Detect) -> None:
     from tracker import parameters as table
     from tracker import pipeline
     from tracker.boxes import Boxes
+    from tracker.placing import file_names
     from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
-    from tracker.placing import file_names
 
     changes = set_values(command.set)
     if command.output.exists() and not command.output.is_dir():
