@@ -1,6 +1,7 @@
 /** Buttons, layer chips and keys: each performs a command of the one list. */
 import { all } from "../elements/dom.js";
 import { commandFor, commandOf, keyLabel, keyOf, perform } from "../state/commands.js";
+import { isBench } from "../state/places.js";
 
 /** Fields that take letters. */
 const TYPING =
@@ -88,7 +89,7 @@ export function pressed(event, store, actions) {
 	const command = commandFor(key, store.get().singleKeys);
 	if (!command) return false;
 	// What a key means of the clock and the panes holds where they are.
-	if (store.get().place !== "tune" && command.group !== "Page") return false;
+	if (!isBench(store.get().place) && command.group !== "Page") return false;
 	event.preventDefault();
 	// What is being typed is kept first.
 	if (types && key !== "Ctrl+k") target.blur();

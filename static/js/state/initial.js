@@ -73,6 +73,7 @@ export function initialState() {
 		asked: "",
 		moved: false,
 		place: "tune",
+		signs: {},
 		dismissed: [],
 		undoable: [0, 0],
 		...kept,

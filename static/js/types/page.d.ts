@@ -134,6 +134,8 @@ interface PageState {
 	asked: string;
 	/** Which of the page's places is looked at. */
 	place: string;
+	/** What stands beside the words of the places, by name. */
+	signs: Record<string, string>;
 	/** Whether somebody has chosen a step of this sequence. */
 	moved: boolean;
 	/** How many changes can be undone, and redone. */
@@ -274,6 +276,31 @@ interface Context {
 	retry: () => void;
 	/** Run the command of a key; whether there was one. */
 	press: (event: KeyboardEvent) => boolean;
+}
+
+/** What others draw in the timeline, and ask of it. */
+interface TimelineSeam {
+	plot: HTMLElement;
+	draw: () => void;
+	/** What is under the pointer. */
+	at: (event: PointerEvent) => { step: number; track: Server.TrackLife | undefined };
+	/** Draws the braid of identities; read when the page is there. */
+	braid?: typeof import("../timeline/braid.js").drawBraid;
+}
+
+/** One of the places of the top bar. */
+interface PageSite {
+	name: string;
+	word: string;
+	tip: string;
+	/** It is the workbench with its clock: all commands mean there what they mean in Tune. */
+	bench?: boolean;
+	/** Reads what fills it, when it is first gone to. */
+	read?: () => Promise<Pane>;
+	/** Whether what it shows exists; always where it is left out. */
+	exists?: (state: Readonly<PageState>) => boolean;
+	/** A sign beside its word: a count, a dot. */
+	sign?: (state: Readonly<PageState>) => string;
 }
 
 /** Fills its part of the page and keeps it current. */

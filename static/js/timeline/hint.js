@@ -36,11 +36,12 @@ export function hintLines(state, step, track) {
 	return lines;
 }
 
-/**
- * @param {HTMLElement} plot
- * @param {(event: PointerEvent) => (Node | string)[][]} read  lines for where the pointer is
- */
-export function mountHint(plot, read) {
+/** @param {TimelineSeam} timeline @param {Store<PageState>} store */
+export function mountHint({ plot, at }, store) {
+	const read = (/** @type {PointerEvent} */ event) => {
+		const { step, track } = at(event);
+		return store.get().sequence ? hintLines(store.get(), step, track) : [];
+	};
 	const card = h("div", { class: "card hint-card", hidden: true });
 	plot.append(card);
 	plot.addEventListener("pointermove", (event) => {
