@@ -65,6 +65,7 @@ from app.models.step import (
 )
 from app.models.timeline import (
     Counts,
+    Decided,
     LaneEvent,
     Numbers,
     PinnedLife,
@@ -83,6 +84,7 @@ __all__ = [
     "CameraTruth",
     "Counts",
     "CurveRequest",
+    "Decided",
     "EntranceInfo",
     "Estimate",
     "Feeding",

@@ -2,6 +2,7 @@
 import { mountMagnifier } from "./cameras/magnify.js";
 import { one, parts } from "./elements/dom.js";
 import { mountBookmarks } from "./inspector/bookmarks.js";
+import { mountIdentity } from "./inspector/identity.js";
 import { mountTables } from "./inspector/tables.js";
 import { mountTeach } from "./inspector/teach.js";
 import { mountKeep } from "./sheets/keep.js";
@@ -14,6 +15,7 @@ export function mountLater(context, timeline) {
 	const { store } = context;
 	const [side, mosaic] = [one(".side"), one(".mosaic")];
 	mountTables(side, context);
+	mountIdentity(context);
 	mountBookmarks(parts(side).marks, context);
 	mountMagnifier(mosaic, store);
 	mountTeach(mosaic, context);

@@ -73,8 +73,16 @@ const readRest = () =>
 		({ mountLater }) => mountLater(context, timeline),
 		() => (rest = undefined),
 	));
-for (const name of /** @type {const} */ (["help", "palette", "keepPicture", "drawTemplate"])) {
-	const early = async (/** @type {string} */ what = "") => {
+const brought = /** @type {const} */ ([
+	"help",
+	"palette",
+	"bookmark",
+	"keepPicture",
+	"drawTemplate",
+	"checkIdentities",
+]);
+for (const name of brought) {
+	const early = async (/** @type {any} */ what = undefined) => {
 		await readRest();
 		if (actions[name] === early)
 			return actions.note("error", "That is not read yet", "The server does not answer.");

@@ -4,7 +4,7 @@ import { prepare } from "../draw/canvas.js";
 import { drawLoupe, drawPicture, lensOf } from "../draw/picture.js";
 import { visibleTracks } from "../draw/overlay.js";
 import { fillBoxCard, fillTrackCard } from "./cards.js";
-import { isAlone, viewWords } from "../state/events.js";
+import { decisionsOf, isAlone, viewWords } from "../state/events.js";
 import { mosaic } from "./mosaic.js";
 import { pictureInk } from "../draw/colours.js";
 
@@ -269,6 +269,7 @@ export function mountCameras(root, { store, actions, playback }) {
 					card,
 					track,
 					frame?.result?.tracks.find(({ id }) => id === track.id),
+					decisionsOf(store.get(), track.id, frame?.step ?? 0),
 				);
 			const { width, height, x } = places[index];
 			const { k, left: gone, top } = lensNow(index);

@@ -65,6 +65,7 @@ export function initialState() {
 		eventKind: "",
 		every: false,
 		scores: null,
+		identity: null,
 		measure: "ospa",
 		laneOrder: "longest",
 		layout: {},

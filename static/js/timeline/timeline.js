@@ -163,6 +163,7 @@ export function mountTimeline(root, context) {
 			selection,
 			hover: hover?.id ?? null,
 			switches: series?.switches ?? [],
+			decisions: timeline?.decisions ?? [],
 		});
 		drawRange(over, playback.loadedSteps(), done, frames);
 		drawRuler(ruler, range, store.get().bookmarks);

@@ -122,6 +122,8 @@ interface PageState {
 	every: boolean;
 	/** Of the run that was set against the truth last. */
 	scores: Scores | null;
+	/** Of the run whose identities were checked without truth last. */
+	identity: Server.IdentityInfo | null;
 	/** What the timeline plots. */
 	measure: "ospa" | "gospa";
 	laneOrder: "longest" | "born";
@@ -218,6 +220,10 @@ interface Actions {
 	useAgain: (number: string) => void;
 	runAgain: () => void;
 	pin: (on: boolean) => void;
+	/** The tracks with hindsight, or those of the filter alone. */
+	hindsight: () => void;
+	/** Of the shown run, without truth. */
+	checkIdentities: (what: "start" | "stop") => void;
 	/** The shown run and the pinned one change places. */
 	swap: () => Promise<void>;
 	/** What the parameters were, whoever changed them. */
@@ -323,12 +329,17 @@ interface Lanes {
 	selection: number | null;
 	hover: number | null;
 	switches: Server.Switch[];
+	decisions: Server.Decided[];
 }
 
 /** The steps an axis of `width` CSS pixels shows. */
 type View = { first: number; last: number; width: number };
 
-type LaneEvent = { step: number; id: number; kind: Server.Timeline["events"][0][2] | "switch" };
+type LaneEvent = {
+	step: number;
+	id: number;
+	kind: Server.Timeline["events"][0][2] | "switch" | "doubt";
+};
 
 /** Of the mosaic of pictures. */
 type Cell = { x: number; y: number; width: number; height: number };

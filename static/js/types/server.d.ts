@@ -132,6 +132,14 @@ declare namespace Server {
 		points: [number, number][];
 	}
 
+	/** What hindsight made otherwise than the filter, and why. */
+	interface Decided {
+		step: number;
+		track: number;
+		kind: "cut" | "joined" | "removed";
+		words: string;
+	}
+
 	/** What was deleted. */
 	interface Deleted {
 		runs: number[];
@@ -155,6 +163,13 @@ declare namespace Server {
 		/** False where the two were measured with different settings. */
 		comparable: boolean;
 		settings: string;
+	}
+
+	/** A moment at which other ways to look disagree. */
+	interface DoubtInfo {
+		step: number;
+		ids: number[];
+		why: string;
 	}
 
 	/** Where people appear: mean and standard deviation. */
@@ -293,6 +308,29 @@ declare namespace Server {
 	interface GroupInfo {
 		name: string;
 		help: string;
+	}
+
+	/** How well people are told apart, as far as the recording alone can say. */
+	interface IdentityInfo {
+		/** Key of the run that was looked at; empty before the first time. */
+		run: string;
+		state: "idle" | "looking" | "done" | "failed" | "cancelled";
+		done: number;
+		/** Steps over all ways to look; 0 while it is not known. */
+		total: number;
+		error: string | null;
+		/** Estimate of IDF1; null until it is done, as all that follows. */
+		score: number | null;
+		low: number | null;
+		/** IDF1 lay between these in nine of ten runs by which the estimate was calibrated. */
+		high: number | null;
+		/** IDF1 of the run backwards in time by the run as it is. */
+		backwards: number | null;
+		/** Empty where there is one camera only. */
+		witnesses: Witness[];
+		/** The most doubtful first. */
+		doubts: DoubtInfo[];
+		warning: string;
 	}
 
 	/** An import on its way. */
@@ -877,6 +915,8 @@ declare namespace Server {
 		pinned: PinnedTimeline | null;
 		/** Of all steps, also of those not asked for, in their order. */
 		events: ([number, number, "birth" | "death" | "long miss" | "cut" | "joined" | "removed"])[];
+		/** What hindsight changed, by its step; empty for the filter alone. */
+		decisions: Decided[];
 		/** How many more live there: the shorter ones, where they are very many. */
 		left_out: number;
 	}
@@ -939,5 +979,14 @@ declare namespace Server {
 	/** Where the 3D view is. */
 	interface ViserInfo {
 		path: string;
+	}
+
+	/** What leaving one camera out says. */
+	interface Witness {
+		camera: string;
+		/** IDF1 of the others alone by all of them. */
+		agreed: number;
+		/** Mean overlap of its boxes with the people whom the others found; null without both. */
+		overlap: number | null;
 	}
 }
