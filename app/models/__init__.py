@@ -11,6 +11,7 @@ from app.models.base import (
     Model,
     Vector,
 )
+from app.models.course import CourseKind, CourseKinds, Courses, TrackCourse
 from app.models.requests import (
     CurveRequest,
     LayerChanges,
@@ -83,6 +84,9 @@ __all__ = [
     "CameraTrack",
     "CameraTruth",
     "Counts",
+    "CourseKind",
+    "CourseKinds",
+    "Courses",
     "CurveRequest",
     "Decided",
     "EntranceInfo",
@@ -127,6 +131,7 @@ __all__ = [
     "ThemeChange",
     "Timeline",
     "Track",
+    "TrackCourse",
     "TrackLife",
     "TrailChanges",
     "TrailInfo",

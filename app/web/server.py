@@ -36,7 +36,7 @@ from app.state.workers.jobs import Jobs, in_background
 from app.state.workers.keeper import Keeper
 from app.state.workers.sensitivity import Sensitivity
 from app.web import api, gateway, stream, teaching_routes
-from app.web.evaluation import identity_routes
+from app.web.evaluation import course_routes, identity_routes
 from app.web.evaluation import routes as evaluation
 from app.web.gateway import Gateway
 from app.web.importing import routes as importing
@@ -76,6 +76,7 @@ ROUTERS = (
     teaching_tables.router,
     evaluation.router,
     identity_routes.router,
+    course_routes.router,
     importing.router,
     library.router,
     export_routes.router,

@@ -9,6 +9,7 @@ import { mountKeep } from "./sheets/keep.js";
 import { mountSheets } from "./sheets/sheets.js";
 import { drawBraid } from "./timeline/braid.js";
 import { mountHint } from "./timeline/hint.js";
+import { mountPlots } from "./timeline/plots.js";
 
 /** @param {Context} context @param {TimelineSeam} timeline */
 export function mountLater(context, timeline) {
@@ -22,6 +23,7 @@ export function mountLater(context, timeline) {
 	mountSheets(context);
 	mountKeep(context);
 	mountHint(timeline, store);
+	mountPlots(context, timeline);
 	timeline.braid = drawBraid;
 	timeline.draw();
 }

@@ -65,7 +65,7 @@ const timeline = mountTimeline(one(".time"), context);
 mountDoor(context);
 mountLayout(context);
 mountControls(context);
-// The rest is read when there is a picture; what it brings may be asked for before.
+// The rest is read once the page stands; what it brings may be asked for before.
 /** @type {Promise<void> | undefined} */
 let rest;
 const readRest = () =>
@@ -80,6 +80,7 @@ const brought = /** @type {const} */ ([
 	"keepPicture",
 	"drawTemplate",
 	"checkIdentities",
+	"plot",
 ]);
 for (const name of brought) {
 	const early = async (/** @type {any} */ what = undefined) => {
@@ -90,8 +91,7 @@ for (const name of brought) {
 	};
 	actions[name] = early;
 }
-store.on(["shown"], readRest);
-setTimeout(readRest, 1000);
+void readRest();
 
 // Also for a click inside the 3D view, which the server hears of first.
 const still = matchMedia("(prefers-reduced-motion: reduce)");

@@ -60,7 +60,7 @@ def event_table(
         found += [(s.step, s.track, "switch") for s in messages.switches_of(scored.evaluation)]
     check: IdentityCheck = request.app.state.identity_check
     if kind == "doubt":
-        return _checked(check.now, snapshot) + _doubts(check.now, snapshot)
+        return _doubts(check.now, snapshot)
     why = {} if run is None else dict[tuple[int, int, str], str](words_of(run))
     estimated = _found(check.now, snapshot)
     for doubt in () if estimated is None else estimated.doubts:
@@ -145,10 +145,16 @@ def _doubts(now: Checked, snapshot: Snapshot) -> str:
     found = _found(now, snapshot)
     sequence = snapshot.sequence
     if found is None or sequence is None:
-        return ""
+        return _checked(now, snapshot)
+    low, high = found.interval
+    head = line(
+        f"IDF1 is estimated {number(found.score, 3)} ({low:.3f} … {high:.3f}); ",
+        "Compare tells by what. ",
+        quiet(WARNING),
+    )
     if not found.doubts:
-        return line("All ways to look agree: no moment is doubtful.")
-    return table(
+        return head + line("All ways to look agree: no moment is doubtful.")
+    return head + table(
         "Doubtful moments",
         ("#Step", "#Time  s", "Doubtful, the most doubtful first", "Tracks"),
         [

@@ -12,6 +12,7 @@ const KEPT = /** @type {const} */ ([
 	"dismissed",
 	"realTime",
 	"turn",
+	"plots",
 ]);
 
 /** @returns {Partial<PageState>} */
@@ -60,6 +61,7 @@ export function initialState() {
 		listed: "all",
 		bookmarks: [],
 		layers3d: {},
+		plots: [],
 		large: null,
 		tab: "tracks",
 		eventKind: "",

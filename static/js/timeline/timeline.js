@@ -56,6 +56,7 @@ export function mountTimeline(root, context) {
 	const seam = {
 		plot,
 		draw,
+		rows: [],
 		at: (event) => ({
 			step: stepAt(event.clientX - plot.getBoundingClientRect().left, view),
 			track: laneAt(event),
@@ -171,12 +172,14 @@ export function mountTimeline(root, context) {
 		const scores = scoresOf(store.get());
 		if (!braided.hidden && scores)
 			seam.braid?.(row(token("h-strip")), scores, sorted.tracks, selection);
-		const [counts, costs, distances] = [0, 1, 2].map(() => row(token("h-strip")));
+		const counts = row(token("h-strip"));
 		if (timeline) drawCardinality(counts, timeline);
-		if (series && !scored.hidden) {
-			drawParts(costs, series, reference ?? null, name);
-			drawErrors(distances, series, selection);
+		if (!scored.hidden) {
+			const [costs, distances] = [0, 1].map(() => row(token("h-strip")));
+			if (series) drawParts(costs, series, reference ?? null, name);
+			if (series) drawErrors(distances, series, selection);
 		}
+		for (const drawRow of seam.rows) drawRow(row(token("h-strip")));
 		if (done < frames) {
 			const x = Math.max(0, xOf(done, view));
 			hatch(

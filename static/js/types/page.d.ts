@@ -124,6 +124,8 @@ interface PageState {
 	scores: Scores | null;
 	/** Of the run whose identities were checked without truth last. */
 	identity: Server.IdentityInfo | null;
+	/** What is plotted of the selected track, by the server's names. */
+	plots: string[];
 	/** What the timeline plots. */
 	measure: "ospa" | "gospa";
 	laneOrder: "longest" | "born";
@@ -253,6 +255,8 @@ interface Actions {
 	/** A pane and a kind of file: `cams png`. */
 	keepPicture: (what: string) => Promise<void>;
 	nextTurn: () => void;
+	/** Something of the selected track over time, there or away; the menu where nothing is named. */
+	plot: (name?: string) => void;
 	wholePictures: () => void;
 	arrange: (name: "inspect" | "tune" | "compare") => void;
 	/** Mark the shown step, or go to its note. */
@@ -288,6 +292,8 @@ interface Context {
 interface TimelineSeam {
 	plot: HTMLElement;
 	draw: () => void;
+	/** Rows of others, under its own: each draws one. */
+	rows: ((pen: Pen) => void)[];
 	/** What is under the pointer. */
 	at: (event: PointerEvent) => { step: number; track: Server.TrackLife | undefined };
 	/** Draws the braid of identities; read when the page is there. */

@@ -132,6 +132,29 @@ declare namespace Server {
 		points: [number, number][];
 	}
 
+	/** What can be plotted. */
+	interface CourseKind {
+		name: string;
+		word: string;
+		help: string;
+		needs_truth: boolean;
+	}
+
+	/** All of it, in the order of the list. */
+	interface CourseKinds {
+		kinds: CourseKind[];
+	}
+
+	/** Of one track of the shown run, in the buckets that were asked for. */
+	interface Courses {
+		run: string;
+		track: number;
+		first: number;
+		/** Steps a bucket: a value stands for the mean over them. */
+		stride: number;
+		courses: TrackCourse[];
+	}
+
 	/** What hindsight made otherwise than the filter, and why. */
 	interface Decided {
 		step: number;
@@ -930,6 +953,23 @@ declare namespace Server {
 		existence: number;
 		/** By camera. */
 		seen: boolean[];
+	}
+
+	/** One curve, or one for each camera. */
+	interface TrackCourse {
+		name: string;
+		word: string;
+		/** Empty for a share. */
+		unit: string;
+		help: string;
+		/** Value at the lower edge of its plot. */
+		low: number;
+		/** At its upper edge: a round number. */
+		high: number;
+		/** Each curve by buckets; null where the track is not there or the value is not known. */
+		values: ((number | null)[])[];
+		/** Whose the curves are; empty for one that is no camera's. */
+		cameras: string[];
 	}
 
 	/** A track's distance to whomever it is paired with, over time. */
