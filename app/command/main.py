@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.command.correction_flags import Corrections
 from app.command.flags import (
     Arguments,
     Benchmark,
@@ -118,6 +119,10 @@ def _run(command: Arguments) -> int:
             from app.command.runs import check
 
             return check(command)
+        case Corrections():
+            from app.command.correcting import corrections
+
+            return corrections(command)
     return 0
 
 
@@ -260,6 +265,7 @@ def _track(command: Track) -> None:
     if not output.parent.is_dir():
         raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
 
+    from app.command.correcting import of_run
     from app.state.workers.compiling import Compiling
     from tracker import pipeline
     from tracker.checks import check
@@ -278,6 +284,7 @@ def _track(command: Track) -> None:
         if found.status == "warning" and str(found) not in sequence.warnings:
             say(str(found))
     parameters = table.with_values(pipeline.default_parameters(sequence), changes)
+    told_by_hand = of_run(sequence, command.corrections, none=command.no_corrections)
     begin, began = time.perf_counter(), time.time()
     stages: set[table.Stage] = set()
 
@@ -296,6 +303,7 @@ def _track(command: Track) -> None:
             sequence,
             parameters,
             seed=command.seed,
+            corrections=told_by_hand,
             cache=StageCache.on_disk() if command.cache else None,
             on_progress=told,
             cancelled=interrupted,
@@ -314,6 +322,12 @@ def _track(command: Track) -> None:
         say(reason)
     for sentence in notices(run):
         say(sentence)
+    if told_by_hand:
+        unmet = {one.id: one.why for one in run.outcomes if not one.met}
+        say(f"{len(told_by_hand) - len(unmet)} of {len(told_by_hand)} corrections met")
+        for one in told_by_hand:
+            if one.id in unmet:
+                say(f"unmet: {one.words}: {unmet[one.id]}")
     if command.keep:
         _keep(command, run, began, seconds)
 
