@@ -118,6 +118,8 @@ class Track:
     """Obey none, not even those of the sequence."""
     cache: bool = True
     """Take up what the cameras found in an earlier run with the same values, and keep it."""
+    strict: bool = False
+    """End with status 1 where a picture was missing; the tracks are written all the same."""
     library: LibraryFile = None
     """The file that finished runs are kept in."""
     keep: Annotated[int, arg(metavar="INT")] = KEEP

@@ -82,7 +82,7 @@ def _run(command: Arguments) -> int:
         case Serve():
             return _serve(command)
         case Track():
-            _track(command)
+            return _track(command)
         case Detect():
             from app.command.detect import detect
 
@@ -250,7 +250,7 @@ def _leave(status: int) -> None:
 # track
 
 
-def _track(command: Track) -> None:
+def _track(command: Track) -> int:
     changes = command.changes()
     table.with_values(table.RunParameters(), changes)  # wrong usage shows before any work
     _check_seed(command.seed)
@@ -269,6 +269,7 @@ def _track(command: Track) -> None:
     from app.state.workers.compiling import Compiling
     from tracker import pipeline
     from tracker.checks import check
+    from tracker.runs import gaps
     from tracker.runs.gates import notices
     from tracker.runs.outcome import why_no_tracks
     from tracker.runs.stage_cache import StageCache
@@ -310,14 +311,11 @@ def _track(command: Track) -> None:
         )
     seconds = time.perf_counter() - begin
     with Bar("writing", "step") as writing:
-        written = Written(sequence, run.tracks, parameters, command.seed)
+        missing = gaps.sentences(run)
+        written = Written(sequence, run.tracks, parameters, command.seed, remarks=tuple(missing))
         save(output, form, written, Options(progress=writing.at))
     targets = len(set(run.tracks.ids.tolist()))
     kept = "" if "single_view" in stages else "; stage 1 was kept from an earlier run"
-    say(
-        f"{sequence.frames} steps, {targets} tracks, {sequence.frames / seconds:.0f} steps/s "
-        f"({sequence.frames / seconds / sequence.fps:.1f} × real time{kept}), written to {output}"
-    )
     if (reason := why_no_tracks(run)) is not None:
         say(reason)
     for sentence in notices(run):
@@ -328,8 +326,15 @@ def _track(command: Track) -> None:
         for one in told_by_hand:
             if one.id in unmet:
                 say(f"unmet: {one.words}: {unmet[one.id]}")
-    if command.keep:
+    if command.keep and not any(gap.unexpected for gap in gaps.gaps(run)):
         _keep(command, run, began, seconds)
+    incomplete = "".join(f"; {one}" for one in missing)
+    say(
+        f"{sequence.frames} steps, {targets} tracks, {sequence.frames / seconds:.0f} steps/s "
+        f"({sequence.frames / seconds / sequence.fps:.1f} × real time{kept}), written to {output}"
+        f"{incomplete}"
+    )
+    return FAILURE if command.strict and missing else 0
 
 
 def _keep(command: Track, run: Run, began: float, seconds: float) -> None:
