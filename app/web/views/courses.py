@@ -89,7 +89,7 @@ def _detection(life: _Life) -> Float[ndarray, "C K"]:
 
 def _distance(life: _Life) -> Float[ndarray, "1 K"]:
     tracks = life.run.tracks
-    found = np.full(len(life.rows), np.nan)
+    found: ndarray = np.full(len(life.rows), np.nan)
     for k, (row, frame) in enumerate(zip(life.rows.tolist(), life.frames.tolist(), strict=True)):
         here = tracks.at(frame)
         gaps = np.linalg.norm(tracks.positions[here, :2] - tracks.positions[row, :2], axis=1)
@@ -100,12 +100,13 @@ def _distance(life: _Life) -> Float[ndarray, "1 K"]:
 
 
 def _error(life: _Life) -> Float[ndarray, "1 K"]:
-    values = np.full(life.run.sequence.frames, np.nan)
+    values: ndarray = np.full(life.run.sequence.frames, np.nan)
     if life.scored is not None and life.scored.evaluation is not None:
         pairs = life.scored.evaluation.pairs
         own = pairs.tracks == life.track
         values[pairs.steps[own]] = pairs.distances[own]
-    return values[life.frames][None]
+    errors: ndarray = values[life.frames]
+    return errors[None]
 
 
 KINDS: dict[str, Kind] = {
