@@ -81,13 +81,14 @@ const brought = /** @type {const} */ ([
 	"drawTemplate",
 	"checkIdentities",
 	"plot",
+	"correct",
 ]);
 for (const name of brought) {
 	const early = async (/** @type {any} */ what = undefined) => {
 		await readRest();
 		if (actions[name] === early)
 			return actions.note("error", "That is not read yet", "The server does not answer.");
-		await actions[name](what);
+		await /** @type {any} */ (actions)[name](what);
 	};
 	actions[name] = early;
 }

@@ -1,0 +1,228 @@
+/**
+ * Where somebody stands, said in the pictures: the feet of the selected track have a handle in each
+ * picture, to be dragged or moved by arrows; and while a person is placed, every picture takes a
+ * click.
+ */
+import { lensOf } from "../draw/picture.js";
+import { h, one } from "../elements/dom.js";
+import { getJson } from "../state/api.js";
+
+/** Of a press of an arrow, pixels of the picture. */
+const [SMALL, LARGE] = [1, 10];
+
+/** How a cell shows its picture. @param {Element} cell @param {number} camera @param {Readonly<PageState>} state */
+function scaleOf(cell, camera, { zooms, cameras }) {
+	const { clientWidth: width, clientHeight: height } = cell;
+	const lens = lensOf(zooms[camera], width, height);
+	return { ...lens, scale: (width * lens.k) / cameras[camera].width };
+}
+
+/**
+ * The pixel under the pointer, and of which camera.
+ * @param {MouseEvent} event @param {Readonly<PageState>} state
+ * @returns {Click | null}
+ */
+export function pixelOf({ target, clientX, clientY }, state) {
+	const cell = /** @type {Element} */ (target).closest(".cam");
+	const camera = cell ? [...one(".mosaic").children].indexOf(cell) : -1;
+	if (!cell || !state.cameras[camera]) return null;
+	const edge = cell.getBoundingClientRect();
+	const { left, top, scale } = scaleOf(cell, camera, state);
+	return {
+		camera,
+		x: (clientX - edge.left + left) / scale,
+		y: (clientY - edge.top + top) / scale,
+	};
+}
+
+/** @param {Context} context @param {Check} check */
+export function mountFeet({ store, playback }, check) {
+	const { state } = check;
+	const mosaic = one(".mosaic");
+	/** By camera; a place in the picture, and whether somebody said it. @type {(Click & {said: boolean})[]} */
+	let feet = [];
+	/** @type {HTMLElement[]} */
+	let handles = [];
+	let wanted = "";
+
+	/** The feet of the selected track at the shown step, as the server projects them. */
+	async function refresh() {
+		const { place, selection, shown, playing, cameras, basis, result } = store.get();
+		const { placing } = state.get();
+		const track = placing ? placing.track : selection;
+		const on = place === "check" && !playing && shown >= 0 && (placing || track !== null);
+		const key = on ? `${track} ${shown} ${basis} ${Boolean(placing)} ${result?.run}` : "";
+		if (key === wanted) return put();
+		wanted = key;
+		feet = [];
+		put();
+		if (!on) return;
+		const there = track === null ? null : await footprints(track, shown);
+		if (key !== wanted) return;
+		feet = cameras.flatMap(({ width, height }, camera) => {
+			const at = there?.[camera];
+			if (!at && !placing) return [];
+			const [x, y] = at ?? [width / 2, height * 0.75];
+			return [{ camera, x, y, said: false }];
+		});
+		build();
+	}
+
+	/** @param {number} track @param {number} step @returns {Promise<([number, number] | null)[]>} */
+	async function footprints(track, step) {
+		/** @type {Server.Step} */
+		const result = await getJson(`/api/step/${step}?samples=false&trails=true`);
+		return result.cameras.map(({ tracks }) => {
+			const found = tracks.find(({ id, visible }) => id === track && visible);
+			const now = found?.trail.find(([since]) => since === 0);
+			return now ? [now[1], now[2]] : null;
+		});
+	}
+
+	function build() {
+		const { placing } = state.get();
+		const { selection, cameras } = store.get();
+		for (const handle of handles) handle.remove();
+		handles = feet.map((foot) => {
+			const id = placing ? placing.track : selection;
+			const handle = h("button", {
+				class: "foothold",
+				"aria-label": `Feet of ${id === null ? "somebody" : `track ${id}`} in ${cameras[foot.camera].name}: drag, or arrows and Enter`,
+				onclick: (event) => event.stopPropagation(),
+				ondblclick: (event) => event.stopPropagation(),
+			});
+			handle.addEventListener("pointerdown", (event) => {
+				event.stopPropagation();
+				if (event.button === 0) handle.setPointerCapture(event.pointerId);
+			});
+			handle.addEventListener("pointermove", (event) => {
+				event.stopPropagation();
+				if (!handle.hasPointerCapture(event.pointerId)) return;
+				const at = pixelOf(event, store.get());
+				if (at) move(foot, at.x, at.y);
+			});
+			handle.addEventListener("pointerup", (event) => {
+				event.stopPropagation();
+				if (foot.said && !state.get().placing) void send();
+			});
+			handle.addEventListener("keydown", (event) => keyed(event, foot));
+			mosaic.children[foot.camera]?.append(handle);
+			return handle;
+		});
+		put();
+	}
+
+	/** @param {Click & {said: boolean}} foot @param {number} x @param {number} y */
+	function move(foot, x, y) {
+		const { width, height } = store.get().cameras[foot.camera];
+		Object.assign(foot, {
+			x: Math.max(0, Math.min(width - 1, x)),
+			y: Math.max(0, Math.min(height - 1, y)),
+			said: true,
+		});
+		put();
+		tell();
+	}
+
+	/** @param {KeyboardEvent} event @param {Click & {said: boolean}} foot */
+	function keyed(event, foot) {
+		const far = event.shiftKey ? LARGE : SMALL;
+		const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[
+			event.key
+		];
+		if (way) move(foot, foot.x + far * way[0], foot.y + far * way[1]);
+		else if (event.key === "Enter") {
+			foot.said = true;
+			void send();
+		} else if (event.key === "Escape") cancel();
+		else return;
+		event.preventDefault();
+		event.stopPropagation();
+	}
+
+	/** What was said so far is told to who places. */
+	function tell() {
+		const { placing } = state.get();
+		if (placing) state.set({ placing: { ...placing, clicks: said() } });
+	}
+	const said = () => feet.filter(({ said }) => said).map(({ camera, x, y }) => ({ camera, x, y }));
+
+	async function send() {
+		const { placing } = state.get();
+		const track = placing ? placing.track : store.get().selection;
+		const step = placing ? placing.step : store.get().shown;
+		const clicks = said();
+		if (!clicks.length) return;
+		await check.say([{ kind: "here", step, clicks, ...(track !== null && { tracks: [track] }) }]);
+		wanted = "";
+		void refresh();
+	}
+
+	function cancel() {
+		state.set({ placing: null });
+		wanted = "";
+		void refresh();
+	}
+
+	function put() {
+		const now = store.get();
+		handles.forEach((handle, k) => {
+			const foot = feet[k];
+			const cell = mosaic.children[foot?.camera];
+			handle.hidden = !foot || !cell;
+			if (!foot || !cell) return;
+			const { left, top, scale } = scaleOf(cell, foot.camera, now);
+			handle.style.translate = `${Math.round(foot.x * scale - left)}px ${Math.round(foot.y * scale - top)}px`;
+			handle.classList.toggle("said", foot.said);
+			handle.classList.toggle("placing", Boolean(state.get().placing));
+		});
+		if (!feet.length) {
+			for (const handle of handles) handle.remove();
+			handles = [];
+		}
+	}
+
+	// While somebody is placed a click in a picture says where; nothing else happens there.
+	for (const name of ["pointerdown", "click", "dblclick"])
+		mosaic.addEventListener(
+			name,
+			(event) => {
+				const { placing } = state.get();
+				const target = /** @type {Element} */ (event.target);
+				if (!placing || target.closest(".foothold")) return;
+				const at = pixelOf(/** @type {MouseEvent} */ (event), store.get());
+				if (!at) return;
+				event.stopPropagation();
+				const foot = feet.find(({ camera }) => camera === at.camera);
+				if (name !== "click" || !foot) return;
+				// Two pictures are enough; a third click begins with the newest two.
+				const others = feet.filter((one) => one.said && one !== foot);
+				if (others.length > 1) others[0].said = false;
+				move(foot, at.x, at.y);
+			},
+			true,
+		);
+	document.addEventListener(
+		"keydown",
+		(event) => {
+			if (!state.get().placing || store.get().place !== "check") return;
+			if (document.querySelector("dialog[open], :popover-open")) return;
+			const onControl = /** @type {Element} */ (event.target).closest("button, input, select");
+			if (event.key === "Escape") cancel();
+			else if (event.key === "Enter" && !onControl && said().length) void send();
+			else return;
+			event.preventDefault();
+			event.stopPropagation();
+		},
+		true,
+	);
+	store.watch(
+		["place", "selection", "shown", "playing", "basis", "result", "cameras"],
+		() => void refresh(),
+	);
+	state.on(["placing"], () => void refresh());
+	store.on(["zooms", "large", "layout"], put);
+	playback.onPaint(() => handles.length && put());
+	new ResizeObserver(put).observe(mosaic);
+	return { send, cancel };
+}

@@ -1,0 +1,158 @@
+/** What is doubtful and what was put right, fetched and kept; every part of Check looks at this. */
+import { fetcher, getJson } from "../state/api.js";
+import { createStore } from "../state/store.js";
+import { middleOf } from "./words.js";
+
+/** One for a page. @type {WeakMap<Store<PageState>, Check>} */
+const made = new WeakMap();
+
+/** @param {Context} context @returns {Check} */
+export function checkOf(context) {
+	const { store } = context;
+	const check = made.get(store) ?? createCheck(context);
+	made.set(store, check);
+	return check;
+}
+
+/** While a run goes on its places are asked for at most so often, milliseconds. */
+const OFTEN = 1500;
+
+/** @param {Context} context @returns {Check} */
+function createCheck({ store, actions, playback }) {
+	/** @type {Store<CheckState>} */
+	const state = createStore(
+		/** @type {CheckState} */ ({
+			told: null,
+			queue: null,
+			chosen: null,
+			other: 0,
+			preview: null,
+			ends: null,
+			placing: null,
+		}),
+	);
+	/** Where the chosen place stood, so that the next one is there when it is done. */
+	let at = 0;
+	let answered = false;
+	let asked = 0;
+
+	const refresh = fetcher(async () => {
+		const { sequence, run } = store.get();
+		if (!sequence) return;
+		asked = performance.now();
+		const told = await getJson("/api/corrections");
+		state.set({ told });
+		if (!run?.done) return;
+		receiveQueue(await getJson("/api/corrections/queue"));
+	});
+
+	/** @param {Server.Queue} queue */
+	function receiveQueue(queue) {
+		const { chosen } = state.get();
+		const { doubts } = queue;
+		const same = doubts.find(({ id }) => id === chosen?.id);
+		state.set({ queue });
+		store.set({
+			signs: { ...store.get().signs, check: doubts.length ? String(doubts.length) : "" },
+		});
+		if (same) {
+			at = doubts.indexOf(same);
+			state.set({ chosen: same });
+		} else if (answered || (chosen && queue.complete && store.get().run?.state === "done")) {
+			// What is done makes room for the next; while a run goes on the shown one stays.
+			answered = false;
+			const next = doubts[Math.min(at, doubts.length - 1)] ?? null;
+			if (store.get().place === "check") choose(next);
+			else state.set({ chosen: null, other: 0, preview: null, ends: null });
+		}
+	}
+
+	/** @param {Doubt | null} doubt */
+	function choose(doubt) {
+		at = Math.max(0, state.get().queue?.doubts.findIndex(({ id }) => id === doubt?.id) ?? 0);
+		state.set({ chosen: doubt, other: 0, preview: null, ends: null, placing: null });
+		void actions.ask("POST", "corrections/ghosts", { doubt: null });
+		if (!doubt) return;
+		store.set({ playing: 0 });
+		playback.seek(middleOf(doubt));
+		actions.select(doubt.tracks[0] ?? null);
+	}
+
+	/** @param {number} other */
+	async function show(other) {
+		const { chosen } = state.get();
+		if (!chosen || !chosen.alternatives[other]) return;
+		state.set({ other, ...(other ? {} : { preview: null }) });
+		void actions.ask(
+			"POST",
+			"corrections/ghosts",
+			other ? { doubt: chosen.id, alternative: other } : {},
+		);
+		if (!other) return;
+		const preview = await getJson(`/api/corrections/queue/${chosen.id}/${other}`).catch(() => null);
+		const now = state.get();
+		if (now.chosen?.id === chosen.id && now.other === other) state.set({ preview });
+	}
+
+	/** Ask, and take over what is told. @param {"POST" | "DELETE"} method @param {string} path @param {object} [body] */
+	async function ask(method, path, body) {
+		const told = await actions.ask(method, `corrections${path}`, body);
+		if (!told) return false;
+		state.set({ told, other: 0, preview: null, ends: null, placing: null });
+		void refresh();
+		return true;
+	}
+
+	store.watch(["sequence"], () => {
+		state.set({
+			told: null,
+			queue: null,
+			chosen: null,
+			other: 0,
+			preview: null,
+			ends: null,
+			placing: null,
+		});
+		store.set({ signs: { ...store.get().signs, check: "" } });
+		void refresh();
+	});
+	store.on(["corrected", "basis"], () => void refresh());
+	/** @type {Timer} */
+	let waiting;
+	let ended = "";
+	store.watch(["run"], ({ run }) => {
+		const now = `${run?.key} ${run?.state}`;
+		if (!run || (now === ended && run.state !== "computing")) return;
+		ended = now;
+		clearTimeout(waiting);
+		const rest = run.state === "computing" ? OFTEN - (performance.now() - asked) : 100;
+		waiting = setTimeout(() => void refresh(), Math.max(0, rest));
+	});
+
+	return {
+		state,
+		choose,
+		show: (other) => void show(other),
+		say: (corrections) => ask("POST", "", { corrections }),
+		async answer(alternative) {
+			const { chosen } = state.get();
+			if (!chosen) return false;
+			answered = true;
+			const taken = await ask("POST", "/answers", { doubt: chosen.id, alternative });
+			answered &&= taken;
+			return taken;
+		},
+		async skip() {
+			const { chosen } = state.get();
+			if (!chosen) return;
+			answered = true;
+			const queue = await actions.ask("POST", "corrections/skips", { doubt: chosen.id });
+			if (queue) receiveQueue(queue);
+			else answered = false;
+		},
+		drop: (id) => ask("DELETE", `/${id}`),
+		async undo(direction) {
+			await ask("POST", `/${direction}`);
+		},
+	};
+}
