@@ -34,6 +34,7 @@ from app.state.workers.jobs import Jobs, in_background
 from app.state.workers.keeper import Keeper
 from app.state.workers.sensitivity import Sensitivity
 from app.web import api, gateway, stream, teaching_routes
+from app.web.access import Access, Keys
 from app.web.entrance import LARGEST_MESSAGE, Entrance, start_viser
 from app.web.evaluation import routes as evaluation
 from app.web.gateway import Gateway
@@ -83,6 +84,8 @@ class Settings:
     """What a server is started with."""
 
     host: str = "127.0.0.1"
+    keys: Keys | None = None
+    """What lets in; None: whoever reaches it."""
     sequence: str | None = None
     """Opened at once, in the background."""
     data: Path | None = None
@@ -115,13 +118,14 @@ def create_app(settings: Settings) -> FastAPI:
         lifespan=_lifespan,
     )
     app.state.settings = settings
-    app.add_middleware(
+    if isinstance(settings.run, Result):
+        app.add_middleware(OnlyLooking)
+    app.add_middleware(Access, keys=settings.keys)
+    app.add_middleware(  # the last one is the first that sees a request
         Guard,
         hosts=allowed_hosts(settings.host),
         addresses_are_fine=not is_loopback(settings.host),
     )
-    if isinstance(settings.run, Result):
-        app.add_middleware(OnlyLooking)
     errors.install(app)
     for router in ROUTERS:
         app.include_router(router)
