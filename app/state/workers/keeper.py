@@ -19,6 +19,7 @@ from tracker.library import KEEP
 from tracker.library.errors import LibraryError
 from tracker.library.keeping import recording_of, run_of, thumbnail_of
 from tracker.library.store import Library, open_library
+from tracker.runs.gaps import gaps
 from tracker.sequences.sequence import Sequence
 
 logger = logging.getLogger("app")
@@ -139,6 +140,8 @@ class Keeper:
         run, scored = now.run, now.scores.shown
         library = self.library()
         if run is None or library.read_only:
+            return
+        if any(gap.unexpected for gap in gaps(run)):  # another result when the files are whole
             return
         speed = now.run_state.steps_per_second
         began = self._begun[1] if self._begun[0] == key else time.time()

@@ -709,6 +709,8 @@ declare namespace Server {
 		smoothed: boolean;
 		/** The key that a computation would have, where older code made what is shown; else empty. */
 		stands_for: string;
+		/** What its result lacks: pictures that were missing, files that changed. */
+		warnings: string[];
 	}
 
 	/** Every parameter, method and preset. */
@@ -771,6 +773,8 @@ declare namespace Server {
 		cameras: CameraInfo[];
 		/** How many colour templates it has. */
 		templates: number;
+		/** What is odd about it, or was found out because it is not stated. */
+		warnings: string[];
 	}
 
 	/** What can be opened. */
