@@ -199,12 +199,12 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
         return address if key is None else f"{address}?{PARAMETER}={key}"
 
     def ready() -> None:
-        sys.stdout.write(f"multiview-phd: {link(keys and keys.token)} (Ctrl-C ends it)\n")
+        sys.stdout.write(f"multiview-phd: {link(keys.token if keys else None)} (Ctrl-C ends it)\n")
         sys.stdout.flush()
         if command.open:
             import webbrowser
 
-            opened = link(keys and keys.ticket())
+            opened = link(keys.ticket() if keys else None)
             threading.Thread(target=webbrowser.open, args=(opened,), daemon=True).start()
 
     app = server.create_app(
