@@ -20,26 +20,30 @@ function scaleOf(cell, camera, { zooms, cameras }) {
 /**
  * The pixel under the pointer, and of which camera.
  * @param {MouseEvent} event @param {Readonly<PageState>} state
- * @returns {Click | null}
+ * @returns {Spot | null}
  */
 export function pixelOf({ target, clientX, clientY }, state) {
 	const cell = /** @type {Element} */ (target).closest(".cam");
-	const camera = cell ? [...one(".mosaic").children].indexOf(cell) : -1;
-	if (!cell || !state.cameras[camera]) return null;
+	const index = cell ? [...one(".mosaic").children].indexOf(cell) : -1;
+	if (!cell || !state.cameras[index]) return null;
 	const edge = cell.getBoundingClientRect();
-	const { left, top, scale } = scaleOf(cell, camera, state);
+	const { left, top, scale } = scaleOf(cell, index, state);
 	return {
-		camera,
+		index,
+		camera: state.cameras[index].name,
 		x: (clientX - edge.left + left) / scale,
 		y: (clientY - edge.top + top) / scale,
 	};
 }
 
+/** As it is said. @param {Spot} spot @returns {Click} */
+export const clickOf = ({ camera, x, y }) => ({ camera, x, y });
+
 /** @param {Context} context @param {Check} check */
 export function mountFeet({ store, playback }, check) {
 	const { state } = check;
 	const mosaic = one(".mosaic");
-	/** By camera; a place in the picture, and whether somebody said it. @type {(Click & {said: boolean})[]} */
+	/** By camera; a place in the picture, and whether somebody said it. @type {(Spot & {said: boolean})[]} */
 	let feet = [];
 	/** @type {HTMLElement[]} */
 	let handles = [];
@@ -59,11 +63,11 @@ export function mountFeet({ store, playback }, check) {
 		if (!on) return;
 		const there = track === null ? null : await footprints(track, shown);
 		if (key !== wanted) return;
-		feet = cameras.flatMap(({ width, height }, camera) => {
-			const at = there?.[camera];
+		feet = cameras.flatMap(({ name, width, height }, index) => {
+			const at = there?.[index];
 			if (!at && !placing) return [];
 			const [x, y] = at ?? [width / 2, height * 0.75];
-			return [{ camera, x, y, said: false }];
+			return [{ index, camera: name, x, y, said: false }];
 		});
 		build();
 	}
@@ -81,13 +85,13 @@ export function mountFeet({ store, playback }, check) {
 
 	function build() {
 		const { placing } = state.get();
-		const { selection, cameras } = store.get();
+		const { selection } = store.get();
 		for (const handle of handles) handle.remove();
 		handles = feet.map((foot) => {
 			const id = placing ? placing.track : selection;
 			const handle = h("button", {
 				class: "foothold",
-				"aria-label": `Feet of ${id === null ? "somebody" : `track ${id}`} in ${cameras[foot.camera].name}: drag, or arrows and Enter`,
+				"aria-label": `Feet of ${id === null ? "somebody" : `track ${id}`} in ${foot.camera}: drag, or arrows and Enter`,
 				onclick: (event) => event.stopPropagation(),
 				ondblclick: (event) => event.stopPropagation(),
 			});
@@ -106,15 +110,15 @@ export function mountFeet({ store, playback }, check) {
 				if (foot.said && !state.get().placing) void send();
 			});
 			handle.addEventListener("keydown", (event) => keyed(event, foot));
-			mosaic.children[foot.camera]?.append(handle);
+			mosaic.children[foot.index]?.append(handle);
 			return handle;
 		});
 		put();
 	}
 
-	/** @param {Click & {said: boolean}} foot @param {number} x @param {number} y */
+	/** @param {Spot & {said: boolean}} foot @param {number} x @param {number} y */
 	function move(foot, x, y) {
-		const { width, height } = store.get().cameras[foot.camera];
+		const { width, height } = store.get().cameras[foot.index];
 		Object.assign(foot, {
 			x: Math.max(0, Math.min(width - 1, x)),
 			y: Math.max(0, Math.min(height - 1, y)),
@@ -124,7 +128,7 @@ export function mountFeet({ store, playback }, check) {
 		tell();
 	}
 
-	/** @param {KeyboardEvent} event @param {Click & {said: boolean}} foot */
+	/** @param {KeyboardEvent} event @param {Spot & {said: boolean}} foot */
 	function keyed(event, foot) {
 		const far = event.shiftKey ? LARGE : SMALL;
 		const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[
@@ -145,7 +149,7 @@ export function mountFeet({ store, playback }, check) {
 		const { placing } = state.get();
 		if (placing) state.set({ placing: { ...placing, clicks: said() } });
 	}
-	const said = () => feet.filter(({ said }) => said).map(({ camera, x, y }) => ({ camera, x, y }));
+	const said = () => feet.filter(({ said }) => said).map(clickOf);
 
 	async function send() {
 		const { placing } = state.get();
@@ -168,10 +172,10 @@ export function mountFeet({ store, playback }, check) {
 		const now = store.get();
 		handles.forEach((handle, k) => {
 			const foot = feet[k];
-			const cell = mosaic.children[foot?.camera];
+			const cell = mosaic.children[foot?.index];
 			handle.hidden = !foot || !cell;
 			if (!foot || !cell) return;
-			const { left, top, scale } = scaleOf(cell, foot.camera, now);
+			const { left, top, scale } = scaleOf(cell, foot.index, now);
 			handle.style.translate = `${Math.round(foot.x * scale - left)}px ${Math.round(foot.y * scale - top)}px`;
 			handle.classList.toggle("said", foot.said);
 			handle.classList.toggle("placing", Boolean(state.get().placing));
@@ -193,7 +197,7 @@ export function mountFeet({ store, playback }, check) {
 				const at = pixelOf(/** @type {MouseEvent} */ (event), store.get());
 				if (!at) return;
 				event.stopPropagation();
-				const foot = feet.find(({ camera }) => camera === at.camera);
+				const foot = feet.find(({ index }) => index === at.index);
 				if (name !== "click" || !foot) return;
 				// Two pictures are enough; a third click begins with the newest two.
 				const others = feet.filter((one) => one.said && one !== foot);

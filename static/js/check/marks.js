@@ -138,7 +138,7 @@ export function mountMarks({ store }, timeline, check) {
 			tracks.map(({ id }, k) => [id, lanes.y + (k + 0.5) * laneHeight - scroll]),
 		);
 		// How it would be: the lane's new colour around it, over what is not so then.
-		for (const { id, first, last, was } of (here && preview?.lanes) || []) {
+		for (const { id, first, last, was } of (here && preview?.spans) || []) {
 			const y = middles.get(was);
 			const [a, b] = [
 				Math.max(-4, xOf(first, view)),

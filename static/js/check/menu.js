@@ -2,7 +2,7 @@
 import { fill, h, icon, idTag, one } from "../elements/dom.js";
 import { resultOf } from "../state/events.js";
 import { commandOf, keyLabel, perform } from "../state/commands.js";
-import { pixelOf } from "./feet.js";
+import { clickOf, pixelOf } from "./feet.js";
 import { checkOf } from "./model.js";
 import { neighbours } from "./words.js";
 
@@ -78,7 +78,7 @@ export function mountMenu(context, timeline, does) {
 			key && h("kbd", {}, key),
 		);
 
-	/** @param {{track: number | null, step: number, click?: Click}} what */
+	/** @param {{track: number | null, step: number, click?: Spot}} what */
 	function open({ track, step, click }) {
 		if (track !== null) actions.select(track);
 		if (click) store.set({ playing: 0 });
@@ -99,7 +99,12 @@ export function mountMenu(context, timeline, does) {
 			click &&
 				item("i-here", [track === null ? "Somebody is here" : "Its feet are here"], "", () =>
 					checkOf(context).say([
-						{ kind: "here", step, clicks: [click], ...(track !== null && { tracks: [track] }) },
+						{
+							kind: "here",
+							step,
+							clicks: [clickOf(click)],
+							...(track !== null && { tracks: [track] }),
+						},
 					]),
 				),
 			told?.undo && item("i-undo", [`Undo: ${told.undo}`], "", () => actions.correct("undo")),
@@ -176,7 +181,7 @@ export function mountMenu(context, timeline, does) {
 	store.on(["selection"], ({ selection }) => {
 		if (takes && selection !== null) takes(selection);
 	});
-	/** @param {MouseEvent} event @param {{track: number | null, step: number, click?: Click}} what */
+	/** @param {MouseEvent} event @param {{track: number | null, step: number, click?: Spot}} what */
 	function at(event, what) {
 		if (!store.get().sequence) return;
 		event.preventDefault();
@@ -200,7 +205,7 @@ export function mountMenu(context, timeline, does) {
 		if (!click) return;
 		const { hover } = store.get();
 		at(event, {
-			track: hover?.camera === click.camera ? hover.id : null,
+			track: hover?.camera === click.index ? hover.id : null,
 			step: shown(),
 			click,
 		});

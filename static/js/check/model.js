@@ -46,7 +46,7 @@ function createCheck({ store, actions, playback }) {
 		receiveQueue(await getJson("/api/corrections/queue"));
 	});
 
-	/** @param {Server.Queue} queue */
+	/** @param {Server.DoubtQueue} queue */
 	function receiveQueue(queue) {
 		const { chosen } = state.get();
 		const { doubts } = queue;
@@ -116,7 +116,13 @@ function createCheck({ store, actions, playback }) {
 		store.set({ signs: { ...store.get().signs, check: "" } });
 		void refresh();
 	});
-	store.on(["corrected", "basis"], () => void refresh());
+	let heard = "";
+	store.on(["server", "basis"], ({ server, basis }) => {
+		const now = `${server?.corrections?.key} ${basis}`;
+		if (now === heard) return;
+		heard = now;
+		void refresh();
+	});
 	/** @type {Timer} */
 	let waiting;
 	let ended = "";

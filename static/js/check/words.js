@@ -104,7 +104,7 @@ export function camerasFor(results, ids, cameras) {
 
 /**
  * Whose box shows at a step where somebody would be after a change: the nearest track.
- * @param {Server.Preview | null} preview
+ * @param {Server.AlternativePreview | null} preview
  * @param {number} id  as it would be
  * @param {Server.Step | null} result
  * @returns {number | null} the id as it is; null where there is nobody

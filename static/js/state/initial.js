@@ -76,7 +76,6 @@ export function initialState() {
 		asked: "",
 		moved: false,
 		place: "tune",
-		corrected: 0,
 		signs: {},
 		dismissed: [],
 		undoable: [0, 0],

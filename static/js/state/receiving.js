@@ -174,7 +174,6 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 			void fetchTimeline();
 		},
 		evaluation: () => void fetchScores(),
-		corrections: () => store.set({ corrected: store.get().corrected + 1 }),
 		notice: ({ level, message, hint }) => actions.note(level, message, hint ?? ""),
 		command({ name }) {
 			// Of a 3D view in a window of its own: keys of our frame come by themselves.

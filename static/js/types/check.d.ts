@@ -23,7 +23,7 @@ type Correcting =
 	| "redo"
 	| "truth";
 
-type Doubt = Server.Queue["doubts"][number];
+type Doubt = Server.DoubtQueue["doubts"][number];
 type Told = Server.Corrections["corrections"][number];
 
 /** A correction as the page says it: tracks of the shown run, or a place. */
@@ -41,17 +41,20 @@ type Wish = {
 };
 
 /** Where somebody stands in a picture: its pixels. */
-type Click = { camera: number; x: number; y: number };
+type Click = { camera: string; x: number; y: number };
+
+/** The same, and which of the pictures it is. */
+type Spot = Click & { index: number };
 
 interface CheckState {
 	told: Server.Corrections | null;
-	queue: Server.Queue | null;
+	queue: Server.DoubtQueue | null;
 	/** The place that is looked at; it stays until another is chosen. */
 	chosen: Doubt | null;
 	/** Which of its alternatives is shown; 0 is as it is. */
 	other: number;
 	/** How it would be, of the alternative that is shown. */
-	preview: Server.Preview | null;
+	preview: Server.AlternativePreview | null;
 	/** Of an exchange, where somebody changed them: from, and where it goes back if it does. */
 	ends: [number, number | null] | null;
 	/** Somebody says by clicks where a person is. */

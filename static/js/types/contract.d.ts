@@ -23,7 +23,7 @@ declare namespace Server {
 		undo: string | null;
 		redo: string | null;
 	}
-	interface Queue {
+	interface DoubtQueue {
 		run: string | null;
 		complete: boolean;
 		how: string;
@@ -52,8 +52,11 @@ declare namespace Server {
 			alternatives: { words: string; probability: number; as_it_is: boolean }[];
 		}[];
 	}
-	interface Preview {
+	interface AlternativePreview {
 		tracks: { id: number; first: number; positions: ([number, number, number] | null)[] }[];
-		lanes: { id: number; first: number; last: number; was: number }[];
+		spans: { id: number; first: number; last: number; was: number }[];
+	}
+	interface State {
+		corrections: { key: string; count: number; unmet: number };
 	}
 }

@@ -138,8 +138,6 @@ interface PageState {
 	asked: string;
 	/** Which of the page's places is looked at. */
 	place: string;
-	/** Counts up whenever the corrections changed. */
-	corrected: number;
 	/** What stands beside the words of the places, by name. */
 	signs: Record<string, string>;
 	/** Whether somebody has chosen a step of this sequence. */

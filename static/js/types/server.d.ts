@@ -671,7 +671,7 @@ declare namespace Server {
 		/**
 		 * Within the steps asked for; ones shorter than ``stride`` are joined with their neighbours.
 		 */
-		spans: ([number, number, "seen" | "coasting" | "long miss"])[];
+		spans: [number, number, "seen" | "coasting" | "long miss"][];
 		/** The track of the shown run that it is most often paired with. */
 		like: number | null;
 	}
@@ -941,7 +941,7 @@ declare namespace Server {
 		/** Where a run is pinned that is not the shown one. */
 		pinned: PinnedTimeline | null;
 		/** Of all steps, also of those not asked for, in their order. */
-		events: ([number, number, "birth" | "death" | "long miss" | "cut" | "joined" | "removed"])[];
+		events: [number, number, "birth" | "death" | "long miss" | "cut" | "joined" | "removed"][];
 		/** What hindsight changed, by its step; empty for the filter alone. */
 		decisions: Decided[];
 		/** How many more live there: the shorter ones, where they are very many. */
@@ -971,7 +971,7 @@ declare namespace Server {
 		/** At its upper edge: a round number. */
 		high: number;
 		/** Each curve by buckets; null where the track is not there or the value is not known. */
-		values: ((number | null)[])[];
+		values: (number | null)[][];
 		/** Whose the curves are; empty for one that is no camera's. */
 		cameras: string[];
 	}
@@ -998,7 +998,7 @@ declare namespace Server {
 		/**
 		 * Within the steps asked for; ones shorter than ``stride`` are joined with their neighbours.
 		 */
-		spans: ([number, number, "seen" | "coasting" | "long miss"])[];
+		spans: [number, number, "seen" | "coasting" | "long miss"][];
 	}
 
 	/** How trails are drawn, in 3D and in pictures. */
