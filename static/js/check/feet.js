@@ -20,10 +20,14 @@ function scaleOf(cell, camera, { zooms, cameras }) {
 /**
  * The pixel under the pointer, and of which camera.
  * @param {MouseEvent} event @param {Readonly<PageState>} state
+ * @param {Element | null} cell  that is meant, where it is not under the pointer
  * @returns {Spot | null}
  */
-export function pixelOf({ target, clientX, clientY }, state) {
-	const cell = /** @type {Element} */ (target).closest(".cam");
+export function pixelOf(
+	{ target, clientX, clientY },
+	state,
+	cell = /** @type {Element} */ (target).closest(".cam"),
+) {
 	const index = cell ? [...one(".mosaic").children].indexOf(cell) : -1;
 	if (!cell || !state.cameras[index]) return null;
 	const edge = cell.getBoundingClientRect();
@@ -43,6 +47,9 @@ export const clickOf = ({ camera, x, y }) => ({ camera, x, y });
 export function mountFeet({ store, playback }, check) {
 	const { state } = check;
 	const mosaic = one(".mosaic");
+	// Beside the pictures, which are buttons themselves.
+	const layer = h("div", { class: "feet" });
+	mosaic.after(layer);
 	/** By camera; a place in the picture, and whether somebody said it. @type {(Spot & {said: boolean})[]} */
 	let feet = [];
 	/** @type {HTMLElement[]} */
@@ -102,7 +109,7 @@ export function mountFeet({ store, playback }, check) {
 			handle.addEventListener("pointermove", (event) => {
 				event.stopPropagation();
 				if (!handle.hasPointerCapture(event.pointerId)) return;
-				const at = pixelOf(event, store.get());
+				const at = pixelOf(event, store.get(), mosaic.children[foot.index]);
 				if (at) move(foot, at.x, at.y);
 			});
 			handle.addEventListener("pointerup", (event) => {
@@ -110,7 +117,7 @@ export function mountFeet({ store, playback }, check) {
 				if (foot.said && !state.get().placing) void send();
 			});
 			handle.addEventListener("keydown", (event) => keyed(event, foot));
-			mosaic.children[foot.index]?.append(handle);
+			layer.append(handle);
 			return handle;
 		});
 		put();
@@ -174,9 +181,12 @@ export function mountFeet({ store, playback }, check) {
 			const foot = feet[k];
 			const cell = mosaic.children[foot?.index];
 			handle.hidden = !foot || !cell;
-			if (!foot || !cell) return;
+			if (!foot || !(cell instanceof HTMLElement)) return;
 			const { left, top, scale } = scaleOf(cell, foot.index, now);
-			handle.style.translate = `${Math.round(foot.x * scale - left)}px ${Math.round(foot.y * scale - top)}px`;
+			const [x, y] = [foot.x * scale - left, foot.y * scale - top];
+			// A part that is magnified may not show it.
+			handle.hidden = x < 0 || y < 0 || x > cell.clientWidth || y > cell.clientHeight;
+			handle.style.translate = `${Math.round(mosaic.offsetLeft + cell.offsetLeft + x)}px ${Math.round(mosaic.offsetTop + cell.offsetTop + y)}px`;
 			handle.classList.toggle("said", foot.said);
 			handle.classList.toggle("placing", Boolean(state.get().placing));
 		});

@@ -16,6 +16,8 @@ const ACTS = /** @type {const} */ ([
 	["check-nobody", "i-trash", "Delete"],
 	["check-here", "i-here", "Place…"],
 ]);
+/** Where there is little room their words go first. */
+const SHORT = ["check-here", "check-nobody", "check-skip"];
 /** Which of them a kind of doubt proposes where it is wrong. @type {Record<string, string>} */
 const PROPOSES = {
 	exchange: "check-exchange",
@@ -57,7 +59,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 		return h(
 			"button",
 			{
-				class: `btn up ${main ? "main" : "box"}`,
+				class: `btn up ${main ? "main" : "box"}${SHORT.includes(name) ? " short end" : ""}`,
 				"data-tip": command.title,
 				onclick: () => perform(command, actions),
 			},
