@@ -63,15 +63,20 @@ function createCheck({ store, actions, playback }) {
 			answered = false;
 			const next = doubts[Math.min(at, doubts.length - 1)] ?? null;
 			if (store.get().place === "check") choose(next);
-			else state.set({ chosen: null, other: 0, preview: null, ends: null });
+			else state.set({ ...hide(), chosen: null });
 		}
+	}
+
+	/** How it would be is drawn no more. */
+	function hide() {
+		if (state.get().other) void actions.ask("POST", "corrections/ghosts", { doubt: null });
+		return { other: 0, preview: null, ends: null, placing: null };
 	}
 
 	/** @param {Doubt | null} doubt */
 	function choose(doubt) {
 		at = Math.max(0, state.get().queue?.doubts.findIndex(({ id }) => id === doubt?.id) ?? 0);
-		state.set({ chosen: doubt, other: 0, preview: null, ends: null, placing: null });
-		void actions.ask("POST", "corrections/ghosts", { doubt: null });
+		state.set({ ...hide(), chosen: doubt });
 		if (!doubt) return;
 		store.set({ playing: 0 });
 		playback.seek(middleOf(doubt));
@@ -80,16 +85,12 @@ function createCheck({ store, actions, playback }) {
 
 	/** @param {number} other */
 	async function show(other) {
-		const { chosen } = state.get();
-		if (!chosen || !chosen.alternatives[other]) return;
-		state.set({ other, ...(other ? {} : { preview: null }) });
-		void actions.ask(
-			"POST",
-			"corrections/ghosts",
-			other ? { doubt: chosen.id, alternative: other } : {},
-		);
-		if (!other) return;
-		const preview = await getJson(`/api/corrections/queue/${chosen.id}/${other}`).catch(() => null);
+		const { chosen, ends } = state.get();
+		if (!chosen?.alternatives[other]) return;
+		if (!other) return state.set({ ...hide(), ends });
+		state.set({ other });
+		const wish = { doubt: chosen.id, alternative: other };
+		const preview = await actions.ask("POST", "corrections/ghosts", wish);
 		const now = state.get();
 		if (now.chosen?.id === chosen.id && now.other === other) state.set({ preview });
 	}
@@ -98,7 +99,7 @@ function createCheck({ store, actions, playback }) {
 	async function ask(method, path, body) {
 		const told = await actions.ask(method, `corrections${path}`, body);
 		if (!told) return false;
-		state.set({ told, other: 0, preview: null, ends: null, placing: null });
+		state.set({ ...hide(), told });
 		void refresh();
 		return true;
 	}
