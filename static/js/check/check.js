@@ -33,7 +33,9 @@ export function mountCheck(root, context) {
 	const { state } = check;
 	const first = () => {
 		const { chosen, queue } = state.get();
-		if (store.get().place === "check" && !chosen && queue?.doubts[0]) check.choose(queue.doubts[0]);
+		// While a run goes on another may still come before it.
+		if (store.get().place === "check" && !chosen && queue?.complete && queue.doubts[0])
+			check.choose(queue.doubts[0]);
 	};
 	let before = "";
 	store.watch(["place"], ({ place }) => {

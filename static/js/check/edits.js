@@ -13,7 +13,7 @@ export function mountCorrecting(context, timeline) {
 	const { state } = check;
 	const menu = mountMenu(context, timeline, { exchange, join, name });
 
-	const shown = () => Math.max(0, store.get().shown);
+	const shown = () => store.get().step;
 	const chosen = () => (store.get().place === "check" ? state.get().chosen : null);
 
 	/** The chosen place, where the playhead is at it. */

@@ -34,6 +34,9 @@ function createCheck({ store, actions, playback }) {
 	/** Where the chosen place stood, so that the next one is there when it is done. */
 	let at = 0;
 	let answered = false;
+	/** Places that were answered, and the run whose they are: its queue still has them. */
+	/** @type {Map<string, string | null>} */
+	const gone = new Map();
 	let asked = 0;
 
 	const refresh = fetcher(async () => {
@@ -42,14 +45,16 @@ function createCheck({ store, actions, playback }) {
 		asked = performance.now();
 		const told = await getJson("/api/corrections");
 		state.set({ told });
-		if (!run?.done) return;
+		// In Tune the run has the machine for itself; the queue is asked for when it is done.
+		if (!run?.done || (run.state === "computing" && store.get().place !== "check")) return;
 		receiveQueue(await getJson("/api/corrections/queue"));
 	});
 
-	/** @param {Server.DoubtQueue} queue */
-	function receiveQueue(queue) {
+	/** @param {Server.DoubtQueue} told */
+	function receiveQueue(told) {
 		const { chosen } = state.get();
-		const { doubts } = queue;
+		const doubts = told.doubts.filter(({ id }) => gone.get(id) !== told.run || !gone.has(id));
+		const queue = { ...told, doubts };
 		const same = doubts.find(({ id }) => id === chosen?.id);
 		state.set({ queue });
 		store.set({
@@ -124,6 +129,7 @@ function createCheck({ store, actions, playback }) {
 		heard = now;
 		void refresh();
 	});
+	store.on(["place"], ({ place }) => place === "check" && void refresh());
 	/** @type {Timer} */
 	let waiting;
 	let ended = "";
@@ -145,8 +151,13 @@ function createCheck({ store, actions, playback }) {
 			const { chosen } = state.get();
 			if (!chosen) return false;
 			answered = true;
+			const { queue } = state.get();
 			const taken = await ask("POST", "/answers", { doubt: chosen.id, alternative });
 			answered &&= taken;
+			if (taken && queue) {
+				gone.set(chosen.id, queue.run);
+				receiveQueue({ ...queue, answered: queue.answered + 1 });
+			}
 			return taken;
 		},
 		async skip() {
@@ -157,8 +168,12 @@ function createCheck({ store, actions, playback }) {
 			if (queue) receiveQueue(queue);
 			else answered = false;
 		},
-		drop: (id) => ask("DELETE", `/${id}`),
+		drop(id) {
+			gone.clear();
+			return ask("DELETE", `/${id}`);
+		},
 		async undo(direction) {
+			gone.clear();
 			await ask("POST", `/${direction}`);
 		},
 	};
