@@ -57,9 +57,9 @@ def tracks(client: TestClient) -> str:
 
 def complaint(answer: Any) -> str:
     assert answer.status_code == 422, answer.text
-    error = answer.json()["error"]
+    error = answer.json()
     assert error["hint"] == "Nothing was changed, and nothing is lost."
-    return str(error["message"])
+    return str(error["detail"])
 
 
 def test_the_first_template_makes_the_colour_methods_usable(client: TestClient) -> None:

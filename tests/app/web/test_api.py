@@ -33,14 +33,18 @@ def empty(data: Path) -> Iterator[TestClient]:
         yield client
 
 
+PROBLEM = {"type", "title", "status", "detail", "code", "field", "hint"}
+
+
 def assert_error(answer: Any, status: int, code: str, *words: str) -> None:
     assert answer.status_code == status
-    assert set(answer.json()) == {"error"}
-    error = answer.json()["error"]
-    assert set(error) == {"code", "message", "field", "hint"}
+    assert answer.headers["content-type"] == "application/problem+json"
+    error = answer.json()
+    assert set(error) == PROBLEM
+    assert error["status"] == status
     assert error["code"] == code
     for word in words:
-        assert word in error["message"]
+        assert word in error["detail"]
 
 
 def test_state(client: TestClient) -> None:
@@ -226,7 +230,7 @@ def test_a_value_that_does_not_fit(
         "/api/parameters", json={"changes": {"fusion.birth_rate": 1.0, **changes}}
     )
     assert_error(answer, 422, "bad_parameter", *words)
-    assert answer.json()["error"]["field"] == next(iter(changes))
+    assert answer.json()["field"] == next(iter(changes))
     assert client.get("/api/state").json()["parameters"] == before["parameters"]
 
 
@@ -249,9 +253,9 @@ def test_every_failure_has_the_one_shape(
 ) -> None:
     answer = client.request(method, path, json=json)
     assert answer.status_code == status
-    error = answer.json()["error"]
-    assert set(error) == {"code", "message", "field", "hint"}
-    assert error["message"]
+    error = answer.json()
+    assert set(error) == PROBLEM
+    assert error["detail"]
 
 
 def test_a_failure_of_our_own_has_the_one_shape_too(

@@ -167,15 +167,15 @@ def test_an_import_that_is_given_up_leaves_nothing(
     key = _send(client, files)
     assert client.delete(f"/api/import/{key}").status_code == 204
     answer = client.get(f"/api/import/{key}")
-    assert (answer.status_code, answer.json()["error"]["code"]) == (404, "no_import")
+    assert (answer.status_code, answer.json()["code"]) == (404, "no_import")
     wait_until(lambda: not list(data.iterdir()))
 
 
 def test_what_cannot_be_imported_is_told(client: TestClient, data: Path, tmp_path: Path) -> None:
-    outside = client.post("/api/import/path", json={"path": str(tmp_path)}).json()["error"]
-    assert "expected files below the data folder" in outside["message"]
+    outside = client.post("/api/import/path", json={"path": str(tmp_path)}).json()
+    assert "expected files below the data folder" in outside["detail"]
     bad = client.post("/api/import", json={"files": [{"path": "../a", "bytes": 1}]})
-    assert "leads elsewhere" in bad.json()["error"]["message"]
+    assert "leads elsewhere" in bad.json()["detail"]
     assert list(data.iterdir()) == []
     folder = tmp_path / "alone"
     folder.mkdir()
@@ -184,13 +184,13 @@ def test_what_cannot_be_imported_is_told(client: TestClient, data: Path, tmp_pat
     assert (info["phase"], info["cameras"]) == ("failed", [])
     assert "no calibration was found" in info["error"]
     written = client.post(f"/api/import/{info['key']}/write", json={})
-    assert "No calibration was found" in written.json()["error"]["message"]
+    assert "No calibration was found" in written.json()["detail"]
     toml(folder)
     text = (folder / "calibration.toml").read_bytes()
     more = [{"path": "calibration.toml", "bytes": len(text)}]
     added = client.post(f"/api/import/{info['key']}/files", json={"files": more}).json()
     early = client.post(f"/api/import/{info['key']}/arrived")
-    assert "are here; drop the rest" in early.json()["error"]["message"]
+    assert "are here; drop the rest" in early.json()["detail"]
     client.put(f"/api/import/{info['key']}/files/{added['first']}", content=text)
     client.post(f"/api/import/{info['key']}/arrived")
     assert len(_settled(client, info["key"])["cameras"]) == 4
