@@ -7,6 +7,7 @@ wrong usage, 130 after Ctrl-C. The engine is imported by the command that needs 
 from __future__ import annotations
 
 import errno
+import gc
 import os
 import subprocess
 import sys
@@ -162,12 +163,15 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
         )
     check_data(command.data)
     _check_keep(command.keep)
+    gc.disable()  # a seventh of the time: nothing that is imported ever goes
     from app.state.workers.jobs import locate
     from app.web import server
     from app.web.security import is_loopback
     from tracker.library.records import Result
     from tracker.sequences import library, rendering
 
+    gc.freeze()
+    gc.enable()
     place = locate(command.sequence, command.data)
     if place not in rendering.ROOMS:
         library.open_sequence(place)  # what cannot be read is told here, before a page is open

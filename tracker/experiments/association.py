@@ -76,7 +76,7 @@ class Tracked:
 
 def run(context: Context) -> Result:
     """Every method on every clip with every seed, and every threshold over the change of light."""
-    seeds = list(range(QUICK_SEEDS if context.quick else SEEDS))
+    seeds = list(range(context.seeds_of(SEEDS, QUICK_SEEDS)))
     items = [(clip, seed) for clip in CLIPS for seed in seeds]
     answers = spread(
         _track,

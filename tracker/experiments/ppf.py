@@ -94,7 +94,7 @@ class Followed:
 
 def run(context: Context) -> Result:
     """Every filter on every clip, and on the cameras of the real recording, with every seed."""
-    seeds = QUICK_SEEDS if context.quick else SEEDS
+    seeds = context.seeds_of(SEEDS, QUICK_SEEDS)
     with tempfile.TemporaryDirectory(prefix="multiview-phd-") as folder:
         scenes = list(_drawn(context, Path(folder)))
         real, notes = _recorded(context)

@@ -9,21 +9,23 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import cv2
 import numpy as np
 
 from app.errors import sentence
-from app.state.importing.looking import Looked, look_into
 from app.state.importing.uploads import Upload
 from app.state.importing.wish import Wish, options_of
 from tracker.formats.pieces import FormatError, ImagesPiece, VideoPiece
-from tracker.importing.gathering import Taken, gather
-from tracker.importing.settling import Settled, SettledView, settle
-from tracker.importing.writing import FILE, write
 from tracker.pipeline import Cancelled
+from tracker.sequences.reader import FILE
 from tracker.sequences.video import VideoDecoder, VideoError, index_video, read_image
+
+if TYPE_CHECKING:
+    from app.state.importing.looking import Looked
+    from tracker.importing.gathering import Taken
+    from tracker.importing.settling import Settled, SettledView
 
 logger = logging.getLogger("app")
 
@@ -159,6 +161,11 @@ class Draft:
                     raise Cancelled
                 self._tell(**changes)
 
+        # the readers of all formats: a server starts without them
+        from app.state.importing.looking import look_into
+        from tracker.importing.gathering import gather
+        from tracker.importing.settling import settle
+
         try:
             with self._lock:
                 wish, taken, gathered = self._known.wish, self._known.taken, self._gathered
@@ -223,6 +230,9 @@ class Draft:
     def _write(
         self, taken: tuple[Taken, ...], wish: Wish, place: Path, then: Callable[[Path], object]
     ) -> None:
+        from tracker.importing.settling import settle
+        from tracker.importing.writing import write
+
         try:
             # what was wished last may not have been looked into yet
             settled = settle(taken, options_of(wish, taken))

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tracker.checks import Check
 from tracker.formats.pieces import (
@@ -22,8 +22,10 @@ from tracker.formats.pieces import (
     Up,
     VideoPiece,
 )
-from tracker.importing.gathering import Taken
 from tracker.importing.options import Corner, ImportOptions
+
+if TYPE_CHECKING:
+    from tracker.importing.gathering import Taken
 
 
 @dataclass(frozen=True, slots=True)

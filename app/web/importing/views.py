@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 import shutil
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from app.state.importing.draft import Draft, Known
-from app.state.importing.looking import Looked
 from app.state.importing.wish import WORDS, Wish, mended, places
 from app.web.importing.models import (
     ImportedCamera,
@@ -26,7 +25,10 @@ from app.web.importing.sheet.draft import draft_sheet
 from tracker.checks import Check
 from tracker.checks.synchronisation import CameraOffset
 from tracker.formats.pieces import DetectionPiece
-from tracker.importing.settling import Settled, SettledView
+
+if TYPE_CHECKING:
+    from app.state.importing.looking import Looked
+    from tracker.importing.settling import Settled, SettledView
 
 MOST_OFFSETS = 241
 """Values of a curve of agreement."""

@@ -374,6 +374,7 @@ def test_every_route_is_documented(client: TestClient) -> None:
         ("DELETE", "/api/teach/templates/{index}"),
         ("PATCH", "/api/teach/room/{side}/{axis}"),
         ("POST", "/api/teach/entrances"),
+        ("POST", "/api/teach/entrances/suggested"),
         ("PATCH", "/api/teach/entrances/{index}/{part}/{axis}"),
         ("DELETE", "/api/teach/entrances/{index}"),
         ("POST", "/api/teach/editing"),
