@@ -13,8 +13,8 @@ import sys
 from pathlib import Path
 
 from tests.conftest import DATA
-from tests.manual import machines, results, sweeps
 from tests.manual.places import ROOT, made_pages
+from tests.manual.records import machines, results, sweeps
 from tracker.experiments import EXPERIMENTS
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.manual import results, sweeps
 from tests.manual.places import PAGES, ROOT, between, made_pages
 from tests.manual.plots import picture
+from tests.manual.records import results, sweeps
 from tracker.parameters import PARAMETERS
 
 

@@ -15,7 +15,7 @@ from tracker import parameters as table
 from tracker import single_view
 from tracker.boxes import Boxes
 from tracker.evaluation.figures import number
-from tracker.evaluation.matching import assign
+from tracker.evaluation.measures.matching import assign
 from tracker.experiments.clips import clip as clips
 from tracker.experiments.clips.association import CLIPS, together
 from tracker.experiments.clips.clip import Clip

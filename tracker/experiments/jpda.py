@@ -21,7 +21,7 @@ from tracker import single_view
 from tracker.assignment import linear_sum_assignment
 from tracker.boxes import Boxes
 from tracker.evaluation.figures import number
-from tracker.evaluation.matching import assign
+from tracker.evaluation.measures.matching import assign
 from tracker.experiments import cameras
 from tracker.experiments.clips import clip as clips
 from tracker.experiments.laboratory import runs

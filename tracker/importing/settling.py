@@ -15,14 +15,14 @@ from tracker.camera import Camera
 from tracker.checks.reading import Reading, read_boxes, to_camera
 from tracker.checks.readings import Open, Seen, find_meaning
 from tracker.formats.pieces import FormatError, Layout, RawCamera
-from tracker.importing.calibrations import camera_sets
+from tracker.importing.finding.calibrations import camera_sets
+from tracker.importing.finding.geometry import read_poses
+from tracker.importing.finding.matching import MatchedCamera, match_all
+from tracker.importing.finding.pictures import picture_sizes, scaled
+from tracker.importing.finding.times import CameraTime, Times, first_index, frames_of, settle_times
+from tracker.importing.finding.truths import settle_truth
 from tracker.importing.gathering import Taken
-from tracker.importing.geometry import read_poses
-from tracker.importing.matching import MatchedCamera, match_all
 from tracker.importing.options import ImportOptions
-from tracker.importing.pictures import picture_sizes, scaled
-from tracker.importing.times import CameraTime, Times, first_index, frames_of, settle_times
-from tracker.importing.truths import settle_truth
 from tracker.sequences.sequence import Detections, Entrance, GroundTruth
 
 ROOM_MARGIN = 1.0

@@ -9,8 +9,8 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from tests.manual import machines, recordings
 from tests.manual.places import RECORDS, ROOT, between
+from tests.manual.records import machines, recordings
 from tracker.experiments import EXPERIMENTS
 
 FOLDER = RECORDS / "experiments"
