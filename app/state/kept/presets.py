@@ -92,6 +92,18 @@ class OwnPresets:
         self._workbench.set_presets(presets)
 
 
+def keep_preset(path: Path, name: str, values: Mapping[str, Any]) -> None:
+    """Put a preset into the file without a workbench; the next start shows it.
+
+    Raises:
+        ParameterError: If the name does not do.
+        ValueError: If the file is not as it was written.
+        OSError: If it cannot be written.
+    """
+    presets = _read(path) if path.is_file() else {}
+    write_json(path, {**presets, _checked(name): dict(values)})
+
+
 def _checked(name: str) -> str:
     name = " ".join(name.split())
     if not 0 < len(name) <= LONGEST_NAME:
