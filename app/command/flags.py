@@ -15,7 +15,7 @@ import tyro
 from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subcommand
 
 from app.command.library_flags import Bundle, FormatName, LibraryCommand, LibraryFile, Runs
-from app.command.study_flags import Batch, Study, Tune
+from app.command.study_flags import Batch, Study
 from tracker import parameters as table
 from tracker.library import KEEP
 from tracker.parameters import FOLLOWS, METHODS, PRESETS, Parameter, ParameterError
@@ -445,7 +445,6 @@ Arguments = (
     | LibraryCommand
     | Study
     | Batch
-    | Tune
 )
 
 
@@ -476,7 +475,6 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         | Annotated[LibraryCommand, subcommand("library")]
         | Annotated[Study, subcommand("study")]
         | Annotated[Batch, subcommand("batch")]
-        | Annotated[Tune, subcommand("tune")]
     )
     parsed: Arguments = tyro.cli(
         commands,

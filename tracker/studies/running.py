@@ -81,6 +81,7 @@ def run_study(
         study.prepare()
         study.crew = crew(study.wait_for)
         study.work()
+        study.say()
     except StudyError as error:
         study.state, study.words = "failed", str(error)
         study.say()
@@ -89,7 +90,8 @@ def run_study(
         study.state, study.words = "stopped", "interrupted; nothing that ended before is lost"
         study.say()
         raise
-    study.say()
+    finally:
+        study.close()
     return study.status
 
 
@@ -147,6 +149,11 @@ class _Running:
             else:
                 self._take_up(number, values)
         self._first_values()
+
+    def close(self) -> None:
+        """Close what the sampler keeps."""
+        if hasattr(self, "_sampler"):
+            self._sampler.close()
 
     def _check_same(self) -> None:
         """Old trials stand beside new ones only where nothing but the values differs."""

@@ -57,20 +57,28 @@ class Sampler:
         self._definition, self._bases = definition, bases
         self._varied = {one.key: one for one in definition.varied}
         self._single = len(objectives) == 1
+        self._journal: Any = None
         try:
+            self._journal = _journal(path)
             self._study: Any = optuna.create_study(
-                storage=JournalStorage(_journal(path)),
+                storage=JournalStorage(self._journal),
                 study_name=definition.name,
                 directions=["maximize" if one.higher else "minimize" for one in objectives],
                 sampler=self._sampler(),
                 load_if_exists=True,
             )
         except (ValueError, KeyError) as error:
+            self.close()
             raise StudyError(
                 f"{path}: the record of what was tried cannot be read ({error}); the results are "
                 "in results.sqlite3 beside it: start a new study with what they show"
             ) from None
         self._trials: dict[int, Any] = {}
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._journal is not None:
+            self._journal.close()
 
     def _sampler(self) -> Any:
         samplers, seed = self._optuna.samplers, self._definition.seed
@@ -185,6 +193,9 @@ def _journal(path: Path) -> Any:
             self._lines: list[dict[str, Any]] = [json.loads(one) for one in complete.splitlines()]
             self._first = 0
             self._file = path.open("ab", buffering=0)
+
+        def close(self) -> None:
+            self._file.close()
 
         def read_logs(self, log_number_from: int) -> Iterator[dict[str, Any]]:
             # what Optuna has read it does not ask for again

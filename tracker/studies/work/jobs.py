@@ -5,12 +5,13 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
 from tracker import evaluation
+from tracker.library.records import NewRecording, NewRun
 from tracker.parameters import RunParameters
 from tracker.runs.numbers_version import numbers_version
 from tracker.runs.run import stage_keys
@@ -49,6 +50,8 @@ class Job:
     """Whether it is held against other looks at the recording."""
     timed: bool
     """Whether what stage 1 takes must be known, be it from an earlier run."""
+    keep: bool = False
+    """Whether the whole run is wanted, for the library."""
 
 
 Became = Literal["done", "failed", "unreadable", "version"]
@@ -74,10 +77,12 @@ class Outcome:
     """On the clock of the worker, scoring included."""
     worker: str = ""
     machine: str = ""
+    kept: tuple[NewRecording, NewRun] | None = None
+    """The whole run, where it was wanted."""
 
     def to_json(self) -> dict[str, Any]:
-        """As plain values."""
-        return asdict(self)
+        """As plain values, without the whole run."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "kept"}
 
 
 def job_of(

@@ -26,6 +26,7 @@ from tracker import pipeline
 from tracker.evaluation import evaluate_sequence
 from tracker.folders import cache_folder
 from tracker.kernels import compilation
+from tracker.library.keeping import recording_of, run_of, thumbnail_of
 from tracker.parameters import with_values
 from tracker.pipeline import Run
 from tracker.runs.stage_cache import StageCache
@@ -153,12 +154,14 @@ def _opened(job: Job, tell: Tell) -> tuple[Sequence, FrameReader]:
 
 
 def _done(job: Job, sequence: Sequence, reader: FrameReader) -> dict[str, Any]:
+    began, begin = time.time(), time.perf_counter()
     run, seconds = _tracked(job, sequence, reader)
+    took = time.perf_counter() - begin
     figures: dict[str, float | None] = {"speed": None}
     if seconds is not None:
         figures["speed"] = sequence.frames / max(seconds, 1e-9)
-    if job.truth:
-        evaluation = evaluate_sequence(sequence, run.tracks)
+    evaluation = evaluate_sequence(sequence, run.tracks) if job.truth else None
+    if evaluation is not None:
         figures |= {
             one.definition.key: one.value
             for one in evaluation.figures
@@ -173,8 +176,20 @@ def _done(job: Job, sequence: Sequence, reader: FrameReader) -> dict[str, Any]:
         found = [one for one in looked.overlaps if one is not None]
         overlap = sum(found) / len(looked.overlaps) if looked.overlaps else None
         figures["identity"] = looked.score if len(run.tracks) else 0.0
-    people = len(set(run.tracks.ids.tolist()))
-    return {"figures": figures, "overlap": overlap, "tracks": tracks_hash(run), "people": people}
+    kept = None
+    if job.keep:
+        recording = recording_of(sequence, job.place, thumbnail_of(sequence, reader))
+        kept = (
+            recording,
+            run_of(run, source="batch", began=began, seconds=took, evaluation=evaluation),
+        )
+    return {
+        "figures": figures,
+        "overlap": overlap,
+        "tracks": tracks_hash(run),
+        "people": len(set(run.tracks.ids.tolist())),
+        "kept": kept,
+    }
 
 
 def _tracked(job: Job, sequence: Sequence, reader: FrameReader) -> tuple[Run, float | None]:
