@@ -167,7 +167,7 @@ def _tell_end(store: Store, status: Status) -> None:
 
 
 def _list(found: list[Store], command: ListStudies) -> None:
-    rows = []
+    rows: list[dict[str, Any]] = []
     for store in found:
         status = store.status()
         rows.append(

@@ -271,7 +271,7 @@ def _varied(fields: _Fields, key: str, table: Any) -> Varied:
         )
     if key in METHODS or PARAMETERS[key].kind in ("bool", "choice"):
         allowed: tuple[Any, ...] = (
-            METHODS[key]  # type: ignore[index]  # a key of it
+            METHODS[key]
             if key in METHODS
             else (False, True)
             if PARAMETERS[key].kind == "bool"

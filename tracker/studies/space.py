@@ -111,7 +111,7 @@ def around(key: str, *values: Any) -> Varied:
         values: For instance today's and the default.
     """
     if key in METHODS:
-        return Varied(key, choices=METHODS[key])  # type: ignore[index]  # a key of it
+        return Varied(key, choices=METHODS[key])
     parameter = PARAMETERS[key]
     if parameter.kind == "bool":
         return Varied(key, choices=(False, True))

@@ -6,6 +6,7 @@ under its own key, a recording goes where it cannot be read, and what a worker w
 
 from __future__ import annotations
 
+import importlib
 import logging
 import queue
 import subprocess
@@ -119,12 +120,12 @@ class DaskCrew:
         Raises:
             StudyError: If there is no scheduler at the address.
         """
-        import distributed
+        distributed: Any = importlib.import_module("distributed")  # slow, and without types
 
         for name in ("distributed", "distributed.worker", "distributed.nanny"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
         self._do, self._address, self._sent_bytes = do, scheduler, sent_bytes
-        self._ended: queue.SimpleQueue[tuple[Any, Job | None]] = queue.SimpleQueue()
+        self._ended: queue.SimpleQueue[tuple[Any, Job]] = queue.SimpleQueue()
         self._futures: dict[str, Any] = {}
         self._states: dict[str, WorkerState] = {}
         self._lock = threading.Lock()
@@ -147,7 +148,7 @@ class DaskCrew:
         self._client.subscribe_topic(TOPIC, self._heard)
 
     def _start(self, count: int, processes: bool, tell: Told) -> Any:
-        import distributed
+        distributed: Any = importlib.import_module("distributed")  # slow, and without types
 
         if processes:
             compile_first(tell)
