@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal
 import tyro
 from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subcommand
 
+from app.command.correction_flags import Corrections, LogFile
 from app.command.library_flags import Bundle, FormatName, LibraryCommand, LibraryFile, Runs
 from app.command.study_flags import Batch, Study
 from tracker import parameters as table
@@ -112,8 +113,14 @@ class Track:
     processors without fused multiply-add."""
     detector: Annotated[Path | None, arg(metavar="MODEL", help_behavior_hint="(optional)")] = None
     """A detection network of your own, as ONNX: the method onnx_detector runs it on pictures."""
+    corrections: LogFile = None
+    """What was put right by hand: the run obeys it."""
+    no_corrections: FlagCreatePairsOff[bool] = False
+    """Obey none, not even those of the sequence."""
     cache: bool = True
     """Take up what the cameras found in an earlier run with the same values, and keep it."""
+    strict: bool = False
+    """End with status 1 where a picture was missing; the tracks are written all the same."""
     library: LibraryFile = None
     """The file that finished runs are kept in."""
     keep: Annotated[int, arg(metavar="INT")] = KEEP
@@ -445,6 +452,7 @@ Arguments = (
     | LibraryCommand
     | Study
     | Batch
+    | Corrections
 )
 
 
@@ -475,6 +483,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         | Annotated[LibraryCommand, subcommand("library")]
         | Annotated[Study, subcommand("study")]
         | Annotated[Batch, subcommand("batch")]
+        | Annotated[Corrections, subcommand("corrections")]
     )
     parsed: Arguments = tyro.cli(
         commands,

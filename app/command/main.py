@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.command.correction_flags import Corrections
 from app.command.flags import (
     Arguments,
     Benchmark,
@@ -82,7 +83,7 @@ def _run(command: Arguments) -> int:
         case Serve():
             return _serve(command)
         case Track():
-            _track(command)
+            return _track(command)
         case Detect():
             from app.command.detect import detect
 
@@ -127,6 +128,10 @@ def _run(command: Arguments) -> int:
             from app.command.batch import batch
 
             return batch(command)
+        case Corrections():
+            from app.command.correcting import corrections
+
+            return corrections(command)
     return 0
 
 
@@ -254,7 +259,7 @@ def _leave(status: int) -> None:
 # track
 
 
-def _track(command: Track) -> None:
+def _track(command: Track) -> int:
     changes = command.changes()
     table.with_values(table.RunParameters(), changes)  # wrong usage shows before any work
     _check_seed(command.seed)
@@ -269,9 +274,11 @@ def _track(command: Track) -> None:
     if not output.parent.is_dir():
         raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
 
+    from app.command.correcting import of_run
     from app.state.workers.compiling import Compiling
     from tracker import pipeline
     from tracker.checks import check
+    from tracker.runs import gaps
     from tracker.runs.gates import notices
     from tracker.runs.outcome import why_no_tracks
     from tracker.runs.stage_cache import StageCache
@@ -287,6 +294,7 @@ def _track(command: Track) -> None:
         if found.status == "warning" and str(found) not in sequence.warnings:
             say(str(found))
     parameters = table.with_values(pipeline.default_parameters(sequence), changes)
+    told_by_hand = of_run(sequence, command.corrections, none=command.no_corrections)
     begin, began = time.perf_counter(), time.time()
     stages: set[table.Stage] = set()
 
@@ -305,26 +313,37 @@ def _track(command: Track) -> None:
             sequence,
             parameters,
             seed=command.seed,
+            corrections=told_by_hand,
             cache=StageCache.on_disk() if command.cache else None,
             on_progress=told,
             cancelled=interrupted,
         )
     seconds = time.perf_counter() - begin
     with Bar("writing", "step") as writing:
-        written = Written(sequence, run.tracks, parameters, command.seed)
+        missing = gaps.sentences(run)
+        written = Written(sequence, run.tracks, parameters, command.seed, remarks=tuple(missing))
         save(output, form, written, Options(progress=writing.at))
     targets = len(set(run.tracks.ids.tolist()))
     kept = "" if "single_view" in stages else "; stage 1 was kept from an earlier run"
-    say(
-        f"{sequence.frames} steps, {targets} tracks, {sequence.frames / seconds:.0f} steps/s "
-        f"({sequence.frames / seconds / sequence.fps:.1f} × real time{kept}), written to {output}"
-    )
     if (reason := why_no_tracks(run)) is not None:
         say(reason)
     for sentence in notices(run):
         say(sentence)
-    if command.keep:
+    if told_by_hand:
+        unmet = {one.id: one.why for one in run.outcomes if not one.met}
+        say(f"{len(told_by_hand) - len(unmet)} of {len(told_by_hand)} corrections met")
+        for one in told_by_hand:
+            if one.id in unmet:
+                say(f"unmet: {one.words}: {unmet[one.id]}")
+    if command.keep and not any(gap.unexpected for gap in gaps.gaps(run)):
         _keep(command, run, began, seconds)
+    incomplete = "".join(f"; {one}" for one in missing)
+    say(
+        f"{sequence.frames} steps, {targets} tracks, {sequence.frames / seconds:.0f} steps/s "
+        f"({sequence.frames / seconds / sequence.fps:.1f} × real time{kept}), written to {output}"
+        f"{incomplete}"
+    )
+    return FAILURE if command.strict and missing else 0
 
 
 def _keep(command: Track, run: Run, began: float, seconds: float) -> None:

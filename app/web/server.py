@@ -31,10 +31,12 @@ from app.state.workbench import Workbench
 from app.state.workers.compiling import Compiling
 from app.state.workers.evaluator import Evaluator
 from app.state.workers.exporter import Exporter
+from app.state.workers.identity_check import IdentityCheck
 from app.state.workers.jobs import Jobs, in_background
 from app.state.workers.keeper import Keeper
 from app.state.workers.sensitivity import Sensitivity
 from app.web import api, gateway, stream, teaching_routes
+from app.web.evaluation import course_routes, identity_routes
 from app.web.evaluation import routes as evaluation
 from app.web.gateway import Gateway
 from app.web.importing import routes as importing
@@ -47,7 +49,7 @@ from app.web.pictures.likelihood import Likelihoods
 from app.web.pictures.swatches import Swatches
 from app.web.security import CONTENT_POLICY, Guard, OnlyLooking, allowed_hosts, is_loopback
 from app.web.stream import Stream
-from app.web.tables import tables, teaching_tables
+from app.web.tables import event_tables, tables, teaching_tables
 from app.web.views.timeline import Timelines
 from tracker import __version__
 from tracker.folders import settings_folder
@@ -69,9 +71,12 @@ ROUTERS = (
     foreground.router,
     likelihood_routes.router,
     tables.router,
+    event_tables.router,
     teaching_routes.router,
     teaching_tables.router,
     evaluation.router,
+    identity_routes.router,
+    course_routes.router,
     importing.router,
     library.router,
     export_routes.router,
@@ -184,6 +189,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         workbench, settings_folder() / "recent.json" if kept else None
     )
     evaluator = app.state.evaluator = Evaluator(workbench)
+    identity_check = app.state.identity_check = IdentityCheck(workbench)
     exporter = app.state.exporter = Exporter()
     sensitivity = app.state.sensitivity = Sensitivity(workbench, settings.seed)
     keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep)
@@ -221,7 +227,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         await asyncio.gather(
             *(
                 asyncio.to_thread(part.close)
-                for part in (exporter, keeper, jobs, evaluator, sensitivity, room)
+                for part in (identity_check, exporter, keeper, jobs, evaluator, sensitivity, room)
             )
         )
 
