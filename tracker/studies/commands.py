@@ -35,7 +35,7 @@ def changes_of(definition: Definition, trial: Trial, recording: str) -> dict[str
 
 
 def _command(definition: Definition, trial: Trial, row: JobRow) -> str:
-    words = ["multiview-phd", "track", row.recording, "--seed", str(row.seed)]
+    words = ["multiview-phd", "track", row.recording, "--no-corrections", "--seed", str(row.seed)]
     for key, value in changes_of(definition, trial, row.recording).items():
         text = json.dumps(value) if not isinstance(value, str) else value
         words += ["--set", f"{key}={text}"]
