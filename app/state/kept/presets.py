@@ -54,8 +54,15 @@ class OwnPresets:
             ParameterError: If the name is empty, too long or a built-in preset's.
         """
         now = self._workbench.snapshot()
-        values = table.changed(now.parameters, now.defaults)
-        self._put({**now.presets, _checked(name): values})
+        self.keep(name, table.changed(now.parameters, now.defaults))
+
+    def keep(self, name: str, values: Mapping[str, Any]) -> None:
+        """Keep values, by key against the defaults, under a name.
+
+        Raises:
+            ParameterError: If the name is empty, too long or a built-in preset's.
+        """
+        self._put({**self._workbench.snapshot().presets, _checked(name): values})
 
     def rename(self, name: str, new: str) -> None:
         """Give a preset another name, which no other one may have.

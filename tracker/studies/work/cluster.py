@@ -94,6 +94,33 @@ def _do(job: Job) -> Outcome:
     return working.work(job, tell, name)
 
 
+def look_at(address: str, seconds: float) -> dict[str, Any]:
+    """Who works for a scheduler: ``workers``, ``threads``, ``machines``.
+
+    Raises:
+        StudyError: If there is none at the address.
+    """
+    distributed: Any = importlib.import_module("distributed")  # slow, and without types
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    try:
+        with distributed.Client(address, timeout=seconds, set_as_default=False) as client:
+            workers = client.scheduler_info(n_workers=-1).get("workers", {})
+    except (OSError, TimeoutError, ValueError) as error:
+        raise _no_scheduler(address, error) from None
+    return {
+        "workers": len(workers),
+        "threads": sum(int(about.get("nthreads", 1)) for about in workers.values()),
+        "machines": sorted({str(about.get("host", "")) for about in workers.values()}),
+    }
+
+
+def _no_scheduler(address: str | None, error: Exception) -> StudyError:
+    return StudyError(
+        f"there is no Dask scheduler at {address} ({_words(error)}); start one by "
+        "`dask scheduler`, name another address, or leave it out to work on this machine"
+    )
+
+
 class DaskCrew:
     """Jobs as tasks of a Dask cluster; close it, or use ``with``."""
 
@@ -141,10 +168,7 @@ class DaskCrew:
             )
         except (OSError, TimeoutError, ValueError) as error:
             self.close()
-            raise StudyError(
-                f"there is no Dask scheduler at {scheduler} ({_words(error)}); start one by "
-                "`dask scheduler`, name another address, or leave it out to work on this machine"
-            ) from None
+            raise _no_scheduler(scheduler, error) from None
         self._client.subscribe_topic(TOPIC, self._heard)
 
     def _start(self, count: int, processes: bool, tell: Told) -> Any:
