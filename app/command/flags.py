@@ -58,6 +58,8 @@ class Serve:
     """Address to listen on. Anything but this machine's own lets others change what you see."""
     port: int = 8000
     """Port to listen on."""
+    token: bool = True
+    """Let in only whoever has the token of the printed link; $MULTIVIEW_PHD_TOKEN chooses one."""
     open: bool = field(default_factory=has_screen)
     """Open the page in a browser; by default where there is a screen."""
     data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None

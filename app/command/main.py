@@ -178,10 +178,17 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     _check_keep(command.keep)
     from app.state.workers.jobs import locate
     from app.web import server
+    from app.web.access import PARAMETER, Keys, new_token, own_token
     from app.web.security import is_loopback
     from tracker.library.records import Result
     from tracker.sequences import library, rendering
 
+    if not command.token and not is_loopback(command.host):
+        raise ParameterError(
+            "--no-token",
+            f"expected --host of this machine alone, got {command.host}: others need one",
+        )
+    keys = Keys(own_token(os.environ) or new_token()) if command.token else None
     place = locate(command.sequence, command.data)
     if place not in rendering.ROOMS:
         library.open_sequence(place)  # what cannot be read is told here, before a page is open
@@ -193,21 +200,26 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     port = listener.getsockname()[1]
     host = f"[{command.host}]" if ":" in command.host else command.host
     shown = "127.0.0.1" if command.host == "0.0.0.0" else "[::1]" if host == "[::]" else host
-    address = f"http://{shown}:{port}"
+    address = f"http://{shown}:{port}/"
     if not is_loopback(command.host):
-        say(f"anyone who reaches {command.host} can change what you see")
+        say(f"whoever reaches {command.host} and has the token can change what you see")
+
+    def link(key: str | None) -> str:
+        return address if key is None else f"{address}?{PARAMETER}={key}"
 
     def ready() -> None:
-        sys.stdout.write(f"multiview-phd: {address} (Ctrl-C ends it)\n")
+        sys.stdout.write(f"multiview-phd: {link(keys.token if keys else None)} (Ctrl-C ends it)\n")
         sys.stdout.flush()
         if command.open:
             import webbrowser
 
-            threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+            opened = link(keys.ticket() if keys else None)
+            threading.Thread(target=webbrowser.open, args=(opened,), daemon=True).start()
 
     app = server.create_app(
         server.Settings(
             host=command.host,
+            keys=keys,
             sequence=command.sequence,
             data=command.data,
             detector=command.detector,

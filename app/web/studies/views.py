@@ -125,7 +125,9 @@ def ranges_of(snapshot: Snapshot, keys: list[str] | None) -> list[models.RangeIn
             table.with_values(now, {key: None})  # says what is wrong
         own, default = table.value(now, key), table.value(defaults, key)
         if key == "single_view":
-            fit = [one for one in METHODS["single_view"] if one not in snapshot.unfit[key]]
+            fit = [
+                one for one in METHODS["single_view"] if one not in snapshot.unfit["single_view"]
+            ]
             one = Varied(key, choices=tuple(fit))
         else:
             one = around(key, own, default)
