@@ -18,7 +18,6 @@ from app.web.views import results
 from tracker import parameters as table
 from tracker.experiments.laboratory.pool import cores
 from tracker.sequences.sequence import SequenceError
-from tracker.studies import report
 from tracker.studies.commands import track_commands
 from tracker.studies.definition import Definition, definition_of
 from tracker.studies.errors import StudyError
@@ -319,6 +318,8 @@ def _values(store: Store, number: int, bench: Bench) -> dict[str, object]:
 )
 def export(store: Named, file: Literal["report.html", "trials.csv", "study.json"]) -> Response:
     """A study as a report, a table, or everything."""
+    from tracker.studies import report  # and with it the library of plots
+
     writers = {
         "report.html": (report.write_report, "text/html; charset=utf-8"),
         "trials.csv": (report.write_csv, "text/csv; charset=utf-8"),
