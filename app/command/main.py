@@ -41,6 +41,7 @@ from app.command.flags import (
 )
 from app.command.interruption import between_steps
 from app.command.library_flags import Bundle, LibraryCommand, OpenRun, Runs
+from app.command.study_flags import Batch, Study
 from app.command.terminal import Bar, CommandError, check_data, print_table, say
 from tracker import parameters as table
 from tracker.folders import library_file
@@ -120,6 +121,14 @@ def _run(command: Arguments) -> int:
             from app.command.runs import check
 
             return check(command)
+        case Study():
+            from app.command.studies import study
+
+            return study(command)
+        case Batch():
+            from app.command.batch import batch
+
+            return batch(command)
         case Corrections():
             from app.command.correcting import corrections
 

@@ -25,6 +25,7 @@ from app.state.importing.desk import Desk
 from app.state.kept.history import History
 from app.state.kept.presets import OwnPresets
 from app.state.kept.recents import Recents
+from app.state.studies.desk import StudyDesk
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench
 from app.state.workers.compiling import Compiling
@@ -50,6 +51,7 @@ from app.web.pictures.likelihood import Likelihoods
 from app.web.pictures.swatches import Swatches
 from app.web.security import CONTENT_POLICY, Guard, OnlyLooking, allowed_hosts, is_loopback
 from app.web.stream import Stream
+from app.web.studies import routes as studies
 from app.web.tables import event_tables, tables, teaching_tables
 from app.web.views.timeline import Timelines
 from tracker import __version__
@@ -58,6 +60,7 @@ from tracker.library import KEEP
 from tracker.library.records import Result
 from tracker.pipeline import Cancelled
 from tracker.runs.stage_cache import StageCache
+from tracker.studies.store import studies_folder
 
 logger = logging.getLogger("app")
 
@@ -75,6 +78,7 @@ ROUTERS = (
     importing.router,
     library.router,
     export_routes.router,
+    studies.router,
     stream.router,
     gateway.router,
 )
@@ -193,6 +197,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     exporter = app.state.exporter = Exporter()
     sensitivity = app.state.sensitivity = Sensitivity(workbench, settings.seed)
     keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep)
+    study_desk = app.state.studies = StudyDesk(workbench, studies_folder())
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
     told.start()
@@ -227,7 +232,16 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         await asyncio.gather(
             *(
                 asyncio.to_thread(part.close)
-                for part in (identity_check, exporter, keeper, jobs, evaluator, sensitivity, room)
+                for part in (
+                    identity_check,
+                    exporter,
+                    keeper,
+                    jobs,
+                    evaluator,
+                    sensitivity,
+                    room,
+                    study_desk,
+                )
             )
         )
 

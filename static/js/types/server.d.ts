@@ -441,6 +441,14 @@ declare namespace Server {
 		copy_files: boolean;
 	}
 
+	/** How much of the leading figure's variance a parameter explains by itself. */
+	interface ImportanceInfo {
+		key: string;
+		share: number;
+		/** Standard deviation, over trials drawn with replacement. */
+		spread: number;
+	}
+
 	/** A camera with what belongs to it. */
 	interface ImportedCamera {
 		/** Its name in the calibration. */
@@ -593,6 +601,18 @@ declare namespace Server {
 		mean: number[];
 	}
 
+	/** A figure that trials can be judged by. */
+	interface ObjectiveInfo {
+		key: string;
+		name: string;
+		help: string;
+		/** Whether more of it is better. */
+		higher: boolean;
+		unit: string;
+		digits: number;
+		needs_truth: boolean;
+	}
+
 	/** A sequence on its way. */
 	interface OpeningInfo {
 		name: string;
@@ -708,6 +728,27 @@ declare namespace Server {
 		courses: Course[];
 	}
 
+	/** A parameter, or the choice of a method, with the range that is tried. */
+	interface RangeInfo {
+		key: string;
+		label: string;
+		symbol: string;
+		unit: string;
+		help: string;
+		kind: "float" | "int" | "bool" | "choice";
+		/** Of its definition. */
+		minimum: number | null;
+		maximum: number | null;
+		low: number | null;
+		high: number | null;
+		log: boolean;
+		/** Of what is no range. */
+		choices: any[];
+		default: any;
+		/** Today's value. */
+		now: any;
+	}
+
 	/** A recording that can be opened. */
 	interface RecordingCard {
 		name: string;
@@ -787,6 +828,16 @@ declare namespace Server {
 		stands_for: string;
 		/** What its result lacks: pictures that were missing, files that changed. */
 		warnings: string[];
+	}
+
+	/** What answers at a scheduler's address. */
+	interface SchedulerInfo {
+		address: string;
+		workers: number;
+		threads: number;
+		machines: string[];
+		/** Why it cannot be used. */
+		error: string | null;
 	}
 
 	/** Every parameter, method and preset. */
@@ -910,6 +961,90 @@ declare namespace Server {
 		cardinality: number;
 	}
 
+	/** Everything of a study but its trials. */
+	interface Study {
+		info: StudyInfo;
+		/** As its file has it. */
+		definition: Record<string, any>;
+		toml: string;
+		objectives: ObjectiveInfo[];
+		varied: RangeInfo[];
+		status: StudyStatus;
+		/** Number of the best trial; 0 where nothing is better than the defaults. */
+		best: number | null;
+		/** Trials that no other beats in all objectives. */
+		front: number[];
+		/** Empty while there are too few trials. */
+		importance: ImportanceInfo[];
+		importance_trials: number;
+		sentences: string[];
+	}
+
+	/** What a study would take. */
+	interface StudyCost {
+		runs: number;
+		/** Null where nothing is known of how long a run takes. */
+		seconds: number | null;
+		bytes: number;
+		words: string;
+		/** Why it would be refused. */
+		error: string | null;
+	}
+
+	/** A study as it could be defined from what is open. */
+	interface StudyDraft {
+		/** One that is free. */
+		name: string;
+		recordings: string[];
+		has_truth: boolean;
+		parameters: RangeInfo[];
+		/** Those that it would have. */
+		objectives: string[];
+		/** Those that it could have. */
+		choices: ObjectiveInfo[];
+		/** Cores of the machine. */
+		workers: number;
+		/** What is not in the study though it is on the screen; empty for nothing. */
+		words: string;
+	}
+
+	/** A study in a line. */
+	interface StudyInfo {
+		name: string;
+		state: "new" | "running" | "stopped" | "done" | "failed";
+		/** What it waits for, or why it ended. */
+		words: string;
+		/** Trials that ended. */
+		done: number;
+		trials: number;
+		/** When it was at work last, seconds since 1970. */
+		touched: number;
+		seconds_left: number | null;
+		/** Name of the leading figure. */
+		objective: string;
+		/** Its best value. */
+		best: number | null;
+		default: number | null;
+	}
+
+	/** All studies, the one that was at work last first. */
+	interface StudyList {
+		folder: string;
+		studies: StudyInfo[];
+	}
+
+	/** What a study does now. */
+	interface StudyStatus {
+		/** That ended since it was started. */
+		runs: number;
+		/** Since then. */
+		seconds: number;
+		seconds_left: number | null;
+		/** Share of the workers' time in which they worked. */
+		busy: number | null;
+		workers: WorkerInfo[];
+	}
+
 	/** A person's identity switched. */
 	interface Switch {
 		step: number;
@@ -1024,6 +1159,53 @@ declare namespace Server {
 		fades: boolean;
 	}
 
+	/** A trial with its runs and what repeats them. */
+	interface TrialDetail {
+		trial: TrialInfo;
+		runs: TrialRun[];
+		commands: string[];
+	}
+
+	/** A trial that ended. */
+	interface TrialInfo {
+		number: number;
+		state: "complete" | "pruned" | "failed";
+		values: Record<string, any>;
+		/** Over recordings and seeds; null where it failed. */
+		objectives: number[] | null;
+		/** Of each over the seeds. */
+		spreads: (number | null)[];
+		figures: Record<string, number>;
+		/** Whether people overlap too little with the cameras that were left out. */
+		vetoed: boolean;
+		words: string;
+		/** Of its runs. */
+		seconds: number;
+		/** Seconds since 1970. */
+		ended: number;
+	}
+
+	/** Trials that ended after a moment. */
+	interface TrialList {
+		trials: TrialInfo[];
+		/** To be given as `after` the next time. */
+		last: number;
+	}
+
+	/** One run of a trial. */
+	interface TrialRun {
+		/** Hash of recording, values, seed and code. */
+		key: string;
+		recording: string;
+		seed: number;
+		figures: Record<string, number | null>;
+		seconds: number;
+		worker: string;
+		machine: string;
+		/** Hash of its tracks. */
+		tracks: string;
+	}
+
 	/** Where a person really is. */
 	interface Truth {
 		id: number;
@@ -1047,5 +1229,18 @@ declare namespace Server {
 		agreed: number;
 		/** Mean overlap of its boxes with the people whom the others found; null without both. */
 		overlap: number | null;
+	}
+
+	/** A worker of a study that runs. */
+	interface WorkerInfo {
+		name: string;
+		machine: string;
+		/** What it waits for; empty while it works on a run. */
+		words: string;
+		trial: number | null;
+		recording: string | null;
+		seed: number | null;
+		/** Seconds since 1970. */
+		since: number;
 	}
 }
