@@ -845,6 +845,8 @@ declare namespace Server {
 
 	/** Everything that all pages share, but for the results themselves. */
 	interface State {
+		/** Another for every start of the server. */
+		session: string;
 		/** Grows with every change; of two states the larger is the newer. */
 		version: number;
 		sequence: SequenceInfo | null;
