@@ -691,6 +691,8 @@ declare namespace Server {
 		/** Targets at each of equally many steps, their mean. */
 		people: number[];
 		courses: Course[];
+		/** Its mean over equally many steps each, metres; empty without a truth. */
+		ospa: number[];
 	}
 
 	/** A recording that can be opened. */
