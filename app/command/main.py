@@ -7,6 +7,7 @@ wrong usage, 130 after Ctrl-C. The engine is imported by the command that needs 
 from __future__ import annotations
 
 import errno
+import gc
 import os
 import subprocess
 import sys
@@ -40,6 +41,7 @@ from app.command.flags import (
 )
 from app.command.interruption import between_steps
 from app.command.library_flags import Bundle, LibraryCommand, OpenRun, Runs
+from app.command.study_flags import Batch, Study
 from app.command.terminal import Bar, CommandError, check_data, print_table, say
 from tracker import parameters as table
 from tracker.folders import library_file
@@ -119,6 +121,14 @@ def _run(command: Arguments) -> int:
             from app.command.runs import check
 
             return check(command)
+        case Study():
+            from app.command.studies import study
+
+            return study(command)
+        case Batch():
+            from app.command.batch import batch
+
+            return batch(command)
         case Corrections():
             from app.command.correcting import corrections
 
@@ -167,12 +177,22 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
         )
     check_data(command.data)
     _check_keep(command.keep)
+    gc.disable()  # a seventh of the time: nothing that is imported ever goes
     from app.state.workers.jobs import locate
     from app.web import server
+    from app.web.access import PARAMETER, Keys, new_token, own_token
     from app.web.security import is_loopback
     from tracker.library.records import Result
     from tracker.sequences import library, rendering
 
+    gc.freeze()
+    gc.enable()
+    if not command.token and not is_loopback(command.host):
+        raise ParameterError(
+            "--no-token",
+            f"expected --host of this machine alone, got {command.host}: others need one",
+        )
+    keys = Keys(own_token(os.environ) or new_token()) if command.token else None
     place = locate(command.sequence, command.data)
     if place not in rendering.ROOMS:
         library.open_sequence(place)  # what cannot be read is told here, before a page is open
@@ -184,21 +204,26 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     port = listener.getsockname()[1]
     host = f"[{command.host}]" if ":" in command.host else command.host
     shown = "127.0.0.1" if command.host == "0.0.0.0" else "[::1]" if host == "[::]" else host
-    address = f"http://{shown}:{port}"
+    address = f"http://{shown}:{port}/"
     if not is_loopback(command.host):
-        say(f"anyone who reaches {command.host} can change what you see")
+        say(f"whoever reaches {command.host} and has the token can change what you see")
+
+    def link(key: str | None) -> str:
+        return address if key is None else f"{address}?{PARAMETER}={key}"
 
     def ready() -> None:
-        sys.stdout.write(f"multiview-phd: {address} (Ctrl-C ends it)\n")
+        sys.stdout.write(f"multiview-phd: {link(keys.token if keys else None)} (Ctrl-C ends it)\n")
         sys.stdout.flush()
         if command.open:
             import webbrowser
 
-            threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+            opened = link(keys.ticket() if keys else None)
+            threading.Thread(target=webbrowser.open, args=(opened,), daemon=True).start()
 
     app = server.create_app(
         server.Settings(
             host=command.host,
+            keys=keys,
             sequence=command.sequence,
             data=command.data,
             detector=command.detector,
