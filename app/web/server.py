@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import uvicorn
 from fastapi import FastAPI, Request
@@ -62,6 +63,7 @@ from tracker.pipeline import Cancelled
 from tracker.runs.stage_cache import StageCache
 from tracker.studies.store import studies_folder
 
+if TYPE_CHECKING:
     from app.scene.scene import Scene
 
 logger = logging.getLogger("app")

@@ -83,13 +83,13 @@ def test_a_recording_that_was_moved_is_found_again(data: Path, path: Path, tmp_p
         address = f"/api/library/recordings/{recording['id']}/place"
         other = client.post(address, json={"place": str(data / "numbers")})
         assert other.status_code == 422
-        assert "another content" in other.json()["error"]["message"]
+        assert "another content" in other.json()["detail"]
         told = client.post(address, json={"place": str(after)}).json()
         assert (told["place"], told["missing"]) == (str(after), None)
         number = runs_of(client)[0]["id"]
         shown = client.post(f"/api/library/runs/{number}/open").json()
         wait_until(lambda: client.get("/api/state").json()["run"]["kept"] == number)
-        assert "error" not in shown
+        assert "detail" not in shown
 
 
 def test_a_run_that_was_deleted_and_is_made_again_is_kept_again(kept: TestClient) -> None:
