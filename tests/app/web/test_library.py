@@ -227,7 +227,7 @@ def test_what_is_drawn_says_what_there_is_and_is_escaped(kept: TestClient) -> No
     text = kept.get(f"/api/library/runs/{number}/drawn").text
     assert f"Lanes of run {number}: 2 tracks over 120 steps" in text
     assert "0.95 → " in text
-    assert text.count("<polyline") == 3
+    assert text.count("<polyline") == 4
     assert "<script" not in text
     told = kept.get("/api/library/compared", params={"runs": [number, other]}).text
     assert "&lt;b&gt;x" in told
