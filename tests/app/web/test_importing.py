@@ -188,7 +188,7 @@ def test_entrances_and_methods_are_chosen_on_the_sheet(
     assert chosen["wish"]["methods"] == {"fusion_method": "sequential_phd"}
     wrong = _wish(client, info, methods={"single_view": "guessing"})
     answer = client.post(f"/api/import/{wrong['key']}/write", json={})
-    assert "guessing" in answer.json()["error"]["message"]
+    assert "guessing" in answer.json()["detail"]
     chosen = _wish(client, info, entrances=[[place, sigma]], methods=methods)
     client.post(f"/api/import/{chosen['key']}/write", json={})
 
