@@ -82,6 +82,7 @@ const brought = /** @type {const} */ ([
 	"checkIdentities",
 	"plot",
 	"correct",
+	"keepLayout",
 ]);
 for (const name of brought) {
 	const early = async (/** @type {any} */ what = undefined) => {
