@@ -15,6 +15,7 @@ from tracker.corrections.outcomes import outcomes
 from tracker.fusion.told import told_by_step
 from tracker.parameters import RunParameters, Stage
 from tracker.runs.fitting import default_parameters
+from tracker.runs.gaps import where_to_keep
 from tracker.runs.run import Cancelled, Progress, Run, stage_keys
 from tracker.runs.single_views import Cancel, SingleViews
 from tracker.runs.stage_cache import FusionColumn, StageCache, TrackColumn, ViewColumn
@@ -83,6 +84,7 @@ def compute(
     _adopt(run, previous)
     if cache is not None:
         _take(run, cache)
+    taken = len(run.views)
     telling = _Telling(run, total, wanted, on_progress)
     sound = False
     try:
@@ -95,7 +97,7 @@ def compute(
         raise
     finally:
         if cache is not None:
-            _keep(run, cache, fused=sound)
+            _keep(run, cache, fused=sound, read=run.costly and len(run.views) > taken)
     return run
 
 
@@ -289,11 +291,21 @@ def _take(run: Run, cache: StageCache) -> None:
         run.settled = True
 
 
-def _keep(run: Run, cache: StageCache, *, fused: bool) -> None:
-    """Keep the run's columns for later ones; those of the fusion unless it failed."""
+def _keep(run: Run, cache: StageCache, *, fused: bool, read: bool) -> None:
+    """Keep the run's columns for later ones; those of the fusion unless it failed.
+
+    Args:
+        run: Whose.
+        cache: Where.
+        fused: Whether the fusion did not fail.
+        read: Whether pictures were read: then the files are looked at again.
+    """
+    place = where_to_keep(run) if read else "everywhere"
+    if place == "nowhere":
+        return
     if run.views:
         column = ViewColumn(run.views, run.view_states, run.costly)
-        complete = len(run.views) == run.sequence.frames
+        complete = len(run.views) == run.sequence.frames and place == "everywhere"
         cache.keep_views(run.keys["single_view"], column, complete=complete)
     if fused and run.fused:
         cache.keep_fusion(run.keys["fusion"], FusionColumn(run.fused, run.fusion_state))

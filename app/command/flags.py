@@ -57,6 +57,8 @@ class Serve:
     """Address to listen on. Anything but this machine's own lets others change what you see."""
     port: int = 8000
     """Port to listen on."""
+    token: bool = True
+    """Let in only whoever has the token of the printed link; $MULTIVIEW_PHD_TOKEN chooses one."""
     open: bool = field(default_factory=has_screen)
     """Open the page in a browser; by default where there is a screen."""
     data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None
@@ -118,6 +120,8 @@ class Track:
     """Obey none, not even those of the sequence."""
     cache: bool = True
     """Take up what the cameras found in an earlier run with the same values, and keep it."""
+    strict: bool = False
+    """End with status 1 where a picture was missing; the tracks are written all the same."""
     library: LibraryFile = None
     """The file that finished runs are kept in."""
     keep: Annotated[int, arg(metavar="INT")] = KEEP

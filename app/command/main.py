@@ -82,7 +82,7 @@ def _run(command: Arguments) -> int:
         case Serve():
             return _serve(command)
         case Track():
-            _track(command)
+            return _track(command)
         case Detect():
             from app.command.detect import detect
 
@@ -169,10 +169,17 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     _check_keep(command.keep)
     from app.state.workers.jobs import locate
     from app.web import server
+    from app.web.access import PARAMETER, Keys, new_token, own_token
     from app.web.security import is_loopback
     from tracker.library.records import Result
     from tracker.sequences import library, rendering
 
+    if not command.token and not is_loopback(command.host):
+        raise ParameterError(
+            "--no-token",
+            f"expected --host of this machine alone, got {command.host}: others need one",
+        )
+    keys = Keys(own_token(os.environ) or new_token()) if command.token else None
     place = locate(command.sequence, command.data)
     if place not in rendering.ROOMS:
         library.open_sequence(place)  # what cannot be read is told here, before a page is open
@@ -184,21 +191,26 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     port = listener.getsockname()[1]
     host = f"[{command.host}]" if ":" in command.host else command.host
     shown = "127.0.0.1" if command.host == "0.0.0.0" else "[::1]" if host == "[::]" else host
-    address = f"http://{shown}:{port}"
+    address = f"http://{shown}:{port}/"
     if not is_loopback(command.host):
-        say(f"anyone who reaches {command.host} can change what you see")
+        say(f"whoever reaches {command.host} and has the token can change what you see")
+
+    def link(key: str | None) -> str:
+        return address if key is None else f"{address}?{PARAMETER}={key}"
 
     def ready() -> None:
-        sys.stdout.write(f"multiview-phd: {address} (Ctrl-C ends it)\n")
+        sys.stdout.write(f"multiview-phd: {link(keys.token if keys else None)} (Ctrl-C ends it)\n")
         sys.stdout.flush()
         if command.open:
             import webbrowser
 
-            threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+            opened = link(keys.ticket() if keys else None)
+            threading.Thread(target=webbrowser.open, args=(opened,), daemon=True).start()
 
     app = server.create_app(
         server.Settings(
             host=command.host,
+            keys=keys,
             sequence=command.sequence,
             data=command.data,
             detector=command.detector,
@@ -250,7 +262,7 @@ def _leave(status: int) -> None:
 # track
 
 
-def _track(command: Track) -> None:
+def _track(command: Track) -> int:
     changes = command.changes()
     table.with_values(table.RunParameters(), changes)  # wrong usage shows before any work
     _check_seed(command.seed)
@@ -269,6 +281,7 @@ def _track(command: Track) -> None:
     from app.state.workers.compiling import Compiling
     from tracker import pipeline
     from tracker.checks import check
+    from tracker.runs import gaps
     from tracker.runs.gates import notices
     from tracker.runs.outcome import why_no_tracks
     from tracker.runs.stage_cache import StageCache
@@ -310,14 +323,11 @@ def _track(command: Track) -> None:
         )
     seconds = time.perf_counter() - begin
     with Bar("writing", "step") as writing:
-        written = Written(sequence, run.tracks, parameters, command.seed)
+        missing = gaps.sentences(run)
+        written = Written(sequence, run.tracks, parameters, command.seed, remarks=tuple(missing))
         save(output, form, written, Options(progress=writing.at))
     targets = len(set(run.tracks.ids.tolist()))
     kept = "" if "single_view" in stages else "; stage 1 was kept from an earlier run"
-    say(
-        f"{sequence.frames} steps, {targets} tracks, {sequence.frames / seconds:.0f} steps/s "
-        f"({sequence.frames / seconds / sequence.fps:.1f} × real time{kept}), written to {output}"
-    )
     if (reason := why_no_tracks(run)) is not None:
         say(reason)
     for sentence in notices(run):
@@ -328,8 +338,15 @@ def _track(command: Track) -> None:
         for one in told_by_hand:
             if one.id in unmet:
                 say(f"unmet: {one.words}: {unmet[one.id]}")
-    if command.keep:
+    if command.keep and not any(gap.unexpected for gap in gaps.gaps(run)):
         _keep(command, run, began, seconds)
+    incomplete = "".join(f"; {one}" for one in missing)
+    say(
+        f"{sequence.frames} steps, {targets} tracks, {sequence.frames / seconds:.0f} steps/s "
+        f"({sequence.frames / seconds / sequence.fps:.1f} × real time{kept}), written to {output}"
+        f"{incomplete}"
+    )
+    return FAILURE if command.strict and missing else 0
 
 
 def _keep(command: Track, run: Run, began: float, seconds: float) -> None:

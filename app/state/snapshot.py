@@ -69,6 +69,8 @@ class RunState:
     """Its number in the library that it was taken from; what the cameras found is not there."""
     stands_for: str = ""
     """The key that a computation with these values would have, where older code made this one."""
+    warnings: tuple[str, ...] = ()
+    """What its result is not: pictures that were missing, files that changed; a sentence each."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ from tracker.library.columns import KeptTracks
 from tracker.library.records import NewRecording, NewRun, Result, Source
 from tracker.parameters import changed
 from tracker.runs.fitting import default_parameters
+from tracker.runs.gaps import gaps
 from tracker.runs.numbers_version import numbers_version
 from tracker.runs.run import Run, stage_keys
 from tracker.sequences.frames import FrameReader
@@ -30,6 +31,9 @@ THUMBNAIL = (144, 96)
 """Width and height in pixels that a recording's picture fills: twice what the page shows."""
 
 _QUALITY = 80
+
+MISSING = "missing_pictures"
+"""The figure of a run that did not get all pictures: how many, over all cameras."""
 
 
 def code_version() -> str:
@@ -118,6 +122,8 @@ def run_of(
     figures = {}
     if evaluation is not None and evaluation.has_truth:
         figures = {figure.definition.key: figure.value for figure in evaluation.figures}
+    if missing := sum(gap.missing for gap in gaps(run)):
+        figures[MISSING] = missing
     return NewRun(
         key=run.key,
         digest=run.sequence.digest,
@@ -137,6 +143,12 @@ def run_of(
         figures=figures,
         kept=kept_of(run),
     )
+
+
+def remarks_of(result: Result) -> tuple[str, ...]:
+    """What must be said of a kept run wherever it is written to."""
+    missing = result.figures.get(MISSING)
+    return (f"{missing} pictures were missing",) if missing else ()
 
 
 def run_from(sequence: Sequence, result: Result, *, key: str) -> Run:

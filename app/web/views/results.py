@@ -53,7 +53,8 @@ def run_of(snapshot: Snapshot) -> models.RunInfo:
     smoothed = run is not None and run.key == state.key and run.tracks is not run.filtered
     if run is not None and state.kept is not None:  # only its people are kept, not the filter's
         smoothed = run.parameters.smoothing_method != "none"
-    return models.RunInfo(**asdict(state), smoothed=smoothed)
+    values = {**asdict(state), "warnings": list(state.warnings)}
+    return models.RunInfo(**values, smoothed=smoothed)
 
 
 def _teaching_of(snapshot: Snapshot) -> models.TeachingInfo:
@@ -131,6 +132,7 @@ def _sequence_of(snapshot: Snapshot) -> models.SequenceInfo | None:
             for view in sequence.views
         ],
         templates=len(sequence.templates),
+        warnings=list(sequence.warnings),
     )
 
 
