@@ -25,6 +25,11 @@ _FOR, _AGAINST = 2.5, -2.5
 """What the other run's word adds to the log odds of a move."""
 
 
+def _told(pairs: list[tuple[int, int]]) -> list[bool]:
+    """Whether each pair is one person for the other run, where it knows both."""
+    return [one == other for one, other in pairs if min(one, other) >= 0]
+
+
 class Opinion:
     """The other run's id at each row of a run's tracks."""
 
@@ -85,8 +90,7 @@ class Opinion:
                     [*now, (earlier[1], later[1])],
                     [(earlier[0], later[1]), (earlier[1], later[0])],
                 )
-            known = lambda pairs: [a == b for a, b in pairs if min(a, b) >= 0]  # noqa: E731
-            agrees, differs = known(new), known(now)
+            agrees, differs = _told(new), _told(now)
             if agrees and all(agrees):
                 added += _FOR
             if differs and all(differs):
@@ -136,10 +140,10 @@ class Opinion:
                     merged[-1].extend(part.tolist())
                 else:
                     merged.append(part.tolist())
-            for part in merged:
-                begin, end = self._lanes.of_row(part[0]), self._lanes.of_row(part[-1])
+            for own in merged:
+                begin, end = self._lanes.of_row(own[0]), self._lanes.of_row(own[-1])
                 piece = Piece(
                     track, begin, end, self._lanes.count(track, 0, end.step),
                     self._lanes.count(track, begin.step),
                 )  # fmt: skip
-                yield int(self.ids[part[0]]), piece
+                yield int(self.ids[own[0]]), piece

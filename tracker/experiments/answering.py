@@ -12,6 +12,7 @@ from tracker.corrections import Correction, Place
 from tracker.doubts import Doubt, queue
 from tracker.doubts.doubt import said, unsaid
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
+from tracker.parameters import RunParameters
 from tracker.pipeline import Run
 from tracker.runs.stage_cache import StageCache
 from tracker.sequences.sequence import GroundTruth, Sequence
@@ -88,7 +89,7 @@ class Answered:
 
 def session(
     sequence: Sequence,
-    parameters: pipeline.RunParameters,
+    parameters: RunParameters,
     settings: EvaluationSettings,
     answers: int,
     *,
