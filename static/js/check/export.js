@@ -1,5 +1,5 @@
 /** A file of the server's, saved by the browser. */
-import { request } from "../state/api.js";
+import { ApiError, request } from "../state/api.js";
 
 /** @param {Actions} actions @param {string} path @param {string} name */
 export async function sendsFile(actions, path, name) {
@@ -11,7 +11,7 @@ export async function sendsFile(actions, path, name) {
 		link.click();
 		setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 	} catch (error) {
-		const { message, hint } = /** @type {ApiFailure} */ (/** @type {unknown} */ (error));
-		actions.note("error", message, hint ?? "");
+		if (!(error instanceof ApiError)) throw error;
+		actions.note("error", error.message, error.hint ?? "");
 	}
 }
