@@ -41,6 +41,8 @@ export function mountCheck(root, context) {
 	store.watch(["place"], ({ place }) => {
 		if (place === "check" && before !== "check") {
 			actions.showTab("place");
+			// Who came by its word goes on in the queue: there Enter means the place.
+			if (document.activeElement?.matches(".place")) one(".qlist").focus();
 			first();
 		} else if (before === "check" && state.get().other) check.show(0);
 		before = place;

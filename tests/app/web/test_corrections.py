@@ -191,6 +191,15 @@ def test_how_it_would_be_is_shown_until_it_is_no_more(desk: TestClient) -> None:
     assert desk.app.state.workbench.snapshot().ghosts is None  # type: ignore[attr-defined]
 
 
+def test_a_name_that_is_dropped_is_gone_before_the_run_is_another(desk: TestClient) -> None:
+    wish = {"kind": "name", "tracks": [tracks(desk)[0]["id"]], "name": "Anna", "step": 30}
+    desk.post(PLACE, json={"corrections": [wish]})
+    (one,) = settled(desk)["corrections"]
+    answer = desk.delete(f"{PLACE}/{one['id']}")
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["names"] == {}
+
+
 def test_only_what_was_checked_counts_as_truth(desk: TestClient, own: Path, run: Runs) -> None:
     assert desk.get(f"{PLACE}/truth.csv").status_code == 409
     wish = [{"kind": "checked", "first": 10, "last": 19}, {"kind": "checked", "first": 20, "last": 29}]

@@ -10,7 +10,7 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.conftest import opened
-from tests.browser.looking import ask, shown_in_3d, until, viser
+from tests.browser.looking import ask, readout, shown_in_3d, until, viser
 from tests.browser.meeting import FRAMES, HIDDEN, write_meeting
 from tests.browser.serving import Server
 
@@ -173,7 +173,7 @@ def test_somebody_is_placed_by_a_click(check: Page, server: Server) -> None:
     check.locator(".lane").first.click()
     check.keyboard.press("Shift+H")
     expect(check.get_by_text("Click where")).to_be_visible()
-    check.locator(".cam").first.click(position={"x": 150, "y": 170})
+    check.locator(".cam").first.click(position={"x": 60, "y": 190})
     expect(check.get_by_text("Enter says it")).to_be_visible()
     check.keyboard.press("Enter")
     until(check, lambda: len(corrections(server)["corrections"]) == 1, "it is said")
@@ -188,8 +188,10 @@ def test_a_name_and_a_checked_range_leave_as_truth(check: Page, server: Server) 
     check.keyboard.press("Enter")
     until(check, lambda: "Anna" in corrections(server)["names"].values(), "she has a name")
     check.keyboard.press("Home")
+    until(check, lambda: readout(check) == "0", "the first step")
     check.keyboard.press("i")
     check.keyboard.press("PageDown")
+    until(check, lambda: readout(check) == "10", "the eleventh")
     check.keyboard.press("o")
     check.keyboard.press("Shift+G")
     until(check, lambda: corrections(server)["checked"] == [[0, 10]], "the range is checked")
