@@ -137,7 +137,7 @@ def test_what_cannot_be_is_refused_with_a_sentence(desk: TestClient, own: Path) 
     ):
         answer = desk.post(PLACE, json={"corrections": [wish]})
         assert answer.status_code == 422, wish
-        assert words in answer.json()["error"]["message"], answer.text
+        assert words in answer.json()["detail"], answer.text
     assert not (own / "corrections.toml").exists()
     assert desk.delete(f"{PLACE}/nothing").status_code == 404
 
@@ -152,7 +152,7 @@ def test_a_malformed_log_is_told_and_the_recording_stays_usable(own: Path) -> No
             PLACE, json={"corrections": [{"kind": "checked", "first": 0, "last": 9}]}
         )
         assert answer.status_code == 422
-        assert "line 4" in answer.json()["error"]["message"]
+        assert "line 4" in answer.json()["detail"]
     assert "hier" in (own / "corrections.toml").read_text()
 
 
