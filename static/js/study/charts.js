@@ -162,16 +162,20 @@ function room(values) {
 	return [low - more, high + more];
 }
 
-/** The middle half of the values and as much again, so that a lost trial does not flatten the rest.
- * @param {number[]} values */
-function core(values) {
+/**
+ * The middle half of the values and as much again, so that a lost trial does not flatten the rest;
+ * what has to be seen is in it.
+ * @param {number[]} values
+ * @param {number[]} seen
+ */
+function core(values, seen) {
 	const sorted = [...values].sort((a, b) => a - b);
 	const at = (/** @type {number} */ share) =>
 		sorted[Math.round(share * (sorted.length - 1))] ?? Number.NaN;
 	const [low, high] = [at(0.25), at(0.75)];
 	const reach = 3 * (high - low) || Infinity;
 	const inside = sorted.filter((value) => value >= low - reach && value <= high + reach);
-	return room(inside.length ? inside : sorted);
+	return room([...inside, ...seen]);
 }
 
 /**
@@ -187,7 +191,13 @@ export async function scatter(place, trials, x, y, which, choose) {
 	const ink = inks();
 	const known = trials.filter((trial) => x.at(trial) != null && y.at(trial) != null);
 	const values = (/** @type {Measure} */ of) => known.map((trial) => Number(of.at(trial)));
-	const [across, up] = [core(values(x)), core(values(y))];
+	const seen = known.filter(({ number }) => !number || number === which.best);
+	const [across, up] = [x, y].map((of) =>
+		core(
+			values(of),
+			seen.map((one) => Number(of.at(one))),
+		),
+	);
 	const outside = known.filter((trial) => {
 		const [a, b] = [Number(x.at(trial)), Number(y.at(trial))];
 		return a < across[0] || a > across[1] || b < up[0] || b > up[1];
@@ -322,7 +332,9 @@ export async function against(place, trials, range, y, which, choose, narrow) {
 		return typeof value === "number" ? value : valueOf(value);
 	};
 	const known = trials.filter((trial) => y.at(trial) != null);
-	const up = core(known.map((trial) => Number(y.at(trial))));
+	const seen = known.filter(({ number }) => !number || number === which.best);
+	const [all, marked] = [known, seen].map((some) => some.map((trial) => Number(y.at(trial))));
+	const up = core(all, marked);
 	const numbers = range.kind === "float" || range.kind === "int";
 	const ends =
 		numbers && range.low !== null && range.high !== null ? [range.low, range.high] : null;

@@ -3,10 +3,11 @@ import { choices, fill, h, icon } from "../elements/dom.js";
 import { getJson, sendJson } from "../state/api.js";
 import { SEARCHES, numberField, tag } from "./fields.js";
 import { lockedParts } from "./locked.js";
+import { parameterRanges, rangeOf } from "./ranges.js";
 import { runsOn } from "./where.js";
 import { nameOf, symbolOf, valueOf } from "./words.js";
 
-/** @typedef {{low: number | null, high: number | null, log: boolean, choices: any[] | null}} Range */
+/** @import { Range } from "./ranges.js" */
 /**
  * @typedef {object} Wish  what is sent, and what of it is only shown
  * @property {string} name
@@ -21,14 +22,6 @@ import { nameOf, symbolOf, valueOf } from "./words.js";
 /** @typedef {{scheduler: string | null, workers: number}} Where */
 
 const ASKED_MS = 300;
-
-/** @param {Server.RangeInfo} range @returns {Range} */
-export const rangeOf = ({ low, high, log, choices: all }) => ({
-	low,
-	high,
-	log,
-	choices: all.length ? [...all] : null,
-});
 
 /**
  * @param {Pick<Context, "store" | "actions">} context
@@ -136,7 +129,7 @@ export function definition({ store }, { start, cost: told, copy }) {
 			body,
 			named(now),
 			recordings(now),
-			parameters(now),
+			parameterRanges(now, known, store.get().schema?.parameters ?? [], { changed, show, add }),
 			numbers(now),
 			objective(now),
 			runsOn(where, { changed, show }),
@@ -196,162 +189,6 @@ export function definition({ store }, { start, cost: told, copy }) {
 				),
 			),
 			others.length > 0 && more,
-		);
-	}
-
-	/** @param {Wish} now */
-	function parameters(now) {
-		const all = store.get().schema?.parameters ?? [];
-		const rest = all.filter(({ key }) => !(key in now.parameters));
-		const more = h("select", {
-			class: "field",
-			"aria-label": "Vary another parameter",
-			onchange: () => void add(more.value),
-		});
-		choices(
-			more,
-			[
-				["", "vary another…"],
-				...rest.map(
-					({ key, label, group }) => /** @type {[string, string]} */ ([key, `${label} · ${group}`]),
-				),
-			],
-			"",
-		);
-		return h(
-			"div",
-			{ class: "blk" },
-			h(
-				"h3",
-				{ class: "h" },
-				"Parameters",
-				h("span", { class: "grow" }),
-				h("span", { class: "small" }, `${Object.keys(now.parameters).length} of ${all.length}`),
-			),
-			h(
-				"table",
-				{ class: "pt" },
-				h(
-					"thead",
-					{},
-					h(
-						"tr",
-						{},
-						h("th", {}, "name"),
-						h("th", { class: "num" }, "from"),
-						h("th", { class: "num" }, "to"),
-						h("th", {}, "scale"),
-						h("th", {}, h("span", { class: "vh" }, "leave out")),
-					),
-				),
-				h(
-					"tbody",
-					{},
-					Object.entries(now.parameters).map(([key, range]) => parameter(now, key, range)),
-				),
-			),
-			more,
-		);
-	}
-
-	/** @param {Wish} now @param {string} key @param {Range} range */
-	function parameter(now, key, range) {
-		const found = known.find((one) => one.key === key);
-		const label = found?.label ?? key;
-		const out = h(
-			"button",
-			{
-				class: "btn icon",
-				"aria-label": `Leave out ${label}`,
-				onclick: () => {
-					delete now.parameters[key];
-					show();
-					changed();
-				},
-			},
-			icon("i-close", "s"),
-		);
-		const name = h(
-			"td",
-			{ title: found?.help ?? "" },
-			h("span", { class: "lab" }, label),
-			" ",
-			found && symbolOf(found.symbol),
-		);
-		if (range.choices)
-			return h(
-				"tr",
-				{},
-				name,
-				h(
-					"td",
-					{ colspan: 3, class: "num" },
-					(found?.choices ?? range.choices).map((one) =>
-						h(
-							"button",
-							{
-								class: "btn one",
-								"aria-pressed": String(range.choices?.includes(one)),
-								onclick: () => {
-									const left = range.choices?.includes(one)
-										? range.choices.filter((other) => other !== one)
-										: [...(range.choices ?? []), one];
-									range.choices = left;
-									show();
-									changed();
-								},
-							},
-							valueOf(one),
-						),
-					),
-				),
-				h("td", {}, out),
-			);
-		const ends = { min: found?.minimum, max: found?.maximum };
-		return h(
-			"tr",
-			{},
-			name,
-			h(
-				"td",
-				{ class: "num" },
-				numberField(
-					changed,
-					`${label} from`,
-					tidy(range.low),
-					(value) => (range.low = value),
-					ends,
-				),
-			),
-			h(
-				"td",
-				{ class: "num" },
-				numberField(
-					changed,
-					`${label} to`,
-					tidy(range.high),
-					(value) => (range.high = value),
-					ends,
-				),
-			),
-			h(
-				"td",
-				{},
-				h(
-					"button",
-					{
-						class: "btn scale",
-						"aria-label": `Scale of ${label}: ${range.log ? "logarithmic" : "linear"}`,
-						onclick: () => {
-							range.log = !range.log;
-							show();
-							changed();
-						},
-					},
-					range.log ? "log" : "linear",
-				),
-			),
-			h("td", {}, out),
 		);
 	}
 
@@ -472,6 +309,3 @@ export function definition({ store }, { start, cost: told, copy }) {
 
 /** @param {string} name @returns {[string, string]} */
 const pair = (name) => [name, name];
-
-/** @param {number | null} value */
-const tidy = (value) => (value === null ? null : Number(value.toPrecision(4)));

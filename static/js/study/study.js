@@ -419,10 +419,7 @@ export function mountStudy(root, { store, actions }) {
 	store.on(["place"], ({ place }) => {
 		if (place === "study") void refreshList();
 	});
-	store.on(
-		["theme"],
-		() => study && void draw([...trials.values()].sort((a, b) => a.ended - b.ended)),
-	);
+	store.on(["theme"], () => show(true));
 	void refreshList().then(() =>
 		open(studies.find(({ state }) => state === "running")?.name ?? studies[0]?.name ?? NEW),
 	);

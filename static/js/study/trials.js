@@ -24,9 +24,11 @@ export function trialsTable({ choose, use }) {
 		const [lead] = study.objectives;
 		const standard = trials.find(({ number }) => number === 0);
 		const worth = (/** @type {Server.TrialInfo} */ trial) =>
-			trial.objectives === null || trial.vetoed || trial.state !== "complete"
-				? -Infinity
-				: (lead.higher ? 1 : -1) * trial.objectives[0];
+			trial.number === study.best
+				? Infinity
+				: trial.objectives === null || trial.vetoed || trial.state !== "complete"
+					? -Infinity
+					: (lead.higher ? 1 : -1) * trial.objectives[0];
 		const rows = trials
 			.filter(({ number }) => number !== 0)
 			.sort((a, b) => worth(b) - worth(a) || a.number - b.number)
