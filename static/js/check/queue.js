@@ -50,7 +50,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 			onclick: () => actions.correct("truth"),
 		},
 		icon("i-export", "s"),
-		"Truth",
+		"Save truth",
 	);
 	const done = h("div", {
 		class: "qds",

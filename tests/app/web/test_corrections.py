@@ -11,9 +11,12 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from app.state.doubting import Doubting
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, Runs, run_is, wait_until
 from tracker.corrections.log import read_log
+from tracker.doubts import Alternative, Doubt, Queue
+from tracker.doubts.doubt import Lanes, unsaid
 
 PLACE = "/api/corrections"
 
@@ -187,10 +190,22 @@ def test_the_queue_is_answered_previewed_and_skipped(
         assert left[0]["id"] not in [one["id"] for one in rest]
 
 
-def test_how_it_would_be_is_shown_until_it_is_no_more(desk: TestClient) -> None:
+def test_how_it_would_be_is_shown_until_it_is_no_more(
+    desk: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lanes = Lanes(desk.app.state.workbench.snapshot().run.tracks)  # type: ignore[attr-defined]
+    track = tracks(desk)[0]["id"]
+    places = (lanes.place(track, 59), lanes.place(track, 60, after=True))
+    two = Alternative("two people", 0.5, unsaid("different", places))
+    made = Doubt(
+        "cut", "two people?", "told", 59, 60, (track,), places, 0.5, 60,
+        (Alternative("as it is", 0.5, ()), two),
+    )  # fmt: skip
+    monkeypatch.setattr(Doubting, "of", lambda self, snapshot: Queue((made,), 0, "a test"))
     first = desk.get(f"{PLACE}/queue").json()["doubts"][0]
     told = desk.post(f"{PLACE}/ghosts", json={"doubt": first["id"], "alternative": 1}).json()
     assert told == desk.get(f"{PLACE}/queue/{first['id']}/1").json()
+    assert [one["was"] for one in told["spans"]] == [track]
     ghosts = desk.app.state.workbench.snapshot().ghosts  # type: ignore[attr-defined]
     assert set(ghosts.tracks.ids.tolist()) == {one["id"] for one in told["tracks"]}
     assert ghosts.run == desk.get("/api/state").json()["run"]["key"]

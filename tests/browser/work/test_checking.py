@@ -197,7 +197,7 @@ def test_a_name_and_a_checked_range_leave_as_truth(check: Page, server: Server) 
     until(check, lambda: corrections(server)["checked"] == [[0, 10]], "the range is checked")
     server.wait_for_run()
     with check.expect_download() as saved:
-        check.get_by_role("button", name="Truth").click()
+        check.get_by_role("button", name="Save truth").click()
     lines = Path(saved.value.path()).read_text(encoding="utf-8").splitlines()
     assert len(lines) > 11
 
