@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -133,6 +134,8 @@ class Snapshot:
     """The values that a reset returns to: of methods, those that fit the sequence."""
     parameters_origin: str = ""
     """Who changed the parameters last, so that a client is not sent its own change."""
+    session: str = field(default_factory=lambda: secrets.token_hex(4))
+    """Another for every start of the program."""
     presets: Presets = field(default_factory=lambda: MappingProxyType({}))
     playhead: int = 0
     playhead_origin: str = ""

@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import uvicorn
 from fastapi import FastAPI, Request
@@ -45,7 +46,7 @@ from app.web.importing import routes as importing
 from app.web.library import export_routes
 from app.web.library import routes as library
 from app.web.manual import Manual
-from app.web.pictures import foreground, likelihood_routes
+from app.web.pictures import foreground, likelihood_routes, view_routes
 from app.web.pictures.jpegs import Pictures
 from app.web.pictures.likelihood import Likelihoods
 from app.web.pictures.swatches import Swatches
@@ -62,12 +63,16 @@ from tracker.pipeline import Cancelled
 from tracker.runs.stage_cache import StageCache
 from tracker.studies.store import studies_folder
 
+if TYPE_CHECKING:
+    from app.scene.scene import Scene
+
 logger = logging.getLogger("app")
 
 ROUTERS = (
     api.router,
     foreground.router,
     likelihood_routes.router,
+    view_routes.router,
     tables.router,
     event_tables.router,
     teaching_routes.router,
@@ -202,7 +207,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     door = app.state.gateway = Gateway()
     told.start()
     opening_step.follow(workbench)
-    room = _Room(workbench, teaching, sensitivity)
+    room = app.state.room = _Room(workbench, teaching, sensitivity)
     if settings.with_viser:
         door.prepare()
         # the page is served meanwhile; requests for the 3D view wait
@@ -276,6 +281,7 @@ class _Room:
         self._workbench = workbench
         self._sensitivity = sensitivity
         self._teaching = teaching
+        self.scene: Scene | None = None
         self._parts: list[Callable[[], object]] = []
 
     def open(self, entrance: Entrance) -> None:
@@ -286,7 +292,8 @@ class _Room:
 
         server = start_viser(entrance)
         self._parts.append(server.stop)
-        self._parts.append(Scene(server, self._workbench).close)
+        self.scene = Scene(server, self._workbench)
+        self._parts.append(self.scene.close)
         self._parts.append(RoomEditing(server, self._workbench, self._teaching).close)
         self._parts.append(Controls(server, self._workbench, self._sensitivity).close)
 

@@ -726,6 +726,8 @@ declare namespace Server {
 		/** Targets at each of equally many steps, their mean. */
 		people: number[];
 		courses: Course[];
+		/** Its mean over equally many steps each, metres; empty without a truth. */
+		ospa: number[];
 	}
 
 	/** A parameter, or the choice of a method, with the range that is tried. */
@@ -911,6 +913,8 @@ declare namespace Server {
 
 	/** Everything that all pages share, but for the results themselves. */
 	interface State {
+		/** Another for every start of the server. */
+		session: string;
 		/** Grows with every change; of two states the larger is the newer. */
 		version: number;
 		sequence: SequenceInfo | null;
