@@ -16,7 +16,7 @@ from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subc
 
 from app.command.correction_flags import Corrections, LogFile
 from app.command.library_flags import Bundle, FormatName, LibraryCommand, LibraryFile, Runs
-from app.command.study_flags import Batch, Study
+from app.command.study_flags import Batch, Study, Tune
 from tracker import parameters as table
 from tracker.library import KEEP
 from tracker.parameters import FOLLOWS, METHODS, PRESETS, Parameter, ParameterError
@@ -454,6 +454,7 @@ Arguments = (
     | LibraryCommand
     | Study
     | Batch
+    | Tune
     | Corrections
 )
 
@@ -485,6 +486,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         | Annotated[LibraryCommand, subcommand("library")]
         | Annotated[Study, subcommand("study")]
         | Annotated[Batch, subcommand("batch")]
+        | Annotated[Tune, subcommand("tune")]
         | Annotated[Corrections, subcommand("corrections")]
     )
     parsed: Arguments = tyro.cli(

@@ -40,7 +40,7 @@ from app.command.flags import (
 )
 from app.command.interruption import between_steps
 from app.command.library_flags import Bundle, LibraryCommand, OpenRun, Runs
-from app.command.study_flags import Batch, Study
+from app.command.study_flags import Batch, Study, Tune
 from app.command.terminal import Bar, CommandError, check_data, print_table, say
 from tracker import parameters as table
 from tracker.folders import library_file
@@ -128,6 +128,10 @@ def _run(command: Arguments) -> int:
             from app.command.batch import batch
 
             return batch(command)
+        case Tune():
+            from app.command.tune import tune
+
+            return tune(command)
         case Corrections():
             from app.command.correcting import corrections
 
