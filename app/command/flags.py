@@ -213,6 +213,8 @@ class Experiment:
     """Run every one."""
     quick: FlagCreatePairsOff[bool] = False
     """Shortened to what shows the direction of each claim."""
+    seeds: Annotated[int | None, arg(help_behavior_hint="(default: each experiment's own)")] = None
+    """How many seeds each case is run with, where chance plays a part."""
     count: int = 20
     """Of `rooms`: how many random rooms."""
     first: int = 0

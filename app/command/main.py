@@ -7,6 +7,7 @@ wrong usage, 130 after Ctrl-C. The engine is imported by the command that needs 
 from __future__ import annotations
 
 import errno
+import gc
 import os
 import subprocess
 import sys
@@ -180,6 +181,7 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
         )
     check_data(command.data)
     _check_keep(command.keep)
+    gc.disable()  # a seventh of the time: nothing that is imported ever goes
     from app.state.workers.jobs import locate
     from app.web import server
     from app.web.access import PARAMETER, Keys, new_token, own_token
@@ -187,6 +189,8 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     from tracker.library.records import Result
     from tracker.sequences import library, rendering
 
+    gc.freeze()
+    gc.enable()
     if not command.token and not is_loopback(command.host):
         raise ParameterError(
             "--no-token",

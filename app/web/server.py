@@ -35,7 +35,7 @@ from app.state.workers.identity_check import IdentityCheck
 from app.state.workers.jobs import Jobs, in_background
 from app.state.workers.keeper import Keeper
 from app.state.workers.sensitivity import Sensitivity
-from app.web import api, gateway, stream, teaching_routes
+from app.web import api, description, gateway, stream, teaching_routes
 from app.web.access import Access, Keys
 from app.web.entrance import LARGEST_MESSAGE, Entrance, start_viser
 from app.web.evaluation import course_routes, identity_routes
@@ -124,8 +124,10 @@ def create_app(settings: Settings) -> FastAPI:
         description="Tracks of several people in 3D from calibrated cameras, and their tuning.",
         redoc_url=None,
         static_url="/docs-files",  # the page of the routes loads nothing from another host
+        generate_unique_id_function=description.operation_id,
         lifespan=_lifespan,
     )
+    description.install(app)
     app.state.settings = settings
     if isinstance(settings.run, Result):
         app.add_middleware(OnlyLooking)

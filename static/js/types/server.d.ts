@@ -360,7 +360,7 @@ declare namespace Server {
 	interface ImportInfo {
 		key: string;
 		version: number;
-		phase: "uploading" | "reading" | "settled" | "failed" | "writing" | "written";
+		phase: "uploading" | "reading" | "settled" | "failed" | "writing" | "copying" | "written";
 		busy: boolean;
 		/** What is being looked into. */
 		under_way: string;
@@ -387,6 +387,15 @@ declare namespace Server {
 		suggested: [[number, number, number], [number, number, number]] | null;
 		half_extents: [number, number, number] | null;
 		suggested_half_extents: [number, number, number] | null;
+		/** Suggested where tracks of a first run begin and end: position, standard deviations. */
+		entrances: [[number, number, number], [number, number, number]][];
+		/** What it is tracked with unless somebody wishes otherwise, by what chooses a method. */
+		fitting: Record<string, string>;
+		/** Methods that cannot work on it, each with the reason. */
+		unfit: Record<string, Record<string, string>>;
+		/** Bytes, of the files that become its own. */
+		copied: number;
+		megabytes_per_second: number;
 		/** People in the truth; 0 where there is none. */
 		truth: number;
 		/** Whether every camera has boxes. */
@@ -424,6 +433,10 @@ declare namespace Server {
 		files: [string, string][];
 		room: [[number, number, number], [number, number, number]] | null;
 		half_extents: [number, number, number] | null;
+		/** Of each the position and the standard deviations, metres. */
+		entrances: [[number, number, number], [number, number, number]][];
+		/** What it is to be tracked with; null, or not there: what fits. */
+		methods: Record<"single_view" | "fusion_method" | "smoothing_method", string | null>;
 		/** Whether what lies elsewhere on the disk is copied, not linked. */
 		copy_files: boolean;
 	}
@@ -506,6 +519,8 @@ declare namespace Server {
 		height: number;
 		/** How many cameras see the floor, by cell, rows along y. */
 		seen: number[];
+		/** Of those that are wished, else of those that are suggested: x, y and how wide they are. */
+		entrances: [number, number, number, number][];
 		/** x, y, direction and half the angle across, radians. */
 		cameras: [number, number, number, number][];
 		feet: [number, number][];

@@ -166,8 +166,8 @@ def test_what_is_not_there_is_said(data: Path, tmp_path: Path) -> None:
     with TestClient(app, base_url=ADDRESS) as client:
         paths = ("evaluation", "evaluation/series", "evaluation/comparison", "export/report.html")
         for path in paths:
-            assert client.get(f"/api/{path}").json()["error"]["code"] == "nothing_open"
-        assert client.post("/api/run/pin").json()["error"]["code"] == "nothing_open"
+            assert client.get(f"/api/{path}").json()["code"] == "nothing_open"
+        assert client.post("/api/run/pin").json()["code"] == "nothing_open"
         folder = tmp_path / "untrue"
         folder.mkdir()
         toml = (data / "crossing" / "sequence.toml").read_text(encoding="utf-8")
@@ -177,8 +177,8 @@ def test_what_is_not_there_is_said(data: Path, tmp_path: Path) -> None:
         client.post("/api/sequence", json={"name": str(folder)})
         wait_until(run_is(client, "done"))
         for path in paths:
-            error = client.get(f"/api/{path}").json()["error"]
-            assert (error["code"], "has no truth" in error["message"]) == ("no_truth", True)
+            error = client.get(f"/api/{path}").json()
+            assert (error["code"], "has no truth" in error["detail"]) == ("no_truth", True)
         assert client.post("/api/run/pin").status_code == 200
 
 

@@ -56,10 +56,10 @@ def test_what_there_is_no_map_of(numbers: TestClient, client: TestClient) -> Non
     for path in ("nothing/0/5.png", f"{key}/9/5.png", f"{key}/0/999.png", f"{key}/0/5.png?run=x"):
         answer = numbers.get(f"/api/likelihood/{path}")
         assert answer.status_code == 404, path
-        assert answer.json()["error"]["code"] == "no_likelihood"
+        assert answer.json()["code"] == "no_likelihood"
     boxes_only = client.get("/api/step/5").json()["cameras"][0]
     assert boxes_only["likelihood"] is None
     key = client.get("/api/state").json()["sequence"]["key"]
     answer = client.get(f"/api/likelihood/{key}/0/5.png")
     assert answer.status_code == 404
-    assert "has no picture of step 5" in answer.json()["error"]["message"]
+    assert "has no picture of step 5" in answer.json()["detail"]

@@ -70,7 +70,7 @@ def test_the_address_with_the_run_is_kept_for_ever(numbers: TestClient, computed
     assert "immutable" in answer.headers["cache-control"]
     other = numbers.get(address, params={"run": "0" * 16})
     assert other.status_code == 404
-    assert other.json()["error"]["message"] == "That run is not shown any more."
+    assert other.json()["detail"] == "That run is not shown any more."
 
 
 @pytest.mark.parametrize(
@@ -84,14 +84,14 @@ def test_the_address_with_the_run_is_kept_for_ever(numbers: TestClient, computed
 def test_what_is_not_there_is_told(numbers: TestClient, path: str, words: str) -> None:
     answer = numbers.get(f"/api/foreground/{path.replace('KEY', key_of(numbers))}.png")
     assert answer.status_code == 404
-    assert answer.json()["error"]["code"] == "no_foreground"
-    assert answer.json()["error"]["message"] == words
+    assert answer.json()["code"] == "no_foreground"
+    assert answer.json()["detail"] == words
 
 
 def test_a_method_without_foreground_is_told(client: TestClient) -> None:
     answer = client.get(f"/api/foreground/{key_of(client)}/0/0.png")
     assert answer.status_code == 404
-    error = answer.json()["error"]
-    assert "none had no picture there, or looks at none" in error["message"]
+    error = answer.json()
+    assert "none had no picture there, or looks at none" in error["detail"]
     assert "that looks at pictures" in error["hint"]
     assert client.get("/api/step/0").json()["cameras"][0]["foreground"] is None
