@@ -58,7 +58,7 @@ def test_the_program_is_killed_and_nothing_is_lost_or_run_twice(tmp_path: Path) 
     wait(lambda: not workers_of(program.pid))
     said = finish(store, "--workers", "2")
     check_whole(store, 40)
-    assert store.trials()[: len(before)] == before
+    assert [store.trial(one.number) for one in before] == before
     assert {key: outcomes(store)[key] for key in runs} == runs
     left = len(outcomes(store)) - len(runs)
     assert f" {left} runs in " in said  # what had ended was not run again
@@ -100,7 +100,7 @@ def test_the_scheduler_is_killed_and_another_goes_on(tmp_path: Path) -> None:
     with cluster(where=tmp_path) as (address, _):
         finish(store, "--scheduler", address)
     check_whole(store, 60)
-    assert store.trials()[: len(before)] == before
+    assert [store.trial(one.number) for one in before] == before
     assert {key: outcomes(store)[key] for key in runs} == runs
 
 

@@ -232,7 +232,7 @@ def tune(wish: models.TuneWish, desk: Desk, bench: Bench) -> models.Study:
         raise no_study(error) from None
 
 
-@router.get("/{name}")
+@router.get("/{name}", operation_id="get_study")
 def study(store: Named, desk: Desk) -> models.Study:
     """Everything of a study but its trials."""
     return _told(desk, store)
@@ -279,7 +279,7 @@ def trials(
     )
 
 
-@router.get("/{name}/trials/{number}")
+@router.get("/{name}/trials/{number}", operation_id="get_studies_trial")
 def trial(store: Named, number: int) -> models.TrialDetail:
     """A trial with its runs, and the commands that repeat them."""
     try:
