@@ -31,7 +31,7 @@ SECONDS_BETWEEN = 0.5
 AHEAD = 1
 """Runs that wait beside each one under way, so that no worker waits for the sampler."""
 
-IMPORTANCE_GROWTH = 1.25
+IMPORTANCE_GROWTH = 1.5
 """What matters is found out anew when there are so many times more trials."""
 
 LAST_SECONDS = 60.0
