@@ -49,5 +49,5 @@ def test_a_finger_selects_seeks_and_plots(touched: Page, server: Server) -> None
     page.touchscreen.tap(plot["x"] + plot["width"] / 2, plot["y"] + 14)
     until(page, lambda: 20 < int(readout(page)) < 40, "the step under the finger")
     page.get_by_role("button", name="Plots", exact=True).tap()
-    page.get_by_label("Height").tap()
+    page.locator("#plot-height").tap()
     expect(page.locator(".plot-row")).to_contain_text(f"track {state['selection']}")
