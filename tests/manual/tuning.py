@@ -26,7 +26,7 @@ leads here.
 ## In which order
 
 1. **Choose what is measured.** With templates and pictures: `colour_phd`. With pictures alone:
-   `jpda` or `association_matrix`, which look at the foreground. With a detector's boxes: `none`
+   `shapes`, or `jpda` and `association_matrix`, which look at the foreground. With a detector's boxes: `none`
    or `detection_phd`.
 2. **Look at stage 1 first**: the boxes in the pictures. Somebody without a box in any camera
    cannot be found; boxes on furniture that stay at one place can become ghosts.
