@@ -7,8 +7,9 @@ value of every parameter, in words that ``multiview-phd track --set`` takes back
 from __future__ import annotations
 
 import csv
+import itertools
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
@@ -20,7 +21,7 @@ from numpy import ndarray
 from tracker import __version__
 from tracker.parameters import METHODS, PARAMETERS, RunParameters, value
 from tracker.placing import replacing
-from tracker.sequences.csv_columns import read_columns
+from tracker.sequences.csv_columns import guarded, read_columns, unguarded
 from tracker.sequences.sequence import Sequence, SequenceError
 from tracker.trajectories import Trajectories
 
@@ -48,6 +49,8 @@ class TrackFile:
     """The comment lines ``# key = value``: sequence, seed, methods and parameters."""
     done: int | None = None
     """The number of steps computed, where the file says that it is not all of them."""
+    remarks: tuple[str, ...] = ()
+    """What the file says is missing of it."""
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -61,6 +64,7 @@ def write_tracks_csv(
     seed: int,
     *,
     done: int | None = None,
+    remarks: Iterable[str] = (),
 ) -> None:
     """Write the track file.
 
@@ -73,12 +77,13 @@ def write_tracks_csv(
         parameters: With which they were found.
         seed: Of the run.
         done: The number of steps computed; fewer than the sequence has are said at the top.
+        remarks: What else is said there of the result, for instance that pictures were missing.
     """
-    for line in _comments(sequence, parameters, seed, done):
+    for line in _comments(sequence, parameters, seed, done, remarks):
         stream.write(f"# {line}\n")
     cameras = sequence.cameras
     boxes = [f"{camera.name}_{side}" for camera in cameras for side in BOX]
-    csv.writer(stream, lineterminator="\n").writerow([*COLUMNS, *boxes])
+    csv.writer(stream, lineterminator="\n").writerow([*COLUMNS, *map(guarded, boxes)])
     columns = [
         [f"{frame}" for frame in tracks.frames],
         [f"{frame * sequence.step_time:.6f}" for frame in tracks.frames],
@@ -101,12 +106,17 @@ def _fixed(values: Float[ndarray, "N C"], decimals: int) -> Iterator[list[str]]:
 
 
 def _comments(
-    sequence: Sequence, parameters: RunParameters, seed: int, done: int | None
+    sequence: Sequence,
+    parameters: RunParameters,
+    seed: int,
+    done: int | None,
+    remarks: Iterable[str],
 ) -> Iterator[str]:
     yield f"{PROGRAM} {__version__}"
+    yield from (f"incomplete: {guarded(' '.join(remark.split()))}" for remark in remarks)
     if done is not None and done < sequence.frames:
         yield f"partial: the first {done} of {sequence.frames} steps"
-    yield f"sequence = {' '.join(sequence.name.split())}"
+    yield f"sequence = {guarded(' '.join(sequence.name.split()))}"
     yield f"seed = {seed}"
     for key in (*METHODS, *PARAMETERS):
         yield f"{key} = {_as_text(value(parameters, key))}"
@@ -124,12 +134,13 @@ def save_tracks_csv(
     seed: int,
     *,
     done: int | None = None,
+    remarks: Iterable[str] = (),
 ) -> None:
     """Write the track file to disk: wholly or not at all, whatever interrupts it.
 
     Args:
         path: Replaced if it is there. A pipe or device is written to directly.
-        sequence, tracks, parameters, seed, done: As for :func:`write_tracks_csv`.
+        sequence, tracks, parameters, seed, done, remarks: As for :func:`write_tracks_csv`.
 
     Raises:
         OSError: With a sentence, if the file cannot be written.
@@ -137,10 +148,10 @@ def save_tracks_csv(
     path = Path(path)
     if not path.is_dir() and path.exists() and not path.is_file():
         with path.open("w", encoding="utf-8", newline="") as stream:
-            write_tracks_csv(stream, sequence, tracks, parameters, seed, done=done)
+            write_tracks_csv(stream, sequence, tracks, parameters, seed, done=done, remarks=remarks)
         return
     with replacing(path) as temporary, temporary.open("x", encoding="utf-8", newline="") as stream:
-        write_tracks_csv(stream, sequence, tracks, parameters, seed, done=done)
+        write_tracks_csv(stream, sequence, tracks, parameters, seed, done=done, remarks=remarks)
 
 
 def read_tracks_csv(path: Path | str) -> TrackFile:
@@ -154,7 +165,11 @@ def read_tracks_csv(path: Path | str) -> TrackFile:
     cameras = [name.removesuffix("_left") for name in header if name.endswith("_left")]
     sides = tuple(f"{camera}_{side}" for camera in cameras for side in BOX)
     columns = read_columns(
-        path, path.name, needed=(*COLUMNS, *(s for s in sides if s not in header)), blank=sides
+        path,
+        path.name,
+        needed=(*COLUMNS, *(s for s in sides if s not in header)),
+        blank=sides,
+        called=unguarded,
     )
     frames = columns.whole("frame", 0, None, "the step")
     ids = columns.whole("id", 0, None, "the track")
@@ -172,13 +187,14 @@ def read_tracks_csv(path: Path | str) -> TrackFile:
         },
         settings=_settings(path),
         done=_done(path),
+        remarks=_remarks(path),
     )
 
 
 def _header(path: Path) -> list[str]:
     for line in _beginning(path):
         if line.strip() and not line.startswith("#"):
-            return [cell.strip() for cell in next(csv.reader([line]))]
+            return [unguarded(cell.strip()) for cell in next(csv.reader([line]))]
     return []
 
 
@@ -189,7 +205,7 @@ def _settings(path: Path) -> dict[str, str]:
             break
         key, equals, setting = line[1:].partition("=")
         if equals:
-            settings[key.strip()] = setting.strip()
+            settings[key.strip()] = unguarded(setting.strip())
     return settings
 
 
@@ -200,6 +216,12 @@ def _done(path: Path) -> int | None:
         if partial := re.match(r"# partial: the first (\d+) of ", line):
             return int(partial[1])
     return None
+
+
+def _remarks(path: Path) -> tuple[str, ...]:
+    head = itertools.takewhile(lambda line: line.startswith("#"), _beginning(path))
+    found = (re.match(r"# incomplete: (.*)", line) for line in head)
+    return tuple(unguarded(one[1].strip()) for one in found if one)
 
 
 def _beginning(path: Path) -> Iterator[str]:

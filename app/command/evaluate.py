@@ -51,6 +51,8 @@ def evaluate(command: Evaluate) -> None:
         sequence = library.open_sequence(command.sequence, progress=rendering.at)
     tracks = export.read_tracks_csv(command.tracks)
     check_fit(sequence, tracks, str(command.tracks))
+    for sentence in (*sequence.warnings, *tracks.remarks):
+        say(sentence)
     evaluation = evaluate_sequence(sequence, tracks, settings, steps=tracks.done)
     if command.html is not None:
         from tracker.evaluation.report.page import write_report  # brings plotly
@@ -91,12 +93,15 @@ def estimate_without_truth(command: Evaluate) -> None:
     from tracker import pipeline
     from tracker.experiments.laboratory.experiment import Context
     from tracker.experiments.laboratory.pool import cores
+    from tracker.runs import gaps
     from tracker.runs.stage_cache import StageCache
     from tracker.without_truth import estimate
     from tracker.without_truth.estimate import WARNING
 
     with Bar("rendering", "frame") as rendering:
         sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    for sentence in sequence.warnings:
+        say(sentence)
     with Bar("tracking", "step") as tracking, closing(Compiling(say)) as compiling:
         tracking.at(0, sequence.frames)
         compiling.wait(lambda done, total: None, lambda: False)
@@ -106,6 +111,8 @@ def estimate_without_truth(command: Evaluate) -> None:
             cache=StageCache.on_disk(),
             on_progress=lambda _, progress: tracking.at(progress.done, progress.total),
         )
+    for sentence in gaps.sentences(run):
+        say(sentence)
     with Bar("looking in other ways", "step") as looking:
         told = lambda words, done, total: looking.at(done, total)  # noqa: E731
         found = estimate(run, Context(processes=cores(), told=told))

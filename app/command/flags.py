@@ -14,7 +14,9 @@ from typing import Annotated, Any, Literal
 import tyro
 from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subcommand
 
+from app.command.correction_flags import Corrections, LogFile
 from app.command.library_flags import Bundle, FormatName, LibraryCommand, LibraryFile, Runs
+from app.command.study_flags import Batch, Study
 from tracker import parameters as table
 from tracker.library import KEEP
 from tracker.parameters import FOLLOWS, METHODS, PRESETS, Parameter, ParameterError
@@ -56,6 +58,8 @@ class Serve:
     """Address to listen on. Anything but this machine's own lets others change what you see."""
     port: int = 8000
     """Port to listen on."""
+    token: bool = True
+    """Let in only whoever has the token of the printed link; $MULTIVIEW_PHD_TOKEN chooses one."""
     open: bool = field(default_factory=has_screen)
     """Open the page in a browser; by default where there is a screen."""
     data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None
@@ -111,8 +115,14 @@ class Track:
     processors without fused multiply-add."""
     detector: Annotated[Path | None, arg(metavar="MODEL", help_behavior_hint="(optional)")] = None
     """A detection network of your own, as ONNX: the method onnx_detector runs it on pictures."""
+    corrections: LogFile = None
+    """What was put right by hand: the run obeys it."""
+    no_corrections: FlagCreatePairsOff[bool] = False
+    """Obey none, not even those of the sequence."""
     cache: bool = True
     """Take up what the cameras found in an earlier run with the same values, and keep it."""
+    strict: bool = False
+    """End with status 1 where a picture was missing; the tracks are written all the same."""
     library: LibraryFile = None
     """The file that finished runs are kept in."""
     keep: Annotated[int, arg(metavar="INT")] = KEEP
@@ -203,6 +213,8 @@ class Experiment:
     """Run every one."""
     quick: FlagCreatePairsOff[bool] = False
     """Shortened to what shows the direction of each claim."""
+    seeds: Annotated[int | None, arg(help_behavior_hint="(default: each experiment's own)")] = None
+    """How many seeds each case is run with, where chance plays a part."""
     count: int = 20
     """Of `rooms`: how many random rooms."""
     first: int = 0
@@ -442,6 +454,9 @@ Arguments = (
     | Runs
     | Bundle
     | LibraryCommand
+    | Study
+    | Batch
+    | Corrections
 )
 
 
@@ -451,6 +466,8 @@ def parse(arguments: list[str] | None = None) -> Arguments:
     # its settings come with the engine, which only who evaluates has to wait for
     asked = sys.argv[1:] if arguments is None else arguments
     evaluate: Any = _evaluate_with_flags() if asked[:1] == ["evaluate"] else Evaluate
+    if asked[:1] == ["study"] and asked[1:2] and asked[1].endswith(".toml"):
+        arguments = ["study", "run", *asked[1:]]  # `study STUDY.toml` runs it
     commands: Any = (
         Annotated[Serve, subcommand("serve")]
         | Annotated[track, subcommand("track")]
@@ -468,6 +485,9 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         | Annotated[Runs, subcommand("runs")]
         | Annotated[Bundle, subcommand("bundle")]
         | Annotated[LibraryCommand, subcommand("library")]
+        | Annotated[Study, subcommand("study")]
+        | Annotated[Batch, subcommand("batch")]
+        | Annotated[Corrections, subcommand("corrections")]
     )
     parsed: Arguments = tyro.cli(
         commands,

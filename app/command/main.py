@@ -7,6 +7,7 @@ wrong usage, 130 after Ctrl-C. The engine is imported by the command that needs 
 from __future__ import annotations
 
 import errno
+import gc
 import os
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.command.correction_flags import Corrections
 from app.command.flags import (
     Arguments,
     Benchmark,
@@ -39,6 +41,7 @@ from app.command.flags import (
 )
 from app.command.interruption import between_steps
 from app.command.library_flags import Bundle, LibraryCommand, OpenRun, Runs
+from app.command.study_flags import Batch, Study
 from app.command.terminal import Bar, CommandError, check_data, print_table, say
 from tracker import parameters as table
 from tracker.folders import library_file
@@ -81,7 +84,7 @@ def _run(command: Arguments) -> int:
         case Serve():
             return _serve(command)
         case Track():
-            _track(command)
+            return _track(command)
         case Detect():
             from app.command.detect import detect
 
@@ -118,6 +121,18 @@ def _run(command: Arguments) -> int:
             from app.command.runs import check
 
             return check(command)
+        case Study():
+            from app.command.studies import study
+
+            return study(command)
+        case Batch():
+            from app.command.batch import batch
+
+            return batch(command)
+        case Corrections():
+            from app.command.correcting import corrections
+
+            return corrections(command)
     return 0
 
 
@@ -162,12 +177,22 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
         )
     check_data(command.data)
     _check_keep(command.keep)
+    gc.disable()  # a seventh of the time: nothing that is imported ever goes
     from app.state.workers.jobs import locate
     from app.web import server
+    from app.web.access import PARAMETER, Keys, new_token, own_token
     from app.web.security import is_loopback
     from tracker.library.records import Result
     from tracker.sequences import library, rendering
 
+    gc.freeze()
+    gc.enable()
+    if not command.token and not is_loopback(command.host):
+        raise ParameterError(
+            "--no-token",
+            f"expected --host of this machine alone, got {command.host}: others need one",
+        )
+    keys = Keys(own_token(os.environ) or new_token()) if command.token else None
     place = locate(command.sequence, command.data)
     if place not in rendering.ROOMS:
         library.open_sequence(place)  # what cannot be read is told here, before a page is open
@@ -179,21 +204,26 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     port = listener.getsockname()[1]
     host = f"[{command.host}]" if ":" in command.host else command.host
     shown = "127.0.0.1" if command.host == "0.0.0.0" else "[::1]" if host == "[::]" else host
-    address = f"http://{shown}:{port}"
+    address = f"http://{shown}:{port}/"
     if not is_loopback(command.host):
-        say(f"anyone who reaches {command.host} can change what you see")
+        say(f"whoever reaches {command.host} and has the token can change what you see")
+
+    def link(key: str | None) -> str:
+        return address if key is None else f"{address}?{PARAMETER}={key}"
 
     def ready() -> None:
-        sys.stdout.write(f"multiview-phd: {address} (Ctrl-C ends it)\n")
+        sys.stdout.write(f"multiview-phd: {link(keys.token if keys else None)} (Ctrl-C ends it)\n")
         sys.stdout.flush()
         if command.open:
             import webbrowser
 
-            threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+            opened = link(keys.ticket() if keys else None)
+            threading.Thread(target=webbrowser.open, args=(opened,), daemon=True).start()
 
     app = server.create_app(
         server.Settings(
             host=command.host,
+            keys=keys,
             sequence=command.sequence,
             data=command.data,
             detector=command.detector,
@@ -245,7 +275,7 @@ def _leave(status: int) -> None:
 # track
 
 
-def _track(command: Track) -> None:
+def _track(command: Track) -> int:
     changes = command.changes()
     table.with_values(table.RunParameters(), changes)  # wrong usage shows before any work
     _check_seed(command.seed)
@@ -260,9 +290,11 @@ def _track(command: Track) -> None:
     if not output.parent.is_dir():
         raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
 
+    from app.command.correcting import of_run
     from app.state.workers.compiling import Compiling
     from tracker import pipeline
     from tracker.checks import check
+    from tracker.runs import gaps
     from tracker.runs.gates import notices
     from tracker.runs.outcome import why_no_tracks
     from tracker.runs.stage_cache import StageCache
@@ -278,6 +310,7 @@ def _track(command: Track) -> None:
         if found.status == "warning" and str(found) not in sequence.warnings:
             say(str(found))
     parameters = table.with_values(pipeline.default_parameters(sequence), changes)
+    told_by_hand = of_run(sequence, command.corrections, none=command.no_corrections)
     begin, began = time.perf_counter(), time.time()
     stages: set[table.Stage] = set()
 
@@ -296,26 +329,37 @@ def _track(command: Track) -> None:
             sequence,
             parameters,
             seed=command.seed,
+            corrections=told_by_hand,
             cache=StageCache.on_disk() if command.cache else None,
             on_progress=told,
             cancelled=interrupted,
         )
     seconds = time.perf_counter() - begin
     with Bar("writing", "step") as writing:
-        written = Written(sequence, run.tracks, parameters, command.seed)
+        missing = gaps.sentences(run)
+        written = Written(sequence, run.tracks, parameters, command.seed, remarks=tuple(missing))
         save(output, form, written, Options(progress=writing.at))
     targets = len(set(run.tracks.ids.tolist()))
     kept = "" if "single_view" in stages else "; stage 1 was kept from an earlier run"
-    say(
-        f"{sequence.frames} steps, {targets} tracks, {sequence.frames / seconds:.0f} steps/s "
-        f"({sequence.frames / seconds / sequence.fps:.1f} × real time{kept}), written to {output}"
-    )
     if (reason := why_no_tracks(run)) is not None:
         say(reason)
     for sentence in notices(run):
         say(sentence)
-    if command.keep:
+    if told_by_hand:
+        unmet = {one.id: one.why for one in run.outcomes if not one.met}
+        say(f"{len(told_by_hand) - len(unmet)} of {len(told_by_hand)} corrections met")
+        for one in told_by_hand:
+            if one.id in unmet:
+                say(f"unmet: {one.words}: {unmet[one.id]}")
+    if command.keep and not any(gap.unexpected for gap in gaps.gaps(run)):
         _keep(command, run, began, seconds)
+    incomplete = "".join(f"; {one}" for one in missing)
+    say(
+        f"{sequence.frames} steps, {targets} tracks, {sequence.frames / seconds:.0f} steps/s "
+        f"({sequence.frames / seconds / sequence.fps:.1f} × real time{kept}), written to {output}"
+        f"{incomplete}"
+    )
+    return FAILURE if command.strict and missing else 0
 
 
 def _keep(command: Track, run: Run, began: float, seconds: float) -> None:

@@ -204,6 +204,7 @@ def _show(library: Library, command: ShowRun) -> None:
 
 
 def _export(library: Library, command: ExportRun) -> None:
+    from tracker.library.keeping import remarks_of
     from tracker.sequences import library as sequences
     from tracker.writing.registry import format_of, save
     from tracker.writing.written import Options, Written
@@ -213,7 +214,14 @@ def _export(library: Library, command: ExportRun) -> None:
     with Bar("rendering", "frame") as rendering:
         sequence = sequences.open_sequence(result.place, progress=rendering.at)
     done = None if result.run.steps >= sequence.frames else result.run.steps
-    written = Written(sequence, result.kept.tracks, result.parameters, result.run.seed, done)
+    written = Written(
+        sequence,
+        result.kept.tracks,
+        result.parameters,
+        result.run.seed,
+        done,
+        remarks_of(result),
+    )
     with Bar("writing", "step") as writing:
         options = Options(command.first, command.last, command.speed, writing.at)
         save(command.output, form, written, options)

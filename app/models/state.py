@@ -58,6 +58,8 @@ class SequenceInfo(Model):
     cameras: list[CameraInfo]
     templates: int
     """How many colour templates it has."""
+    warnings: list[str]
+    """What is odd about it, or was found out because it is not stated."""
 
 
 class OpeningInfo(Model):
@@ -97,6 +99,8 @@ class RunInfo(Model):
     """Whether the people are those of stage 3; else the filter's, as a live system would see."""
     stands_for: str
     """The key that a computation would have, where older code made what is shown; else empty."""
+    warnings: list[str]
+    """What its result lacks: pictures that were missing, files that changed."""
 
 
 class PinnedInfo(Model):
@@ -140,6 +144,8 @@ class ViserInfo(Model):
 class State(Model):
     """Everything that all pages share, but for the results themselves."""
 
+    session: str
+    """Another for every start of the server."""
     version: int
     """Grows with every change; of two states the larger is the newer."""
     sequence: SequenceInfo | None

@@ -29,6 +29,7 @@ from app.state.snapshot import (
     Presets,
     RunState,
     Snapshot,
+    StudyNews,
     Trail,
     View,
     clamp,
@@ -295,6 +296,10 @@ class Workbench:
         """Say one sentence to everyone who looks."""
         self._tell(Notice(level, message, hint))
 
+    def study_changed(self, told: Mapping[str, Any]) -> None:
+        """Tell everyone who looks of a study."""
+        self._tell(StudyNews(told))
+
     # what the jobs report
 
     def set_opening(self, opening: Opening | None) -> None:
@@ -374,11 +379,21 @@ class Workbench:
             self._put("run" if now.run is not run else "progress", run=run, run_state=state)
 
     def run_ends(
-        self, key: str, phase: Literal["done", "cancelled", "failed"], error: str | None = None
+        self,
+        key: str,
+        phase: Literal["done", "cancelled", "failed"],
+        error: str | None = None,
+        warnings: Iterable[str] = (),
     ) -> None:
         """The run with this key is over; after a failure the last good one is shown again.
 
         Where none was finished yet, what was shown stays: an unfinished run says more than none.
+
+        Args:
+            key: The run's.
+            phase: How it ended.
+            error: Why it failed, in one sentence.
+            warnings: What its result lacks, a sentence each.
         """
         with self._edit() as now:
             if key != now.run_state.key:  # superseded
@@ -388,7 +403,14 @@ class Workbench:
                 run = self._last_good or run
             elif phase == "done":
                 self._last_good = run
-            state = replace(now.run_state, state=phase, seconds_left=None, message="", error=error)
+            state = replace(
+                now.run_state,
+                state=phase,
+                seconds_left=None,
+                message="",
+                error=error,
+                warnings=tuple(warnings),
+            )
             self._put("run", run=run, run_state=state)
 
     def show_kept(self, run: Run, number: int, stands_for: str = "") -> None:

@@ -28,6 +28,7 @@ from app.web.pictures.jpegs import Pictures
 from app.web.views import results, steps
 from app.web.views.timeline import Timelines
 from tracker import export
+from tracker.runs import gaps
 from tracker.sequences import library
 
 router = APIRouter(prefix="/api", responses=ERRORS)
@@ -269,7 +270,10 @@ def export_tracks(bench: Bench) -> Response:
     sequence = snapshot.named(run.sequence)
     name = file_name(sequence.name, "tracks.csv")
     stream = io.StringIO(newline="")
-    export.write_tracks_csv(stream, sequence, tracks, run.parameters, run.seed, done=done)
+    told = gaps.sentences(run)
+    export.write_tracks_csv(
+        stream, sequence, tracks, run.parameters, run.seed, done=done, remarks=told
+    )
     return Response(
         stream.getvalue(),
         media_type="text/csv; charset=utf-8",

@@ -26,28 +26,34 @@ from app.state.importing.desk import Desk
 from app.state.kept.history import History
 from app.state.kept.presets import OwnPresets
 from app.state.kept.recents import Recents
+from app.state.studies.desk import StudyDesk
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench
 from app.state.workers.compiling import Compiling
 from app.state.workers.evaluator import Evaluator
 from app.state.workers.exporter import Exporter
+from app.state.workers.identity_check import IdentityCheck
 from app.state.workers.jobs import Jobs, in_background
 from app.state.workers.keeper import Keeper
 from app.state.workers.sensitivity import Sensitivity
-from app.web import api, gateway, stream, teaching_routes
+from app.web import api, description, gateway, stream, teaching_routes
+from app.web.access import Access, Keys
+from app.web.entrance import LARGEST_MESSAGE, Entrance, start_viser
+from app.web.evaluation import course_routes, identity_routes
 from app.web.evaluation import routes as evaluation
 from app.web.gateway import Gateway
 from app.web.importing import routes as importing
 from app.web.library import export_routes
 from app.web.library import routes as library
 from app.web.manual import Manual
-from app.web.pictures import foreground, likelihood_routes
+from app.web.pictures import foreground, likelihood_routes, view_routes
 from app.web.pictures.jpegs import Pictures
 from app.web.pictures.likelihood import Likelihoods
 from app.web.pictures.swatches import Swatches
 from app.web.security import CONTENT_POLICY, Guard, OnlyLooking, allowed_hosts, is_loopback
 from app.web.stream import Stream
-from app.web.tables import tables, teaching_tables
+from app.web.studies import routes as studies
+from app.web.tables import event_tables, tables, teaching_tables
 from app.web.views.timeline import Timelines
 from tracker import __version__
 from tracker.folders import settings_folder
@@ -55,26 +61,29 @@ from tracker.library import KEEP
 from tracker.library.records import Result
 from tracker.pipeline import Cancelled
 from tracker.runs.stage_cache import StageCache
+from tracker.studies.store import studies_folder
 
 if TYPE_CHECKING:
-    import viser
+    from app.scene.scene import Scene
 
 logger = logging.getLogger("app")
-
-LARGEST_SOCKET_MESSAGE = 64 << 20
-"""Bytes: viser's client may send a rendered picture of itself."""
 
 ROUTERS = (
     api.router,
     foreground.router,
     likelihood_routes.router,
+    view_routes.router,
     tables.router,
+    event_tables.router,
     teaching_routes.router,
     teaching_tables.router,
     evaluation.router,
+    identity_routes.router,
+    course_routes.router,
     importing.router,
     library.router,
     export_routes.router,
+    studies.router,
     stream.router,
     gateway.router,
 )
@@ -89,6 +98,8 @@ class Settings:
     """What a server is started with."""
 
     host: str = "127.0.0.1"
+    keys: Keys | None = None
+    """What lets in; None: whoever reaches it."""
     sequence: str | None = None
     """Opened at once, in the background."""
     data: Path | None = None
@@ -118,16 +129,19 @@ def create_app(settings: Settings) -> FastAPI:
         description="Tracks of several people in 3D from calibrated cameras, and their tuning.",
         redoc_url=None,
         static_url="/docs-files",  # the page of the routes loads nothing from another host
+        generate_unique_id_function=description.operation_id,
         lifespan=_lifespan,
     )
+    description.install(app)
     app.state.settings = settings
-    app.add_middleware(
+    if isinstance(settings.run, Result):
+        app.add_middleware(OnlyLooking)
+    app.add_middleware(Access, keys=settings.keys)
+    app.add_middleware(  # the last one is the first that sees a request
         Guard,
         hosts=allowed_hosts(settings.host),
         addresses_are_fine=not is_loopback(settings.host),
     )
-    if isinstance(settings.run, Result):
-        app.add_middleware(OnlyLooking)
     errors.install(app)
     for router in ROUTERS:
         app.include_router(router)
@@ -184,14 +198,16 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         workbench, settings_folder() / "recent.json" if kept else None
     )
     evaluator = app.state.evaluator = Evaluator(workbench)
+    identity_check = app.state.identity_check = IdentityCheck(workbench)
     exporter = app.state.exporter = Exporter()
     sensitivity = app.state.sensitivity = Sensitivity(workbench, settings.seed)
     keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep)
+    study_desk = app.state.studies = StudyDesk(workbench, studies_folder())
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
     told.start()
     opening_step.follow(workbench)
-    room = _Room(workbench, teaching, sensitivity)
+    room = app.state.room = _Room(workbench, teaching, sensitivity)
     if settings.with_viser:
         door.prepare()
         # the page is served meanwhile; requests for the 3D view wait
@@ -221,7 +237,16 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         await asyncio.gather(
             *(
                 asyncio.to_thread(part.close)
-                for part in (exporter, keeper, jobs, evaluator, sensitivity, room)
+                for part in (
+                    identity_check,
+                    exporter,
+                    keeper,
+                    jobs,
+                    evaluator,
+                    sensitivity,
+                    room,
+                    study_desk,
+                )
             )
         )
 
@@ -238,7 +263,8 @@ def _say_failure(name: str) -> Callable[..., None]:
 
 async def _start_viser(room: _Room, door: Gateway, workbench: Workbench) -> None:
     try:
-        door.started(await asyncio.to_thread(room.open))
+        await asyncio.to_thread(room.open, door.entrance)
+        door.started()
     except Exception as error:
         logger.exception("the 3D view did not start")
         workbench.notify(
@@ -255,20 +281,21 @@ class _Room:
         self._workbench = workbench
         self._sensitivity = sensitivity
         self._teaching = teaching
+        self.scene: Scene | None = None
         self._parts: list[Callable[[], object]] = []
 
-    def open(self) -> viser.ViserServer:
-        """Start viser on a private loopback port and build scene and sliders in it."""
+    def open(self, entrance: Entrance) -> None:
+        """Start viser behind its entrance and build scene and sliders in it."""
         from app.scene.panel.controls import Controls
         from app.scene.room_editing import RoomEditing
         from app.scene.scene import Scene
 
-        server = gateway.start_viser()
+        server = start_viser(entrance)
         self._parts.append(server.stop)
-        self._parts.append(Scene(server, self._workbench).close)
+        self.scene = Scene(server, self._workbench)
+        self._parts.append(self.scene.close)
         self._parts.append(RoomEditing(server, self._workbench, self._teaching).close)
         self._parts.append(Controls(server, self._workbench, self._sensitivity).close)
-        return server
 
     def close(self) -> None:
         """Take it down in the opposite order."""
@@ -315,7 +342,7 @@ def serve(app: FastAPI, listener: sockets.socket, on_ready: Callable[[], None]) 
         ws="websockets-sansio",
         # viser's messages are packed already, ours are small: compressing only costs time
         ws_per_message_deflate=False,
-        ws_max_size=LARGEST_SOCKET_MESSAGE,
+        ws_max_size=LARGEST_MESSAGE,
         timeout_graceful_shutdown=1,
         server_header=False,
     )

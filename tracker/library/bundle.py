@@ -23,6 +23,7 @@ import tomlkit
 from tracker import __version__, export
 from tracker.library import columns
 from tracker.library.errors import LibraryError
+from tracker.library.keeping import remarks_of
 from tracker.library.records import KeptRun, Result
 from tracker.library.store import parameters_of
 from tracker.placing import replacing, zip_folder
@@ -84,7 +85,9 @@ def _fill(folder: Path, result: Result, sequence: Sequence, videos: bool) -> Non
     (folder / TRACKS).write_bytes(columns.pack(result.kept))
     tracks = result.kept.tracks
     with (folder / "tracks.csv").open("w", encoding="utf-8", newline="") as stream:
-        export.write_tracks_csv(stream, sequence, tracks, result.parameters, run.seed)
+        export.write_tracks_csv(
+            stream, sequence, tracks, result.parameters, run.seed, remarks=remarks_of(result)
+        )
     if sequence.ground_truth is not None:
         from tracker.evaluation import evaluate_sequence
         from tracker.evaluation.report.page import report_html  # brings plotly

@@ -20,6 +20,7 @@ from tracker.library.columns import KeptTracks
 from tracker.library.records import NewRecording, NewRun, Result, Source
 from tracker.parameters import changed
 from tracker.runs.fitting import default_parameters
+from tracker.runs.gaps import gaps
 from tracker.runs.numbers_version import numbers_version
 from tracker.runs.run import Run, stage_keys
 from tracker.sequences.frames import FrameReader
@@ -30,6 +31,9 @@ THUMBNAIL = (144, 96)
 """Width and height in pixels that a recording's picture fills: twice what the page shows."""
 
 _QUALITY = 80
+
+MISSING = "missing_pictures"
+"""The figure of a run that did not get all pictures: how many, over all cameras."""
 
 
 def code_version() -> str:
@@ -84,6 +88,10 @@ def thumbnail_of(sequence: Sequence, reader: FrameReader | None = None) -> bytes
     return None
 
 
+CURVE = 300
+"""Values of a curve that is kept in small."""
+
+
 def kept_of(run: Run) -> KeptTracks:
     """What is kept of a run's result."""
     tracks = run.tracks
@@ -116,8 +124,12 @@ def run_of(
     """
     parameters = run.parameters
     figures = {}
+    ospa: tuple[float, ...] = ()
     if evaluation is not None and evaluation.has_truth:
+        ospa = _in_small(evaluation.series.ospa)
         figures = {figure.definition.key: figure.value for figure in evaluation.figures}
+    if missing := sum(gap.missing for gap in gaps(run)):
+        figures[MISSING] = missing
     return NewRun(
         key=run.key,
         digest=run.sequence.digest,
@@ -136,7 +148,22 @@ def run_of(
         targets=len(np.unique(run.tracks.ids)),
         figures=figures,
         kept=kept_of(run),
+        ospa=ospa,
     )
+
+
+def _in_small(values: ndarray) -> tuple[float, ...]:
+    """The mean over each of equally many steps."""
+    starts = np.arange(0, len(values), max(1, -(-len(values) // CURVE)))
+    sizes = np.diff(np.append(starts, len(values)))
+    means = np.add.reduceat(values, starts) / sizes if len(values) else values
+    return tuple(means.round(3).tolist())
+
+
+def remarks_of(result: Result) -> tuple[str, ...]:
+    """What must be said of a kept run wherever it is written to."""
+    missing = result.figures.get(MISSING)
+    return (f"{missing} pictures were missing",) if missing else ()
 
 
 def run_from(sequence: Sequence, result: Result, *, key: str) -> Run:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,24 @@ from numpy import ndarray
 
 from tracker.sequences.fields import LARGEST, did_you_mean, listed, shown
 from tracker.sequences.sequence import SequenceError
+
+_FORMULA = re.compile(r"(^|[,;\t]\s*)(?='*[=+\-@\t\r])")
+_GUARDED = re.compile(r"(^|[,;\t]\s*)'(?='*[=+\-@\t\r])")
+
+
+def guarded(text: str) -> str:
+    """A name as a cell of a CSV file that no spreadsheet takes for a formula.
+
+    An apostrophe stands before a beginning by ``=``, ``+``, ``-``, ``@`` or a tab, also behind a
+    comma or semicolon, where a comment line becomes cells. :func:`unguarded` takes it away.
+    Source: OWASP, "CSV Injection".
+    """
+    return _FORMULA.sub(r"\1'", text)
+
+
+def unguarded(text: str) -> str:
+    """What :func:`guarded` made a cell of."""
+    return _GUARDED.sub(r"\1", text)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,6 +121,7 @@ def read_columns(
     optional: Mapping[str, float] | None = None,
     blank: tuple[str, ...] = (),
     largest: float = LARGEST,
+    called: Callable[[str], str] = str,
 ) -> Columns:
     """Read a CSV file with a header.
 
@@ -114,6 +134,7 @@ def read_columns(
         optional: Columns that may be there, and what stands for them where they are not.
         blank: Columns whose cells may be empty; empty is NaN.
         largest: No number lies beyond it, on either side.
+        called: What a cell of the header calls its column.
 
     Raises:
         SequenceError: Naming line and column, what was expected and what was found.
@@ -121,7 +142,7 @@ def read_columns(
     optional = optional or {}
     lines, numbers = _lines(path, where)
     header = (lines[0] if lines else "").strip()
-    names = tuple(cell.strip() for cell in next(csv.reader([header]), []))
+    names = tuple(called(cell.strip()) for cell in next(csv.reader([header]), []))
     _check_header(names, where, numbers[0] if numbers else 1, needed, optional)
     # a column may be needed although its cells may be empty
     wanted = [name for name in dict.fromkeys((*needed, *optional, *blank)) if name in names]

@@ -8,8 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Bool
+from numpy import ndarray
 
-from tracker.sequences.fields import Fields, did_you_mean
+from tracker.sequences.fields import Fields, did_you_mean, listed
+from tracker.sequences.numbering import whole_row
 from tracker.sequences.sequence import SequenceError, View
 from tracker.sequences.video import VideoError, index_video, read_image
 
@@ -31,8 +34,11 @@ def locate(folder: Path, fields: Fields, name: str) -> Path:
     return path
 
 
-def find_images(folder: Path, fields: Fields) -> tuple[Path, ...]:
+def find_images(folder: Path, fields: Fields) -> tuple[tuple[Path, ...], Bool[ndarray, " N"]]:
     """The pictures that the pattern ``images`` names, sorted by name.
+
+    Returns:
+        They, with those that are missing in the row of their numbers, and which are there.
 
     Raises:
         SequenceError: If there is none, or one lies outside the folder.
@@ -49,7 +55,7 @@ def find_images(folder: Path, fields: Fields) -> tuple[Path, ...]:
         )
     for path in images:
         _inside(folder, path.relative_to(folder).as_posix(), fields, "images")
-    return tuple(images)
+    return whole_row(images)
 
 
 def _inside(folder: Path, given: str, fields: Fields, name: str) -> Path:
@@ -119,7 +125,7 @@ def check_pictures(view: View, found: Pictures, fields: Fields, frames: int) -> 
         _check_size(view, fields, found.size, "frame size")
         return list(_short(view, found.frames, frames, "video has"))
     _check_size(view, fields, found.size, "image size")
-    warnings = list(_short(view, found.frames, frames, "images are"))
+    warnings = [*_holes(view), *_short(view, found.frames, frames, "images are")]
     by_number = sorted(view.images, key=_by_number)
     for first, other in zip(by_number, view.images, strict=True):
         if first != other:
@@ -161,6 +167,20 @@ def _short(view: View, there: int, frames: int, what: str) -> Iterable[str]:
             f'camera "{view.camera.name}": the {what} too few: expected {frames} '
             f"frames{offset}, found {steps}; {missing} no picture"
         )
+
+
+def _holes(view: View) -> Iterable[str]:
+    """Pictures that are missing in the row of their numbers."""
+    if view.there is None or view.there.all():
+        return
+    names = [view.images[k].name for k in np.flatnonzero(~view.there)]
+    shown = listed(f'"{name}"' for name in names[:3]) if len(names) < 4 else f'"{names[0]}"'
+    others = "" if len(names) < 4 else f" and {len(names) - 1} others"
+    yield (
+        f'camera "{view.camera.name}": {shown}{others} '
+        f"{'is' if len(names) == 1 else 'are'} missing in the row of its pictures; the steps there "
+        "have no picture (where none is missing, number the files one by one)"
+    )
 
 
 def _by_number(path: Path) -> list[str | int]:

@@ -15,7 +15,7 @@ from pathlib import Path
 from tracker.sequences.calibration import check_sight
 from tracker.sequences.fields import Fields, did_you_mean, shown
 from tracker.sequences.filling import check_missing, find_room, find_time
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.sequence import FileState, Sequence, SequenceError
 from tracker.sequences.tables import Reading, read_ground_truth
 from tracker.sequences.views import CAMERA, read_sources, read_views
 from tracker.sequences.writing.taught_fields import read_room, read_target, read_templates
@@ -74,6 +74,7 @@ def read_sequence(folder: Path | str) -> Sequence:
         reading.warnings += check_sight(view.camera, room)
     templates = read_templates(fields, views, time.steps)
     ground_truth = read_ground_truth(fields, reading, time.steps)
+    files = _states(reading)
     return Sequence(
         name=fields.text("name"),
         folder=folder,
@@ -85,8 +86,9 @@ def read_sequence(folder: Path | str) -> Sequence:
         description=fields.text("description", ""),
         templates=templates,
         ground_truth=ground_truth,
-        digest=_digest(text, reading),
+        digest=_digest(text, folder, files),
         warnings=tuple(reading.warnings),
+        files=files,
     )
 
 
@@ -175,10 +177,20 @@ def _parse(folder: Path, text: str) -> Fields:
     return fields
 
 
-def _digest(text: str, reading: Reading) -> str:
+def _states(reading: Reading) -> tuple[FileState, ...]:
+    try:
+        return tuple(FileState.of(path) for path in reading.files)
+    except OSError as error:
+        name = Path(str(error.filename)).name
+        raise SequenceError(
+            f'{reading.folder.name}/{FILE}: the file "{name}" was there and cannot be found any '
+            f"more ({error.strerror}); put it back, then open the folder again"
+        ) from None
+
+
+def _digest(text: str, folder: Path, files: tuple[FileState, ...]) -> str:
     digest = hashlib.sha256(text.encode())
-    for path in reading.files:
-        status = path.stat()
-        name = path.relative_to(reading.folder).as_posix()
-        digest.update(f"{name} {status.st_size} {status.st_mtime_ns}\n".encode())
+    for file in files:
+        name = file.path.relative_to(folder).as_posix()
+        digest.update(f"{name} {file.size} {file.changed}\n".encode())
     return digest.hexdigest()[:16]

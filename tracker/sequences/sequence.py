@@ -116,6 +116,8 @@ class View:
     """Which frame each step shows; None where it is ``first_frame`` + k at step k."""
     looked_at: Bool[ndarray, " F"] | None = None
     """At which steps the detector had a picture; None where it had one at every step."""
+    there: Bool[ndarray, " N"] | None = None
+    """Which frames of the video or image list were there on opening; None where nobody looked."""
 
     @property
     def has_pictures(self) -> bool:
@@ -128,9 +130,57 @@ class View:
             return self.first_frame + step
         return int(self.clock.frame_of_step[step])
 
+    def asked_for(self, steps: int) -> Bool[ndarray, " F"]:
+        """At which of the first steps the camera's clock has a frame: where a picture belongs."""
+        if self.clock is None or not self.has_pictures:
+            return np.full(steps, self.has_pictures)
+        return np.asarray(self.clock.frame_of_step[:steps] >= 0)
+
+    def expected(self, steps: int) -> Bool[ndarray, " F"]:
+        """At which of the first steps there was a picture when the sequence was opened."""
+        asked = self.asked_for(steps)
+        if self.there is None or not self.has_pictures:
+            return asked
+        frames = np.arange(steps) + self.first_frame
+        if self.clock is not None:
+            frames = self.clock.frame_of_step[:steps]
+        found = np.zeros(steps, dtype=bool)
+        known = asked & (frames < len(self.there))
+        found[known] = self.there[frames[known]]
+        return found
+
     def was_looked_at(self, step: int) -> bool:
         """Whether the outside detector had a picture of this step: else it says nothing there."""
         return self.looked_at is None or bool(self.looked_at[step])
+
+
+@dataclass(frozen=True, slots=True)
+class FileState:
+    """A file of a sequence as it was when the sequence was opened."""
+
+    path: Path
+    size: int
+    """Bytes."""
+    changed: int
+    """Time of its last change, nanoseconds since 1970."""
+
+    @staticmethod
+    def of(path: Path) -> FileState:
+        """As it is now.
+
+        Raises:
+            OSError: If it is not there.
+        """
+        status = path.stat()
+        return FileState(path, status.st_size, status.st_mtime_ns)
+
+    @property
+    def is_same(self) -> bool:
+        """Whether it is still so."""
+        try:
+            return FileState.of(self.path) == self
+        except OSError:
+            return False
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,6 +215,8 @@ class Sequence:
     """The network that may be run on its pictures; no part of :attr:`digest`."""
     warnings: tuple[str, ...] = ()
     """What is odd about it but does not keep it from running, one sentence each."""
+    files: tuple[FileState, ...] = ()
+    """Every file that its sequence.toml names, as it was on opening."""
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
@@ -180,6 +232,10 @@ class Sequence:
     def has_detections(self) -> bool:
         """Whether every camera has boxes of an outside detector."""
         return all(view.detections is not None for view in self.views)
+
+    def changed_files(self) -> tuple[Path, ...]:
+        """The files that are gone, or others, since it was opened."""
+        return tuple(file.path for file in self.files if not file.is_same)
 
     @property
     def step_time(self) -> float:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Bool
+from numpy import ndarray
 
 from tracker.sequences.calibration import POSE, read_camera
 from tracker.sequences.clock import FIELDS, Timing, read_timing
@@ -30,6 +32,8 @@ class Source:
     fields: Fields
     video: Path | None
     images: tuple[Path, ...]
+    there: Bool[ndarray, " N"]
+    """Which of the images are there, where some are missing in the row of their numbers."""
     pictures: Pictures | None
     timing: Timing
     table: BoxTable | None
@@ -74,14 +78,21 @@ def _source(name: str, fields: Fields, reading: Reading) -> Source:
     if "video" in fields and "images" in fields:
         raise fields.error("images", "expected a video or images, found both; remove one")
     video = locate(reading.folder, fields, "video") if "video" in fields else None
-    images = find_images(reading.folder, fields) if "images" in fields else ()
+    images: tuple[Path, ...] = ()
+    there: Bool[ndarray, " N"] = np.zeros(0, dtype=bool)
+    if "images" in fields:
+        images, there = find_images(reading.folder, fields)
     stamps = locate(reading.folder, fields, "timestamps") if "timestamps" in fields else None
     timing = read_timing(fields, reading.folder, reading.folder.name, stamps)
     table = read_box_table(fields, reading, timing.first_frame)
-    reading.files += images if video is None else (video,)
+    reading.files += [path for path, is_there in zip(images, there, strict=True) if is_there]
+    reading.files += [] if video is None else [video]
     if stamps is not None:
         reading.files.append(stamps)
-    return Source(name, fields, video, images, probe(video, images, fields), timing, table)
+    pictures = probe(video, images, fields)
+    if video is not None and pictures is not None:
+        there = np.ones(pictures.frames, dtype=bool)
+    return Source(name, fields, video, images, there, pictures, timing, table)
 
 
 def read_views(sources: Many[Source], time: Time, reading: Reading) -> tuple[View, ...]:
@@ -109,6 +120,7 @@ def _view(source: Source, time: Time, reading: Reading) -> View:
         detections=detections,
         clock=clock,
         looked_at=looked_at,
+        there=source.there,
     )
     if pictures is not None:
         reading.warnings += check_pictures(view, pictures, fields, time.steps)

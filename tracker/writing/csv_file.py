@@ -18,5 +18,6 @@ def write(path: Path, written: Written, options: Options) -> None:
             written.parameters,
             written.seed,
             done=written.done,
+            remarks=written.remarks,
         )
     options.at(written.steps, written.steps)

@@ -50,6 +50,8 @@ class RunOfFile(_Model):
     """Computed; fewer than the sequence has where the run was not finished."""
     parameters: dict[str, str | int | float | bool]
     """Methods and every value, by key."""
+    remarks: list[str]
+    """What must be said of it: a sentence for each camera of which pictures were missing."""
 
 
 class TrackOfFile(_Model):
@@ -104,7 +106,12 @@ def write(path: Path, written: Written, options: Options) -> None:
                 for c in sequence.cameras
             ],
         ),
-        run=RunOfFile(seed=written.seed, steps=written.steps, parameters=written.settings),
+        run=RunOfFile(
+            seed=written.seed,
+            steps=written.steps,
+            parameters=written.settings,
+            remarks=list(written.remarks),
+        ),
         tracks=[],
     )
     text = head.model_dump_json()

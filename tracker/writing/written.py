@@ -57,6 +57,8 @@ class Written:
     seed: int = 0
     done: int | None = None
     """The number of steps computed; None for all."""
+    remarks: tuple[str, ...] = ()
+    """What must be said of it wherever it goes: that pictures were missing."""
     boxes: list[tuple[Float[ndarray, "N 4"], Bool[ndarray, " N"]]] = field(init=False)
     """For each camera left, top, width, height in pixels, and whether the picture has them."""
 

@@ -27,6 +27,7 @@ from tracker.library.keeping import run_from
 from tracker.library.records import Result
 from tracker.parameters import RunParameters
 from tracker.pipeline import Cancelled, Progress, Run
+from tracker.runs import gaps
 from tracker.runs.stage_cache import StageCache
 from tracker.sequences import library
 from tracker.sequences.frames import FrameReader
@@ -307,7 +308,7 @@ class Jobs:
         try:
             if self._compiling is not None:
                 self._compiling.wait(on_compiling, wanted.cancelled.is_set)
-            pipeline.compute(
+            run = pipeline.compute(
                 sequence,
                 snapshot.parameters,
                 seed=self._seed,
@@ -326,7 +327,7 @@ class Jobs:
                 logger.exception("a run failed")
             workbench.run_ends(wanted.key, "failed", sentence(error))
         else:
-            workbench.run_ends(wanted.key, "done")
+            workbench.run_ends(wanted.key, "done", warnings=gaps.sentences(run))
 
     def close(self) -> None:
         """Stop everything; what is under way ends after its step."""

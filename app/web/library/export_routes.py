@@ -15,6 +15,8 @@ from app.state.workers.exporter import Exporter
 from app.web.dependencies import ERRORS, Bench
 from app.web.library.routes import Kept, no_library
 from tracker.library.errors import LibraryError
+from tracker.library.keeping import remarks_of
+from tracker.runs import gaps
 from tracker.sequences import library as sequences
 from tracker.writing.registry import FORMATS
 from tracker.writing.written import Options, Written
@@ -115,7 +117,14 @@ def begin(wish: ExportRequest, exporter: Out, keeper: Kept, bench: Bench) -> Exp
         rows = slice(0, run.tracks.at(done).start)
         columns = (getattr(run.tracks, name)[rows] for name in type(run.tracks).__slots__)
         named = now.named(run.sequence)
-        written = Written(named, type(run.tracks)(*columns), run.parameters, run.seed, done)
+        written = Written(
+            named,
+            type(run.tracks)(*columns),
+            run.parameters,
+            run.seed,
+            done,
+            tuple(gaps.sentences(run)),
+        )
         try:
             form.check(sequence)
         except ValueError as error:
@@ -129,7 +138,12 @@ def begin(wish: ExportRequest, exporter: Out, keeper: Kept, bench: Bench) -> Exp
     def make() -> Written:
         sequence = sequences.open_sequence(result.place)
         return Written(
-            sequence, result.kept.tracks, result.parameters, result.run.seed, result.run.steps
+            sequence,
+            result.kept.tracks,
+            result.parameters,
+            result.run.seed,
+            result.run.steps,
+            remarks_of(result),
         )
 
     name = f"{result.run.recording_name}-{result.run.name or result.run.id}"

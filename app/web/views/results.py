@@ -17,6 +17,7 @@ def state_of(snapshot: Snapshot) -> models.State:
     """The shared state as the page gets it."""
     parameters = snapshot.parameters
     return models.State(
+        session=snapshot.session,
         version=snapshot.version,
         sequence=_sequence_of(snapshot),
         opening=None
@@ -53,7 +54,8 @@ def run_of(snapshot: Snapshot) -> models.RunInfo:
     smoothed = run is not None and run.key == state.key and run.tracks is not run.filtered
     if run is not None and state.kept is not None:  # only its people are kept, not the filter's
         smoothed = run.parameters.smoothing_method != "none"
-    return models.RunInfo(**asdict(state), smoothed=smoothed)
+    values = {**asdict(state), "warnings": list(state.warnings)}
+    return models.RunInfo(**values, smoothed=smoothed)
 
 
 def _teaching_of(snapshot: Snapshot) -> models.TeachingInfo:
@@ -131,6 +133,7 @@ def _sequence_of(snapshot: Snapshot) -> models.SequenceInfo | None:
             for view in sequence.views
         ],
         templates=len(sequence.templates),
+        warnings=list(sequence.warnings),
     )
 
 

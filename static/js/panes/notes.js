@@ -1,18 +1,14 @@
-/** Notes under the top bar: what happened, what still works, what to do next. */
+/** Notes under the top bar: what happened, what to do. */
 import { fill, h, icon } from "../elements/dom.js";
 
 /** @type {Pane} */
 export function mountNotes(root, { store, actions, retry }) {
 	let dismissed = "";
+	let heard = "";
 	/** @type {Timer} */
 	let ticking;
 
-	/**
-	 * @param {string} kind
-	 * @param {string} title
-	 * @param {string} text
-	 * @param {(Node | null | false)[]} buttons
-	 */
+	/** @type {(kind: string, title: string, text: string, buttons: (Node | null)[]) => HTMLElement} */
 	const note = (kind, title, text, buttons) =>
 		h(
 			"div",
@@ -69,6 +65,12 @@ export function mountNotes(root, { store, actions, retry }) {
 				),
 			);
 		}
+		const odd = [...(server?.sequence?.warnings ?? []), ...(run?.warnings ?? [])].join(". ");
+		const hide = () => {
+			heard = odd;
+			render();
+		};
+		if (odd && odd !== heard) all.push(note("warn", "Worth knowing", odd, [close(hide)]));
 		for (const { id, level, title, text, remedy, once } of notes) {
 			const kind = { error: "bad", warn: "warn", info: "busy" }[level];
 			const gone = () => {

@@ -12,6 +12,8 @@ const KEPT = /** @type {const} */ ([
 	"dismissed",
 	"realTime",
 	"turn",
+	"plots",
+	"layouts",
 ]);
 
 /** @returns {Partial<PageState>} */
@@ -60,11 +62,14 @@ export function initialState() {
 		listed: "all",
 		bookmarks: [],
 		layers3d: {},
+		plots: [],
+		layouts: {},
 		large: null,
 		tab: "tracks",
 		eventKind: "",
 		every: false,
 		scores: null,
+		identity: null,
 		measure: "ospa",
 		laneOrder: "longest",
 		layout: {},
@@ -73,6 +78,7 @@ export function initialState() {
 		asked: "",
 		moved: false,
 		place: "tune",
+		signs: {},
 		dismissed: [],
 		undoable: [0, 0],
 		...kept,

@@ -1,8 +1,8 @@
-/** What the server tells, put into the store: its state, its runs, and the lists that go with them. */
+/** What the server tells, put into the store. */
 import { fetcher, getJson } from "./api.js";
 import { commandOf, perform } from "./commands.js";
 
-/** What is known of a sequence is forgotten when another is opened. */
+/** Forgotten when another sequence is opened. */
 const FORGOTTEN = /** @type {const} */ ({
 	basis: "",
 	timeline: null,
@@ -38,8 +38,7 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 	 * @param {boolean} [streamed]  it came over the socket, in order
 	 */
 	function receiveState(told, streamed = false) {
-		// A method is a choice like any other: it is listed, undone and taken up again with the
-		// values.
+		// A method is a choice as a value is.
 		const server = {
 			...told,
 			parameters: { ...told.parameters, ...told.methods, taught: told.teaching.key },
@@ -108,7 +107,7 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 		);
 	}
 
-	/** The server shows this run from now on. @param {string} run */
+	/** The server shows this run. @param {string} run */
 	function showRun(run) {
 		if (run === store.get().basis) return;
 		store.set({ basis: run, timeline: null });
@@ -127,8 +126,7 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 	const fetchTimeline = fetcher(async () => {
 		if (!store.get().sequence) return;
 		const timeline = await getJson(`/api/timeline?${part()}`);
-		// Lanes of another run than the one that is shown would mix the two; its own news is on the
-		// way.
+		// Lanes of another run would mix the two; its own news is on the way.
 		if (timeline.run === store.get().basis) store.set({ timeline });
 	});
 
@@ -178,8 +176,7 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 		evaluation: () => void fetchScores(),
 		notice: ({ level, message, hint }) => actions.note(level, message, hint ?? ""),
 		command({ name }) {
-			// Keys inside our own frame come here by themselves; this is for a 3D view in a window of
-			// its own.
+			// Of a 3D view in a window of its own: keys of our frame come by themselves.
 			if (document.hasFocus() && document.activeElement instanceof HTMLIFrameElement) return;
 			perform(commandOf(name), actions);
 		},

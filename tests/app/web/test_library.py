@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,8 +10,10 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from app.state.workers import keeper
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, is_evaluated, run_is, wait_until
+from tracker.library.errors import LibraryError
 from tracker.library.store import Library
 
 P_D = "fusion.detection_probability"
@@ -57,6 +60,64 @@ def test_finished_runs_are_kept_with_their_figures(kept: TestClient) -> None:
     # what was never opened can be opened from there all the same
     (never,) = [r for r in listed["recordings"] if r["name"] == "numbers"]
     assert (never["id"], never["runs"]) == (None, 0)
+
+
+def test_a_preview_has_the_distance_to_the_truth_in_small(kept: TestClient) -> None:
+    changed, _ = runs_of(kept)
+    ospa = kept.get("/api/evaluation/series").json()["ospa"]
+    told = kept.get(f"/api/library/runs/{changed['id']}").json()["ospa"]
+    np.testing.assert_allclose(told, ospa, atol=2e-3)
+    assert "OSPA over time" in kept.get(f"/api/library/runs/{changed['id']}/drawn").text
+
+
+def test_a_recording_that_was_moved_is_found_again(data: Path, path: Path, tmp_path: Path) -> None:
+    before, after = tmp_path / "before", tmp_path / "after"
+    shutil.copytree(data / "crossing", before)
+    with application(data, path, str(before)) as client:
+        wait_until(lambda: len(runs_of(client)) == 1)
+        before.rename(after)
+        (recording,) = [
+            r for r in client.get("/api/library").json()["recordings"] if r["place"] == str(before)
+        ]
+        assert recording["missing"]
+        address = f"/api/library/recordings/{recording['id']}/place"
+        other = client.post(address, json={"place": str(data / "numbers")})
+        assert other.status_code == 422
+        assert "another content" in other.json()["detail"]
+        told = client.post(address, json={"place": str(after)}).json()
+        assert (told["place"], told["missing"]) == (str(after), None)
+        number = runs_of(client)[0]["id"]
+        shown = client.post(f"/api/library/runs/{number}/open").json()
+        wait_until(lambda: client.get("/api/state").json()["run"]["kept"] == number)
+        assert "detail" not in shown
+
+
+def test_a_run_that_was_deleted_and_is_made_again_is_kept_again(kept: TestClient) -> None:
+    _, default = runs_of(kept)
+    kept.post("/api/library/delete", json={"runs": [default["id"]]})
+    assert len(runs_of(kept)) == 1
+    kept.post("/api/parameters/reset", json={"keys": [P_D]})
+    wait_until(lambda: [run["id"] for run in runs_of(kept)][:1] == [default["id"]])
+
+
+def test_a_library_that_cannot_be_used_for_a_while_keeps_runs_again_afterwards(
+    data: Path, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    free = False
+
+    def opened(path: Path) -> Library:
+        if not free:
+            raise LibraryError(f"{path}: another program holds the library")
+        return Library(path)
+
+    monkeypatch.setattr(keeper, "open_library", opened)
+    monkeypatch.setattr(keeper, "RETRY_SECONDS", 0.2)
+    with application(data, path) as client:
+        wait_until(lambda: run_is(client, "done"))
+        assert "another program holds" in client.get("/api/library").json()["error"]
+        free = True
+        wait_until(lambda: len(runs_of(client)) == 1)
+        assert client.get("/api/library").json()["error"] is None
 
 
 def test_a_kept_run_is_shown_as_it_was_and_nothing_is_computed(kept: TestClient) -> None:
@@ -144,7 +205,7 @@ def test_names_stars_notes_and_deletion(kept: TestClient) -> None:
     assert runs_of(kept)[0]["name"] == "baseline"
     answer = kept.post("/api/library/delete", json={"runs": [999]})
     assert answer.status_code == 409
-    assert "no run 999" in answer.json()["error"]["message"]
+    assert "no run 999" in answer.json()["detail"]
 
 
 def test_the_preview_has_what_is_drawn(kept: TestClient) -> None:
@@ -166,7 +227,7 @@ def test_what_is_drawn_says_what_there_is_and_is_escaped(kept: TestClient) -> No
     text = kept.get(f"/api/library/runs/{number}/drawn").text
     assert f"Lanes of run {number}: 2 tracks over 120 steps" in text
     assert "0.95 → " in text
-    assert text.count("<polyline") == 3
+    assert text.count("<polyline") == 4
     assert "<script" not in text
     told = kept.get("/api/library/compared", params={"runs": [number, other]}).text
     assert "&lt;b&gt;x" in told
@@ -194,7 +255,7 @@ def test_a_damaged_library_is_told_and_the_workbench_goes_on(data: Path, path: P
         assert any(r["name"] == "numbers" for r in told["recordings"])
         answer = client.get("/api/library/runs/1")
         assert answer.status_code == 409
-        assert "damaged" in answer.json()["error"]["message"]
+        assert "damaged" in answer.json()["detail"]
     assert path.read_bytes() == b"not a database " * 100
 
 

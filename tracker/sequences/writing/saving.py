@@ -121,7 +121,7 @@ def _files(sequence: Sequence, values: dict[str, Any]) -> Iterator[Path]:
     for view, camera in zip(sequence.views, values["camera"], strict=True):
         if view.video is not None:
             yield view.video
-        yield from view.images
+        yield from (path for path in view.images if path.exists())  # a row may have holes
         if "detections" in camera:
             yield sequence.folder / camera["detections"]
     if "ground_truth" in values:

@@ -1,0 +1,172 @@
+/** The two dialogs made from the registry of commands: help with its keys, and the palette. */
+import { COMMANDS, keyLabel, perform, search } from "../state/commands.js";
+import { all, fill, h, parts } from "../elements/dom.js";
+import { matching, offersOf, rangeOf, valueOf } from "./offers.js";
+
+/** @param {string[]} keys */
+const signs = (keys) => keys.map((key) => h("kbd", {}, keyLabel(key)));
+
+/** @param {Context} context */
+export function mountSheets({ store, actions }) {
+	const [help, palette] = /** @type {any[]} */ (all("dialog"));
+	const { sheet, single } = parts(help);
+	const { input, list } = parts(palette);
+	for (const dialog of [help, palette]) {
+		dialog.addEventListener(
+			"click",
+			(/** @type {Event} */ event) => event.target === dialog && dialog.close(),
+		);
+	}
+
+	const row = (/** @type {Command} */ { name, title, keys }) => {
+		const cameras = name === "camera-1";
+		return h(
+			"div",
+			{ class: "key-row" },
+			cameras ? "Camera 1 to 9 large, again: all alike" : title,
+			h("span", { class: "grow" }),
+			cameras ? [...signs(["1"]), "–", ...signs(["9"])] : signs(keys),
+		);
+	};
+	const listed = COMMANDS.filter(({ name, keys }) => keys.length && !/^camera-[2-9]$/.test(name));
+	fill(
+		sheet,
+		[...new Set(listed.map(({ group }) => group))].map((group) =>
+			h("section", {}, h("h3", {}, group), listed.filter((c) => c.group === group).map(row)),
+		),
+	);
+	single.addEventListener("change", () => store.set({ singleKeys: single.checked }));
+	actions.help = () => {
+		if (help.open) return help.close();
+		single.checked = store.get().singleKeys;
+		help.showModal();
+	};
+
+	let at = 0;
+	/** @type {Offer[]} */
+	let found = [];
+	/** Whose value is asked for.  @type {Server.ParameterInfo | null} */
+	let asked = null;
+	/** Whether a name for the layout is asked for. */
+	let naming = false;
+
+	/** @returns {Offer[]} */
+	function offered() {
+		if (naming) return layoutOffers();
+		if (asked) return valueOffers(asked);
+		const commands = search(input.value).map((command) => ({
+			title: command.title,
+			keys: command.keys.slice(0, 1),
+			run: () => perform(command, actions),
+		}));
+		return [...commands, ...matching(offersOf(store.get(), actions, edit), input.value)];
+	}
+	/** Keep the layout under what is typed, or forget one. @returns {Offer[]} */
+	function layoutOffers() {
+		const { layout, layouts } = store.get();
+		const name = input.value.trim();
+		const { [name]: _, ...others } = layouts;
+		const forget = Object.keys(layouts).map((own) => ({
+			title: `Forget layout ${own}`,
+			keys: [],
+			run: () =>
+				store.set({
+					layouts: Object.fromEntries(Object.entries(layouts).filter(([one]) => one !== own)),
+				}),
+		}));
+		if (!name) return forget;
+		const title = name in layouts ? `Replace layout ${name}` : `Keep as layout ${name}`;
+		return [{ title, keys: [], run: () => store.set({ layouts: { ...others, [name]: layout } }) }];
+	}
+	/** @param {Server.ParameterInfo} parameter */
+	function edit(parameter) {
+		asked = parameter;
+		input.value = "";
+		palette.showModal();
+		offer();
+	}
+	/** @param {Server.ParameterInfo} parameter @returns {Offer[]} */
+	function valueOffers(parameter) {
+		const { key, label, unit, choices, kind } = parameter;
+		const set = (/** @type {any} */ value) => ({
+			title: `${label} = ${value} ${unit}`,
+			keys: [],
+			run: () => void actions.change({ [key]: value }),
+		});
+		const typed = input.value ? valueOf(parameter, input.value) : null;
+		if (typed !== null) return [set(typed)];
+		const words = kind === "choice" ? choices : kind === "bool" ? [true, false] : [];
+		return input.value ? [] : words.map(set);
+	}
+	function offer() {
+		found = offered();
+		at = Math.max(0, Math.min(at, found.length - 1));
+		input.placeholder = asked
+			? `${asked.label}: ${rangeOf(asked)}, now ${store.get().server?.parameters[asked.key]}`
+			: naming
+				? "Name of this layout"
+				: "Command, parameter, recording or track";
+		const option = (/** @type {Offer} */ one, /** @type {number} */ index) =>
+			h(
+				"div",
+				{
+					class: "key-row",
+					role: "option",
+					id: `option-${index}`,
+					"aria-selected": String(index === at),
+					onclick: () => run(one),
+					onpointermove: () => index !== at && choose(index),
+				},
+				one.title,
+				h("span", { class: "grow" }),
+				signs(one.keys),
+			);
+		const none = naming
+			? "Type a name, then Enter. The palette finds the layout by it."
+			: asked
+				? `${asked.help} ${rangeOf(asked)}`
+				: "Nothing here has these words.";
+		fill(list, found.length ? found.map(option) : h("p", {}, none));
+		choose(at);
+	}
+	/** @param {number} index */
+	function choose(index) {
+		at = index;
+		all("[role=option]", list).forEach((option, k) => (option.ariaSelected = String(k === at)));
+		input.setAttribute("aria-activedescendant", found.length ? `option-${at}` : "");
+		list.children[at]?.scrollIntoView({ block: "nearest" });
+	}
+	/** @param {Offer} one */
+	function run(one) {
+		asked = null;
+		naming = false;
+		palette.close();
+		one.run();
+	}
+	actions.keepLayout = () => {
+		actions.palette();
+		naming = true;
+		offer();
+	};
+	store.on(["timeline", "sequences"], () => palette.open && offer());
+	input.addEventListener("input", () => {
+		at = 0;
+		offer();
+	});
+	input.addEventListener("keydown", (event) => {
+		const turn = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+		if (turn && found.length) choose((at + turn + found.length) % found.length);
+		else if (event.key === "Enter" && found[at]) run(found[at]);
+		else return;
+		event.preventDefault();
+	});
+	actions.palette = () => {
+		if (palette.open) return palette.close();
+		asked = null;
+		naming = false;
+		input.value = "";
+		at = 0;
+		palette.showModal();
+		offer();
+	};
+}
