@@ -7,7 +7,7 @@ from numpy import ndarray
 
 from tracker.single_view.shape.trees import Trees
 
-ROUNDS, RATE = 150, 0.15
+ROUNDS, RATE, MOST = 110, 0.2, 40_000
 GIVEN_UP = 0.002
 """Share of the people found that each tree of the cascade may lose."""
 _FOUND, _SLACK = -1.0, 0.1
@@ -25,9 +25,12 @@ def fit(means: ndarray, people: ndarray) -> Trees:
 
     model = HistGradientBoostingClassifier(
         max_iter=ROUNDS, learning_rate=RATE, max_leaf_nodes=8, max_depth=3, min_samples_leaf=60,
-        l2_regularization=5.0, max_features=0.35, early_stopping=False, random_state=0,
+        l2_regularization=5.0, max_features=0.2, early_stopping=False, random_state=0,
         max_bins=64,
     )  # fmt: skip
+    if len(means) > MOST:
+        some = np.random.default_rng(0).choice(len(means), MOST, replace=False)
+        means, people = means[some], people[some]
     model.fit(means, people)
     grown = [predictors[0].nodes for predictors in model._predictors]
     features = np.zeros((len(grown), 7), dtype=np.int32)

@@ -57,7 +57,7 @@ class ColourPeakParams(Params):
     """Whether a camera without a template of a person gets one from where the others' templates
     and the calibration say that the person is."""
 
-    shapes: Annotated[bool, ui("S_h", published=False, essential=True)] = True
+    shapes: Annotated[bool, ui("S_h")] = False
     """Whether people found by shape are peaks as well, whatever their colours."""
 
     shape_odds: Annotated[
