@@ -18,7 +18,7 @@ class ShapesParams(Params):
     """People by the shape of head and trunk, without templates ([DTPB09])."""
 
     least_odds: Annotated[float, Field(ge=-6.0, le=10.0), ui("ln o", step=0.1, essential=True)] = (
-        1.0
+        0.5
     )
     """Logarithm of the odds from which a window of the picture is taken for a person."""
 
