@@ -43,8 +43,9 @@ def gradients(picture: ndarray) -> Gradients:
         for x in range(1, width - 1):
             best, across, down = -1, 0, 0
             for c in range(3):
-                right = np.int64(picture[y, x + 1, c]) - np.int64(picture[y, x - 1, c])
-                below = np.int64(picture[y + 1, x, c]) - np.int64(picture[y - 1, x, c])
+                # bytes are subtracted with a sign
+                right = int(np.int64(picture[y, x + 1, c]) - np.int64(picture[y, x - 1, c]))
+                below = int(np.int64(picture[y + 1, x, c]) - np.int64(picture[y - 1, x, c]))
                 size = right * right + below * below
                 if size > best:
                     best, across, down = size, right, below
@@ -112,7 +113,7 @@ def _mean(sums: ndarray, xs: ndarray, ys: ndarray, feature: int) -> int:
         - sums[bottom, left, channel]
         + sums[top, left, channel]
     )
-    return (total + area // 2) // area
+    return int((total + area // 2) // area)
 
 
 @pixel_kernel
