@@ -19,7 +19,7 @@ METHODS = ("get", "put", "post", "delete", "patch")
 
 def operation_id(route: APIRoute) -> str:
     """A route's name for programs: its method and the fixed parts of its address."""
-    (method,) = route.methods
+    (method,) = route.methods or ("get",)
     parts = [part for part in route.path_format.split("/") if part and not part.startswith("{")]
     return re.sub(r"\W", "_", "_".join([method.lower(), *parts[1:]]))
 
