@@ -8,6 +8,7 @@ what browsers say of who asks keeps them from having pictures, scripts or frames
 
 from __future__ import annotations
 
+import asyncio
 import ipaddress
 import json
 import socket
@@ -22,6 +23,9 @@ from app.errors import PROBLEM, ErrorDetail, body
 
 LARGEST_BODY = 1 << 20
 """Bytes of a request's body; what people send are a few numbers."""
+
+SECONDS_TO_SEND = 60.0
+"""For a request's body."""
 
 READING = frozenset({"GET", "HEAD", "OPTIONS"})
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
@@ -184,13 +188,28 @@ class BodyTooLarge(HTTPException):
         super().__init__(413, _too_large().message)
 
 
+class BodyTooSlow(HTTPException):
+    """A body that is not there in time."""
+
+    def __init__(self) -> None:
+        super().__init__(408, f"The request's body took longer than {SECONDS_TO_SEND:g} s.")
+
+
 def _limited(receive: Receive) -> Receive:
-    received = 0
+    received, there = 0, False
+    until = asyncio.get_running_loop().time() + SECONDS_TO_SEND
 
     async def counted() -> Message:
-        nonlocal received
-        message = await receive()
+        nonlocal received, there
+        if there:  # what is waited for now is that the other side goes
+            return await receive()
+        try:
+            async with asyncio.timeout_at(until):
+                message = await receive()
+        except TimeoutError:
+            raise BodyTooSlow from None
         received += len(message.get("body", b""))
+        there = not message.get("more_body", False)
         if received > LARGEST_BODY:
             raise BodyTooLarge
         return message
