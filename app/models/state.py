@@ -144,6 +144,8 @@ class ViserInfo(Model):
 class State(Model):
     """Everything that all pages share, but for the results themselves."""
 
+    session: str
+    """Another for every start of the server."""
     version: int
     """Grows with every change; of two states the larger is the newer."""
     sequence: SequenceInfo | None

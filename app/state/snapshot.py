@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -99,7 +100,15 @@ class Notice:
     hint: str | None = None
 
 
-Event = Command | Notice
+@dataclass(frozen=True, slots=True)
+class StudyNews:
+    """A study has another state, or more trials that ended."""
+
+    told: Mapping[str, Any]
+    """What the list of studies says of it."""
+
+
+Event = Command | Notice | StudyNews
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,6 +134,8 @@ class Snapshot:
     """The values that a reset returns to: of methods, those that fit the sequence."""
     parameters_origin: str = ""
     """Who changed the parameters last, so that a client is not sent its own change."""
+    session: str = field(default_factory=lambda: secrets.token_hex(4))
+    """Another for every start of the program."""
     presets: Presets = field(default_factory=lambda: MappingProxyType({}))
     playhead: int = 0
     playhead_origin: str = ""

@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import uvicorn
 from fastapi import FastAPI, Request
@@ -25,6 +26,7 @@ from app.state.importing.desk import Desk
 from app.state.kept.history import History
 from app.state.kept.presets import OwnPresets
 from app.state.kept.recents import Recents
+from app.state.studies.desk import StudyDesk
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench
 from app.state.workers.compiling import Compiling
@@ -45,12 +47,13 @@ from app.web.importing import routes as importing
 from app.web.library import export_routes
 from app.web.library import routes as library
 from app.web.manual import Manual
-from app.web.pictures import foreground, likelihood_routes
+from app.web.pictures import foreground, likelihood_routes, view_routes
 from app.web.pictures.jpegs import Pictures
 from app.web.pictures.likelihood import Likelihoods
 from app.web.pictures.swatches import Swatches
 from app.web.security import CONTENT_POLICY, Guard, OnlyLooking, allowed_hosts, is_loopback
 from app.web.stream import Stream
+from app.web.studies import routes as studies
 from app.web.tables import event_tables, tables, teaching_tables
 from app.web.views.timeline import Timelines
 from tracker import __version__
@@ -59,6 +62,10 @@ from tracker.library import KEEP
 from tracker.library.records import Result
 from tracker.pipeline import Cancelled
 from tracker.runs.stage_cache import StageCache
+from tracker.studies.store import studies_folder
+
+if TYPE_CHECKING:
+    from app.scene.scene import Scene
 
 logger = logging.getLogger("app")
 
@@ -69,6 +76,7 @@ ROUTERS = (
     api.router,
     foreground.router,
     likelihood_routes.router,
+    view_routes.router,
     tables.router,
     event_tables.router,
     teaching_routes.router,
@@ -79,6 +87,7 @@ ROUTERS = (
     importing.router,
     library.router,
     export_routes.router,
+    studies.router,
     stream.router,
     gateway.router,
 )
@@ -197,11 +206,12 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     exporter = app.state.exporter = Exporter()
     sensitivity = app.state.sensitivity = Sensitivity(workbench, settings.seed)
     keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep)
+    study_desk = app.state.studies = StudyDesk(workbench, studies_folder())
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
     told.start()
     opening_step.follow(workbench)
-    room = _Room(workbench, teaching, sensitivity)
+    room = app.state.room = _Room(workbench, teaching, sensitivity)
     if settings.with_viser:
         door.prepare()
         # the page is served meanwhile; requests for the 3D view wait
@@ -231,7 +241,16 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         await asyncio.gather(
             *(
                 asyncio.to_thread(part.close)
-                for part in (identity_check, exporter, keeper, jobs, evaluator, sensitivity, room)
+                for part in (
+                    identity_check,
+                    exporter,
+                    keeper,
+                    jobs,
+                    evaluator,
+                    sensitivity,
+                    room,
+                    study_desk,
+                )
             )
         )
 
@@ -266,6 +285,7 @@ class _Room:
         self._workbench = workbench
         self._sensitivity = sensitivity
         self._teaching = teaching
+        self.scene: Scene | None = None
         self._parts: list[Callable[[], object]] = []
 
     def open(self, entrance: Entrance) -> None:
@@ -276,7 +296,8 @@ class _Room:
 
         server = start_viser(entrance)
         self._parts.append(server.stop)
-        self._parts.append(Scene(server, self._workbench).close)
+        self.scene = Scene(server, self._workbench)
+        self._parts.append(self.scene.close)
         self._parts.append(RoomEditing(server, self._workbench, self._teaching).close)
         self._parts.append(Controls(server, self._workbench, self._sensitivity).close)
 

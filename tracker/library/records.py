@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 from tracker.library.columns import KeptTracks
 from tracker.parameters import RunParameters
 
-Source = Literal["track", "page", "bundle"]
+Source = Literal["track", "page", "bundle", "batch"]
 
 HEADLINES = (
     "mota", "idf1", "hota", "ospa", "position_error", "misses", "false_positives", "id_switches",
@@ -60,7 +60,8 @@ class KeptRun(NamedTuple):
     code: str
     """Hash of the code that computes, as in the keys of stages."""
     source: str
-    """Who computed it: ``track``, ``page``, or ``bundle`` where it was taken from a file."""
+    """Who computed it: ``track``, ``batch``, ``page``, or ``bundle`` where it was taken from a
+    file."""
     targets: int
     """How many tracks."""
     mota: float | None
@@ -130,6 +131,8 @@ class Result:
     """All of them as they were written."""
     figures: dict[str, Any]
     kept: KeptTracks
+    ospa: tuple[float, ...] = ()
+    """Its mean over equally many steps each, metres; empty without a truth."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,5 +173,7 @@ class NewRun:
     targets: int
     figures: dict[str, float | int | None]
     kept: KeptTracks
+    ospa: tuple[float, ...] = ()
+    """Its mean over equally many steps each, metres; empty without a truth."""
     name: str = ""
     note: str = ""

@@ -54,8 +54,15 @@ class OwnPresets:
             ParameterError: If the name is empty, too long or a built-in preset's.
         """
         now = self._workbench.snapshot()
-        values = table.changed(now.parameters, now.defaults)
-        self._put({**now.presets, _checked(name): values})
+        self.keep(name, table.changed(now.parameters, now.defaults))
+
+    def keep(self, name: str, values: Mapping[str, Any]) -> None:
+        """Keep values, by key against the defaults, under a name.
+
+        Raises:
+            ParameterError: If the name is empty, too long or a built-in preset's.
+        """
+        self._put({**self._workbench.snapshot().presets, _checked(name): values})
 
     def rename(self, name: str, new: str) -> None:
         """Give a preset another name, which no other one may have.
@@ -90,6 +97,18 @@ class OwnPresets:
         if self._path is not None:
             write_json(self._path, dict(presets))
         self._workbench.set_presets(presets)
+
+
+def keep_preset(path: Path, name: str, values: Mapping[str, Any]) -> None:
+    """Put a preset into the file without a workbench; the next start shows it.
+
+    Raises:
+        ParameterError: If the name does not do.
+        ValueError: If the file is not as it was written.
+        OSError: If it cannot be written.
+    """
+    presets = _read(path) if path.is_file() else {}
+    write_json(path, {**presets, _checked(name): dict(values)})
 
 
 def _checked(name: str) -> str:

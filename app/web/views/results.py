@@ -17,6 +17,7 @@ def state_of(snapshot: Snapshot) -> models.State:
     """The shared state as the page gets it."""
     parameters = snapshot.parameters
     return models.State(
+        session=snapshot.session,
         version=snapshot.version,
         sequence=_sequence_of(snapshot),
         opening=None

@@ -184,6 +184,19 @@ def test_a_box_that_sticks_out_is_cut_at_the_border(client: TestClient) -> None:
     assert template.box.tolist() == [0.0, 120.0, 14.0, 24.0]
 
 
+def test_entrances_are_suggested_by_the_tracks(client: TestClient) -> None:
+    entrance = state(client)["sequence"]["room"]["entrances"][0]
+    words = complaint(client.post("/api/teach/entrances/suggested"))
+    assert words.startswith("The tracks begin and end together at no other place")
+    client.delete("/api/teach/entrances/0")
+    done(client)
+    answer = client.post("/api/teach/entrances/suggested")
+    assert answer.status_code == 200, answer.text
+    (found,) = state(client)["sequence"]["room"]["entrances"]
+    assert found["position"][:2] == pytest.approx(entrance["position"][:2], abs=0.4)
+    assert "teach/entrances/suggested" in client.get("/api/tables/teach").text
+
+
 def test_saving_keeps_a_backup_and_reopens_to_the_same_run(
     client: TestClient, walkers: Path
 ) -> None:

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.assignment import linear_sum_assignment
-from tracker.evaluation.matching import Comparison
+from tracker.evaluation.measures.matching import Comparison
 
 ALPHAS = np.arange(1, 20) * 0.05
 """The strictnesses: similarity from which a pair counts, 0.05 … 0.95."""

@@ -10,7 +10,7 @@ from jaxtyping import Int
 from numpy import ndarray
 
 from tracker.formats.pieces import DetectionPiece, FormatError, TruthPiece, VideoPiece
-from tracker.importing.matching import MatchedCamera
+from tracker.importing.finding.matching import MatchedCamera
 from tracker.importing.options import ImportOptions
 from tracker.sequences.clock import Clock, Timing
 

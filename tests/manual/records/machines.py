@@ -86,7 +86,7 @@ def section() -> str:
 def _digests(environment: dict[str, str], folder: Path) -> dict[str, Any]:
     kernels = folder / environment.get("NUMBA_CPU_NAME", "native")
     own = {**os.environ, **environment, "NUMBA_CACHE_DIR": str(kernels)}
-    line = [sys.executable, "-m", "tests.manual.machines"]
+    line = [sys.executable, "-m", "tests.manual.records.machines"]
     done = subprocess.run(line, check=True, cwd=ROOT, env=own, stdout=subprocess.PIPE)
     found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return found

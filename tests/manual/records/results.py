@@ -9,16 +9,18 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from tests.manual import machines
 from tests.manual.places import RECORDS, ROOT, between
+from tests.manual.records import machines, recordings
 from tracker.experiments import EXPERIMENTS
 
 FOLDER = RECORDS / "experiments"
-KEPT = ("experiment", "version", "claim", "findings", "table", "notes")
+KEPT = ("experiment", "version", "form", "claim", "findings", "table", "notes")
 """What the page needs of an experiment's document; all else is made anew with the run."""
 
 OWN_MACHINE = ("steps/s", "frames/s")
 """Columns that tell of the machine more than of the method: they are not printed."""
+
+SMALLER = "A smaller form, run as `multiview-phd experiment {experiment} {form}`."
 
 INTRODUCTION = """# Results
 
@@ -30,7 +32,8 @@ a folder `DIR`:
 python3 -m tests.manual --record --data DIR
 ```
 
-One experiment alone, figure included, is run by `multiview-phd experiment NAME --data DIR`. The
+One experiment alone, figure included, is run by `multiview-phd experiment NAME --data DIR`; what
+took too long to be run whole says in which smaller form it was. The
 rooms are rendered and come with the program; AV16.3 and the Curtin recordings are real
 ([sources](methods.md#sources)). *Found* is the share of true positions with an estimate within
 the stated distance, *error* the mean distance of those that are matched; every other figure is
@@ -58,14 +61,11 @@ def record(names: list[str], data: Path) -> None:
 
 
 def keep(path: Path) -> None:
-    """Take an experiment's document into the records.
-
-    Raises:
-        ValueError: If it is of a shortened run.
-    """
+    """Take an experiment's document into the records, with the form in which it was run."""
     document = json.loads(path.read_text(encoding="utf-8"))
-    if document["quick"]:
-        raise ValueError(f"{path}: expected a whole run, found a shortened one; leave out --quick")
+    flags = ["--quick"] if document["quick"] else []
+    flags += [f"--seeds {document['seeds']}"] if document["seeds"] else []
+    document["form"] = " ".join(flags)
     table = document["table"]
     columns = [k for k, word in enumerate(table["head"]) if word not in OWN_MACHINE]
     document["table"] = {
@@ -88,9 +88,11 @@ def page() -> str:
     parts = [INTRODUCTION, "## Claims of the papers, run again", "", _claims(documents), ""]
     for document in documents:
         parts += [f"## {document['experiment']}", "", f"> {document['claim']}", ""]
+        if document["form"]:
+            parts += [SMALLER.format(**document), ""]
         parts += [_table(document["table"]), ""]
         parts += [f"{note}\n" for note in document["notes"]]
-    parts.append(machines.section())
+    parts += [recordings.section(), machines.section()]
     return "\n".join(parts).rstrip() + "\n"
 
 

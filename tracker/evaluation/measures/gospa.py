@@ -13,7 +13,7 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.assignment import linear_sum_assignment
-from tracker.evaluation.matching import Comparison
+from tracker.evaluation.measures.matching import Comparison
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,7 +11,7 @@ from numpy import ndarray
 
 from tracker.checks.reading import lens_of, read_boxes
 from tracker.formats.pieces import DetectionPiece, FormatError, RawCamera
-from tracker.importing.matching import MatchedCamera, same_aspect
+from tracker.importing.finding.matching import MatchedCamera, same_aspect
 
 COMMON_SIZES = (
     (320, 240), (352, 288), (360, 288), (640, 360), (640, 480), (720, 576), (768, 576), (800, 600),

@@ -15,9 +15,9 @@ from tracker.formats.pieces import (
     TruthPiece,
     VideoPiece,
 )
-from tracker.importing.calibrations import CameraSet
+from tracker.importing.finding.calibrations import CameraSet
+from tracker.importing.finding.names import How, match
 from tracker.importing.gathering import Taken
-from tracker.importing.names import How, match
 from tracker.importing.options import ImportOptions
 
 ASPECT_TOLERANCE = 0.01

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from tracker.formats.pieces import CalibrationPiece, FormatError, RawCamera
+from tracker.importing.finding.names import match, short_names
 from tracker.importing.gathering import Taken
-from tracker.importing.names import match, short_names
 
 
 @dataclass(frozen=True, slots=True, eq=False)
