@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from tracker.library import KEEP, columns, schema
-from tracker.library.errors import LibraryError, told
+from tracker.library.errors import LibraryError, NoSuchRun, told
 from tracker.library.records import (
     HEADLINES,
     KeptRun,
@@ -167,7 +167,7 @@ class Library:
                 f"{_RUNS} WHERE runs.id = ? AND deleted IS NULL", (number,)
             ).fetchone()
             if row is None:
-                raise LibraryError(
+                raise NoSuchRun(
                     f"{self.path}: there is no run {number}; `multiview-phd runs` lists them"
                 )
             return KeptRun._make(row)
