@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 from app.command.arguments.corrections import Corrections
 from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
 from app.command.arguments.library import Bundle, LibraryCommand, OpenRun, Runs
-from app.command.arguments.studies import Batch, Study
+from app.command.arguments.studies import Batch, Study, Tune
 from app.command.flags import (
     Arguments,
     Benchmark,
@@ -126,6 +126,10 @@ def _run(command: Arguments) -> int:
             from app.command.batch import batch
 
             return batch(command)
+        case Tune():
+            from app.command.tune import tune
+
+            return tune(command)
         case Corrections():
             from app.command.correcting import corrections
 
