@@ -9,11 +9,14 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.camera import Camera
-from tracker.sequences.fields import Fields, listed, shown
+from tracker.sequences.fields import LARGEST, Fields, listed, shown
 from tracker.sequences.sequence import Room, SequenceError
 
 POSE = ("K", "distortion", "lens", "R", "t")
 """The fields that, without ``projection``, say how a camera sees."""
+
+LEAST_FOCAL = 0.1
+"""Pixels; of a real camera it is about the size of its picture."""
 
 ROTATION_TOLERANCE = 2e-3
 """How far R Rᵀ may be from the identity: entries written with three decimals pass."""
@@ -65,6 +68,18 @@ def _intrinsics(fields: Fields) -> Float[ndarray, "3 3"]:
     if matrix[0, 0] <= 0.0 or matrix[1, 1] <= 0.0:
         found = f"{matrix[0, 0]:g} and {matrix[1, 1]:g}"
         raise fields.error("K", f"expected focal lengths fx and fy above 0 pixels, found {found}")
+    focal = matrix[[0, 1], [0, 1]]
+    if focal.min() < LEAST_FOCAL or focal.max() > LARGEST:
+        raise fields.error(
+            "K",
+            f"expected focal lengths fx and fy from {LEAST_FOCAL:g} to {LARGEST:g} pixels, found "
+            f"{focal[0]:g} and {focal[1]:g}",
+        )
+    if np.abs(matrix[:2]).max() > LARGEST:
+        largest = np.abs(matrix[:2]).max()
+        raise fields.error(
+            "K", f"expected numbers of at most {LARGEST:g} pixels, found {largest:g}"
+        )
     return matrix
 
 

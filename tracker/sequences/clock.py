@@ -128,7 +128,7 @@ def read_timing(fields: Fields, folder: Path, where: str, stamps: Path | None) -
     """
     timing = Timing(
         first_frame=fields.integer("first_frame", 0),
-        fps=fields.number("fps", above=0.0, at_most=1000.0) if "fps" in fields else None,
+        fps=fields.rate("fps") if "fps" in fields else None,
         time_offset=fields.number("time_offset", above=-_LONGEST_OFFSET, at_most=_LONGEST_OFFSET)
         if "time_offset" in fields
         else 0.0,

@@ -18,6 +18,10 @@ from tracker.sequences.sequence import Detections, GroundTruth
 
 BOX = ("left", "top", "width", "height")
 
+MOST_BOXES = 1000
+"""Of one camera at one step: a detector finds fewer, and the pairs of two cameras are their
+product."""
+
 
 @dataclass(slots=True)
 class Reading:
@@ -96,6 +100,16 @@ class BoxTable:
         looked_at = self._looked_at(steps, clock, of_row)
         kept = np.flatnonzero(is_box & (of_row >= 0))
         kept = kept[np.argsort(of_row[kept], kind="stable")]
+        counts = np.bincount(of_row[kept], minlength=1)
+        if counts.max() > MOST_BOXES:
+            step = int(np.argmax(counts))
+            last = kept[np.searchsorted(of_row[kept], step) + MOST_BOXES]
+            raise columns.error(
+                int(columns.lines[last]),
+                "frame",
+                f"expected at most {MOST_BOXES:,} boxes at a step, found {int(counts[step]):,} at "
+                f"step {step}; leave out those with low scores",
+            )
         boxes: Float[ndarray, "D 4"] = columns.stacked(*BOX)[kept]
         return Detections(of_row[kept], boxes, scores[kept]), looked_at
 

@@ -1,21 +1,22 @@
 """A person's own presets: named sets of values, kept in a file for every later start.
 
 The file holds one object by name; each has the values, by key, that were not at their
-defaults. It is written atomically.
+defaults. Several workbenches may have it open: each changes what is in the file then, one at a
+time, so that none undoes what another saved.
 """
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
-from app.state.kept.json_files import write_json
+from app.errors import sentence
+from app.state.kept.json_files import read_json, set_aside, write_json
 from app.state.snapshot import Presets
 from app.state.workbench import Workbench
 from tracker import parameters as table
 from tracker.parameters import ParameterError
+from tracker.placing import locked
 
 YOURS = "GET /api/state lists your presets."
 
@@ -35,17 +36,8 @@ class OwnPresets:
         """
         self._workbench = workbench
         self._path = path
-        if path is not None and path.is_file():
-            try:
-                workbench.set_presets(_read(path))
-            except (OSError, ValueError) as error:
-                aside = path.with_suffix(".unreadable.json")
-                path.replace(aside)
-                workbench.notify(
-                    "warn",
-                    f"Your presets cannot be read: {error}.",
-                    f"The file was moved to {aside}; mend it there and move it back.",
-                )
+        if path is not None:
+            workbench.set_presets(self._read(path))
 
     def save(self, name: str) -> None:
         """Keep what differs from the defaults now under a name, instead of what had it before.
@@ -53,9 +45,9 @@ class OwnPresets:
         Raises:
             ParameterError: If the name is empty, too long or a built-in preset's.
         """
-        now = self._workbench.snapshot()
+        now, name = self._workbench.snapshot(), _checked(name)
         values = table.changed(now.parameters, now.defaults)
-        self._put({**now.presets, _checked(name): values})
+        self._change(lambda presets: {**presets, name: values})
 
     def rename(self, name: str, new: str) -> None:
         """Give a preset another name, which no other one may have.
@@ -63,11 +55,15 @@ class OwnPresets:
         Raises:
             ParameterError: If there is no such preset, or the new name does not do.
         """
-        presets = self._known(name)
         new = _checked(new)
-        if new != name and new in presets:
-            raise ParameterError("name", f"expected a name that is free, got {new!r}", YOURS)
-        self._put({new if key == name else key: values for key, values in presets.items()})
+
+        def renamed(presets: Presets) -> Presets:
+            _check_known(presets, name)
+            if new != name and new in presets:
+                raise ParameterError("name", f"expected a name that is free, got {new!r}", YOURS)
+            return {new if key == name else key: values for key, values in presets.items()}
+
+        self._change(renamed)
 
     def remove(self, name: str) -> None:
         """Forget a preset.
@@ -75,21 +71,53 @@ class OwnPresets:
         Raises:
             ParameterError: If there is no such preset.
         """
-        self._put({key: values for key, values in self._known(name).items() if key != name})
 
-    def _known(self, name: str) -> Presets:
-        presets = self._workbench.snapshot().presets
-        if name not in presets:
-            known = ", ".join(presets) or "none is saved"
+        def removed(presets: Presets) -> Presets:
+            _check_known(presets, name)
+            return {key: values for key, values in presets.items() if key != name}
+
+        self._change(removed)
+
+    def _change(self, change: Callable[[Presets], Presets]) -> None:
+        """Change what is saved: in the file as it is now, whoever wrote it last.
+
+        Raises:
+            ParameterError: If the file cannot be written; the presets are as they were.
+        """
+        if self._path is None:
+            self._workbench.set_presets(change(self._workbench.snapshot().presets))
+            return
+        try:
+            with locked(self._path):
+                presets = change(self._read(self._path))
+                write_json(self._path, dict(presets))
+        except OSError as error:
             raise ParameterError(
-                "name", f"expected one of your presets ({known}), got {name!r}", YOURS
-            )
-        return presets
-
-    def _put(self, presets: Presets) -> None:
-        if self._path is not None:
-            write_json(self._path, dict(presets))
+                "name", f"your presets cannot be saved: {sentence(error)}", "Make room there."
+            ) from None
         self._workbench.set_presets(presets)
+
+    def _read(self, path: Path) -> Presets:
+        """What the file has; a spoilt one is set aside, and what is known stays."""
+        try:
+            found = read_json(path)
+            good = isinstance(found, dict) and all(isinstance(v, dict) for v in found.values())
+            if not good:
+                raise ValueError(f"{path.name}: expected an object of values for each name")
+        except FileNotFoundError:
+            return self._workbench.snapshot().presets
+        except (OSError, ValueError) as error:
+            aside = set_aside(path)
+            self._workbench.notify(
+                "warn",
+                f"Your presets cannot be read: {sentence(error)}.",
+                f"The file was moved to {aside}; mend it there and move it back."
+                if aside
+                else f"{path} was left as it is.",
+            )
+            return self._workbench.snapshot().presets
+        presets: Presets = found
+        return presets
 
 
 def _checked(name: str) -> str:
@@ -98,6 +126,8 @@ def _checked(name: str) -> str:
         raise ParameterError(
             "name", f"expected 1 to {LONGEST_NAME} characters, got {len(name)}", YOURS
         )
+    if not name.isprintable():
+        raise ParameterError("name", "expected characters that can be printed", YOURS)
     if name in table.PRESETS:
         raise ParameterError(
             "name", f"expected a name of your own: {name} is a built-in preset", YOURS
@@ -105,8 +135,7 @@ def _checked(name: str) -> str:
     return name
 
 
-def _read(path: Path) -> dict[str, Mapping[str, Any]]:
-    found = json.loads(path.read_text(encoding="utf-8"))
-    if not isinstance(found, dict) or not all(isinstance(v, dict) for v in found.values()):
-        raise ValueError(f"{path.name}: expected an object of values for each name")
-    return found
+def _check_known(presets: Presets, name: str) -> None:
+    if name not in presets:
+        known = ", ".join(presets) or "none is saved"
+        raise ParameterError("name", f"expected one of your presets ({known}), got {name!r}", YOURS)
