@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import inspect
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
 
 from tracker import fusion, smoothing
 from tracker import trajectories as tracks_stage
+from tracker.corrections import Correction
+from tracker.corrections.kinds import leeway
+from tracker.corrections.outcomes import outcomes
+from tracker.fusion.told import told_by_step
 from tracker.parameters import RunParameters, Stage
 from tracker.runs.fitting import default_parameters
 from tracker.runs.gaps import where_to_keep
@@ -16,7 +21,7 @@ from tracker.runs.single_views import Cancel, SingleViews
 from tracker.runs.stage_cache import FusionColumn, StageCache, TrackColumn, ViewColumn
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
-from tracker.trajectories import Bounds, Trajectories
+from tracker.trajectories import Bounds, Trajectories, corrected
 
 __all__ = [
     "Cancelled", "Progress", "Run", "compute", "default_parameters", "stage_keys",
@@ -31,6 +36,7 @@ def compute(
     parameters: RunParameters,
     *,
     seed: int = 0,
+    corrections: tuple[Correction, ...] = (),
     steps: int | None = None,
     reader: FrameReader | None = None,
     previous: Run | None = None,
@@ -51,6 +57,8 @@ def compute(
         parameters: Methods and their numbers.
         seed: Every camera and step draws from a generator of its own made of it, so
             the result depends neither on threads nor on where a run was resumed.
+        corrections: What a person said, in its order. They are obeyed as far as the boxes still
+            meet them, and ``outcomes`` tells which are.
         steps: Stop after this many steps, for a first look; None for all.
         reader: The pictures; one is opened for the run where none is given.
         previous: A run, complete or not, whose stages are re-used as far as their
@@ -70,7 +78,8 @@ def compute(
         Cancelled: If ``cancelled`` said so.
         ValueError: If the methods do not fit the sequence.
     """
-    run = Run(sequence, parameters, seed, stage_keys(sequence, parameters, seed))
+    keys = stage_keys(sequence, parameters, seed, corrections)
+    run = Run(sequence, parameters, seed, keys, corrections=corrections)
     total = sequence.frames if steps is None else min(steps, sequence.frames)
     _adopt(run, previous)
     if cache is not None:
@@ -81,6 +90,7 @@ def compute(
     try:
         _fuse(run, total, reader, telling, cancelled, thread_begins)
         _smooth(run, total, telling, cancelled)
+        _settle(run, telling)
         sound = True
     except Cancelled:
         sound = True
@@ -161,6 +171,7 @@ def _fuse(
     """Compute what is missing of the first ``total`` steps."""
     telling.now()
     method = fusion.create(run.sequence, run.parameters)
+    told = told_by_step(run.corrections) if _takes(method.step, "told") else {}
     state = run.fusion_state if run.fused else method.start()
     with ExitStack() as stack:
         if len(run.views) < total:
@@ -175,7 +186,10 @@ def _fuse(
                 views, view_states = next(single_views)
                 run.views.append(views)
                 run.view_states = view_states
-            state, result = method.step(state, run.views[frame])
+            if frame in told:
+                state, result = method.step(state, run.views[frame], told[frame])
+            else:
+                state, result = method.step(state, run.views[frame])
             run.fused.append(result)
             run.fusion_state = state
             telling.after_step()
@@ -200,7 +214,11 @@ def _smooth(run: Run, total: int, telling: _Telling, cancelled: Cancel) -> None:
     check()
     if run.smoothed is None:
         method = smoothing.create(run.sequence, run.parameters)
-        run.smoothed = method.smooth(run.views[:total], run.fused[:total], check)
+        views, fused = run.views[:total], run.fused[:total]
+        if run.corrections and _takes(method.smooth, "corrections"):
+            run.smoothed = method.smooth(views, fused, check, run.corrections)
+        else:
+            run.smoothed = method.smooth(views, fused, check)
         if run.smoothed is None:
             return
     run.tracks = smoothing.tracks_of(
@@ -212,6 +230,27 @@ def _smooth(run: Run, total: int, telling: _Telling, cancelled: Cancel) -> None:
         near=2.0 * float(run.sequence.target_half_extents[:2].mean()),
     )
     telling.now()
+
+
+def _settle(run: Run, telling: _Telling) -> None:
+    """Have the corrections in the tracks where no stage before settles who is who, and see which
+    are met."""
+    if not run.corrections or run.outcomes or not len(run.tracks):
+        return
+    step_time = run.sequence.step_time
+    if not run.settled and not run.parameters.method("smoothing_method").settles_who:
+        run.tracks = corrected(run.tracks, run.corrections, step_time)
+    run.settled = True
+    tracks = run.tracks
+    run.outcomes = outcomes(
+        tracks.frames, tracks.ids, tracks.positions, run.corrections, leeway=leeway(step_time)
+    )
+    telling.now()
+
+
+def _takes(function: Callable[..., object], name: str) -> bool:
+    """Whether a method of whoever wrote it takes an argument."""
+    return name in inspect.signature(function).parameters
 
 
 def _bounds(run: Run) -> Bounds:
@@ -249,6 +288,7 @@ def _take(run: Run, cache: StageCache) -> None:
     found = cache.tracks(run.key)
     if found is not None and _last_stage(run) == "tracks":
         run.tracks, run.filtered, run.done = found.tracks, found.filtered, frames
+        run.settled = True
 
 
 def _keep(run: Run, cache: StageCache, *, fused: bool, read: bool) -> None:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Sequence as Many
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
+from tracker.corrections import Correction
+from tracker.corrections.kinds import leeway
+from tracker.corrections.relabelling import relabelled
 from tracker.filters import gaussian_mixture
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.protocol import FusionResult
@@ -150,6 +154,26 @@ def extract(
         components=components,
         labels=of_label,
     )
+
+
+def corrected(
+    tracks: Trajectories, corrections: Many[Correction], step_time: float
+) -> Trajectories:
+    """Who is who as a person said, by the tracks' rows alone; see
+    :func:`tracker.corrections.relabelling.relabelled`.
+
+    Args:
+        tracks: As some run has them.
+        corrections: In their order.
+        step_time: Seconds between two steps.
+    """
+    if not len(tracks) or not corrections:
+        return tracks
+    ids, kept = relabelled(
+        tracks.frames, tracks.ids, tracks.positions, corrections, leeway=leeway(step_time)
+    )
+    changed = replace(tracks, ids=ids).take(kept)
+    return changed.take(np.lexsort((changed.ids, changed.frames)))
 
 
 def by_boxes(result: FusionResult) -> tuple[GaussianMixture, Int[ndarray, " K"]]:

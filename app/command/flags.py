@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal
 import tyro
 from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subcommand
 
+from app.command.correction_flags import Corrections, LogFile
 from app.command.library_flags import Bundle, FormatName, LibraryCommand, LibraryFile, Runs
 from tracker import parameters as table
 from tracker.library import KEEP
@@ -56,6 +57,8 @@ class Serve:
     """Address to listen on. Anything but this machine's own lets others change what you see."""
     port: int = 8000
     """Port to listen on."""
+    token: bool = True
+    """Let in only whoever has the token of the printed link; $MULTIVIEW_PHD_TOKEN chooses one."""
     open: bool = field(default_factory=has_screen)
     """Open the page in a browser; by default where there is a screen."""
     data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None
@@ -111,6 +114,10 @@ class Track:
     processors without fused multiply-add."""
     detector: Annotated[Path | None, arg(metavar="MODEL", help_behavior_hint="(optional)")] = None
     """A detection network of your own, as ONNX: the method onnx_detector runs it on pictures."""
+    corrections: LogFile = None
+    """What was put right by hand: the run obeys it."""
+    no_corrections: FlagCreatePairsOff[bool] = False
+    """Obey none, not even those of the sequence."""
     cache: bool = True
     """Take up what the cameras found in an earlier run with the same values, and keep it."""
     strict: bool = False
@@ -444,6 +451,7 @@ Arguments = (
     | Runs
     | Bundle
     | LibraryCommand
+    | Corrections
 )
 
 
@@ -470,6 +478,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         | Annotated[Runs, subcommand("runs")]
         | Annotated[Bundle, subcommand("bundle")]
         | Annotated[LibraryCommand, subcommand("library")]
+        | Annotated[Corrections, subcommand("corrections")]
     )
     parsed: Arguments = tyro.cli(
         commands,

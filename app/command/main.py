@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.command.correction_flags import Corrections
 from app.command.flags import (
     Arguments,
     Benchmark,
@@ -118,6 +119,10 @@ def _run(command: Arguments) -> int:
             from app.command.runs import check
 
             return check(command)
+        case Corrections():
+            from app.command.correcting import corrections
+
+            return corrections(command)
     return 0
 
 
@@ -164,10 +169,17 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     _check_keep(command.keep)
     from app.state.workers.jobs import locate
     from app.web import server
+    from app.web.access import PARAMETER, Keys, new_token, own_token
     from app.web.security import is_loopback
     from tracker.library.records import Result
     from tracker.sequences import library, rendering
 
+    if not command.token and not is_loopback(command.host):
+        raise ParameterError(
+            "--no-token",
+            f"expected --host of this machine alone, got {command.host}: others need one",
+        )
+    keys = Keys(own_token(os.environ) or new_token()) if command.token else None
     place = locate(command.sequence, command.data)
     if place not in rendering.ROOMS:
         library.open_sequence(place)  # what cannot be read is told here, before a page is open
@@ -179,21 +191,26 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     port = listener.getsockname()[1]
     host = f"[{command.host}]" if ":" in command.host else command.host
     shown = "127.0.0.1" if command.host == "0.0.0.0" else "[::1]" if host == "[::]" else host
-    address = f"http://{shown}:{port}"
+    address = f"http://{shown}:{port}/"
     if not is_loopback(command.host):
-        say(f"anyone who reaches {command.host} can change what you see")
+        say(f"whoever reaches {command.host} and has the token can change what you see")
+
+    def link(key: str | None) -> str:
+        return address if key is None else f"{address}?{PARAMETER}={key}"
 
     def ready() -> None:
-        sys.stdout.write(f"multiview-phd: {address} (Ctrl-C ends it)\n")
+        sys.stdout.write(f"multiview-phd: {link(keys.token if keys else None)} (Ctrl-C ends it)\n")
         sys.stdout.flush()
         if command.open:
             import webbrowser
 
-            threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+            opened = link(keys.ticket() if keys else None)
+            threading.Thread(target=webbrowser.open, args=(opened,), daemon=True).start()
 
     app = server.create_app(
         server.Settings(
             host=command.host,
+            keys=keys,
             sequence=command.sequence,
             data=command.data,
             detector=command.detector,
@@ -260,6 +277,7 @@ def _track(command: Track) -> int:
     if not output.parent.is_dir():
         raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
 
+    from app.command.correcting import of_run
     from app.state.workers.compiling import Compiling
     from tracker import pipeline
     from tracker.checks import check
@@ -279,6 +297,7 @@ def _track(command: Track) -> int:
         if found.status == "warning" and str(found) not in sequence.warnings:
             say(str(found))
     parameters = table.with_values(pipeline.default_parameters(sequence), changes)
+    told_by_hand = of_run(sequence, command.corrections, none=command.no_corrections)
     begin, began = time.perf_counter(), time.time()
     stages: set[table.Stage] = set()
 
@@ -297,6 +316,7 @@ def _track(command: Track) -> int:
             sequence,
             parameters,
             seed=command.seed,
+            corrections=told_by_hand,
             cache=StageCache.on_disk() if command.cache else None,
             on_progress=told,
             cancelled=interrupted,
@@ -312,6 +332,12 @@ def _track(command: Track) -> int:
         say(reason)
     for sentence in notices(run):
         say(sentence)
+    if told_by_hand:
+        unmet = {one.id: one.why for one in run.outcomes if not one.met}
+        say(f"{len(told_by_hand) - len(unmet)} of {len(told_by_hand)} corrections met")
+        for one in told_by_hand:
+            if one.id in unmet:
+                say(f"unmet: {one.words}: {unmet[one.id]}")
     if command.keep and not any(gap.unexpected for gap in gaps.gaps(run)):
         _keep(command, run, began, seconds)
     incomplete = "".join(f"; {one}" for one in missing)

@@ -11,6 +11,7 @@ from app.models.base import (
     Model,
     Vector,
 )
+from app.models.course import CourseKind, CourseKinds, Courses, TrackCourse
 from app.models.requests import (
     CurveRequest,
     LayerChanges,
@@ -65,6 +66,7 @@ from app.models.step import (
 )
 from app.models.timeline import (
     Counts,
+    Decided,
     LaneEvent,
     Numbers,
     PinnedLife,
@@ -82,7 +84,11 @@ __all__ = [
     "CameraTrack",
     "CameraTruth",
     "Counts",
+    "CourseKind",
+    "CourseKinds",
+    "Courses",
     "CurveRequest",
+    "Decided",
     "EntranceInfo",
     "Estimate",
     "Feeding",
@@ -125,6 +131,7 @@ __all__ = [
     "ThemeChange",
     "Timeline",
     "Track",
+    "TrackCourse",
     "TrackLife",
     "TrailChanges",
     "TrailInfo",

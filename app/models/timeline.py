@@ -61,6 +61,15 @@ class PinnedTimeline(Model):
     tracks: list[PinnedLife]
 
 
+class Decided(Model):
+    """What hindsight made otherwise than the filter, and why."""
+
+    step: int
+    track: int
+    kind: Literal["cut", "joined", "removed"]
+    words: str
+
+
 class Timeline(Model):
     """The shown run over time, as far as it is computed, summed up in buckets of steps."""
 
@@ -85,5 +94,7 @@ class Timeline(Model):
     """Where a run is pinned that is not the shown one."""
     events: list[LaneEvent]
     """Of all steps, also of those not asked for, in their order."""
+    decisions: list[Decided]
+    """What hindsight changed, by its step; empty for the filter alone."""
     left_out: int
     """How many more live there: the shorter ones, where they are very many."""

@@ -1,8 +1,8 @@
 """viser behind our port: its page under ``/viser/``, its socket proxied from ``/viser``.
 
-viser checks neither Host nor Origin and so listens on a private loopback port;
-everything reaches it through here, past our own checks. Its client asks for its
-socket at the address of its own page without the last slash.
+viser checks neither Host nor Origin nor who asks; everything reaches it through here, past our
+own checks, by the one entrance that it has. Its client asks for its socket at the address of its
+own page without the last slash.
 """
 
 from __future__ import annotations
@@ -11,17 +11,14 @@ import asyncio
 import contextlib
 import hashlib
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import websockets
 from fastapi import APIRouter, Request, WebSocket, WebSocketDisconnect
 from fastapi.responses import RedirectResponse, Response
-from websockets.asyncio.client import ClientConnection, connect
+from websockets.asyncio.client import ClientConnection
 
 from app.errors import ApiError
-
-if TYPE_CHECKING:
-    import viser
+from app.web.entrance import Entrance
 
 HAS_FOCUS = b"<script>Document.prototype.hasFocus=()=>true</script>"
 """Makes ``document.hasFocus()`` true: viser's client reconnects only while its document has the
@@ -45,25 +42,12 @@ START_SECONDS = 15.0
 router = APIRouter(include_in_schema=False)
 
 
-def start_viser() -> viser.ViserServer:
-    """viser on a free private port of this machine, silent, and without its public tunnel."""
-    import rich
-    import viser
-    from viser import _messages
-
-    rich.get_console().quiet = True  # it would print its private address, and when it ends
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    # a client may ask for a public address through a third party's server: never here
-    server._websock_server.unregister_handler(_messages.ShareUrlRequest)
-    return server
-
-
 class Gateway:
     """viser's server, its page, and where its socket is."""
 
     def __init__(self) -> None:
+        self.entrance = Entrance()
         self._ready: asyncio.Event | None = None
-        self._port = 0
         self._page = b""
         self._etag = ""
 
@@ -71,7 +55,7 @@ class Gateway:
         """Called on the event loop that serves, before viser is there."""
         self._ready = asyncio.Event()
 
-    def started(self, server: viser.ViserServer) -> None:
+    def started(self) -> None:
         """viser listens; called on the event loop."""
         import viser
 
@@ -79,12 +63,11 @@ class Gateway:
         head, mark, rest = page.read_bytes().partition(b"<head>")
         self._page = head + mark + HAS_FOCUS + LABELS_LEAD_TO_THE_MANUAL + rest
         self._etag = f'"{hashlib.sha256(self._page).hexdigest()[:20]}"'
-        self._port = server.get_port()
         if self._ready is not None:
             self._ready.set()
 
-    async def port(self) -> int:
-        """viser's private port, as soon as it listens.
+    async def there(self) -> None:
+        """Done as soon as viser listens.
 
         Raises:
             ApiError: If it does not in time.
@@ -100,11 +83,10 @@ class Gateway:
                 "The 3D view is not running.",
                 hint="Look at the terminal for the reason, then start the workbench again.",
             ) from None
-        return self._port
 
     async def page(self, request: Request) -> Response:
         """viser's client, which is one file."""
-        await self.port()
+        await self.there()
         headers = {"cache-control": "no-cache", "etag": self._etag}
         if request.headers.get("if-none-match") == self._etag:
             return Response(status_code=304, headers=headers)
@@ -113,17 +95,8 @@ class Gateway:
     async def relay(self, socket: WebSocket) -> None:
         """Pass messages both ways until either side ends."""
         try:
-            port = await self.port()
-            # viser's messages are compressed already and may have many megabytes
-            upstream = await connect(
-                f"ws://127.0.0.1:{port}",
-                subprotocols=[websockets.Subprotocol(p) for p in socket.scope["subprotocols"]],
-                compression=None,
-                ping_interval=None,
-                max_size=None,
-                open_timeout=5.0,
-                proxy=None,
-            )
+            await self.there()
+            upstream = await self.entrance.connect(socket.scope["subprotocols"])
         except (ApiError, OSError, TimeoutError, websockets.InvalidHandshake):
             await socket.close(1013, "the 3D view is not running")
             return

@@ -38,6 +38,7 @@ class Manual(StaticFiles):
             folder: Of the pages; where the installation has them, if none.
         """
         super().__init__(directory=folder or manual_folder(), html=True, check_dir=False)
+        self.config_checked = True  # that the folder is missing is said in words
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         assert self.directory is not None

@@ -2,7 +2,8 @@
 
 Loopback keeps other machines out. The Host check keeps out pages whose domain name was
 re-pointed to this machine (DNS rebinding); the Origin check keeps out writes and sockets of
-other pages in the same browser (cross-site requests), those of the embedded 3D view included.
+other pages in the same browser (cross-site requests), those of the embedded 3D view included;
+what browsers say of who asks keeps them from having pictures, scripts or frames of ours.
 """
 
 from __future__ import annotations
@@ -78,7 +79,7 @@ class Guard:
                 refusal = (413, _too_large())
             receive = _limited(receive)
         if refusal is not None:
-            await _refuse(scope, receive, send, *refusal)
+            await refuse(scope, receive, send, *refusal)
             return
         await self._app(scope, receive, _framed(send))
 
@@ -93,10 +94,14 @@ class Guard:
             )
         origin = headers.get("origin")
         writes = scope["type"] == "websocket" or scope["method"] not in READING
-        if writes and origin is not None and not _same_place(origin, host):
+        foreign = writes and origin is not None and not _same_place(origin, host)
+        if scope["type"] == "http" and not goes_to_a_page(scope, headers):
+            # pictures, scripts and frames of other pages, which send no Origin
+            foreign = foreign or comes_from_elsewhere(headers)
+        if foreign:
             return 403, ErrorDetail(
                 code="foreign_origin",
-                message=f"A page of {origin[:100]!r} may not change anything here.",
+                message=f"A page of {(origin or 'another site')[:100]!r} may not use this server.",
                 field="Origin",
                 hint="Use the workbench's own page.",
             )
@@ -104,7 +109,8 @@ class Guard:
 
     def _is_known(self, host: str) -> bool:
         try:
-            name = urlsplit(f"//{host}").hostname
+            place = urlsplit(f"//{host}")
+            name, _ = place.hostname, place.port
         except ValueError:
             return False
         if name is None or "@" in host:
@@ -118,6 +124,28 @@ class Guard:
         except ValueError:
             return False
         return True
+
+
+def goes_to_a_page(scope: Scope, headers: Headers) -> bool:
+    """Whether a window goes somewhere, and a person will read the answer."""
+    if scope["method"] not in ("GET", "HEAD"):
+        return False
+    mode = headers.get("sec-fetch-mode")
+    if mode is not None:
+        return mode == "navigate" and headers.get("sec-fetch-dest", "document") == "document"
+    return scope["path"] == "/" or "text/html" in headers.get("accept", "")
+
+
+def comes_from_elsewhere(headers: Headers) -> bool:
+    """Whether a page of another origin made the browser ask.
+
+    Browsers say so (https://www.w3.org/TR/fetch-metadata/); those that do not may name the page.
+    """
+    site = headers.get("sec-fetch-site")
+    if site is not None:
+        return site in ("cross-site", "same-site")
+    referrer = urlsplit(headers.get("referer", ""))
+    return bool(referrer.netloc) and referrer.netloc.lower() != headers.get("host", "").lower()
 
 
 def _same_place(origin: str, host: str) -> bool:
@@ -172,9 +200,10 @@ def _framed(send: Send) -> Send:
     return with_headers
 
 
-async def _refuse(
+async def refuse(
     scope: Scope, receive: Receive, send: Send, status: int, detail: ErrorDetail
 ) -> None:
+    """Answer with an error, or let a socket end before it begins."""
     if scope["type"] == "websocket":
         await receive()  # the request to connect
         await send({"type": "websocket.close", "code": 1008, "reason": detail.code})
@@ -185,6 +214,8 @@ async def _refuse(
         (b"content-length", str(len(payload)).encode()),
         (b"connection", b"close"),
     ]
+    if status == 401:
+        headers.append((b"www-authenticate", b"Bearer"))
     await send({"type": "http.response.start", "status": status, "headers": headers})
     await send({"type": "http.response.body", "body": payload})
 
@@ -212,6 +243,6 @@ class OnlyLooking:
                 message="This run came in a bundle and is only looked at: nothing can be changed.",
                 hint="Serve its sequence folder, or another recording, to compute.",
             )
-            await _refuse(scope, receive, send, 403, detail)
+            await refuse(scope, receive, send, 403, detail)
             return
         await self._app(scope, receive, send)

@@ -9,7 +9,6 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import uvicorn
 from fastapi import FastAPI, Request
@@ -31,10 +30,14 @@ from app.state.workbench import Workbench
 from app.state.workers.compiling import Compiling
 from app.state.workers.evaluator import Evaluator
 from app.state.workers.exporter import Exporter
+from app.state.workers.identity_check import IdentityCheck
 from app.state.workers.jobs import Jobs, in_background
 from app.state.workers.keeper import Keeper
 from app.state.workers.sensitivity import Sensitivity
 from app.web import api, gateway, stream, teaching_routes
+from app.web.access import Access, Keys
+from app.web.entrance import LARGEST_MESSAGE, Entrance, start_viser
+from app.web.evaluation import course_routes, identity_routes
 from app.web.evaluation import routes as evaluation
 from app.web.gateway import Gateway
 from app.web.importing import routes as importing
@@ -47,7 +50,7 @@ from app.web.pictures.likelihood import Likelihoods
 from app.web.pictures.swatches import Swatches
 from app.web.security import CONTENT_POLICY, Guard, OnlyLooking, allowed_hosts, is_loopback
 from app.web.stream import Stream
-from app.web.tables import tables, teaching_tables
+from app.web.tables import event_tables, tables, teaching_tables
 from app.web.views.timeline import Timelines
 from tracker import __version__
 from tracker.folders import settings_folder
@@ -56,22 +59,19 @@ from tracker.library.records import Result
 from tracker.pipeline import Cancelled
 from tracker.runs.stage_cache import StageCache
 
-if TYPE_CHECKING:
-    import viser
-
 logger = logging.getLogger("app")
-
-LARGEST_SOCKET_MESSAGE = 64 << 20
-"""Bytes: viser's client may send a rendered picture of itself."""
 
 ROUTERS = (
     api.router,
     foreground.router,
     likelihood_routes.router,
     tables.router,
+    event_tables.router,
     teaching_routes.router,
     teaching_tables.router,
     evaluation.router,
+    identity_routes.router,
+    course_routes.router,
     importing.router,
     library.router,
     export_routes.router,
@@ -89,6 +89,8 @@ class Settings:
     """What a server is started with."""
 
     host: str = "127.0.0.1"
+    keys: Keys | None = None
+    """What lets in; None: whoever reaches it."""
     sequence: str | None = None
     """Opened at once, in the background."""
     data: Path | None = None
@@ -121,13 +123,14 @@ def create_app(settings: Settings) -> FastAPI:
         lifespan=_lifespan,
     )
     app.state.settings = settings
-    app.add_middleware(
+    if isinstance(settings.run, Result):
+        app.add_middleware(OnlyLooking)
+    app.add_middleware(Access, keys=settings.keys)
+    app.add_middleware(  # the last one is the first that sees a request
         Guard,
         hosts=allowed_hosts(settings.host),
         addresses_are_fine=not is_loopback(settings.host),
     )
-    if isinstance(settings.run, Result):
-        app.add_middleware(OnlyLooking)
     errors.install(app)
     for router in ROUTERS:
         app.include_router(router)
@@ -184,6 +187,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         workbench, settings_folder() / "recent.json" if kept else None
     )
     evaluator = app.state.evaluator = Evaluator(workbench)
+    identity_check = app.state.identity_check = IdentityCheck(workbench)
     exporter = app.state.exporter = Exporter()
     sensitivity = app.state.sensitivity = Sensitivity(workbench, settings.seed)
     keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep)
@@ -221,7 +225,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         await asyncio.gather(
             *(
                 asyncio.to_thread(part.close)
-                for part in (exporter, keeper, jobs, evaluator, sensitivity, room)
+                for part in (identity_check, exporter, keeper, jobs, evaluator, sensitivity, room)
             )
         )
 
@@ -238,7 +242,8 @@ def _say_failure(name: str) -> Callable[..., None]:
 
 async def _start_viser(room: _Room, door: Gateway, workbench: Workbench) -> None:
     try:
-        door.started(await asyncio.to_thread(room.open))
+        await asyncio.to_thread(room.open, door.entrance)
+        door.started()
     except Exception as error:
         logger.exception("the 3D view did not start")
         workbench.notify(
@@ -257,18 +262,17 @@ class _Room:
         self._teaching = teaching
         self._parts: list[Callable[[], object]] = []
 
-    def open(self) -> viser.ViserServer:
-        """Start viser on a private loopback port and build scene and sliders in it."""
+    def open(self, entrance: Entrance) -> None:
+        """Start viser behind its entrance and build scene and sliders in it."""
         from app.scene.panel.controls import Controls
         from app.scene.room_editing import RoomEditing
         from app.scene.scene import Scene
 
-        server = gateway.start_viser()
+        server = start_viser(entrance)
         self._parts.append(server.stop)
         self._parts.append(Scene(server, self._workbench).close)
         self._parts.append(RoomEditing(server, self._workbench, self._teaching).close)
         self._parts.append(Controls(server, self._workbench, self._sensitivity).close)
-        return server
 
     def close(self) -> None:
         """Take it down in the opposite order."""
@@ -315,7 +319,7 @@ def serve(app: FastAPI, listener: sockets.socket, on_ready: Callable[[], None]) 
         ws="websockets-sansio",
         # viser's messages are packed already, ours are small: compressing only costs time
         ws_per_message_deflate=False,
-        ws_max_size=LARGEST_SOCKET_MESSAGE,
+        ws_max_size=LARGEST_MESSAGE,
         timeout_graceful_shutdown=1,
         server_header=False,
     )

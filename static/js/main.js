@@ -1,16 +1,12 @@
 /** Wires the page: one store, one socket, one playback, and the panes that look at them. */
+import { mountCameras } from "./cameras/cameras.js";
 import { one } from "./elements/dom.js";
 import { mountSide } from "./inspector/side.js";
-import { mountTeach } from "./inspector/teach.js";
 import { mountDoor } from "./opening/door.js";
-import { mountCameras } from "./panes/cameras.js";
 import { mountControls, pressed } from "./panes/controls.js";
-import { mountKeep } from "./panes/keep.js";
 import { mountLayout } from "./panes/layout.js";
 import { mountNotes } from "./panes/notes.js";
-import { mountSheets } from "./panes/sheets.js";
 import { mountPlaces } from "./panes/places.js";
-import { mountTimeline } from "./panes/timeline.js";
 import { mountTop } from "./panes/top.js";
 import { mountTour } from "./panes/tour.js";
 import { mountView3d } from "./panes/view3d.js";
@@ -22,6 +18,7 @@ import { register } from "./state/commands.js";
 import { initialState, remember } from "./state/initial.js";
 import { createReceiver } from "./state/receiving.js";
 import { createStore } from "./state/store.js";
+import { mountTimeline } from "./timeline/timeline.js";
 
 register(await getJson("/static/commands.json"));
 /** @type {Store<PageState>} */
@@ -64,15 +61,37 @@ mountTour(one(".tour"), context);
 mountView3d(one(".view"), context);
 mountCameras(one(".cams"), context);
 mountSide(one(".side"), context);
-mountTimeline(one(".time"), context);
-mountTeach(one(".mosaic"), context);
-mountSheets(context);
+const timeline = mountTimeline(one(".time"), context);
 mountDoor(context);
 mountLayout(context);
-mountKeep(context);
 mountControls(context);
-// Read when the page is there.
-void import("./library/library.js").then(({ mountLibrary }) => mountLibrary(one(".lib"), context));
+// The rest is read once the page stands; what it brings may be asked for before.
+/** @type {Promise<void> | undefined} */
+let rest;
+const readRest = () =>
+	(rest ??= import("./later.js").then(
+		({ mountLater }) => mountLater(context, timeline),
+		() => (rest = undefined),
+	));
+const brought = /** @type {const} */ ([
+	"help",
+	"palette",
+	"bookmark",
+	"keepPicture",
+	"drawTemplate",
+	"checkIdentities",
+	"plot",
+]);
+for (const name of brought) {
+	const early = async (/** @type {any} */ what = undefined) => {
+		await readRest();
+		if (actions[name] === early)
+			return actions.note("error", "That is not read yet", "The server does not answer.");
+		await actions[name](what);
+	};
+	actions[name] = early;
+}
+void readRest();
 
 // Also for a click inside the 3D view, which the server hears of first.
 const still = matchMedia("(prefers-reduced-motion: reduce)");

@@ -33,7 +33,7 @@ class Server:
         Kernels are those of the machine, whatever the cache folder, unless a folder is given.
         """
         self.folder = sequence
-        self._arguments = [str(sequence), "--no-open"]
+        self._arguments = [str(sequence), "--no-open", "--no-token"]
         self._arguments += [] if data is None else ["--data", str(data)]
         self._environment = dict(os.environ)
         self._environment["NUMBA_CACHE_DIR"] = str(kernels or kernel_folder())

@@ -15,7 +15,7 @@ const scripts = files.filter((name) => name.endsWith(".js"));
 function reached(name, later, known = new Set()) {
   known.add(name);
   const text = readFileSync(join(ROOT, name), "utf8");
-  const ways = [/from "([^"]+)"/g, ...(later ? [/(?:void|\?\?=) import\("([^"]+)"\)/g] : [])];
+  const ways = [/from "([^"]+)"/g, ...(later ? [/(?:void|\?\?=|=>) import\("([^"]+)"\)/g] : [])];
   for (const [, target] of ways.flatMap((way) => [...text.matchAll(way)])) {
     const other = relative(ROOT, join(ROOT, name, "..", target)).replaceAll("\\", "/");
     if (!known.has(other)) reached(other, later, known);

@@ -13,11 +13,11 @@ import {
   viewWords,
 } from "../../static/js/state/events.js";
 import { lensOf } from "../../static/js/draw/picture.js";
-import { magnified } from "../../static/js/panes/magnify.js";
+import { magnified } from "../../static/js/cameras/magnify.js";
 import { kindsOf } from "../../static/js/inspector/listed.js";
-import { strands } from "../../static/js/draw/braid.js";
-import { valueOf } from "../../static/js/state/offers.js";
-import { mosaic } from "../../static/js/draw/mosaic.js";
+import { strands } from "../../static/js/timeline/braid.js";
+import { valueOf } from "../../static/js/sheets/offers.js";
+import { mosaic } from "../../static/js/cameras/mosaic.js";
 import { viewFrom, viewOf } from "../../static/js/state/views.js";
 import { createStore } from "../../static/js/state/store.js";
 import { readPlace, writePlace } from "../../static/js/state/url.js";

@@ -55,6 +55,8 @@ class FusionModel:
         """Squared Mahalanobis distance of the innovation."""
         self.memory_reach = gaussian_mixture.gate_distance(p.memory_gate_probability, 3)
         """Squared Mahalanobis distance within which a newcomer may be somebody lately lost."""
+        self.gate_of_places = gaussian_mixture.gate_distance(p.gate_probability, 3)
+        """Squared Mahalanobis distance within which a place that somebody names is a target's."""
         self.near = p.duplicate_distance * 2.0 * float(np.mean(sequence.target_half_extents[:2]))
         """Metres within which two components may be one person."""
         margin = p.followed_margin

@@ -26,6 +26,7 @@ from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import WORTH_TELLING, Record, summed
 from tracker.fusion.reidentification import Identities
 from tracker.fusion.sight import Recent
+from tracker.fusion.told import Told, obey
 from tracker.kernels.gating import Measurements
 from tracker.kernels.labelled import step as step_kernels
 from tracker.kernels.labelled.camera_update import Tracks
@@ -110,7 +111,7 @@ class MultiBernoulli:
         return MultiBernoulliState(empty, empty, 1, Memory.start(dimension), Identities.none())
 
     def step(
-        self, state: MultiBernoulliState, views: Many[ViewResult]
+        self, state: MultiBernoulliState, views: Many[ViewResult], told: Told | None = None
     ) -> tuple[MultiBernoulliState, FusionResult]:
         """Predict one step ahead and update with every camera's boxes, in the cameras' order."""
         p, before = self._parameters, state.tracks
@@ -149,6 +150,11 @@ class MultiBernoulli:
                 tracks, record = self._with_newborns(
                     tracks, record, born, newborns, state.next_label, cameras
                 )
+        if told is not None:
+            tracks, record, next_label = obey(
+                tracks, record, told, self._model,
+                first_new_label=state.next_label, next_label=next_label,
+            )  # fmt: skip
         kept = step_kernels.kept_tracks(
             tracks.weights, tracks.means, tracks.labels, record.sources, self._keeping_rule
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence as Many
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -12,6 +12,9 @@ from numpy import ndarray
 
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.single_view.protocol import ViewResult
+
+if TYPE_CHECKING:
+    from tracker.fusion.told import Told
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,6 +62,15 @@ class FusionMethod(Protocol):
         """The state before the first step."""
         ...
 
-    def step(self, state: Any, views: Many[ViewResult]) -> tuple[Any, FusionResult]:
-        """Predict one step ahead and update with every camera's boxes, in the cameras' order."""
+    def step(
+        self, state: Any, views: Many[ViewResult], told: Told | None = None
+    ) -> tuple[Any, FusionResult]:
+        """Predict one step ahead and update with every camera's boxes, in the cameras' order.
+
+        Args:
+            state: Of the step before.
+            views: Stage 1, one result a camera.
+            told: What a person said of this step. It is given only where anything was said and
+                to methods that take it: to others corrections of places say nothing.
+        """
         ...

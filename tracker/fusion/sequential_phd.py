@@ -23,6 +23,7 @@ from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import Ledger, Record
 from tracker.fusion.sight import Recent
+from tracker.fusion.told import Told, obey
 from tracker.kernels import linear_algebra
 from tracker.kernels.gating import Measurements
 from tracker.kernels.intensity import mixture as mixture_kernels
@@ -82,7 +83,7 @@ class SequentialPhd:
         return SequentialPhdState(GaussianMixture.empty(dimension), 1, Memory.start(dimension))
 
     def step(
-        self, state: SequentialPhdState, views: Many[ViewResult]
+        self, state: SequentialPhdState, views: Many[ViewResult], told: Told | None = None
     ) -> tuple[SequentialPhdState, FusionResult]:
         """Predict one step ahead and update with every camera's boxes, in the cameras' order."""
         p = self._parameters
@@ -110,6 +111,13 @@ class SequentialPhd:
         recent = state.recent
         if p.birth != "entrances":
             recent = self._add_newborns(work, views, recent)
+        if told is not None:
+            mixture, record, work.next_label = obey(
+                work.mixture, work.record, told, self._model,
+                first_new_label=state.next_label, next_label=work.next_label,
+            )  # fmt: skip
+            heaviest_first = np.argsort(-mixture.weights, kind="stable")
+            work.mixture, work.record = mixture.take(heaviest_first), record.take(heaviest_first)
         inside = self._model.stays(work.mixture)
         mixture, record = work.mixture.take(inside), work.record.take(inside)
         if p.misses == "per_person":

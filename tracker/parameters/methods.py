@@ -86,6 +86,8 @@ class Method:
     uses: Uses | Callable[[RunParameters], Uses] = field(default_factory=Uses)
     parameters: type[Params] | None = None
     group: str = ""
+    settles_who: bool = False
+    """Of stage 3: whether it settles who is who, and obeys what a person said of that."""
 
     @property
     def own_group(self) -> str:

@@ -7,6 +7,8 @@ import json
 from dataclasses import dataclass, field
 from typing import Any
 
+from tracker.corrections.kinds import IN_THE_FUSION, OF_PEOPLE, Correction, Kind, digest
+from tracker.corrections.outcomes import Outcome
 from tracker.fusion.protocol import FusionResult
 from tracker.parameters import RunParameters, Stage, stage_values
 from tracker.parameters.reading import CHOSEN_BY
@@ -82,6 +84,12 @@ class Run:
     """Whether stage 1 looked at pictures."""
     fusion_state: Any = None
     """State of stage 2 after the last step of :attr:`fused`."""
+    corrections: tuple[Correction, ...] = ()
+    """What a person said, which the run obeys."""
+    outcomes: tuple[Outcome, ...] = ()
+    """What became of each of them, once all steps are there."""
+    settled: bool = False
+    """Whether :attr:`tracks` has them."""
 
     def __post_init__(self) -> None:
         self.tracks = self.filtered = Trajectories.empty(len(self.sequence.views))
@@ -97,9 +105,20 @@ class Run:
         return self.done == self.sequence.frames
 
 
-def stage_keys(sequence: Sequence, parameters: RunParameters, seed: int) -> dict[Stage, str]:
+_OBEYED_BY: dict[Stage, tuple[Kind, ...]] = {
+    "fusion": IN_THE_FUSION, "smoothing": OF_PEOPLE,
+}  # fmt: skip
+"""The corrections that a stage obeys."""
+
+
+def stage_keys(
+    sequence: Sequence,
+    parameters: RunParameters,
+    seed: int,
+    corrections: tuple[Correction, ...] = (),
+) -> dict[Stage, str]:
     """The cache key of each stage: a hash of the sequence, the seed, the code, and of the
-    parameters of the stage itself and of those before it."""
+    parameters and corrections of the stage itself and of those before it."""
     keys: dict[Stage, str] = {}
     values: list[Any] = [sequence.digest, seed]
     stages: tuple[Stage, ...] = ("single_view", "fusion", "smoothing", "tracks")
@@ -108,5 +127,8 @@ def stage_keys(sequence: Sequence, parameters: RunParameters, seed: int) -> dict
         values += [numbers_version(stage), method_version(method), stage_values(parameters, stage)]
         if method.used(parameters).detector and sequence.detector is not None:
             values.append(sequence.detector.digest)
+        told = digest(corrections, _OBEYED_BY.get(stage, ()))
+        if told:
+            values.append(told)
         keys[stage] = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
     return keys

@@ -16,6 +16,8 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.special import logsumexp
 
+from tracker.corrections import Correction
+from tracker.corrections.kinds import leeway as corrections_leeway
 from tracker.fusion import visibility
 from tracker.kernels.smoothing import evidence
 from tracker.parameters import SmoothingParams
@@ -26,6 +28,7 @@ from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.pieces import Pairs
 from tracker.smoothing.result import Decision
 from tracker.smoothing.smoother import Fitted, Shared, Smoother
+from tracker.smoothing.ties import Seeker, Ties
 
 _FED = 0.3
 """Boxes, of all cameras together, from which a row counts as seen."""
@@ -64,6 +67,7 @@ def settle(
     had: Bool[ndarray, " N"],
     parameters: SmoothingParams,
     looks: Many[Float[ndarray, "B A"]] | None,
+    corrections: Many[Correction] = (),
 ) -> Settled:
     """Cut and join.
 
@@ -75,20 +79,34 @@ def settle(
         had: At which rows the filter had the track.
         parameters: When to cut, and what holds together.
         looks: A unit vector for each box of each camera; None where there is none.
+        corrections: What a person said of who is who.
     """
-    cut, kept, reasons = _cut(smoother, fitted, shared, contested, had, parameters)
+    seeker = Seeker(fitted.paths, corrections, corrections_leeway(smoother.model.step_time))
+    cut, kept, reasons = _cut(smoother, fitted, shared, contested, had, parameters, seeker)
+    ties = seeker.ties(cut, kept)
     links = pieces.moved(shared.links, kept, len(fitted.paths.states))
     refitted = smoother.fit(cut, links)
     own = Shared(links, shared.chances[:, kept], shared.missed[:, kept], shared.hidden_by[:, kept])
     worths, births, deaths = _odds(smoother, refitted, own, parameters)
     pairs = _goes_on(smoother, refitted.paths, links, parameters, looks)
-    following, used = joining.join(worths, births, deaths, pairs.earlier, pairs.later, pairs.gains)
+    longest = max(round(parameters.longest / smoother.model.step_time), 1)
+    now, later = ties.parted(cut, longest)
+    following, used = joining.join(
+        worths, births, deaths, pairs.earlier, pairs.later, pairs.gains, now
+    )
     first = joining.chains(following, used)
+    of_chains = later.of_chains(first, cut)
+    if of_chains is None:  # who is tied to somebody far away may not be joined to another meanwhile
+        following, used = joining.join(
+            worths, births, deaths, pairs.earlier, pairs.later, pairs.gains, ties
+        )
+        first = joining.chains(following, used)
+        of_chains = Ties(apart=ties.apart).of_chains(first, cut) or Ties()
     # what goes on by its motion tells more of its looks than each piece alone
     back = _comes_back(smoother, refitted.paths, links, first, parameters, looks)
     following, _ = joining.join(
         np.full(len(first), _SURE), births[[c[0] for c in first]], deaths[[c[-1] for c in first]],
-        back.earlier, back.later, back.gains,
+        back.earlier, back.later, back.gains, of_chains,
     )  # fmt: skip
     chains = [
         [piece for number in numbers for piece in first[number]]
@@ -97,7 +115,7 @@ def settle(
     pairs = pairs.with_more(back.of_ends(first))
     labels = _labels(cut, chains)
     decisions = [*_cuts(cut, fitted.paths, kept, reasons, chains, labels)]
-    decisions += _joins(cut, pairs, chains, labels, _anew(smoother))
+    decisions += _joins(cut, pairs, chains, labels, _anew(smoother), set(ties.together))
     paths, rows = _chained(refitted.paths, chains, labels)
     lengths = np.diff(cut.starts)
     origins = [
@@ -116,6 +134,7 @@ def _cut(
     contested: Float[ndarray, " N"],
     had: Bool[ndarray, " N"],
     p: SmoothingParams,
+    seeker: Seeker,
 ) -> tuple[Paths, Int[ndarray, " M"], Int[ndarray, " N"]]:
     """The pieces, the row that each of their rows was, and why each row was left out: 0 for not,
     1 contested, 2 jump, 3 away or not seen."""
@@ -124,6 +143,7 @@ def _cut(
     there, _ = lifetimes(smoother, paths, shared, p)
     reasons = np.zeros(rows, dtype=np.int64)
     fed = np.bincount(shared.links.rows, shared.links.shares, rows) > _FED
+    fed[smoother.pinned(paths)[0]] = True
     too_long = round(p.gap / step_time)
     away = _long_gaps(paths, fed, too_long) | (there < 0.5)
     reasons[away | _not_bridged(paths, had, away, too_long)] = 3
@@ -138,8 +158,12 @@ def _cut(
     reasons[contested >= p.doubt] = 1
     breaks = np.zeros(rows, dtype=bool)
     breaks[jumps] = True
+    breaks |= seeker.breaks()
     clear = _between(paths, fed & (reasons == 0)) & (reasons == 0)
     cut, kept = pieces.cut(paths, clear, breaks)
+    if len(more := seeker.overlaps(cut, kept)):
+        breaks[more] = True
+        cut, kept = pieces.cut(paths, clear, breaks)
     # a short piece says little of who it is; where it is all there is it stays
     lengths = np.diff(cut.starts)
     of = owners[kept[cut.starts[:-1]]]
@@ -147,6 +171,7 @@ def _cut(
     np.maximum.at(longest, of, lengths)
     shortest = round(_SHORTEST / step_time)
     short = (lengths < shortest) & (longest[of] >= shortest)
+    short[list(seeker.meant(cut, kept))] = False
     clear[kept[np.repeat(short, lengths)]] = False
     cut, kept = pieces.cut(paths, clear, breaks)
     return cut, kept, reasons
@@ -408,6 +433,7 @@ def _joins(
     chains: list[list[int]],
     labels: list[int],
     anew: float,
+    told: set[tuple[int, int]],
 ) -> list[Decision]:
     """The joins of what the filter held for two people, with the odds against the best other."""
     gain = {
@@ -423,6 +449,11 @@ def _joins(
     for chain, label in zip(chains, labels, strict=True):
         for i, j in pairwise(chain):
             if cut.labels[i] == cut.labels[j]:
+                continue
+            if (i, j) in told or (i, j) not in gain:
+                name = int(cut.labels[j] if cut.labels[j] != label else cut.labels[i])
+                step = int(cut.firsts[j])
+                found.append(Decision("joined", step, label, name, 1.0, 0.0, "a person said so"))
                 continue
             every = np.array([*by_later[j], anew])
             chances = np.exp(every - logsumexp(every))

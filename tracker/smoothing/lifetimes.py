@@ -14,6 +14,9 @@ from tracker.smoothing.smoother import Shared, Smoother
 UNSURE = 0.3
 """Existence with which a row beyond a path's ends, or within its gaps, competes for boxes."""
 
+_SAID = 1e4
+"""Votes for a person where somebody said that he is: more than any camera has against it."""
+
 
 def independence(step_time: float, memory: float) -> float:
     """The share of a step's evidence that is new: pictures of one moment agree, right or wrong."""
@@ -40,6 +43,7 @@ def lifetimes(
     p = smoother.parameters
     hit = -np.log1p(-min(p.detection_probability, 1.0 - 1e-6))
     votes = hit * np.bincount(shared.links.rows, shared.links.shares, len(paths.states))
+    votes[smoother.pinned(paths)[0]] += _SAID
     weight = independence(smoother.model.step_time, parameters.memory)
     survival = min(p.survival_probability, 1.0 - 1e-9)
     # within the time in which the evidence tells anew; a recording seen backwards is the same

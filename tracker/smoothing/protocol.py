@@ -6,6 +6,7 @@ from collections.abc import Callable
 from collections.abc import Sequence as Many
 from typing import Protocol
 
+from tracker.corrections import Correction
 from tracker.fusion.protocol import FusionResult
 from tracker.parameters import RunParameters
 from tracker.sequences.sequence import Sequence
@@ -21,6 +22,7 @@ class SmoothingMethod(Protocol):
         views: Many[tuple[ViewResult, ...]],
         fused: Many[FusionResult],
         check: Callable[[], None] = lambda: None,
+        corrections: Many[Correction] = (),
     ) -> Smoothed | None:
         """The tracks of some steps from step 0 on, each by the boxes of all of them.
 
@@ -28,6 +30,7 @@ class SmoothingMethod(Protocol):
             views: Stage 1 of each step.
             fused: Stage 2 of each step.
             check: Called now and then; raises to stop.
+            corrections: What a person said; given only where there is any.
 
         Returns:
             None where the filter's tracks stay as they are.
@@ -46,6 +49,7 @@ class NoSmoothing:
         views: Many[tuple[ViewResult, ...]],
         fused: Many[FusionResult],
         check: Callable[[], None] = lambda: None,
+        corrections: Many[Correction] = (),
     ) -> None:
         """Nothing is made of them."""
 

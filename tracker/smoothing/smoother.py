@@ -9,6 +9,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
+from tracker.corrections import Correction
+from tracker.corrections.seeking import Whereabouts
 from tracker.fusion.model import FusionModel
 from tracker.kernels.measurement import ExpectedBoxes as SeenBoxes
 from tracker.kernels.smoothing import evidence, passes
@@ -81,9 +83,18 @@ class Smoother:
         sequence: Sequence,
         parameters: FusionParams,
         views: Many[tuple[ViewResult, ...]],
+        corrections: Many[Correction] = (),
     ) -> None:
-        """Prepare for the boxes of some steps from step 0 on."""
+        """Prepare for the boxes of some steps from step 0 on.
+
+        Args:
+            sequence: Cameras and room.
+            parameters: Of the fusion.
+            views: Stage 1 of each step.
+            corrections: Of them *is here* is a measurement of the place.
+        """
         self.parameters = parameters
+        self._here = [one for one in corrections if one.kind == "here"]
         self.model = model = FusionModel(sequence, parameters)
         self.frames = len(views)
         self.cameras = [
@@ -142,6 +153,11 @@ class Smoother:
                 )
                 log_hit = np.log(self.parameters.detection_probability / model.clutter[c])
                 np.add.at(information.constants, own.rows, own.shares * log_hit)
+            pinned, told = self.pinned(paths)
+            for row, one in zip(pinned.tolist(), told, strict=True):
+                precision = float(one.accuracy or 1.0) ** -2
+                information.matrices[row] += precision * np.eye(3)
+                information.vectors[row] += precision * one.places[0].point
             begins = paths.states[paths.starts[:-1]].copy()
             begins[:, 3:] = 0.0
             found = passes.smooth_paths(
@@ -155,6 +171,19 @@ class Smoother:
             found.ahead_covariances,
             found.traces,
         )
+
+    def pinned(self, paths: Paths) -> tuple[Int[ndarray, " K"], list[Correction]]:
+        """The rows of paths that somebody said is there, each of one correction at most: the
+        nearest within reach."""
+        if not self._here:
+            return np.zeros(0, dtype=np.int64), []
+        whereabouts = Whereabouts(paths.steps, paths.states[:, :3])
+        rows: dict[int, Correction] = {}
+        for one in self._here:
+            row = whereabouts.nearest(one.places[0])
+            if row is not None:
+                rows.setdefault(row, one)
+        return np.array(list(rows), dtype=np.int64), list(rows.values())
 
     def stated(self, paths: Paths) -> Calibration:
         """The boxes as stage 1 states them, for some paths."""

@@ -10,6 +10,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker import trajectories
+from tracker.corrections import Correction
 from tracker.fusion.model import CONFIRMED
 from tracker.fusion.protocol import FusionResult
 from tracker.parameters import RunParameters, SmoothingParams
@@ -48,10 +49,11 @@ class Positions:
         views: Many[tuple[ViewResult, ...]],
         fused: Many[FusionResult],
         check: Callable[[], None] = lambda: None,
+        corrections: Many[Correction] = (),
     ) -> Smoothed:
         """The tracks of some steps from step 0 on, each by the boxes of all of them."""
         p = self._parameters.smoothing
-        smoother = Smoother(self._sequence, self._parameters.fusion, views)
+        smoother = Smoother(self._sequence, self._parameters.fusion, views, corrections)
         dimension, cameras = smoother.model.motion.dimension, len(smoother.cameras)
         tracks = trajectories.extract(fused, cameras=cameras, extraction_threshold=CONFIRMED)
         if not len(tracks):
@@ -61,7 +63,7 @@ class Positions:
         links = reading.read_links(fused, paths, smoother.cameras)
         check()
         paths, existences, links, learnt, decisions = self._named(
-            smoother, paths, existences, links, views, check
+            smoother, paths, existences, links, views, check, corrections
         )
         fitted, shared, learnt = _settled(smoother, paths, existences, links, p, learnt, check)
         return _finished(smoother, fitted, shared, learnt, p, decisions)
@@ -74,6 +76,7 @@ class Positions:
         links: Links,
         views: Many[tuple[ViewResult, ...]],
         check: Callable[[], None],
+        corrections: Many[Correction],
     ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, list[Decision]]:
         """The tracks of people, with which existence each row asks for boxes, and what was learnt
         on the way: here the filter's own."""
@@ -91,12 +94,15 @@ class Identities(Positions):
         links: Links,
         views: Many[tuple[ViewResult, ...]],
         check: Callable[[], None],
+        corrections: Many[Correction],
     ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, list[Decision]]:
         p = self._parameters.smoothing
         contested = pieces.contested(paths, links)
         fitted, shared, learnt = _settled(smoother, paths, existences, links, p, None, check)
         looks = _looks(views) if p.appearance > 0.0 else None
-        found = identities.settle(smoother, fitted, shared, contested, existences == 1.0, p, looks)
+        found = identities.settle(
+            smoother, fitted, shared, contested, existences == 1.0, p, looks, corrections
+        )
         check()
         learnt = learnt.of_people(found.origins)
         existences = np.where(found.had, 1.0, lifetimes.UNSURE)

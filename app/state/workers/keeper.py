@@ -1,6 +1,7 @@
 """Keeps the runs of a workbench in the library, from a thread of its own.
 
-A library that cannot be used is told of once; the workbench goes on without it.
+A library that cannot be used is told of once and tried again now and then; the workbench goes on
+without it.
 """
 
 from __future__ import annotations
@@ -29,6 +30,11 @@ SETTLED_SECONDS = 1.0
 wants one of the runs that he passed, not all."""
 
 
+RETRY_SECONDS = 20.0
+"""A library that could not be used, since another program held it or a disk was full, is tried
+again after so long."""
+
+
 class Keeper:
     """Writes down recordings that are opened and runs that come to their end."""
 
@@ -48,6 +54,9 @@ class Keeper:
         self._lock = threading.Lock()
         self._library: Library | None = None
         self._opened: Sequence | None = None
+        self._retry_at = 0.0
+        self._told = ""
+        self._computing = ""
         self._begun: tuple[str, float] = ("", 0.0)
         self._kept: set[str] = set()
         self._news = threading.Event()
@@ -57,7 +66,8 @@ class Keeper:
         self._thread.start()
 
     def library(self) -> Library:
-        """The library, opened when it is first asked for.
+        """The library, opened when it is first asked for; one that could not be opened is tried
+        again after a while.
 
         Raises:
             LibraryError: If there is none.
@@ -66,13 +76,15 @@ class Keeper:
             if self._library is None:
                 if self.path is None:
                     raise LibraryError("this workbench was started without a library")
-                if self.error is not None:
+                if self.error is not None and (self._closed or time.monotonic() < self._retry_at):
                     raise LibraryError(self.error)
                 try:
                     self._library = open_library(self.path)
                 except LibraryError as error:
                     self.error = sentence(error)
+                    self._retry_at = time.monotonic() + RETRY_SECONDS
                     raise
+                self.error = None
             return self._library
 
     def close(self) -> None:
@@ -89,29 +101,37 @@ class Keeper:
 
     def _on_change(self, change: Change) -> None:
         if change in ("sequence", "run", "evaluation"):
-            now = self._workbench.snapshot()
-            if now.run_state.state == "computing" and now.run_state.key != self._begun[0]:
-                self._begun = (now.run_state.key, time.time())
+            state = self._workbench.snapshot().run_state
+            computing = state.key if state.state == "computing" else ""
+            if computing and computing != self._computing:
+                self._begun = (computing, time.time())
+                self._kept.discard(computing)  # it is made anew: perhaps it was deleted since
+            self._computing = computing
             self._news.set()
 
     def _work(self) -> None:
         be_nice()
         if self.path is None:
             return
+        wait: float | None = None
         while not self._closed:
-            self._news.wait()
+            self._news.wait(wait)
             self._news.clear()
+            wait = None
             try:
                 self._note(self._workbench.snapshot())
+                self._told = ""
             except LibraryError as error:
                 if self._closed:
                     return
-                self._workbench.notify(
-                    "warn",
-                    f"Runs are not kept: {sentence(error)}.",
-                    "Everything else works as it does.",
-                )
-                return
+                wait = RETRY_SECONDS
+                if self._told != sentence(error):
+                    self._told = sentence(error)
+                    self._workbench.notify(
+                        "warn",
+                        f"Runs are not kept: {self._told}.",
+                        "Everything else works as it does; it is tried again by itself.",
+                    )
             except Exception:
                 logger.exception("a run was not kept")
 

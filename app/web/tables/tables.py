@@ -6,12 +6,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 
-from app.models import CameraTrack, LaneEvent, Step
+from app.models import CameraTrack, Step
 from app.state.kept.history import History
 from app.state.scores import Scored
 from app.state.snapshot import RunPhase, RunState, Snapshot
@@ -20,6 +20,7 @@ from app.state.workers.sensitivity import Curve, Sensitivity
 from app.web.dependencies import ERRORS, Bench, nothing_open
 from app.web.evaluation import messages
 from app.web.evaluation.models import Comparison
+from app.web.tables.event_tables import checked
 from app.web.tables.markup import (
     Cell,
     Markup,
@@ -37,16 +38,11 @@ from app.web.tables.markup import (
     vector,
 )
 from app.web.views import steps
-from app.web.views.decisions import words_of
-from app.web.views.timeline import Timelines
 from tracker import parameters as parameter_table
 from tracker.evaluation import Evaluation
 from tracker.evaluation.difference import Verdict
 from tracker.evaluation.figures import Figure
 from tracker.sequences.sequence import Sequence
-
-MOST_EVENTS = 500
-"""Rows of the table of events; more are counted."""
 
 SIGNS: dict[Verdict, str] = {"better": "▲ ", "worse": "▼ ", "same": "= ", "different": "≠ ",
                              "undefined": ""}  # fmt: skip
@@ -59,8 +55,6 @@ PHASES: dict[RunPhase, str] = {
     "cancelled": "partial",
 }
 """A run's state, as the page words it."""
-
-Kind = Literal["birth", "death", "switch", "long miss", "cut", "joined", "removed"]
 
 router = APIRouter(prefix="/api/tables", responses=ERRORS, default_response_class=HTMLResponse)
 
@@ -163,47 +157,6 @@ def _value_at(scored: Scored | None, name: str, message: Step) -> float | None:
     return float(getattr(scored.evaluation.series, name)[message.step])
 
 
-@router.get("/events")
-def event_table(
-    request: Request,
-    bench: Bench,
-    kind: Annotated[Kind | None, Query(description="Only these.")] = None,
-) -> str:
-    """Births, deaths, switches, long misses and what hindsight changed; each can be gone to."""
-    snapshot = bench.snapshot()
-    sequence, run = snapshot.sequence, snapshot.run
-    if sequence is None:
-        raise nothing_open()
-    timelines: Timelines = request.app.state.timelines
-    found: list[LaneEvent | tuple[int, int, Kind]] = (
-        [] if run is None else list(timelines.events(sequence, run))
-    )
-    scored = snapshot.scores.shown
-    if run is not None and scored is not None and scored.key == run.key and scored.evaluation:
-        found += [(s.step, s.track, "switch") for s in messages.switches_of(scored.evaluation)]
-    found = sorted((event for event in found if kind in (None, event[2])), key=lambda e: e[:2])
-    if not found:
-        return blank(
-            "No such event",
-            "Births, deaths, switches of identity and long misses are listed as they are found.",
-        )
-    why = {} if run is None else words_of(run)
-    more = len(found) - MOST_EVENTS
-    return table(
-        "Events",
-        ("#Step", "#Time  s", "Event", "Track"),
-        [
-            (
-                button(step, "go", f"{step} {track}", label=f"Go to step {step}"),
-                number(step / sequence.fps, 2),
-                why.get((step, track, what), what),
-                id_tag(track),
-            )
-            for step, track, what in found[:MOST_EVENTS]
-        ],
-    ) + (line(f"and {more} more") if more > 0 else "")
-
-
 @router.get("/changes")
 def change_table(request: Request, bench: Bench) -> str:
     """What differs from the defaults, each with its reset; and what parameters would change."""
@@ -289,12 +242,14 @@ def compare_tables(
     snapshot = bench.snapshot()
     sequence, scored = snapshot.sequence, snapshot.scores.shown
     if sequence is None:
-        return blank("Figures appear here", "once a sequence with truth is open.")
+        return blank("Figures appear here", "once a sequence is open.")
+    identity = checked(request, snapshot)
     if sequence.ground_truth is None:
-        return blank(
-            "There is no truth to compare with",
-            f"{sequence.name} names no file of true positions ([ground_truth] in "
-            "sequence.toml), so its tracks cannot be scored.",
+        return identity + line(
+            quiet(
+                f"{sequence.name} names no file of true positions ([ground_truth] in "
+                "sequence.toml), so its tracks cannot be scored."
+            )
         )
     if scored is None or scored.evaluation is None:
         return blank(
@@ -305,7 +260,7 @@ def compare_tables(
     if reference is None:
         words = " · no run to compare with: pin this one, or change a parameter"
         head = line(Markup("<b>B</b> "), _side("this run", scored), words)
-        return head + _figures(evaluation, every) + notes
+        return head + _figures(evaluation, every) + notes + identity
     against, other = reference
     evaluator: Evaluator = request.app.state.evaluator
     before = evaluator.beginning(other, scored.steps)
@@ -317,7 +272,8 @@ def compare_tables(
         _side("this run", scored),
         f" · {comparison.steps} steps",
     )
-    return head + _differences(comparison, evaluation, every) + _differing(comparison) + notes
+    tables = _differences(comparison, evaluation, every) + _differing(comparison)
+    return head + tables + notes + identity
 
 
 @router.get("/runs")

@@ -18,7 +18,7 @@ from numpy import ndarray
 from app import models
 from app.state.pairs import alike
 from app.state.scores import Scored
-from app.web.views.decisions import decided
+from app.web.views.decisions import Named, decided
 from app.web.views.names import Names
 from tracker.pipeline import Run
 from tracker.sequences.sequence import Sequence
@@ -191,6 +191,7 @@ class Timelines:
         done, count = 0, np.zeros(0, dtype=np.int64)
         lives: list[models.TrackLife] = []
         events: list[models.LaneEvent] = []
+        hindsight: list[Named] = []
         left_out = 0
         if run is not None:
             done = run.done
@@ -209,7 +210,8 @@ class Timelines:
             shortest = math.ceil(LONG_MISS * sequence.fps)
             lives, left_out = _lives(spans, window, shortest)
             events = _events(spans, done, shortest)
-            found = [(step, name, one.kind) for step, name, one in decided(run)]
+            hindsight = decided(run)
+            found = [(one.step, one.track, one.decision.kind) for one in hindsight]
             events = sorted([*events, *found], key=lambda e: e[:2])[:MOST_EVENTS]
             names = self._names.told(sequence, run)
             for life in lives:
@@ -227,6 +229,12 @@ class Timelines:
             tracks=lives,
             pinned=self._pinned(sequence, run, window, pinned),
             events=events,
+            decisions=[
+                models.Decided(
+                    step=one.step, track=one.track, kind=one.decision.kind, words=one.words
+                )
+                for one in hindsight[:MOST_EVENTS]
+            ],
             left_out=left_out,
         )
 

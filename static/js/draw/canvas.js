@@ -1,8 +1,10 @@
 /** What all canvases share. */
-import { svgBrush } from "./svg.js";
 
-/** Where a canvas is drawn while it is written down. @type {Map<HTMLCanvasElement, Brush & {marks: string[]}>} */
-const written = new Map();
+/**
+ * Canvases that are written down and not drawn: what makes their brush.
+ * @type {Map<HTMLCanvasElement, (real: Brush) => Brush>}
+ */
+export const writers = new Map();
 
 /**
  * Fit a canvas to its element, in CSS pixels, and to the screen's pixels; clear it.
@@ -14,33 +16,12 @@ export function prepare(canvas, width, height) {
 	const ratio = devicePixelRatio || 1;
 	const [w, hgt] = [width, height].map((side) => Math.max(1, Math.round(side * ratio)));
 	if (canvas.width !== w || canvas.height !== hgt) Object.assign(canvas, { width: w, height: hgt });
-	const real = /** @type {Brush} */ (canvas.getContext("2d"));
-	if (written.has(canvas)) {
-		const brush = svgBrush(real);
-		written.set(canvas, brush);
-		return brush;
-	}
-	const g = real;
+	const g = /** @type {Brush} */ (canvas.getContext("2d"));
+	const writer = writers.get(canvas);
+	if (writer) return writer(g);
 	g.setTransform(ratio, 0, 0, ratio, 0, 0);
 	g.clearRect(0, 0, width, height);
 	return g;
-}
-
-/**
- * The canvases of a pane drawn once more, as SVG.
- * @param {HTMLCanvasElement[]} canvases
- * @returns {Promise<(canvas: HTMLCanvasElement) => string>}
- */
-export async function recorded(canvases) {
-	const none = /** @type {any} */ ({ marks: [] });
-	for (const canvas of canvases) written.set(canvas, none);
-	dispatchEvent(new Event("panes"));
-	await new Promise((done) => setTimeout(done, 120));
-	const found = new Map([...written].map(([canvas, { marks }]) => [canvas, marks.join("")]));
-	written.clear();
-	// And back on the screen.
-	dispatchEvent(new Event("panes"));
-	return (canvas) => found.get(canvas) ?? "";
 }
 
 /** A path through points. @param {Brush} g @param {number[][]} points  x and y of each */

@@ -88,7 +88,7 @@ export function drawRuler({ g, row, view, ink }, range, marks = []) {
 /** @param {Pen} pen @param {Lanes} lanes */
 export function drawLanes(
 	pen,
-	{ tracks, pinned, scroll, laneHeight, done, selection, hover, switches },
+	{ tracks, pinned, scroll, laneHeight, done, selection, hover, switches, decisions },
 ) {
 	const { g, row, view, ink } = pen;
 	g.save();
@@ -145,7 +145,30 @@ export function drawLanes(
 		stroke(g, ink.get("bg-1"), 4.5);
 		stroke(g, ink.get("ink-1"), 1.5);
 	}
+	for (const { step, track, kind } of decisions) {
+		const y = kind === "removed" ? row.y + 3 : rows.get(track);
+		if (y !== undefined && step >= view.first && step <= view.last)
+			drawDecision(pen, kind, xOf(step, view), y);
+	}
 	g.restore();
+}
+
+/**
+ * What hindsight made otherwise: a link where pieces were joined, two edges where one was cut, and
+ * over the lanes a small ring where somebody was taken away who has no lane any more.
+ * @param {Pen} pen @param {Server.Decided["kind"]} kind @param {number} x @param {number} y
+ */
+function drawDecision({ g, ink }, kind, x, y) {
+	g.beginPath();
+	if (kind === "removed") g.arc(x, y, 2.5, 0, 7);
+	else if (kind === "joined") g.ellipse(x, y, 5, 3, 0, 0, 7);
+	else
+		for (const side of [-2, 2]) {
+			g.moveTo(x + side, y - 6);
+			g.lineTo(x + side, y + 6);
+		}
+	stroke(g, ink.get("bg-1"), 4);
+	stroke(g, ink.get(kind === "removed" ? "ink-3" : "ink-1"), 1.5);
 }
 
 /**

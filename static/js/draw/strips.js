@@ -36,7 +36,7 @@ function drawStairs({ g, row, view }, buckets, { low, high }, top, colour, width
 }
 
 /** The edge above a strip and the ground it stands on. @param {Pen} pen */
-function drawGround({ g, row, view, ink }) {
+export function drawGround({ g, row, view, ink }) {
 	stroke(
 		trace(g, [
 			[0, row.y + 0.5],

@@ -2,6 +2,7 @@
  * A brush that writes SVG: the drawing code of the canvases makes a vector picture with it. It has
  * what that code uses of a canvas's context, no more.
  */
+import { writers } from "./canvas.js";
 
 const escaped = (/** @type {string} */ text) =>
 	text.replace(/[<&"]/g, (sign) => `&#${sign.charCodeAt(0)};`);
@@ -93,4 +94,26 @@ export function svgBrush(real) {
 		set: (_, name, value) => ((now[String(name)] = value), true),
 	});
 	return brush;
+}
+
+/**
+ * The canvases of a pane drawn once more, as SVG.
+ * @param {HTMLCanvasElement[]} canvases
+ * @returns {Promise<(canvas: HTMLCanvasElement) => string>}
+ */
+export async function recorded(canvases) {
+	/** @type {Map<HTMLCanvasElement, string[]>} */
+	const found = new Map();
+	for (const canvas of canvases)
+		writers.set(canvas, (real) => {
+			const brush = svgBrush(real);
+			found.set(canvas, brush.marks);
+			return brush;
+		});
+	dispatchEvent(new Event("panes"));
+	await new Promise((done) => setTimeout(done, 120));
+	writers.clear();
+	// And back on the screen.
+	dispatchEvent(new Event("panes"));
+	return (canvas) => (found.get(canvas) ?? []).join("");
 }

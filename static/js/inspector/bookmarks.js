@@ -74,7 +74,7 @@ export function mountBookmarks(root, { store, actions, playback }) {
 		if (held?.startsWith("note-")) document.getElementById(held)?.focus();
 	}
 
-	store.on(["sequence"], ({ sequence }) => {
+	store.watch(["sequence"], ({ sequence }) => {
 		if (!sequence || sequence.opened_as === recording) return;
 		recording = sequence.opened_as;
 		store.set({ bookmarks: kept(recording) });
@@ -88,12 +88,12 @@ export function mountBookmarks(root, { store, actions, playback }) {
 			// Without storage they last as long as the page.
 		}
 	});
-	const { bookmark } = actions;
 	actions.bookmark = () => {
-		bookmark();
+		const { shown, bookmarks } = store.get();
+		actions.showTab("events");
+		if (shown >= 0 && !bookmarks.some(({ step }) => step === shown)) put(shown, "");
 		list();
 		// Once the panel is there.
-		const { shown } = store.get();
 		requestAnimationFrame(() => document.getElementById(`note-${shown}`)?.focus());
 	};
 	list();

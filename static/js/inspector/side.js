@@ -1,14 +1,12 @@
 /** The side panel: tabs with a panel each. */
 import { all, one, parts } from "../elements/dom.js";
 import { isAlone } from "../state/events.js";
-import { mountBookmarks } from "./bookmarks.js";
-import { mountTables } from "./tables.js";
 import { mountTracks } from "./tracks.js";
 
 /** @type {Pane} */
 export function mountSide(root, context) {
 	const { store } = context;
-	const { count, only, marks } = parts(root);
+	const { count, only } = parts(root);
 	const tabs = all("[role=tab]", root);
 	const nameOf = (/** @type {Part} */ tab) =>
 		/** @type {PageState["tab"]} */ (tab.id.replace("tab-", ""));
@@ -25,8 +23,6 @@ export function mountSide(root, context) {
 		});
 	});
 	mountTracks(one("#panel-tracks"), context);
-	mountTables(root, context);
-	mountBookmarks(marks, context);
 
 	function choose() {
 		for (const tab of tabs) {

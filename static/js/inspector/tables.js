@@ -13,12 +13,15 @@ import { all, choices, one, parts, write } from "../elements/dom.js";
 const TABLES = {
 	step: { keys: ["result", "scores"], path: ({ shown }) => `step/${Math.max(0, shown)}` },
 	events: {
-		keys: ["timeline", "scores", "eventKind"],
+		keys: ["timeline", "scores", "eventKind", "identity"],
 		path: ({ eventKind }) => `events${eventKind && `?kind=${eventKind}`}`,
 	},
 	teach: { keys: ["server"], path: () => "teach" },
 	changes: { keys: ["server"], path: () => "changes" },
-	compare: { keys: ["scores", "basis", "every"], path: ({ every }) => `compare?every=${every}` },
+	compare: {
+		keys: ["scores", "basis", "every", "identity"],
+		path: ({ every }) => `compare?every=${every}`,
+	},
 	runs: { keys: ["server", "run"], path: () => "runs" },
 };
 
@@ -64,7 +67,7 @@ export function mountTables(root, { store, actions }) {
 					body
 				).focus();
 		});
-		store.on([...keys, "tab", "sequence"], refresh);
+		store.watch([...keys, "tab", "sequence"], refresh);
 	}
 	root.addEventListener("click", ({ target }) => {
 		const { do: act, value = "" } = /** @type {Part} */ (
@@ -127,5 +130,5 @@ export function mountTables(root, { store, actions }) {
 		const past = events.filter(({ step }) => step <= state.shown).length;
 		write(place, events.length ? `${past} of ${events.length}` : "");
 	});
-	store.on(["eventKind"], ({ eventKind }) => (kind.value = eventKind));
+	store.watch(["eventKind"], ({ eventKind }) => (kind.value = eventKind));
 }

@@ -162,7 +162,7 @@ export function mountTeach(mosaic, { store, actions }) {
 		hint.textContent = NAME;
 	}).observe(panel, { childList: true, subtree: true });
 
-	store.on(["server"], ({ server }) => {
+	store.watch(["server"], ({ server }) => {
 		const { unsaved = 0, editing_room: editing = false } = server?.teaching ?? {};
 		const count = one("[data-ref=unsaved]");
 		count.hidden = !unsaved;

@@ -1,6 +1,7 @@
 /** Buttons, layer chips and keys: each performs a command of the one list. */
 import { all } from "../elements/dom.js";
 import { commandFor, commandOf, keyLabel, keyOf, perform } from "../state/commands.js";
+import { isBench } from "../state/places.js";
 
 /** Fields that take letters. */
 const TYPING =
@@ -79,6 +80,8 @@ export function pressed(event, store, actions) {
 	const target = /** @type {HTMLElement} */ (event.target);
 	const open = document.querySelector("dialog[open]");
 	if (open && !(open.matches(".help") ? key === "?" : key === "Ctrl+k")) return false;
+	// An open menu is closed by it, by the browser.
+	if (key === "Escape" && document.querySelector(":popover-open")) return false;
 	const types = target.matches?.(TYPING);
 	if (types && !ALWAYS.includes(key)) return false;
 	// In a list letters and arrows choose.
@@ -88,7 +91,7 @@ export function pressed(event, store, actions) {
 	const command = commandFor(key, store.get().singleKeys);
 	if (!command) return false;
 	// What a key means of the clock and the panes holds where they are.
-	if (store.get().place !== "tune" && command.group !== "Page") return false;
+	if (!isBench(store.get().place) && command.group !== "Page") return false;
 	event.preventDefault();
 	// What is being typed is kept first.
 	if (types && key !== "Ctrl+k") target.blur();

@@ -49,6 +49,8 @@ export function createActions({ store, seek, send, receive }) {
 	/** Layers that were on in pictures and off in 3D, or the other way round, before their key. */
 	/** @type {Record<string, (boolean | undefined)[]>} */
 	const mixed = {};
+	/** How hindsight looked before it was switched off. @type {string | undefined} */
+	let smoothing;
 	const frames = () => store.get().frames;
 
 	const count = () => store.set({ undoable: [past.length, future.length] });
@@ -223,6 +225,14 @@ export function createActions({ store, seek, send, receive }) {
 		useAgain: (number) => void askApart("POST", `run/again/${number}`),
 		runAgain: () => void actions.ask("POST", "run"),
 		pin: (on) => void actions.ask(on ? "POST" : "DELETE", "run/pin"),
+		hindsight() {
+			const { server, schema } = store.get();
+			const now = server?.parameters.smoothing_method;
+			if (!now) return;
+			if (now !== "none") smoothing = now;
+			const usual = schema?.methods.smoothing_method.at(-1) ?? now;
+			void actions.change({ smoothing_method: now !== "none" ? "none" : (smoothing ?? usual) });
+		},
 		async swap() {
 			const { server, run } = store.get();
 			if (!server?.pinned || run?.state !== "done") return;
@@ -313,22 +323,18 @@ export function createActions({ store, seek, send, receive }) {
 		},
 		toggle: (what) => store.set({ [what]: !store.get()[what] }),
 		async keepPicture() {},
+		checkIdentities() {},
 		nextTurn() {
 			const { turn } = store.get();
 			store.set({ turn: turn === "page" ? "centre" : turn === "centre" ? "off" : "page" });
 		},
 		wholePictures: () => store.set({ zooms: {}, follow: false, loupe: false }),
-		bookmark() {
-			const { shown, bookmarks } = store.get();
-			actions.showTab("events");
-			if (shown < 0 || bookmarks.some(({ step }) => step === shown)) return;
-			const all = [...bookmarks, { step: shown, note: "" }];
-			store.set({ bookmarks: all.sort((a, b) => a.step - b.step) });
-		},
 		// what the dialogs and the timeline put in place of these when they are there
 		help() {},
 		openSheet() {},
 		palette() {},
+		bookmark() {},
+		plot() {},
 		zoom() {},
 	};
 	return actions;

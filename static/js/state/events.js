@@ -35,7 +35,7 @@ export const isAlone = ({ selection, layers3d }) => selection !== null && layers
 
 /**
  * Events of the shown run that somebody wants to see, by step and track; switches are among them
- * where there is truth.
+ * where there is truth, doubts where identities were checked.
  * @param {Readonly<PageState>} state
  */
 export function eventsNow(state) {
@@ -44,10 +44,22 @@ export function eventsNow(state) {
 	const events = (timeline?.events ?? []).map(([step, id, kind]) => ({ step, id, kind }));
 	for (const { step, track } of scoresOf(state)?.series.switches ?? [])
 		events.push({ step, id: track, kind: "switch" });
+	const { identity, basis } = state;
+	if (identity?.run === basis)
+		for (const { step, ids } of identity.doubts) events.push({ step, id: ids[0], kind: "doubt" });
 	return events
 		.filter(({ kind }) => !eventKind || kind === eventKind)
 		.sort((a, b) => a.step - b.step || a.id - b.id);
 }
+
+/**
+ * What hindsight decided of a track, nearest to a step first.
+ * @param {Readonly<PageState>} state @param {number} id @param {number} step
+ */
+export const decisionsOf = ({ timeline }, id, step) =>
+	(timeline?.decisions ?? [])
+		.filter(({ track }) => track === id)
+		.sort((a, b) => Math.abs(a.step - step) - Math.abs(b.step - step));
 
 /**
  * The nearest event after or before a step.

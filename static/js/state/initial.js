@@ -12,6 +12,7 @@ const KEPT = /** @type {const} */ ([
 	"dismissed",
 	"realTime",
 	"turn",
+	"plots",
 ]);
 
 /** @returns {Partial<PageState>} */
@@ -60,11 +61,13 @@ export function initialState() {
 		listed: "all",
 		bookmarks: [],
 		layers3d: {},
+		plots: [],
 		large: null,
 		tab: "tracks",
 		eventKind: "",
 		every: false,
 		scores: null,
+		identity: null,
 		measure: "ospa",
 		laneOrder: "longest",
 		layout: {},
@@ -73,6 +76,7 @@ export function initialState() {
 		asked: "",
 		moved: false,
 		place: "tune",
+		signs: {},
 		dismissed: [],
 		undoable: [0, 0],
 		...kept,

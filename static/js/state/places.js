@@ -1,13 +1,26 @@
 /**
- * The places of the page, in the order of the work; the hash of the address names one. Who brings
- * another place adds a row here and marks in the markup what belongs to it (`data-place`).
+ * The places of the page, in the order of the work; the hash of the address names one. Another
+ * place is another row; its module is read when somebody first goes there.
  */
 
-/** @type {{name: string, word: string, tip: string}[]} */
+/** @type {PageSite[]} */
 export const PLACES = [
-	{ name: "tune", word: "Tune", tip: "3D, pictures and parameters on one clock" },
-	{ name: "library", word: "Library", tip: "Recordings and runs that are kept" },
+	{
+		name: "tune",
+		word: "Tune",
+		tip: "3D, pictures and parameters on one clock",
+		bench: true,
+	},
+	{
+		name: "library",
+		word: "Library",
+		tip: "Recordings and runs that are kept",
+		read: () => import("../library/library.js").then(({ mountLibrary }) => mountLibrary),
+	},
 ];
 
 /** The place that a hash names; the first one where it names none. @param {string} hash */
 export const placeOf = (hash) => (PLACES.find(({ name }) => `#${name}` === hash) ?? PLACES[0]).name;
+
+/** Whether a place is the workbench with its clock. @param {string} place */
+export const isBench = (place) => PLACES.some(({ name, bench }) => bench && name === place);

@@ -4,6 +4,7 @@
  */
 import { SPEEDS } from "../play/clock.js";
 
+const EVENTS = ["birth", "death", "switch", "long miss", "joined", "cut", "removed", "doubt"];
 const TABS = ["tracks", "step", "events", "teach", "changes", "compare", "runs"];
 
 /** Layers of the pictures, as they are at first. */
@@ -105,9 +106,7 @@ const KEYS = {
 		first: { eventKind: "" },
 		write: ({ eventKind }) => eventKind,
 		read: (text) =>
-			["birth", "death", "switch", "long miss"].includes(text)
-				? { eventKind: /** @type {LaneEvent["kind"]} */ (text) }
-				: null,
+			EVENTS.includes(text) ? { eventKind: /** @type {LaneEvent["kind"]} */ (text) } : null,
 	},
 	closer: {
 		first: { zooms: {} },

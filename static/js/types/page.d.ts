@@ -122,6 +122,10 @@ interface PageState {
 	every: boolean;
 	/** Of the run that was set against the truth last. */
 	scores: Scores | null;
+	/** Of the run whose identities were checked without truth last. */
+	identity: Server.IdentityInfo | null;
+	/** What is plotted of the selected track, by the server's names. */
+	plots: string[];
 	/** What the timeline plots. */
 	measure: "ospa" | "gospa";
 	laneOrder: "longest" | "born";
@@ -134,6 +138,8 @@ interface PageState {
 	asked: string;
 	/** Which of the page's places is looked at. */
 	place: string;
+	/** What stands beside the words of the places, by name. */
+	signs: Record<string, string>;
 	/** Whether somebody has chosen a step of this sequence. */
 	moved: boolean;
 	/** How many changes can be undone, and redone. */
@@ -216,6 +222,10 @@ interface Actions {
 	useAgain: (number: string) => void;
 	runAgain: () => void;
 	pin: (on: boolean) => void;
+	/** The tracks with hindsight, or those of the filter alone. */
+	hindsight: () => void;
+	/** Of the shown run, without truth. */
+	checkIdentities: (what: "start" | "stop") => void;
 	/** The shown run and the pinned one change places. */
 	swap: () => Promise<void>;
 	/** What the parameters were, whoever changed them. */
@@ -245,6 +255,8 @@ interface Actions {
 	/** A pane and a kind of file: `cams png`. */
 	keepPicture: (what: string) => Promise<void>;
 	nextTurn: () => void;
+	/** Something of the selected track over time, there or away; the menu where nothing is named. */
+	plot: (name?: string) => void;
 	wholePictures: () => void;
 	arrange: (name: "inspect" | "tune" | "compare") => void;
 	/** Mark the shown step, or go to its note. */
@@ -276,6 +288,33 @@ interface Context {
 	press: (event: KeyboardEvent) => boolean;
 }
 
+/** What others draw in the timeline, and ask of it. */
+interface TimelineSeam {
+	plot: HTMLElement;
+	draw: () => void;
+	/** Rows of others, under its own: each draws one. */
+	rows: ((pen: Pen) => void)[];
+	/** What is under the pointer. */
+	at: (event: PointerEvent) => { step: number; track: Server.TrackLife | undefined };
+	/** Draws the braid of identities; read when the page is there. */
+	braid?: typeof import("../timeline/braid.js").drawBraid;
+}
+
+/** One of the places of the top bar. */
+interface PageSite {
+	name: string;
+	word: string;
+	tip: string;
+	/** It is the workbench with its clock: all commands mean there what they mean in Tune. */
+	bench?: boolean;
+	/** Reads what fills it, when it is first gone to. */
+	read?: () => Promise<Pane>;
+	/** Whether what it shows exists; always where it is left out. */
+	exists?: (state: Readonly<PageState>) => boolean;
+	/** A sign beside its word: a count, a dot. */
+	sign?: (state: Readonly<PageState>) => string;
+}
+
 /** Fills its part of the page and keeps it current. */
 type Pane = (root: HTMLElement, context: Context) => void;
 
@@ -296,12 +335,17 @@ interface Lanes {
 	selection: number | null;
 	hover: number | null;
 	switches: Server.Switch[];
+	decisions: Server.Decided[];
 }
 
 /** The steps an axis of `width` CSS pixels shows. */
 type View = { first: number; last: number; width: number };
 
-type LaneEvent = { step: number; id: number; kind: Server.Timeline["events"][0][2] | "switch" };
+type LaneEvent = {
+	step: number;
+	id: number;
+	kind: Server.Timeline["events"][0][2] | "switch" | "doubt";
+};
 
 /** Of the mosaic of pictures. */
 type Cell = { x: number; y: number; width: number; height: number };

@@ -132,6 +132,37 @@ declare namespace Server {
 		points: [number, number][];
 	}
 
+	/** What can be plotted. */
+	interface CourseKind {
+		name: string;
+		word: string;
+		help: string;
+		needs_truth: boolean;
+	}
+
+	/** All of it, in the order of the list. */
+	interface CourseKinds {
+		kinds: CourseKind[];
+	}
+
+	/** Of one track of the shown run, in the buckets that were asked for. */
+	interface Courses {
+		run: string;
+		track: number;
+		first: number;
+		/** Steps a bucket: a value stands for the mean over them. */
+		stride: number;
+		courses: TrackCourse[];
+	}
+
+	/** What hindsight made otherwise than the filter, and why. */
+	interface Decided {
+		step: number;
+		track: number;
+		kind: "cut" | "joined" | "removed";
+		words: string;
+	}
+
 	/** What was deleted. */
 	interface Deleted {
 		runs: number[];
@@ -155,6 +186,13 @@ declare namespace Server {
 		/** False where the two were measured with different settings. */
 		comparable: boolean;
 		settings: string;
+	}
+
+	/** A moment at which other ways to look disagree. */
+	interface DoubtInfo {
+		step: number;
+		ids: number[];
+		why: string;
 	}
 
 	/** Where people appear: mean and standard deviation. */
@@ -293,6 +331,29 @@ declare namespace Server {
 	interface GroupInfo {
 		name: string;
 		help: string;
+	}
+
+	/** How well people are told apart, as far as the recording alone can say. */
+	interface IdentityInfo {
+		/** Key of the run that was looked at; empty before the first time. */
+		run: string;
+		state: "idle" | "looking" | "done" | "failed" | "cancelled";
+		done: number;
+		/** Steps over all ways to look; 0 while it is not known. */
+		total: number;
+		error: string | null;
+		/** Estimate of IDF1; null until it is done, as all that follows. */
+		score: number | null;
+		low: number | null;
+		/** IDF1 lay between these in nine of ten runs by which the estimate was calibrated. */
+		high: number | null;
+		/** IDF1 of the run backwards in time by the run as it is. */
+		backwards: number | null;
+		/** Empty where there is one camera only. */
+		witnesses: Witness[];
+		/** The most doubtful first. */
+		doubts: DoubtInfo[];
+		warning: string;
 	}
 
 	/** An import on its way. */
@@ -881,6 +942,8 @@ declare namespace Server {
 		pinned: PinnedTimeline | null;
 		/** Of all steps, also of those not asked for, in their order. */
 		events: ([number, number, "birth" | "death" | "long miss" | "cut" | "joined" | "removed"])[];
+		/** What hindsight changed, by its step; empty for the filter alone. */
+		decisions: Decided[];
 		/** How many more live there: the shorter ones, where they are very many. */
 		left_out: number;
 	}
@@ -894,6 +957,23 @@ declare namespace Server {
 		existence: number;
 		/** By camera. */
 		seen: boolean[];
+	}
+
+	/** One curve, or one for each camera. */
+	interface TrackCourse {
+		name: string;
+		word: string;
+		/** Empty for a share. */
+		unit: string;
+		help: string;
+		/** Value at the lower edge of its plot. */
+		low: number;
+		/** At its upper edge: a round number. */
+		high: number;
+		/** Each curve by buckets; null where the track is not there or the value is not known. */
+		values: ((number | null)[])[];
+		/** Whose the curves are; empty for one that is no camera's. */
+		cameras: string[];
 	}
 
 	/** A track's distance to whomever it is paired with, over time. */
@@ -943,5 +1023,14 @@ declare namespace Server {
 	/** Where the 3D view is. */
 	interface ViserInfo {
 		path: string;
+	}
+
+	/** What leaving one camera out says. */
+	interface Witness {
+		camera: string;
+		/** IDF1 of the others alone by all of them. */
+		agreed: number;
+		/** Mean overlap of its boxes with the people whom the others found; null without both. */
+		overlap: number | null;
 	}
 }

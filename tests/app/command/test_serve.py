@@ -45,6 +45,7 @@ def said(talk: Callable[[], Coroutine[None, None, T]]) -> T:
 class Server:
     process: subprocess.Popen[str]
     address: str
+    token: str = ""
 
     @property
     def place(self) -> str:
@@ -52,17 +53,23 @@ class Server:
 
 
 def start(*arguments: str) -> Server:
+    """Start it, without a token unless the arguments ask for one."""
+    words = arguments if "--token" in arguments else (*arguments, "--no-token")
     process = subprocess.Popen(
-        [sys.executable, "-m", "app", "serve", *arguments, "--port", "0", "--no-open"],
+        [sys.executable, "-m", "app", "serve", *words, "--port", "0", "--no-open"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
     assert process.stdout is not None
     line = process.stdout.readline()
-    match = re.fullmatch(r"multiview-phd: (http://127\.0\.0\.1:\d+) \(Ctrl-C ends it\)\n", line)
+    match = re.fullmatch(
+        r"multiview-phd: (http://127\.0\.0\.1:\d+)/(?:\?token=([\w-]{43}))? \(Ctrl-C ends it\)\n",
+        line,
+    )
     assert match, (line, process.stderr.read() if process.stderr and not line else "")
-    return Server(process, match[1])
+    assert (match[2] is not None) == ("--token" in arguments)
+    return Server(process, match[1], match[2] or "")
 
 
 @pytest.fixture(scope="module")
@@ -149,16 +156,63 @@ def test_foreign_pages_get_no_socket(server: Server, path: str) -> None:
         assert refused.value.response.status_code == 403
 
 
+@pytest.mark.full
+def test_the_printed_link_opens_what_is_closed_without_it(tmp_path: Path) -> None:
+    server = start(str(write_crossing(tmp_path / "crossing")), "--token")
+
+    async def sockets(**headers: str) -> list[bool]:
+        opened = []
+        for path in ("/api/stream", "/viser"):
+            try:
+                async with connect(
+                    f"ws://{server.place}{path}",
+                    subprotocols=[VISER],
+                    additional_headers=headers,
+                    max_size=None,
+                ) as ws:
+                    opened.append(len(await ws.recv()) > 0)
+            except InvalidStatus:
+                opened.append(False)
+        return opened
+
+    try:
+        with httpx.Client(base_url=server.address) as browser:
+            assert browser.get("/api/state").status_code == 401
+            assert said(sockets) == [False, False]
+            assert "Go on" in browser.get("/", params={"token": server.token}).text
+            name = f"multiview-phd-{server.address.rpartition(':')[2]}"
+            assert browser.cookies[name] == server.token
+            assert browser.get("/api/state").status_code == 200
+            assert browser.get("/viser/").status_code == 200
+            assert said(partial(sockets, Cookie=f"{name}={server.token}")) == [True, True]
+    finally:
+        server.process.send_signal(signal.SIGINT)
+        assert server.process.communicate(timeout=20) == ("", "")
+
+
+def test_no_token_is_for_this_machine_alone(
+    crossing: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for host in ("0.0.0.0", "::", "192.168.1.5"):
+        command = ["serve", str(crossing), "--no-open", "--no-token", "--host", host]
+        assert cli.main(command) == 2
+        assert f"--no-token: expected --host of this machine alone, got {host}" in (
+            capsys.readouterr().err
+        )
+    monkeypatch.setenv("MULTIVIEW_PHD_TOKEN", "short")
+    assert cli.main(["serve", str(crossing), "--no-open"]) == 1
+    assert "$MULTIVIEW_PHD_TOKEN: expected 16 or more" in capsys.readouterr().err
+
+
 def test_visers_public_tunnel_cannot_be_asked_for() -> None:
     from viser import _messages
 
-    from app.web.gateway import start_viser
+    from app.web.entrance import start_viser
 
     running = start_viser()
     try:
         handlers = running._websock_server._incoming_handlers
         assert _messages.ShareUrlRequest not in handlers
-        assert running.get_host() == "127.0.0.1"
     finally:
         running.stop()
 

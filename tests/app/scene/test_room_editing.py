@@ -13,7 +13,7 @@ from viser import _messages
 from app.scene.room_editing import FACES, Face, RoomEditing, dragged, grips
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench
-from app.web import gateway
+from app.web.entrance import start_viser
 from tests.app.scene import scene_case
 from tracker.parameters import RunParameters
 from tracker.sequences.frames import FrameReader
@@ -23,7 +23,7 @@ RIGHT = Face("max", 0)
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[viser.ViserServer]:
-    server = gateway.start_viser()
+    server = start_viser()
     yield server
     server.stop()
 

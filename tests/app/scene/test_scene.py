@@ -17,7 +17,7 @@ from app.scene.geometry import mass_radius
 from app.scene.nodes import linear
 from app.scene.scene import Scene
 from app.scene.worker import LatestWorker
-from app.web import gateway
+from app.web.entrance import start_viser
 from tests.app.scene import scene_case
 from tracker.pipeline import Progress
 
@@ -26,7 +26,7 @@ SECONDS = 20.0
 
 @pytest.fixture(scope="module")
 def shared_server() -> Iterator[viser.ViserServer]:
-    server = gateway.start_viser()
+    server = start_viser()
     yield server
     server.stop()
 

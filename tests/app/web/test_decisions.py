@@ -25,10 +25,16 @@ def test_a_decision_is_an_event_of_the_track_that_it_happened_to() -> None:
     joined = Decision("joined", 7, label, label + 1, 0.97, 0.02, "one person")
     unknown = Decision("removed", 8, 10**6, 10**6, 0.9, 0.1, "nobody")
     run.smoothed = replace(run.smoothed, decisions=(joined, unknown))
-    assert decided(run) == [(7, names[label], joined)]
-    assert words_of(run) == {(7, names[label], "joined"): "joined: one person, 0.97 against 0.02"}
-    told = Timelines().of(whole, run, Window.of(STEPS)).events
-    assert (7, names[label], "joined") in told
+    (one,) = decided(run)
+    assert (one.step, one.track, one.decision) == (7, names[label], joined)
+    other = f" to {one.other}" if one.other is not None else ""
+    words = f"joined{other} at 7: one person, 0.97 against 0.02"
+    assert words_of(run) == {(7, names[label], "joined"): words}
+    told = Timelines().of(whole, run, Window.of(STEPS))
+    assert (7, names[label], "joined") in told.events
+    assert [(d.step, d.track, d.kind, d.words) for d in told.decisions] == [
+        (7, names[label], "joined", words)
+    ]
 
 
 def test_the_filter_alone_decides_nothing_afterwards() -> None:

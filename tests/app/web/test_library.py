@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from app.state.workers import keeper
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, is_evaluated, run_is, wait_until
+from tracker.library.errors import LibraryError
 from tracker.library.store import Library
 
 P_D = "fusion.detection_probability"
@@ -57,6 +59,34 @@ def test_finished_runs_are_kept_with_their_figures(kept: TestClient) -> None:
     # what was never opened can be opened from there all the same
     (never,) = [r for r in listed["recordings"] if r["name"] == "numbers"]
     assert (never["id"], never["runs"]) == (None, 0)
+
+
+def test_a_run_that_was_deleted_and_is_made_again_is_kept_again(kept: TestClient) -> None:
+    _, default = runs_of(kept)
+    kept.post("/api/library/delete", json={"runs": [default["id"]]})
+    assert len(runs_of(kept)) == 1
+    kept.post("/api/parameters/reset", json={"keys": [P_D]})
+    wait_until(lambda: [run["id"] for run in runs_of(kept)][:1] == [default["id"]])
+
+
+def test_a_library_that_cannot_be_used_for_a_while_keeps_runs_again_afterwards(
+    data: Path, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    free = False
+
+    def opened(path: Path) -> Library:
+        if not free:
+            raise LibraryError(f"{path}: another program holds the library")
+        return Library(path)
+
+    monkeypatch.setattr(keeper, "open_library", opened)
+    monkeypatch.setattr(keeper, "RETRY_SECONDS", 0.2)
+    with application(data, path) as client:
+        wait_until(lambda: run_is(client, "done"))
+        assert "another program holds" in client.get("/api/library").json()["error"]
+        free = True
+        wait_until(lambda: len(runs_of(client)) == 1)
+        assert client.get("/api/library").json()["error"] is None
 
 
 def test_a_kept_run_is_shown_as_it_was_and_nothing_is_computed(kept: TestClient) -> None:

@@ -69,4 +69,5 @@ IDENTITIES = Method(
     help="Smoothed, and who is who settled over the whole recording.",
     made_by="tracker.smoothing.stage:Identities",
     uses=Uses(reads=(Reads("smoothing"),)),
+    settles_who=True,
 )

@@ -4,9 +4,8 @@ import { prepare } from "../draw/canvas.js";
 import { drawLoupe, drawPicture, lensOf } from "../draw/picture.js";
 import { visibleTracks } from "../draw/overlay.js";
 import { fillBoxCard, fillTrackCard } from "./cards.js";
-import { mountMagnifier } from "./magnify.js";
-import { isAlone, viewWords } from "../state/events.js";
-import { mosaic } from "../draw/mosaic.js";
+import { decisionsOf, isAlone, viewWords } from "../state/events.js";
+import { mosaic } from "./mosaic.js";
 import { pictureInk } from "../draw/colours.js";
 
 /** A second click within this time makes it a double click, milliseconds. */
@@ -270,6 +269,7 @@ export function mountCameras(root, { store, actions, playback }) {
 					card,
 					track,
 					frame?.result?.tracks.find(({ id }) => id === track.id),
+					decisionsOf(store.get(), track.id, frame?.step ?? 0),
 				);
 			const { width, height, x } = places[index];
 			const { k, left: gone, top } = lensNow(index);
@@ -322,7 +322,6 @@ export function mountCameras(root, { store, actions, playback }) {
 	store.on(["sequence"], ({ sequence }) => (sequence?.key ?? "") !== sequenceKey && build());
 	store.watch(["server", "sequences"], header);
 	store.on(["large"], arrange);
-	mountMagnifier(body, store);
 	store.on(
 		["selection", "hover", "pointed", "layers2d", "layers3d", "zooms", "loupe", "follow"],
 		playback.repaint,

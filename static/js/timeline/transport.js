@@ -4,7 +4,8 @@ import { all, choices, parts, write } from "../elements/dom.js";
 
 /** @type {Pane} */
 export function mountTransport(root, { store, playback }) {
-	const { play, read, step, of, seconds, typed, speed, loop, range, real, turn } = parts(root);
+	const { play, read, step, of, seconds, typed, speed, loop, range, real, turn, hindsight } =
+		parts(root);
 	const close = () => {
 		typed.hidden = true;
 		read.hidden = false;
@@ -58,6 +59,12 @@ export function mountTransport(root, { store, playback }) {
 		speed.value = String(now);
 	};
 	store.watch(["loop", "range", "sequence", "speed"], marks);
+	store.watch(["server", "link"], ({ server, link }) => {
+		const method = server?.parameters.smoothing_method;
+		hindsight.disabled = !method || link !== "open";
+		write(hindsight, method === "none" ? "filter alone" : "with hindsight");
+		hindsight.ariaPressed = String(method !== "none");
+	});
 	store.watch(["realTime", "turn"], ({ realTime, turn: how }) => {
 		write(real, realTime ? "real time" : "every step");
 		write(turn, { page: "turns pages", centre: "centred", off: "stays" }[how]);

@@ -1,6 +1,6 @@
 /** The braid of identities: who is followed by which track, and where that changes. */
 import { bucketOf, xOf } from "../play/clock.js";
-import { stroke } from "./canvas.js";
+import { stroke } from "../draw/canvas.js";
 
 /**
  * By which track each person is followed, from switch to switch.

@@ -1,7 +1,7 @@
 /** What the timeline's curves and lanes say under the pointer, in words beside it. */
 import { bucketOf, secondsOf } from "../play/clock.js";
 import { fill, h, idTag } from "../elements/dom.js";
-import { scoresOf, stateAt } from "../state/events.js";
+import { decisionsOf, scoresOf, stateAt } from "../state/events.js";
 
 /**
  * @param {Readonly<PageState>} state
@@ -10,7 +10,9 @@ import { scoresOf, stateAt } from "../state/events.js";
  * @returns {(Node | string)[][]} lines
  */
 export function hintLines(state, step, track) {
-	const { timeline, fps, measure } = state;
+	const { timeline, fps, measure, span, frames } = state;
+	/** Within which a mark is pointed at, steps. */
+	const reach = Math.max(1, (span ? span[1] - span[0] : frames) / 150);
 	/** @type {(Node | string)[][]} */
 	const lines = [[h("b", {}, `step ${step}`), ` · ${secondsOf(step, fps)} s`]];
 	if (track) {
@@ -19,6 +21,13 @@ export function hintLines(state, step, track) {
 		);
 		const what = events.map(([, , kind]) => kind).join(", ");
 		lines.push([idTag(track.id), ` ${stateAt(track, step)}${what && ` · ${what}`}`]);
+		const near = decisionsOf(state, track.id, step)[0];
+		if (near && Math.abs(near.step - step) <= reach) lines.push([near.words]);
+	} else {
+		const gone = (timeline?.decisions ?? []).filter(
+			({ step: at, kind }) => kind === "removed" && Math.abs(at - step) <= reach,
+		);
+		for (const { track: id, words } of gone.slice(0, 3)) lines.push([idTag(id), ` ${words}`]);
 	}
 	if (timeline && step < timeline.done) {
 		const at = bucketOf(step, timeline);
@@ -36,11 +45,12 @@ export function hintLines(state, step, track) {
 	return lines;
 }
 
-/**
- * @param {HTMLElement} plot
- * @param {(event: PointerEvent) => (Node | string)[][]} read  lines for where the pointer is
- */
-export function mountHint(plot, read) {
+/** @param {TimelineSeam} timeline @param {Store<PageState>} store */
+export function mountHint({ plot, at }, store) {
+	const read = (/** @type {PointerEvent} */ event) => {
+		const { step, track } = at(event);
+		return store.get().sequence ? hintLines(store.get(), step, track) : [];
+	};
 	const card = h("div", { class: "card hint-card", hidden: true });
 	plot.append(card);
 	plot.addEventListener("pointermove", (event) => {

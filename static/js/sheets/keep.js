@@ -3,7 +3,7 @@
  * are written where they stand.
  */
 import { all, one } from "../elements/dom.js";
-import { recorded } from "../draw/canvas.js";
+import { recorded } from "../draw/svg.js";
 
 /** Of a PNG, pixels a CSS pixel. */
 const SHARP = 2;

@@ -3,15 +3,17 @@ import { bucketOf, panned, secondsOf, stepAt, xOf, zoomed } from "../play/clock.
 import { fill, h, idTag, parts, write } from "../elements/dom.js";
 import { hatch, prepare } from "../draw/canvas.js";
 import { drawLanes, drawRange, drawRuler } from "../draw/lanes.js";
-import { drawBraid } from "../draw/braid.js";
 import { drawCardinality, drawErrors, drawParts } from "../draw/strips.js";
 import { isAlone, ordered, resultOf, scoresOf, trueCount } from "../state/events.js";
 import { faded, palette } from "../draw/colours.js";
 import { shownDone } from "../play/playback.js";
-import { hintLines, mountHint } from "./hint.js";
 import { mountTransport } from "./transport.js";
 
-/** @type {Pane} */
+/**
+ * @param {HTMLElement} root
+ * @param {Context} context
+ * @returns {TimelineSeam} where others draw and ask
+ */
 export function mountTimeline(root, context) {
 	const { store, actions, playback } = context;
 	const {
@@ -50,6 +52,16 @@ export function mountTimeline(root, context) {
 	let view = { first: 0, last: 1, width: 1 };
 	let asked = false;
 	let spoken = 0;
+	/** @type {TimelineSeam} */
+	const seam = {
+		plot,
+		draw,
+		rows: [],
+		at: (event) => ({
+			step: stepAt(event.clientX - plot.getBoundingClientRect().left, view),
+			track: laneAt(event),
+		}),
+	};
 
 	const token = (/** @type {string} */ name) =>
 		parseFloat(getComputedStyle(document.documentElement).getPropertyValue(`--${name}`));
@@ -152,19 +164,22 @@ export function mountTimeline(root, context) {
 			selection,
 			hover: hover?.id ?? null,
 			switches: series?.switches ?? [],
+			decisions: timeline?.decisions ?? [],
 		});
 		drawRange(over, playback.loadedSteps(), done, frames);
 		drawRuler(ruler, range, store.get().bookmarks);
 		// Each plot has its row, whether there is something to plot or not.
 		const scores = scoresOf(store.get());
 		if (!braided.hidden && scores)
-			drawBraid(row(token("h-strip")), scores, sorted.tracks, selection);
-		const [counts, costs, distances] = [0, 1, 2].map(() => row(token("h-strip")));
+			seam.braid?.(row(token("h-strip")), scores, sorted.tracks, selection);
+		const counts = row(token("h-strip"));
 		if (timeline) drawCardinality(counts, timeline);
-		if (series && !scored.hidden) {
-			drawParts(costs, series, reference ?? null, name);
-			drawErrors(distances, series, selection);
+		if (!scored.hidden) {
+			const [costs, distances] = [0, 1].map(() => row(token("h-strip")));
+			if (series) drawParts(costs, series, reference ?? null, name);
+			if (series) drawErrors(distances, series, selection);
 		}
+		for (const drawRow of seam.rows) drawRow(row(token("h-strip")));
 		if (done < frames) {
 			const x = Math.max(0, xOf(done, view));
 			hatch(
@@ -299,12 +314,6 @@ export function mountTimeline(root, context) {
 		if (y < 0 || y >= lanes.clientHeight) return undefined;
 		return shownTracks()[Math.floor((y + lanes.scrollTop) / token("h-lane"))];
 	}
-	mountHint(plot, (event) => {
-		const { sequence } = store.get();
-		if (!sequence) return [];
-		const at = stepAt(event.clientX - plot.getBoundingClientRect().left, view);
-		return hintLines(store.get(), at, laneAt(event));
-	});
 	actions.zoom = (factor) =>
 		look(
 			zoomed(
@@ -368,4 +377,5 @@ export function mountTimeline(root, context) {
 	addEventListener("panes", draw);
 	new ResizeObserver(resize).observe(plot);
 	resize();
+	return seam;
 }

@@ -1,7 +1,7 @@
 /** The two dialogs made from the registry of commands: help with its keys, and the palette. */
 import { COMMANDS, keyLabel, perform, search } from "../state/commands.js";
 import { all, fill, h, parts } from "../elements/dom.js";
-import { matching, offersOf, rangeOf, valueOf } from "../state/offers.js";
+import { matching, offersOf, rangeOf, valueOf } from "./offers.js";
 
 /** @param {string[]} keys */
 const signs = (keys) => keys.map((key) => h("kbd", {}, keyLabel(key)));

@@ -1,0 +1,157 @@
+"""``corrections``: what was put right by hand, in a terminal."""
+
+from __future__ import annotations
+
+import json
+import sys
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+from app.command.correction_flags import (
+    CheckCorrections,
+    Corrections,
+    DiffCorrections,
+    ListCorrections,
+    MergeCorrections,
+)
+from app.command.terminal import Bar, CommandError, print_table, say
+from tracker.corrections import Correction, CorrectionError
+from tracker.corrections.log import FILE, place_of, read_log, write_log
+from tracker.corrections.merging import difference, merge
+from tracker.sequences import library
+from tracker.sequences.sequence import Sequence
+
+DIFFERENT = 1
+
+
+def corrections(command: Corrections) -> int:
+    """Run one of the commands; returns the exit status.
+
+    Raises:
+        CorrectionError: If a log is not as it must be.
+    """
+    match command.action:
+        case ListCorrections() as action:
+            _list(read_log(_log(action.log)), as_json=action.json)
+        case CheckCorrections() as action:
+            return _check(action)
+        case DiffCorrections() as action:
+            return _diff(action)
+        case MergeCorrections() as action:
+            merged = merge(read_log(_log(action.first)), read_log(_log(action.second)))
+            write_log(action.output, merged)
+            say(f"{len(merged)} corrections, written to {action.output}")
+    return 0
+
+
+def of_run(sequence: Sequence, file: Path | None, *, none: bool = False) -> tuple[Correction, ...]:
+    """The corrections that a run of a sequence obeys.
+
+    Args:
+        sequence: Whose own log counts where no other is named.
+        file: Another log.
+        none: Whether none are wanted.
+
+    Raises:
+        CorrectionError: If the log that is named is not there, or cannot be used.
+    """
+    if none:
+        if file is not None:
+            raise CommandError("--corrections and --no-corrections: expected one of them")
+        return ()
+    if file is None:
+        own = place_of(sequence.folder)
+        try:
+            return read_log(own)
+        except CorrectionError as error:
+            raise CommandError(f"{error}; mend it, or track with --no-corrections") from None
+    return read_log(_log(str(file)))
+
+
+def _log(name: str) -> Path:
+    """The log that a file or a sequence stands for."""
+    path = Path(name).expanduser()
+    if path.is_file():
+        return path
+    if path.is_dir() and (path / FILE).is_file():
+        return path / FILE
+    try:
+        own = place_of(library.open_sequence(name).folder)
+    except ValueError as error:
+        raise CommandError(f"{name}: expected a {FILE} or a sequence: {error}") from None
+    if not own.is_file():
+        raise CommandError(f"{name}: has no corrections yet; its log would be {own}")
+    return own
+
+
+def _values(one: Correction) -> dict[str, Any]:
+    return one.model_dump(mode="json", exclude_none=True)
+
+
+def _print(document: Any) -> None:
+    sys.stdout.write(json.dumps(document, allow_nan=False) + "\n")
+
+
+def _list(found: tuple[Correction, ...], *, as_json: bool) -> None:
+    if as_json:
+        _print([_values(one) for one in found])
+        return
+    print_table(("id", "time", "what", "where", "note"), [_row(one) for one in found])
+
+
+def _row(one: Correction) -> tuple[str, ...]:
+    where = ", ".join(f"({p.x:.2f}, {p.y:.2f})" for p in one.places[:4])
+    return one.id, f"{one.time:%Y-%m-%d %H:%M}", one.words, where, one.note
+
+
+def _check(action: CheckCorrections) -> int:
+    from app.state.workers.compiling import Compiling
+    from tracker import pipeline
+    from tracker.runs.stage_cache import StageCache
+
+    with Bar("rendering", "frame") as rendering:
+        sequence = library.open_sequence(action.sequence, progress=rendering.at)
+    told = of_run(sequence, action.corrections)
+    with Bar("tracking", "step") as tracking, closing(Compiling(say)) as compiling:
+        compiling.wait(lambda done, total: None, lambda: False)
+        run = pipeline.compute(
+            sequence,
+            pipeline.default_parameters(sequence),
+            corrections=told,
+            cache=StageCache.on_disk(),
+            on_progress=lambda _, progress: tracking.at(progress.done, progress.total),
+        )
+    became = {outcome.id: outcome for outcome in run.outcomes}
+    unmet = [one for one in run.outcomes if not one.met]
+    if action.json:
+        _print([
+            {**_values(one), "met": became[one.id].met, "why": became[one.id].why} for one in told
+        ])  # fmt: skip
+    else:
+        print_table(
+            ("id", "what", "met", "why not"),
+            [
+                (one.id, one.words, "yes" if became[one.id].met else "no", became[one.id].why)
+                for one in told
+            ],
+        )
+    say(f"{len(told) - len(unmet)} of {len(told)} corrections met")
+    return DIFFERENT if unmet else 0
+
+
+def _diff(action: DiffCorrections) -> int:
+    found = difference(read_log(_log(action.first)), read_log(_log(action.second)))
+    if action.json:
+        _print({
+            "only_first": [_values(one) for one in found.only_first],
+            "only_second": [_values(one) for one in found.only_second],
+            "changed": [[_values(one), _values(other)] for one, other in found.changed],
+        })  # fmt: skip
+    else:
+        rows = [("<", *_row(one)) for one in found.only_first]
+        rows += [(">", *_row(one)) for one in found.only_second]
+        for one, other in found.changed:
+            rows += [("<", *_row(one)), (">", *_row(other))]
+        print_table(("", "id", "time", "what", "where", "note"), rows)
+    return 0 if found.empty else DIFFERENT

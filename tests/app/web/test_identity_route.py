@@ -1,0 +1,63 @@
+"""The check of identities without truth, through the routes: begun, watched, listed, stopped."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.state.workbench import Workbench
+from app.state.workers import identity_check
+from tests.app.conftest import wait_until
+from tracker import pipeline
+from tracker.experiments.laboratory.experiment import Context
+from tracker.pipeline import Run
+from tracker.sequences.library import open_sequence
+from tracker.without_truth import Estimate
+
+
+def test_a_finished_run_is_looked_at_in_other_ways(client: TestClient) -> None:
+    assert "Check identities" in client.get("/api/tables/compare").text
+    begun = client.post("/api/identity").json()
+    assert begun["state"] in ("looking", "done")
+    wait_until(lambda: client.get("/api/identity").json()["state"] == "done", 60.0)
+    told = client.get("/api/identity").json()
+    state = client.get("/api/state").json()
+    assert told["run"] == state["run"]["key"]
+    assert 0.0 <= told["low"] <= told["high"] <= 1.0
+    names = [camera["name"] for camera in state["sequence"]["cameras"]]
+    assert [witness["camera"] for witness in told["witnesses"]] == names
+    mean = sum(witness["agreed"] for witness in told["witnesses"]) / len(names)
+    assert told["score"] == told["backwards"] * mean
+    table = client.get("/api/tables/compare").text
+    assert f"{told['score']:.3f}" in table
+    assert "consistently wrong" in table
+    listed = client.get("/api/tables/events", params={"kind": "doubt"}).text
+    assert all(doubt["why"] in listed for doubt in told["doubts"])
+    # asked for again it is there already
+    assert client.post("/api/identity").json()["state"] == "done"
+
+
+def test_a_run_that_is_not_finished_is_not_checked(crossing: Path) -> None:
+    sequence = open_sequence(str(crossing))
+    parameters = pipeline.default_parameters(sequence)
+    check = identity_check.IdentityCheck(Workbench())
+    with pytest.raises(ValueError, match="3 of 120 steps"):
+        check.start(pipeline.compute(sequence, parameters, steps=3))
+    assert check.now.state == "idle"
+
+
+def test_another_run_ends_a_check(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    stopped: list[str] = []
+
+    def endless(run: Run, context: Context) -> Estimate:
+        wait_until(context.cancelled, 30.0)
+        stopped.append(run.key)
+        raise identity_check.Cancelled
+
+    monkeypatch.setattr(identity_check, "estimate", endless)
+    key = client.post("/api/identity").json()["run"]
+    client.patch("/api/parameters", json={"changes": {"fusion.detection_probability": 0.7}})
+    wait_until(lambda: client.get("/api/identity").json()["state"] == "cancelled")
+    assert stopped == [key]

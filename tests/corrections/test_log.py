@@ -1,0 +1,155 @@
+"""The log: what is written is read again, what is wrong is told with its line."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tracker.corrections import Correction, CorrectionError
+from tracker.corrections.contradictions import refuse_contradiction
+from tracker.corrections.kinds import KINDS, digest, make
+from tracker.corrections.log import dump, open_log, parse, place_of, read_log, write_log
+from tracker.corrections.merging import difference, merge
+
+_NUMBERS = st.floats(-50.0, 50.0).map(lambda v: round(v, 4))
+_TIMES = st.datetimes(datetime(2020, 1, 1), datetime(2030, 1, 1)).map(
+    lambda time: time.replace(microsecond=0, tzinfo=UTC)
+)
+_NOTES = st.text(st.characters(exclude_categories=("Cs", "Cc")), max_size=20)
+
+
+@st.composite
+def corrections(draw: st.DrawFn) -> Correction:
+    """Any one."""
+    kind = draw(st.sampled_from(sorted(KINDS)))
+    fewest, most = KINDS[kind].places
+    count = draw(st.integers(fewest, 5 if most is None else most))
+    steps = sorted(draw(st.sets(st.integers(0, 900), min_size=count, max_size=count)))
+    values: dict[str, object] = {
+        "places": [[step, draw(_NUMBERS), draw(_NUMBERS), draw(_NUMBERS)] for step in steps]
+    }
+    if kind == "name":
+        values["name"] = draw(st.sampled_from(["Anna", 'a "quoted" one', "ü"]))
+    if kind == "checked":
+        values |= {"first": draw(st.integers(0, 5)), "last": draw(st.integers(5, 9))}
+    return make(kind=kind, time=draw(_TIMES), note=draw(_NOTES), **values)
+
+
+@given(st.lists(corrections(), max_size=6))
+def test_a_log_is_read_as_it_was_written(told: list[Correction]) -> None:
+    kept: list[Correction] = []
+    for one in told:
+        if all(one.id != other.id for other in kept):
+            try:
+                refuse_contradiction(kept, one)
+            except CorrectionError:
+                continue
+            kept.append(one)
+    text = dump(kept)
+    again = parse(text, "corrections.toml")
+    assert again == tuple(kept)
+    assert dump(again) == text
+    assert digest(again, KINDS) == digest(kept, KINDS)
+
+
+LOG = """format = 1
+
+[[correction]]
+kind = "same"
+time = 2026-11-22T11:32:09Z
+places = [
+    [3, 1.0, 2.0, 0.8],
+    [9, 1.2, 2.0, 0.8],
+]
+
+[[correction]]
+kind = "here"
+time = 2026-11-22T11:32:09Z
+places = [[3, 5.0, 2.0, 0.8]]
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "words"),
+    [
+        ('kind = "here"', 'kind = "hier"', 12, "expected one of same"),
+        ("[[3, 5.0", "[[3.5, 5.0", 14, "places"),
+        ("[[3, 5.0, 2.0, 0.8]]", "[]", 14, "here has 1, found 0"),
+        ("[9, 1.2", "[2, 1.2", 6, "forward in time"),
+        ("format = 1", "format = 2", 1, "a newer program wrote it"),
+        ("format = 1", "colour = 1", 1, "found colour"),
+        ('kind = "here"', 'kind = "here"\ncolour = 3', 13, "colour"),
+        ("[[3, 5.0", "[[nan, 5.0", 14, "places"),
+        ("5.0, 2.0, 0.8]]", "inf, 2.0, 0.8]]", 14, "places"),
+        ('kind = "here"', 'kind = "here', 12, "not TOML"),
+    ],
+)
+def test_a_malformed_log_names_its_line(
+    tmp_path: Path, old: str, new: str, line: int, words: str
+) -> None:
+    assert old in LOG
+    path = tmp_path / "corrections.toml"
+    path.write_text(LOG.replace(old, new), encoding="utf-8")
+    with pytest.raises(CorrectionError, match=f"line {line}") as error:
+        read_log(path)
+    assert words in str(error.value)
+    assert str(path) in str(error.value)
+    opened = open_log(tmp_path)
+    assert opened.corrections == ()
+    assert opened.problem == str(error.value)
+
+
+def test_who_is_tied_together_is_not_parted() -> None:
+    a, b, c = [3, 1.0, 2.0, 0.8], [9, 1.2, 2.0, 0.8], [20, 3.0, 2.0, 0.8]
+    one, other = make(kind="same", places=[a, b]), make(kind="same", places=[b, c])
+    for parted in (make(kind="different", places=[a, c]), make(kind="different", places=[a, b])):
+        with pytest.raises(CorrectionError, match="contradicts"):
+            refuse_contradiction([one, other], parted)
+        with pytest.raises(CorrectionError, match="contradicts"):
+            refuse_contradiction([parted, one], other if parted.places[1].step == 20 else one)
+    refuse_contradiction([one], make(kind="different", places=[a, c]))
+    far = [9, 9.0, 2.0, 0.8]
+    with pytest.raises(CorrectionError, match="two places"):
+        refuse_contradiction([one], make(kind="same", places=[a, far]))
+    with pytest.raises(CorrectionError, match="somebody is at"):
+        refuse_contradiction([make(kind="here", places=[a])], make(kind="nobody", places=[a]))
+
+
+def test_a_line_that_contradicts_one_before_is_told(tmp_path: Path) -> None:
+    more = (
+        '\n[[correction]]\nkind = "different"\nplaces = [[3, 1.0, 2.0, 0.8], [9, 1.2, 2.0, 0.8]]\n'
+    )
+    with pytest.raises(CorrectionError, match=r"line 16: .*contradicts"):
+        parse(LOG + more, "corrections.toml")
+
+
+def test_two_logs_as_one() -> None:
+    first = parse(LOG, "one")
+    later = make(kind="checked", first=0, last=9, time=datetime(2020, 1, 1, tzinfo=UTC))
+    second = (first[0], later)
+    told = difference(first, second)
+    assert (told.only_first, told.only_second, told.changed) == ((first[1],), (later,), ())
+    assert next(one.id for one in merge(first, second)) == later.id
+    assert set(merge(first, second)) == set(merge(second, first)) == {*first, later}
+    changed = first[0].model_copy(update={"note": "look again"})
+    with pytest.raises(CorrectionError, match="same in both logs"):
+        merge(first, (changed,))
+    assert difference(first, first).empty
+
+
+def test_a_folder_that_may_only_be_read_has_its_log_with_the_user(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MULTIVIEW_PHD_SETTINGS", str(tmp_path / "settings"))
+    folder = tmp_path / "recording"
+    folder.mkdir()
+    assert place_of(folder) == folder / "corrections.toml"
+    monkeypatch.setattr("os.access", lambda path, mode: False)
+    place = place_of(folder)
+    assert place.is_relative_to(tmp_path / "settings")
+    write_log(place, parse(LOG, "one"))
+    assert open_log(folder).corrections == parse(LOG, "one")

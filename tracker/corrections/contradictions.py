@@ -1,0 +1,143 @@
+"""Corrections that cannot both be true are refused when they are made."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Many
+
+import numpy as np
+
+from tracker.corrections.kinds import Correction, CorrectionError, Place
+
+NEAR = 0.3
+"""Metres on the ground within which two places of one step are one person's."""
+
+APART = 2.0
+"""Metres on the ground from which two places of one step are two people's for sure."""
+
+
+def refuse_contradiction(before: Many[Correction], new: Correction) -> None:
+    """Say so where a correction cannot be true together with those before.
+
+    Two places of one step within :data:`NEAR` are one person's. People that *same* and *exchanged*
+    tie together must not be parted by *different* and must not be in two places at once; and
+    nobody is where somebody is. Who left may come back.
+
+    Raises:
+        CorrectionError: With both of them in the sentence.
+    """
+    known = [one for one in before if one.id != new.id]
+    try:
+        _check([*known, new])
+    except _Contradiction as found:
+        other = next((one for one in found.others if one is not new), None)
+        against = f'"{other.words}"' if other is not None else "itself"
+        raise CorrectionError(
+            f'"{new.words}" contradicts {against}: {found.why}; take that back first'
+        ) from None
+
+
+class _Contradiction(Exception):
+    def __init__(self, why: str, *others: Correction) -> None:
+        super().__init__(why)
+        self.why, self.others = why, others
+
+
+class _People:
+    """Places that are one person's, tied together: union-find."""
+
+    def __init__(self) -> None:
+        self.places: list[tuple[Place, Correction]] = []
+        self._parents: list[int] = []
+
+    def of(self, place: Place, correction: Correction) -> int:
+        """The number of a place; that of one near it at its step where there is one."""
+        for number, (other, _) in enumerate(self.places):
+            if other.step == place.step and _distance(other, place) <= NEAR:
+                return number
+        self.places.append((place, correction))
+        self._parents.append(len(self._parents))
+        return len(self.places) - 1
+
+    def root(self, number: int) -> int:
+        """Whom a place stands for."""
+        while self._parents[number] != number:
+            number = self._parents[number]
+        return number
+
+    def tie(self, one: int, other: int) -> None:
+        """They are one person's."""
+        self._parents[self.root(one)] = self.root(other)
+
+
+def _distance(one: Place, other: Place) -> float:
+    return float(np.hypot(one.x - other.x, one.y - other.y))
+
+
+def _check(corrections: list[Correction]) -> None:
+    people = _People()
+    for one in corrections:
+        for earlier, later in one.pairs:
+            people.tie(people.of(earlier, one), people.of(later, one))
+    for one in corrections:
+        for earlier, later in one.apart:
+            a, b = people.of(earlier, one), people.of(later, one)
+            if people.root(a) == people.root(b):
+                tying = next(
+                    (
+                        other
+                        for other in reversed(corrections)
+                        if other is not one and any(_touches(other, p) for p in (earlier, later))
+                    ),
+                    one,
+                )
+                raise _Contradiction(
+                    "the same person and not the same person", tying, corrections[-1], one
+                )
+    tied: dict[int, list[tuple[Place, Correction]]] = {}
+    for number, place in enumerate(people.places):
+        tied.setdefault(people.root(number), []).append(place)
+    for group in tied.values():
+        _check_one_place(group)
+    for one in corrections:
+        if one.kind == "nobody":
+            _check_empty(one, corrections)
+
+
+def _touches(one: Correction, place: Place) -> bool:
+    return any(p.step == place.step and _distance(p, place) <= NEAR for p in one.places)
+
+
+def _check_one_place(group: list[tuple[Place, Correction]]) -> None:
+    by_step: dict[int, tuple[Place, Correction]] = {}
+    for place, one in group:
+        other = by_step.setdefault(place.step, (place, one))
+        if _distance(other[0], place) >= APART:
+            raise _Contradiction(
+                f"one person would be in two places, {_distance(other[0], place):.1f} m apart, at "
+                f"step {place.step}",
+                other[1],
+                one,
+            )
+
+
+def _check_empty(one: Correction, corrections: list[Correction]) -> None:
+    for other in corrections:
+        if other.kind not in ("here", "name", "came", "left"):
+            continue
+        place = other.places[0]
+        where = along(one.places, place.step)
+        if where is None:
+            continue
+        if np.hypot(where[0] - place.x, where[1] - place.y) <= min(one.accuracy or 0.0, NEAR):
+            raise _Contradiction(f"somebody is at {place.words} and nobody is", other, one)
+
+
+def along(places: Many[Place], step: int) -> tuple[float, float] | None:
+    """Where the way through places, straight in between, is at a step; None before and after."""
+    if not places[0].step <= step <= places[-1].step:
+        return None
+    steps = [place.step for place in places]
+    return (
+        float(np.interp(step, steps, [place.x for place in places])),
+        float(np.interp(step, steps, [place.y for place in places])),
+    )

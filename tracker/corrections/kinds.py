@@ -1,0 +1,269 @@
+"""The kinds of corrections, and what each must say."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+Kind = Literal[
+    "same", "different", "exchanged", "here", "nobody", "came", "left", "name", "checked"
+]
+
+REACH = 1.0
+"""Metres on the ground within which the nearest person is the one that a place means."""
+
+
+LEEWAY = 1.0
+"""Seconds within which somebody counts as meant who is not there at the very step."""
+
+
+def leeway(step_time: float) -> int:
+    """:data:`LEEWAY` in steps."""
+    return max(round(LEEWAY / step_time), 1)
+
+
+class CorrectionError(ValueError):
+    """A correction, or a log of them, is not as it must be."""
+
+
+class Place(NamedTuple):
+    """Where somebody is meant."""
+
+    step: int
+    x: float
+    y: float
+    z: float
+    """World metres, the middle of the target."""
+
+    @property
+    def point(self) -> Float[ndarray, " 3"]:
+        """World metres."""
+        return np.array(self[1:])
+
+    @property
+    def words(self) -> str:
+        """As a sentence names it."""
+        return f"({self.x:.2f}, {self.y:.2f}) at step {self.step}"
+
+
+@dataclass(frozen=True, slots=True)
+class KindOf:
+    """What a kind of correction means and has."""
+
+    word: str
+    """As a person reads it."""
+    places: tuple[int, int | None]
+    """The fewest and the most; None for any number."""
+    means: str
+    accuracy: float | None = None
+    """Metres, where it has one and none is said."""
+
+
+KINDS: dict[Kind, KindOf] = {
+    "same": KindOf("same person", (2, 2), "who was at the first place is who was at the second"),
+    "different": KindOf(
+        "not the same", (2, 2), "who was at the first place is not who was at the second: cut there"
+    ),
+    "exchanged": KindOf(
+        "exchanged from here",
+        (4, 4),
+        "of two people before (first, second place) each is after where third and fourth are",
+    ),
+    "here": KindOf("is here", (1, 1), "somebody is at this place", 0.1),
+    "nobody": KindOf("was nobody", (1, None), "nobody is along these places", 0.5),
+    "came": KindOf(
+        "came in here", (1, 1), "who is at this place came in then, and was not there just before"
+    ),
+    "left": KindOf(
+        "left here", (1, 1), "who is at this place left then, and is not there just after"
+    ),
+    "name": KindOf("name", (1, 1), "who is at this place has this name"),
+    "checked": KindOf("checked", (0, 0), "a person has looked at these steps: they are right"),
+}
+"""By name. Places of one correction go forward in time."""
+
+
+class Correction(BaseModel):
+    """One thing that a person said."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", use_attribute_docstrings=True, allow_inf_nan=False
+    )
+
+    kind: Kind
+    id: str = Field(default="", max_length=40, pattern=r"^[A-Za-z0-9_-]*$")
+    """By which a log that was copied knows it again; made of its content where none is given."""
+    time: datetime = Field(default_factory=lambda: datetime.now(UTC).replace(microsecond=0))
+    """When it was said."""
+    note: str = Field(default="", max_length=1000)
+    places: tuple[Place, ...] = ()
+    """Each ``[step, x, y, z]``: a step from 0 on, and world metres."""
+    accuracy: Annotated[float, Field(ge=0.01, le=5.0)] | None = None
+    """Metres. Of *here* the standard deviation of the place; of *nobody* how far around its
+    places nobody is."""
+    name: str | None = Field(default=None, min_length=1, max_length=80)
+    """Of *name*."""
+    first: int | None = Field(default=None, ge=0)
+    """Of *checked*: the first step."""
+    last: int | None = Field(default=None, ge=0)
+    """Of *checked*: the last step, included."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_defaults(cls, values: Any) -> Any:
+        if isinstance(values, dict) and values.get("kind") in KINDS:
+            known = KINDS[values["kind"]]
+            values = dict(values)
+            if known.accuracy is not None and values.get("accuracy") is None:
+                values["accuracy"] = known.accuracy
+            values["places"] = _rounded(values.get("places", ()))
+            if not values.get("id"):
+                values["id"] = _id_of(values)
+        return values
+
+    @model_validator(mode="after")
+    def _complete(self) -> Correction:
+        known, count = KINDS[self.kind], len(self.places)
+        fewest, most = known.places
+        if count < fewest or (most is not None and count > most):
+            wanted = str(fewest) if most == fewest else f"{fewest} or more"
+            raise ValueError(f"places: {self.kind} has {wanted}, found {count}")
+        if any(place.step < 0 for place in self.places):
+            raise ValueError("places: a step is a whole number from 0 on")
+        steps = [place.step for place in self.places]
+        if self.kind in ("same", "different") and not steps[0] < steps[1]:
+            raise ValueError(
+                f"places: {self.kind} goes forward in time, found steps {steps[0]} and {steps[1]}"
+            )
+        if self.kind == "exchanged" and not max(steps[:2]) < min(steps[2:]):
+            raise ValueError(
+                "places: exchanged has two before and then two after, found steps "
+                + ", ".join(map(str, steps))
+            )
+        if self.kind == "nobody" and steps != sorted(set(steps)):
+            raise ValueError("places: nobody has one place a step, in the order of time")
+        for field, kinds in _ONLY.items():
+            there = getattr(self, field) is not None
+            if there and self.kind not in kinds:
+                raise ValueError(f"{field}: {self.kind} has none")
+            if not there and self.kind in kinds:
+                raise ValueError(f"{field}: {self.kind} needs it")
+        if self.first is not None and self.last is not None and self.last < self.first:
+            raise ValueError(f"last: expected a step from {self.first} on, found {self.last}")
+        return self
+
+    @property
+    def steps(self) -> tuple[int, int]:
+        """The first and the last step that it speaks of."""
+        if self.kind == "checked":
+            return self.first or 0, self.last or 0
+        steps = [place.step for place in self.places]
+        return min(steps), max(steps)
+
+    @property
+    def pairs(self) -> tuple[tuple[Place, Place], ...]:
+        """Pairs of places that are one person's, the earlier first."""
+        if self.kind == "same":
+            return ((self.places[0], self.places[1]),)
+        if self.kind == "exchanged":
+            one, other, after, other_after = self.places
+            return ((one, after), (other, other_after))
+        return ()
+
+    @property
+    def apart(self) -> tuple[tuple[Place, Place], ...]:
+        """Pairs of places that are two people's, the earlier first."""
+        if self.kind == "different":
+            return ((self.places[0], self.places[1]),)
+        if self.kind == "exchanged":
+            one, other, after, other_after = self.places
+            return ((one, other_after), (other, after))
+        return ()
+
+    @property
+    def words(self) -> str:
+        """What it says, in a few words."""
+        first, last = self.steps
+        span = f"step {first}" if first == last else f"steps {first} – {last}"
+        if self.kind == "checked":
+            return f"steps {first} – {last} checked"
+        if self.kind == "name":
+            return f"{self.name}, {span}"
+        return f"{KINDS[self.kind].word}, {span}"
+
+
+_ONLY = {
+    "accuracy": ("here", "nobody"), "name": ("name",), "first": ("checked",), "last": ("checked",),
+}  # fmt: skip
+
+IN_THE_FUSION: tuple[Kind, ...] = ("here", "nobody")
+"""The kinds that the filter itself obeys; the others say who is who, afterwards."""
+
+OF_PEOPLE: tuple[Kind, ...] = (
+    "same", "different", "exchanged", "here", "nobody", "came", "left", "name",
+)  # fmt: skip
+"""The kinds that say something of people, and may be met or not."""
+
+
+def _rounded(places: Any) -> Any:
+    """As the log writes them, so that a log that is read again gives the same run."""
+    if not isinstance(places, list | tuple):
+        return places
+    return tuple(
+        (one[0], *(round(v, 4) if isinstance(v, float) else v for v in one[1:]))
+        if isinstance(one, list | tuple) and one
+        else one
+        for one in places
+    )
+
+
+def _id_of(values: dict[str, Any]) -> str:
+    content = {key: str(value) for key, value in values.items() if key != "id"}
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:12]
+
+
+def make(**values: Any) -> Correction:
+    """A correction of these values.
+
+    Raises:
+        CorrectionError: In one sentence: field, expected, found.
+    """
+    try:
+        return Correction.model_validate(values)
+    except ValidationError as error:
+        raise CorrectionError(sentence_of(error)) from None
+
+
+def sentence_of(error: ValidationError) -> str:
+    """The first thing that is wrong: field, expected and found."""
+    first = error.errors()[0]
+    place = ".".join(str(part) for part in first["loc"])
+    message = first["msg"].removeprefix("Value error, ")
+    given = first.get("input")
+    found = f", found {given!r}" if place and not isinstance(given, dict) else ""
+    return f"{place}: {message}{found}" if place else message
+
+
+def digest(corrections: Iterable[Correction], kinds: Iterable[Kind]) -> str:
+    """A hash of what corrections of some kinds say, in their order; empty where there is none.
+
+    Note, time and id say nothing to a run.
+    """
+    chosen = set(kinds)
+    told = [
+        one.model_dump(mode="json", exclude={"id", "time", "note"}, exclude_none=True)
+        for one in corrections
+        if one.kind in chosen
+    ]
+    if not told:
+        return ""
+    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]

@@ -1,0 +1,184 @@
+"""Corrections in finished tracks, where no stage settles who is who: cut, joined, left out.
+
+Also what shows at once, while a run that obeys them is computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Many
+
+import numpy as np
+from jaxtyping import Int
+from numpy import ndarray
+
+from tracker.corrections.kinds import Correction, Place
+from tracker.corrections.seeking import Whereabouts, mostly_inside
+
+
+class _Segments:
+    """Tracks cut into segments, each followed by at most one."""
+
+    def __init__(self, frames: ndarray, ids: ndarray, positions: ndarray, leeway: int) -> None:
+        self.frames = frames
+        self.whereabouts = Whereabouts(frames, positions)
+        self.leeway = leeway
+        order = np.lexsort((frames, ids))
+        _names, begins = np.unique(ids[order], return_index=True)
+        self.rows: list[ndarray] = np.split(order, begins[1:]) if len(order) else []
+        self.following: list[int] = [-1] * len(self.rows)
+        self.of_row = np.empty(len(ids), dtype=np.int64)
+        for number, rows in enumerate(self.rows):
+            self.of_row[rows] = number
+
+    def find(self, place: Place) -> int | None:
+        """The row that is meant."""
+        return self.whereabouts.nearest(place, leeway=self.leeway)
+
+    def cut(self, row: int) -> None:
+        """Let the segment of a row begin at it; what was before goes on in it."""
+        number = int(self.of_row[row])
+        rows = self.rows[number]
+        place = int(np.searchsorted(self.frames[rows], self.frames[row]))
+        if place == 0:
+            return
+        new = len(self.rows)
+        self.rows.append(rows[place:])
+        self.rows[number] = rows[:place]
+        self.following.append(self.following[number])
+        self.following[number] = new
+        self.of_row[rows[place:]] = new
+
+    def before(self, number: int) -> int:
+        """What a segment follows, -1 for nothing."""
+        return self.following.index(number) if number in self.following else -1
+
+    def part(self, number: int) -> None:
+        """Let a segment follow nothing."""
+        earlier = self.before(number)
+        if earlier >= 0:
+            self.following[earlier] = -1
+
+    def tie(self, earlier: int, later: int) -> None:
+        """Let a segment follow another, and what followed that follow nothing."""
+        self.part(later)
+        self.following[earlier] = later
+
+    def chain(self, number: int) -> list[int]:
+        """The segments of one person, in the order of time."""
+        while (earlier := self.before(number)) >= 0:
+            number = earlier
+        found = [number]
+        while (number := self.following[number]) >= 0:
+            found.append(number)
+        return found
+
+
+def relabelled(
+    frames: Int[ndarray, " N"],
+    ids: Int[ndarray, " N"],
+    positions: ndarray,
+    corrections: Many[Correction],
+    *,
+    leeway: int,
+) -> tuple[Int[ndarray, " N"], Int[ndarray, " K"]]:
+    """Who is who with the corrections, one after another; what finds nobody is left alone.
+
+    Args:
+        frames: The step of each row of N.
+        ids: Whose each is.
+        positions: (N, 3) world metres.
+        corrections: In their order.
+        leeway: Steps within which somebody counts as meant who is not there at the very step.
+
+    Returns:
+        The id of each row: a person keeps the one of most of his rows, others get new numbers. And
+        the rows that stay, ascending.
+    """
+    segments = _Segments(frames, ids, positions, leeway)
+    gone: set[int] = set()
+    for one in corrections:
+        if one.kind in ("same", "exchanged"):
+            _tie(segments, one)
+        elif one.kind == "different":
+            _part(segments, one)
+        elif one.kind in ("came", "left"):
+            _end(segments, one)
+        elif one.kind == "nobody":
+            inside = segments.whereabouts.inside(one)
+            for number in mostly_inside(segments.of_row, frames, inside, one):
+                rows = segments.rows[number]
+                within = rows[inside[rows]]
+                gone.update(rows[(frames[rows] >= frames[within[0]])
+                                 & (frames[rows] <= frames[within[-1]])].tolist())  # fmt: skip
+    result, free = np.empty(len(ids), dtype=np.int64), int(ids.max(initial=0)) + 1
+    firsts = [n for n in range(len(segments.rows)) if segments.before(n) < 0]
+    chains = [np.concatenate([segments.rows[n] for n in segments.chain(f)]) for f in firsts]
+    votes = []
+    for number, rows in enumerate(chains):
+        names, counts = np.unique(ids[rows], return_counts=True)
+        votes += [(-c, n, number) for n, c in zip(names.tolist(), counts.tolist(), strict=True)]
+    labels: dict[int, int] = {}
+    for _, name, number in sorted(votes):
+        if number not in labels and name not in labels.values():
+            labels[number] = name
+    for number, rows in enumerate(chains):
+        if number not in labels:
+            labels[number], free = free, free + 1
+        result[rows] = labels[number]
+    kept = np.array(sorted(set(range(len(ids))) - gone), dtype=np.int64)
+    return result, kept
+
+
+def _tie(segments: _Segments, one: Correction) -> None:
+    found = [(segments.find(a), segments.find(b)) for a, b in one.pairs]
+    if any(a is None or b is None for a, b in found):
+        return
+    pairs: list[tuple[int, int]] = [(a, b) for a, b in found if a is not None and b is not None]
+    if len({segments.of_row[b] for _, b in pairs}) < len(pairs):
+        return  # both are the same one there
+    if one.kind == "exchanged":
+        for _, later in pairs:
+            segments.cut(later)
+    ties = []
+    for a, b in pairs:
+        if segments.of_row[b] in segments.chain(int(segments.of_row[a])):
+            continue  # so it is
+        if not segments.frames[a] < segments.frames[b]:
+            return
+        # where both are there at once for a while, the later one is meant from its place on
+        mine, theirs = segments.rows[segments.of_row[a]], segments.rows[segments.of_row[b]]
+        first = max(int(segments.frames[theirs[0]]), int(segments.frames[a]) + 1)
+        for rows in (mine, theirs):
+            later = rows[segments.frames[rows] >= first]
+            if len(later):
+                segments.cut(int(later[0]))
+        ties.append((a, b))
+    for a, b in ties:
+        earlier, later = int(segments.of_row[a]), int(segments.of_row[b])
+        if later not in segments.chain(earlier):
+            segments.tie(earlier, later)
+
+
+def _part(segments: _Segments, one: Correction) -> None:
+    earlier, later = (segments.find(place) for place in one.places)
+    if earlier is None or later is None:
+        return
+    if segments.of_row[later] not in segments.chain(int(segments.of_row[earlier])):
+        return
+    segments.cut(later)
+    segments.part(int(segments.of_row[later]))
+
+
+def _end(segments: _Segments, one: Correction) -> None:
+    row = segments.find(one.places[0])
+    if row is None:
+        return
+    if one.kind == "came":
+        segments.cut(row)
+        segments.part(int(segments.of_row[row]))
+        return
+    rows = segments.rows[segments.of_row[row]]
+    later = rows[segments.frames[rows] > segments.frames[row]]
+    if len(later):
+        segments.cut(int(later[0]))
+    segments.following[segments.of_row[row]] = -1

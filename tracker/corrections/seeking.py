@@ -1,0 +1,82 @@
+"""Who is meant: the rows of a run's tracks at the places of a correction."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+
+from tracker.corrections.contradictions import along
+from tracker.corrections.kinds import REACH, Correction, Place
+
+
+class Whereabouts:
+    """Where tracks are, to be asked who was at a place."""
+
+    def __init__(self, steps: Int[ndarray, " N"], positions: Float[ndarray, "N 3"]) -> None:
+        """Prepare for N rows of tracks, in any order.
+
+        Args:
+            steps: Of each row.
+            positions: World metres.
+        """
+        self._order = np.argsort(steps, kind="stable")
+        self._steps = steps[self._order]
+        self._ground = positions[self._order, :2]
+
+    def at(self, step: int) -> slice:
+        """The rows of a step, as places in the order of steps."""
+        low, high = np.searchsorted(self._steps, [step, step + 1])
+        return slice(int(low), int(high))
+
+    def nearest(self, place: Place, *, leeway: int = 0, reach: float = REACH) -> int | None:
+        """The row that a place means: the nearest on the ground within reach, None for nobody.
+
+        Args:
+            place: Step and position.
+            leeway: Steps before and after within which somebody counts who is not there at the
+                very step; each counts as much as ``reach`` over all of them.
+            reach: Metres.
+        """
+        low = int(np.searchsorted(self._steps, place.step - leeway))
+        high = int(np.searchsorted(self._steps, place.step + leeway, side="right"))
+        if low == high:
+            return None
+        apart = np.hypot(*(self._ground[low:high] - [place.x, place.y]).T)
+        away = np.abs(self._steps[low:high] - place.step)
+        cost = apart + away * (reach / max(leeway, 1))
+        best = int(np.argmin(cost))
+        return int(self._order[low + best]) if cost[best] <= reach else None
+
+    def inside(self, nobody: Correction) -> Bool[ndarray, " N"]:
+        """The rows within reach of the way along the places of *nobody*, at its steps."""
+        found = np.zeros(len(self._steps), dtype=bool)
+        around = nobody.accuracy or 0.0
+        first, last = nobody.steps
+        for step in range(first, last + 1):
+            own = self.at(step)
+            where = along(nobody.places, step)
+            if own.start < own.stop and where is not None:
+                near = np.hypot(*(self._ground[own] - where).T) <= around
+                found[self._order[own]] = near
+        return found
+
+
+def mostly_inside(
+    owners: Int[ndarray, " N"],
+    steps: Int[ndarray, " N"],
+    inside: Bool[ndarray, " N"],
+    one: Correction,
+) -> set[int]:
+    """The owners who are nobody: whose rows at the steps of the correction are mostly along it.
+
+    Somebody who only passes by is not meant.
+    """
+    first, last = one.steps
+    during = (steps >= first) & (steps <= last)
+    if not inside.any():
+        return set()
+    count = int(owners.max()) + 1
+    there = np.bincount(owners[during], minlength=count)
+    along_it = np.bincount(owners[inside], minlength=count)
+    return set(np.flatnonzero((along_it > 0) & (2 * along_it > there)).tolist())

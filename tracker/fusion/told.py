@@ -1,0 +1,136 @@
+"""What a person said of a step: somebody is here, nobody is there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.corrections import Correction
+from tracker.corrections.contradictions import along
+from tracker.filters import gaussian_mixture, models
+from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.fusion.model import FusionModel
+from tracker.fusion.record import Record
+
+_SURE = 0.999
+"""Existence of who is there because somebody said so."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Told:
+    """Corrections of one step."""
+
+    places: Float[ndarray, "K 3"]
+    """Where somebody is, world metres."""
+    sigmas: Float[ndarray, " K"]
+    """Standard deviations of the places, metres."""
+    empty: Float[ndarray, "E 2"]
+    """Where nobody begins, on the ground, world metres."""
+    around: Float[ndarray, " E"]
+    """How far around, metres."""
+
+
+def told_by_step(corrections: Iterable[Correction]) -> dict[int, Told]:
+    """What is said of each step, where anything is."""
+    here: dict[int, list[tuple[ndarray, float]]] = {}
+    empty: dict[int, list[tuple[tuple[float, float], float]]] = {}
+    for one in corrections:
+        if one.kind == "here":
+            place = one.places[0]
+            here.setdefault(place.step, []).append((place.point, one.accuracy or 0.0))
+        elif one.kind == "nobody":
+            first, last = one.steps
+            for step in range(first, last + 1):
+                if (where := along(one.places, step)) is not None:
+                    empty.setdefault(step, []).append((where, one.accuracy or 0.0))
+    return {
+        step: Told(
+            np.array([place for place, _ in here.get(step, [])]).reshape(-1, 3),
+            np.array([sigma for _, sigma in here.get(step, [])]),
+            np.array([where for where, _ in empty.get(step, [])]).reshape(-1, 2),
+            np.array([reach for _, reach in empty.get(step, [])]),
+        )
+        for step in sorted(here.keys() | empty.keys())
+    }
+
+
+def obey(
+    mixture: GaussianMixture,
+    record: Record,
+    told: Told,
+    model: FusionModel,
+    *,
+    first_new_label: int,
+    next_label: int,
+) -> tuple[GaussianMixture, Record, int]:
+    """The posterior of a step as it is with what a person said of it.
+
+    Who was born in this step where nobody is, is not. A place z of standard deviation σ is a
+    measurement that is sure to be made and is no clutter: it goes to the component j of the
+    largest w_j N(z; m_j, P_j + σ²I) within the gate, which is there then; where there is none,
+    somebody begins there.
+
+    Args:
+        mixture: Components of this step.
+        record: The same ones.
+        told: Of this step.
+        model: Motion, and the gate.
+        first_new_label: The first label that was given in this step.
+        next_label: The first that is free.
+
+    Returns:
+        The components, their record, and the label that is free now.
+    """
+    if len(told.empty):
+        apart = np.linalg.norm(mixture.means[:, None, :2] - told.empty, axis=2)
+        forbidden = (apart <= told.around).any(axis=1) & (mixture.labels >= first_new_label)
+        kept = np.flatnonzero(~forbidden)
+        mixture, record = mixture.take(kept), record.take(kept)
+    for place, sigma in zip(told.places, told.sigmas.tolist(), strict=True):
+        noise = sigma**2 * np.eye(3)
+        best = _meant(mixture, place, noise, model.gate_of_places)
+        if best is None:
+            nameless = np.zeros(1, dtype=np.int64)
+            one = GaussianMixture(np.array([_SURE]), place[None], noise[None], nameless)
+            born = models.label_births(model.motion.at_rest(one), next_label)
+            next_label += born.size
+            mixture = gaussian_mixture.concatenate([mixture, born])
+            record = record.extended(born.size)
+        else:
+            mixture = _updated(mixture, best, place, noise)
+    return mixture, record, next_label
+
+
+def _meant(mixture: GaussianMixture, place: ndarray, noise: ndarray, gate: float) -> int | None:
+    """The component that a place means; None for nobody yet."""
+    if not mixture.size:
+        return None
+    offsets = place - mixture.means[:, :3]
+    spread = mixture.covariances[:, :3, :3] + noise
+    distances = np.einsum("ja,ja->j", offsets, np.linalg.solve(spread, offsets[..., None])[..., 0])
+    _, log_determinants = np.linalg.slogdet(spread)
+    score = np.log(np.maximum(mixture.weights, 1e-300)) - 0.5 * (distances + log_determinants)
+    score[distances > gate] = -np.inf
+    best = int(np.argmax(score))
+    return best if np.isfinite(score[best]) else None
+
+
+def _updated(
+    mixture: GaussianMixture, component: int, place: ndarray, noise: ndarray
+) -> GaussianMixture:
+    """One component updated by a place, and its label sure to be there: Joseph's form."""
+    mean, covariance = mixture.means[component], mixture.covariances[component]
+    gain = np.linalg.solve(covariance[:3, :3] + noise, covariance[:3]).T
+    rest = np.eye(len(mean))
+    rest[:, :3] -= gain
+    means, covariances = mixture.means.copy(), mixture.covariances.copy()
+    weights = mixture.weights.copy()
+    means[component] = mean + gain @ (place - mean[:3])
+    covariances[component] = rest @ covariance @ rest.T + gain @ noise @ gain.T
+    own = mixture.labels == mixture.labels[component]
+    weights[component] += max(_SURE - float(weights[own].sum()), 0.0)
+    return GaussianMixture(weights, means, covariances, mixture.labels)
