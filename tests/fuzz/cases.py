@@ -6,6 +6,7 @@ import csv
 import io
 import shutil
 import time
+import warnings
 from collections.abc import Sequence as Many
 from pathlib import Path
 
@@ -63,8 +64,10 @@ def try_case(base: Path, damages: Many[Damage], work: Path) -> str:
     begin = time.monotonic()
     try:
         library.available(work)
-        sequence = read_sequence(place)
-        _run(sequence)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RuntimeWarning)  # what overflows is a fault
+            sequence = read_sequence(place)
+            _run(sequence)
         told = ""
     except SequenceError as error:
         told = str(error)

@@ -14,7 +14,7 @@ from numpy import ndarray
 
 from tracker.formats.pieces import FormatError
 from tracker.importing.settling import Settled, SettledView
-from tracker.placing import replacing
+from tracker.placing import replacing, write_whole
 from tracker.sequences.sequence import Detections, GroundTruth
 
 FILE = "sequence.toml"
@@ -86,7 +86,7 @@ def _camera(view: SettledView, name: str, folder: Path, copy: bool, told: list[s
     if timing.stamps is not None:
         file = f"{name}_times.csv"
         rows = "\n".join(map(_number, timing.stamps))
-        (folder / file).write_text(f"frame_time\n{rows}\n", encoding="utf-8")
+        write_whole(folder / file, f"frame_time\n{rows}\n".encode())
         lines.append(f"timestamps = {_text(file)}")
     if view.detections is not None:
         file = f"{name}.csv"
@@ -127,6 +127,8 @@ def _bring_images(files: Sequence[Path], folder: Path, name: str, copy: bool) ->
     own.mkdir(exist_ok=True)
     width = len(str(len(files)))
     for number, path in enumerate(files):
+        if not path.exists():  # missing in the row of their numbers: the hole stays
+            continue
         _bring_as(path, own / f"{number:0{width}}{path.suffix.lower()}", copy)
     return f"{name}/*{files[0].suffix.lower()}"
 
@@ -166,7 +168,8 @@ def _write_boxes(path: Path, detections: Detections) -> None:
             strict=True,
         )
     ]  # fmt: skip
-    path.write_text("\n".join(["frame,left,top,width,height,score", *rows]) + "\n", "utf-8")
+    text = "\n".join(["frame,left,top,width,height,score", *rows]) + "\n"
+    write_whole(path, text.encode())
 
 
 def _write_truth(path: Path, truth: GroundTruth) -> None:
@@ -177,7 +180,7 @@ def _write_truth(path: Path, truth: GroundTruth) -> None:
             truth.valid.tolist(), strict=True,
         )
     ]  # fmt: skip
-    path.write_text("\n".join(["frame,id,x,y,z,valid", *rows]) + "\n", "utf-8")
+    write_whole(path, ("\n".join(["frame,id,x,y,z,valid", *rows]) + "\n").encode())
 
 
 def _text(text: str) -> str:

@@ -84,7 +84,7 @@ class Fields:
             if name not in self._known:
                 hint = did_you_mean(name, set(self._known) - set(values))
                 hint = hint or f"; the fields here are {listed(self._known)}"
-                raise SequenceError(f'{where}: unknown field "{name}"{hint}')
+                raise SequenceError(f"{where}: unknown field {shown(name)}{hint}")
 
     def __contains__(self, name: str) -> bool:
         return name in self._values
@@ -228,7 +228,7 @@ def _called(word: str, number: int, item: Any) -> str:
     """A table by its name where it has one: ``camera "cam2"``, else ``camera 2``."""
     name = item.get("name") if isinstance(item, dict) else None
     plain = word.strip("[]")
-    return f'{plain} "{name}"' if isinstance(name, str) and name else f"{plain} {number}"
+    return f"{plain} {shown(name)}" if isinstance(name, str) and name else f"{plain} {number}"
 
 
 def is_number(value: Any, largest: float) -> bool:

@@ -12,7 +12,7 @@ from numpy import ndarray
 
 from tracker.sequences.clock import Clock
 from tracker.sequences.csv_columns import Columns, read_columns
-from tracker.sequences.fields import Fields
+from tracker.sequences.fields import SMALLEST, Fields
 from tracker.sequences.media import locate
 from tracker.sequences.sequence import Detections, GroundTruth
 
@@ -94,6 +94,11 @@ class BoxTable:
                 raise columns.error(line, name, "expected a number, found an empty cell")
         for name in ("width", "height"):
             columns.require(name, ~is_box | (columns.values[name] > 0.0), "a size above 0 pixels")
+            columns.require(
+                name,
+                ~is_box | (columns.values[name] >= SMALLEST),
+                f"a size of at least {SMALLEST:g} pixels",
+            )
         scores = columns.values["score"]
         within = (scores >= 0.0) & (scores <= 1.0)
         columns.require("score", ~is_box | within, "a score from 0 to 1")
