@@ -69,6 +69,10 @@ class Teaching:
         """Stop following."""
         self._unsubscribe()
 
+    def draft_of(self, folder: Path) -> Path | None:
+        """The file that keeps what was taught of a sequence and not saved; None where all is."""
+        return self._drafts.file_of(folder)
+
     # what a person does
 
     def add_template(

@@ -23,8 +23,12 @@ from collections import Counter
 from pathlib import Path
 from random import Random
 
+from tracker.folders import cache_folder
+
 HANG_SECONDS = 30.0
-"""A worker that says nothing for so long is ended."""
+"""A worker that says nothing for so long is ended; its kernels may be compiled before."""
+
+COMPILE_SECONDS = 600.0
 
 MEMORY_MB = 1024.0
 """What a case may take beyond what the worker had after the first good one."""
@@ -36,10 +40,17 @@ def main() -> int:
     parser.add_argument("minutes", type=float)
     parser.add_argument("--seed", type=int, default=None)
     parser.add_argument("--workers", type=int, default=min(4, os.cpu_count() or 1))
+    parser.add_argument(
+        "--bounds", action="store_true", help="the kernels check every index, and are slower"
+    )
     parser.add_argument("--work", type=int, default=None, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.work is not None:
         return work(arguments.work, time.monotonic() + 60.0 * arguments.minutes)
+    if arguments.bounds:  # machine code of its own, kept for the next time
+        os.environ["NUMBA_BOUNDSCHECK"] = "1"
+        os.environ["NUMBA_CACHE_DIR"] = str(cache_folder() / "kernels-with-bounds")
+        print("fuzz: every index is checked", flush=True)
     seed = secrets.randbelow(2**40) if arguments.seed is None else arguments.seed
     print(f"fuzz: seed {seed}", flush=True)
     deadline = time.monotonic() + 60.0 * arguments.minutes
@@ -85,6 +96,8 @@ def hear(worker: subprocess.Popen[str], seed: int, counts: Counter[str]) -> tupl
         for text in worker.stdout:
             dog.heard()
             told = json.loads(text)
+            if told["is"] != "good":
+                dog.has_compiled()
             current = text.strip() if told["is"] == "begun" else current
             seed = told.get("next", seed)
             if told["is"] in ("refused", "ran", "fell"):
@@ -100,6 +113,7 @@ class Watchdog:
     def __init__(self, process: subprocess.Popen[str]) -> None:
         self._process = process
         self._timer: threading.Timer | None = None
+        self._patience = COMPILE_SECONDS
 
     def __enter__(self) -> Watchdog:
         self.heard()
@@ -109,10 +123,14 @@ class Watchdog:
         if self._timer is not None:
             self._timer.cancel()
 
+    def has_compiled(self) -> None:
+        """From now on no silence is long."""
+        self._patience = HANG_SECONDS
+
     def heard(self) -> None:
         """It is not silent."""
         self.__exit__()
-        self._timer = threading.Timer(HANG_SECONDS, self._bite)
+        self._timer = threading.Timer(self._patience, self._bite)
         self._timer.daemon = True
         self._timer.start()
 

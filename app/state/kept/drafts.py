@@ -43,6 +43,7 @@ class Drafts:
             draft = read_json(path)
             saved, taught = draft["saved"], draft["taught"]
             changes(saved, taught)  # raises where another version wrote them
+            self._kept[sequence] = saved, taught
             return saved, taught
         except FileNotFoundError:
             return None
@@ -56,6 +57,11 @@ class Drafts:
         self._kept.pop(sequence, None)
         if self._folder is not None:
             self._file(sequence).unlink(missing_ok=True)
+
+    def file_of(self, sequence: Path) -> Path | None:
+        """The file of a draft; None where there is none."""
+        kept = self._folder is not None and sequence in self._kept
+        return self._file(sequence) if kept else None
 
     def _file(self, sequence: Path) -> Path:
         assert self._folder is not None
