@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import http
 import logging
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Literal
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -31,10 +33,29 @@ class ErrorDetail(BaseModel):
     """What to do about it."""
 
 
-class ErrorBody(BaseModel):
-    """The body of every answer that is not a success."""
+class Problem(BaseModel):
+    """The body of every answer that is not a success (RFC 9457)."""
 
-    error: ErrorDetail
+    model_config = ConfigDict(use_attribute_docstrings=True)
+
+    type: Literal["about:blank"]
+    """That the status says which kind of failure it is, and ``code`` which one."""
+    title: str
+    """The status in words."""
+    status: int
+    """That of the answer."""
+    detail: str
+    """One sentence for people: what was expected and what was found."""
+    code: str
+    """A word for programs."""
+    field: str | None
+    """The parameter, field or file that it is about."""
+    hint: str | None
+    """What to do about it."""
+
+
+PROBLEM = "application/problem+json"
+"""The media type of that body."""
 
 
 class ApiError(Exception):
@@ -54,9 +75,23 @@ class ApiError(Exception):
         self.detail = ErrorDetail(code=code, message=message, field=field, hint=hint)
 
 
-def body(detail: ErrorDetail) -> dict[str, Any]:
+def body(status: int, detail: ErrorDetail) -> dict[str, Any]:
     """The JSON of an error."""
-    return ErrorBody(error=detail).model_dump()
+    return Problem(
+        type="about:blank",
+        title=http.HTTPStatus(status).phrase,
+        status=status,
+        detail=detail.message,
+        code=detail.code,
+        field=detail.field,
+        hint=detail.hint,
+    ).model_dump()
+
+
+def _answer(
+    status: int, detail: ErrorDetail, headers: Mapping[str, str] | None = None
+) -> JSONResponse:
+    return JSONResponse(body(status, detail), status, headers, PROBLEM)
 
 
 def parameter_detail(error: ParameterError) -> ErrorDetail:
@@ -83,11 +118,11 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(ApiError)
     async def _api(_: Request, error: ApiError) -> JSONResponse:
-        return JSONResponse(body(error.detail), error.status)
+        return _answer(error.status, error.detail)
 
     @app.exception_handler(ParameterError)
     async def _parameter(_: Request, error: ParameterError) -> JSONResponse:
-        return JSONResponse(body(parameter_detail(error)), 422)
+        return _answer(422, parameter_detail(error))
 
     @app.exception_handler(RequestValidationError)
     async def _request(_: Request, error: RequestValidationError) -> JSONResponse:
@@ -99,7 +134,7 @@ def install(app: FastAPI) -> None:
                 message=f"The body is not JSON: {why}, at byte {byte}.",
                 hint='Send an object such as {"changes": {"fusion.clutter_rate": 1.5}}.',
             )
-            return JSONResponse(body(detail), 422)
+            return _answer(422, detail)
         place = [str(part) for part in first["loc"]]
         field = ".".join(place[1:]) or place[0]
         detail = ErrorDetail(
@@ -108,7 +143,7 @@ def install(app: FastAPI) -> None:
             field=field,
             hint="See /docs for what this address takes.",
         )
-        return JSONResponse(body(detail), 422)
+        return _answer(422, detail)
 
     @app.exception_handler(HTTPException)
     async def _http(request: Request, error: HTTPException) -> JSONResponse:
@@ -127,7 +162,7 @@ def install(app: FastAPI) -> None:
         else:
             code = "too_large" if error.status_code == 413 else "http_error"
             detail = ErrorDetail(code=code, message=str(error.detail))
-        return JSONResponse(body(detail), error.status_code, headers=error.headers)
+        return _answer(error.status_code, detail, error.headers)
 
     @app.exception_handler(Exception)
     async def _unexpected(request: Request, error: Exception) -> JSONResponse:
@@ -137,4 +172,4 @@ def install(app: FastAPI) -> None:
             message=f"The server failed: {type(error).__name__}: {sentence(error)}",
             hint="The terminal shows where; what was open still is.",
         )
-        return JSONResponse(body(detail), 500)
+        return _answer(500, detail)

@@ -31,6 +31,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # no test ever writes to the library of whoever runs it
 _LIBRARY = tempfile.TemporaryDirectory(prefix="multiview-phd-library-")
 os.environ["MULTIVIEW_PHD_LIBRARY"] = str(Path(_LIBRARY.name) / "library.sqlite3")
+os.environ["MULTIVIEW_PHD_STUDIES"] = str(Path(_LIBRARY.name) / "studies")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -41,6 +41,8 @@ def experiment(command: Command) -> None:
     if command.name is None and not command.all:
         print_table(("name", "claim"), [(e.name, e.claim) for e in EXPERIMENTS.values()])
         return
+    if command.seeds is not None and command.seeds < 1:
+        raise ParameterError("--seeds", f"expected a whole number from 1, got {command.seeds}")
     if command.output.exists() and not command.output.is_dir():
         raise CommandError(f"--output {command.output}: expected a folder, found a file")
     chosen = list(EXPERIMENTS.values()) if command.all else [EXPERIMENTS[str(command.name)]]
@@ -52,6 +54,7 @@ def experiment(command: Command) -> None:
     with _Bars() as bars:
         context = Context(
             quick=command.quick,
+            seeds=command.seeds,
             data=command.data,
             output=command.output,
             rooms=RandomRooms(command.count, command.first, command.method, command.keep_rooms),
@@ -68,7 +71,7 @@ def experiment(command: Command) -> None:
                     raise CommandError(f"{one.name}: {missing}") from None
                 say(f"{one.name} is left out: {missing}")
                 continue
-            files = write(one, result, command.output, quick=command.quick)
+            files = write(one, result, command.output, quick=command.quick, seeds=command.seeds)
             bars.close()
             _print(one, result)
             say(f"{one.name}: {time.perf_counter() - begin:.0f} s, {_listed(files)}")

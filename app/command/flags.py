@@ -16,6 +16,7 @@ from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subc
 
 from app.command.correction_flags import Corrections, LogFile
 from app.command.library_flags import Bundle, FormatName, LibraryCommand, LibraryFile, Runs
+from app.command.study_flags import Batch, Study
 from tracker import parameters as table
 from tracker.library import KEEP
 from tracker.parameters import FOLLOWS, METHODS, PRESETS, Parameter, ParameterError
@@ -215,6 +216,8 @@ class Experiment:
     """Run every one."""
     quick: FlagCreatePairsOff[bool] = False
     """Shortened to what shows the direction of each claim."""
+    seeds: Annotated[int | None, arg(help_behavior_hint="(default: each experiment's own)")] = None
+    """How many seeds each case is run with, where chance plays a part."""
     count: int = 20
     """Of `rooms`: how many random rooms."""
     first: int = 0
@@ -454,6 +457,8 @@ Arguments = (
     | Runs
     | Bundle
     | LibraryCommand
+    | Study
+    | Batch
     | Corrections
 )
 
@@ -464,6 +469,8 @@ def parse(arguments: list[str] | None = None) -> Arguments:
     # its settings come with the engine, which only who evaluates has to wait for
     asked = sys.argv[1:] if arguments is None else arguments
     evaluate: Any = _evaluate_with_flags() if asked[:1] == ["evaluate"] else Evaluate
+    if asked[:1] == ["study"] and asked[1:2] and asked[1].endswith(".toml"):
+        arguments = ["study", "run", *asked[1:]]  # `study STUDY.toml` runs it
     commands: Any = (
         Annotated[Serve, subcommand("serve")]
         | Annotated[track, subcommand("track")]
@@ -481,6 +488,8 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         | Annotated[Runs, subcommand("runs")]
         | Annotated[Bundle, subcommand("bundle")]
         | Annotated[LibraryCommand, subcommand("library")]
+        | Annotated[Study, subcommand("study")]
+        | Annotated[Batch, subcommand("batch")]
         | Annotated[Corrections, subcommand("corrections")]
     )
     parsed: Arguments = tyro.cli(

@@ -7,6 +7,7 @@ wrong usage, 130 after Ctrl-C. The engine is imported by the command that needs 
 from __future__ import annotations
 
 import errno
+import gc
 import os
 import subprocess
 import sys
@@ -40,6 +41,7 @@ from app.command.flags import (
 )
 from app.command.interruption import between_steps
 from app.command.library_flags import Bundle, LibraryCommand, OpenRun, Runs
+from app.command.study_flags import Batch, Study
 from app.command.terminal import Bar, CommandError, check_data, print_table, say
 from tracker import parameters as table
 from tracker.folders import library_file
@@ -119,6 +121,14 @@ def _run(command: Arguments) -> int:
             from app.command.runs import check
 
             return check(command)
+        case Study():
+            from app.command.studies import study
+
+            return study(command)
+        case Batch():
+            from app.command.batch import batch
+
+            return batch(command)
         case Corrections():
             from app.command.correcting import corrections
 
@@ -169,6 +179,7 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     _check_keep(command.keep)
     if command.memory is not None and not 0.0625 <= command.memory <= 65536.0:
         raise ParameterError("--memory", f"expected 0.0625 to 65536 GB, got {command.memory:g}")
+    gc.disable()  # a seventh of the time: nothing that is imported ever goes
     from app.state.workers.jobs import locate
     from app.web import server
     from app.web.access import PARAMETER, Keys, new_token, own_token
@@ -176,6 +187,8 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     from tracker.library.records import Result
     from tracker.sequences import library, rendering
 
+    gc.freeze()
+    gc.enable()
     if not command.token and not is_loopback(command.host):
         raise ParameterError(
             "--no-token",

@@ -99,7 +99,15 @@ class Notice:
     hint: str | None = None
 
 
-Event = Command | Notice
+@dataclass(frozen=True, slots=True)
+class StudyNews:
+    """A study has another state, or more trials that ended."""
+
+    told: Mapping[str, Any]
+    """What the list of studies says of it."""
+
+
+Event = Command | Notice | StudyNews
 
 
 @dataclass(frozen=True, slots=True, eq=False)

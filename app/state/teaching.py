@@ -18,6 +18,7 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 from app.errors import sentence
+from app.state.entrances import entrances_of
 from app.state.kept.drafts import Drafts
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
@@ -150,6 +151,22 @@ class Teaching:
             position = (position[0], position[1], float(room.entrances[0].position[2]))
         entrance = {"position": [_metres(value) for value in position], "sigma": [*NEW_SIGMA]}
         self._edit(lambda values: values["room"]["entrances"].append(entrance))
+
+    def suggest_entrances(self) -> None:
+        """Add the entrances that the tracks of the shown run tell of, beside those there are.
+
+        Raises:
+            SequenceError: If they tell of no other.
+        """
+        run = self._workbench.snapshot().run
+        doors = [] if run is None else entrances_of(run)
+        if not doors:
+            raise SequenceError(
+                "the tracks begin and end together at no other place; wait for the end of the "
+                "run, or add an entrance by hand"
+            )
+        new = [{"position": d.position.tolist(), "sigma": d.sigma.tolist()} for d in doors]
+        self._edit(lambda values: values["room"]["entrances"].extend(new))
 
     def set_entrance(self, index: int, part: Part, changed: dict[int, float]) -> None:
         """Move an entrance, or make it wider.

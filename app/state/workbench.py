@@ -29,6 +29,7 @@ from app.state.snapshot import (
     Presets,
     RunState,
     Snapshot,
+    StudyNews,
     Trail,
     View,
     clamp,
@@ -294,6 +295,10 @@ class Workbench:
     def notify(self, level: Level, message: str, hint: str | None = None) -> None:
         """Say one sentence to everyone who looks."""
         self._tell(Notice(level, message, hint))
+
+    def study_changed(self, told: Mapping[str, Any]) -> None:
+        """Tell everyone who looks of a study."""
+        self._tell(StudyNews(told))
 
     # what the jobs report
 

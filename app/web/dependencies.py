@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from fastapi import Depends, Query, Request
 
-from app.errors import ApiError, ErrorBody
+from app.errors import ApiError, Problem
 from app.state.kept.presets import OwnPresets
 from app.state.workbench import Workbench
 from app.state.workers.jobs import Jobs
@@ -17,8 +17,8 @@ FOR_EVER = "private, max-age=31536000, immutable"
 """Cache header of pictures: their address names their content, which never changes."""
 
 ERRORS: dict[int | str, dict[str, Any]] = {
-    "4XX": {"model": ErrorBody, "description": "What was expected, what was found, what to do."},
-    "5XX": {"model": ErrorBody, "description": "The server failed; what was open still is."},
+    "4XX": {"model": Problem, "description": "What was expected, what was found, what to do."},
+    "5XX": {"model": Problem, "description": "The server failed; what was open still is."},
 }
 
 

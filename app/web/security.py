@@ -18,7 +18,7 @@ from fastapi import HTTPException
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.errors import ErrorDetail, body
+from app.errors import PROBLEM, ErrorDetail, body
 
 LARGEST_BODY = 1 << 20
 """Bytes of a request's body; what people send are a few numbers."""
@@ -208,9 +208,9 @@ async def refuse(
         await receive()  # the request to connect
         await send({"type": "websocket.close", "code": 1008, "reason": detail.code})
         return
-    payload = json.dumps(body(detail)).encode()
+    payload = json.dumps(body(status, detail)).encode()
     headers = [
-        (b"content-type", b"application/json"),
+        (b"content-type", PROBLEM.encode()),
         (b"content-length", str(len(payload)).encode()),
         (b"connection", b"close"),
     ]

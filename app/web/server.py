@@ -27,6 +27,7 @@ from app.state.kept.history import History
 from app.state.kept.presets import OwnPresets
 from app.state.kept.recents import Recents
 from app.state.memory import Budget
+from app.state.studies.desk import StudyDesk
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench
 from app.state.workers.compiling import Compiling
@@ -36,7 +37,7 @@ from app.state.workers.identity_check import IdentityCheck
 from app.state.workers.jobs import Jobs, in_background
 from app.state.workers.keeper import Keeper
 from app.state.workers.sensitivity import Sensitivity
-from app.web import api, gateway, stream, teaching_routes
+from app.web import api, description, gateway, stream, teaching_routes
 from app.web.access import Access, Keys
 from app.web.entrance import LARGEST_MESSAGE, Entrance, start_viser
 from app.web.evaluation import course_routes, identity_routes
@@ -52,6 +53,7 @@ from app.web.pictures.likelihood import Likelihoods
 from app.web.pictures.swatches import Swatches
 from app.web.security import CONTENT_POLICY, Guard, OnlyLooking, allowed_hosts, is_loopback
 from app.web.stream import Stream
+from app.web.studies import routes as studies
 from app.web.tables import event_tables, tables, teaching_tables
 from app.web.views.timeline import Timelines
 from tracker import __version__
@@ -60,6 +62,7 @@ from tracker.library import KEEP
 from tracker.library.records import Result
 from tracker.pipeline import Cancelled
 from tracker.runs.stage_cache import StageCache
+from tracker.studies.store import studies_folder
 
 logger = logging.getLogger("app")
 
@@ -77,6 +80,7 @@ ROUTERS = (
     importing.router,
     library.router,
     export_routes.router,
+    studies.router,
     stream.router,
     gateway.router,
 )
@@ -124,8 +128,10 @@ def create_app(settings: Settings) -> FastAPI:
         description="Tracks of several people in 3D from calibrated cameras, and their tuning.",
         redoc_url=None,
         static_url="/docs-files",  # the page of the routes loads nothing from another host
+        generate_unique_id_function=description.operation_id,
         lifespan=_lifespan,
     )
+    description.install(app)
     app.state.settings = settings
     if isinstance(settings.run, Result):
         app.add_middleware(OnlyLooking)
@@ -204,6 +210,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     exporter = app.state.exporter = Exporter()
     sensitivity = app.state.sensitivity = Sensitivity(workbench, settings.seed)
     keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep)
+    study_desk = app.state.studies = StudyDesk(workbench, studies_folder())
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
     told.start()
@@ -241,7 +248,16 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         await asyncio.gather(
             *(
                 asyncio.to_thread(part.close)
-                for part in (identity_check, exporter, keeper, jobs, evaluator, sensitivity, room)
+                for part in (
+                    identity_check,
+                    exporter,
+                    keeper,
+                    jobs,
+                    evaluator,
+                    sensitivity,
+                    room,
+                    study_desk,
+                )
             )
         )
         crashes.close()

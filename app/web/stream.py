@@ -17,7 +17,7 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import TypeAdapter, ValidationError
 
 from app import models
-from app.state.snapshot import Change, Command, Event, Notice, Snapshot
+from app.state.snapshot import Change, Command, Event, Notice, Snapshot, StudyNews
 from app.state.workbench import Workbench
 from app.web.views import results, steps
 
@@ -101,6 +101,8 @@ class Stream:
         match event:
             case Command(name):
                 text = json.dumps({"type": "command", "name": name})
+            case StudyNews(told):
+                text = json.dumps({"type": "study", "study": told})
             case Notice():
                 text = _notice(event)
                 if not self._pages:

@@ -120,6 +120,14 @@ def add_entrance(wish: NewEntrance, bench: Bench, teach: Teach) -> models.State:
     return results.state_of(bench.snapshot())
 
 
+@router.post("/entrances/suggested")
+def suggest_entrances(bench: Bench, teach: Teach) -> models.State:
+    """Add the entrances at which the tracks of the shown run begin and end."""
+    with _complaining():
+        teach.suggest_entrances()
+    return results.state_of(bench.snapshot())
+
+
 @router.patch("/entrances/{index}/{part}/{axis}")
 def set_entrance(
     index: int, part: Part, axis: Axis, wish: ValueChange, bench: Bench, teach: Teach

@@ -40,7 +40,7 @@ def is_evaluated(client: TestClient) -> Callable[[], bool]:
     def holds() -> bool:
         answer = client.get("/api/evaluation").json()
         key = client.get("/api/state").json()["run"]["key"]
-        return "error" not in answer and answer["run"] == key and not answer["partial"]
+        return "code" not in answer and answer["run"] == key and not answer["partial"]
 
     return holds
 

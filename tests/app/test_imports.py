@@ -14,6 +14,9 @@ LATER = {
     "trimesh": "viser's",
     "tqdm": "the bars of a terminal",
     "mkdocs": "the manual is built before",
+    "optuna": "studies",
+    "distributed": "studies, in a process of their own",
+    "sklearn": "studies: what matters",
 }
 """What neither the web nor the engine imports before it is used, and what it is for."""
 

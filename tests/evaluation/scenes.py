@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from tracker.evaluation.matching import Comparison, Measure, prepare
+from tracker.evaluation.measures.matching import Comparison, Measure, prepare
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import GroundTruth, Sequence
 

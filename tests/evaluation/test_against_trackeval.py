@@ -25,9 +25,9 @@ from tests.evaluation.scenes import (
     scattered,
     walks,
 )
-from tracker.evaluation.clear import clear
-from tracker.evaluation.hota import hota
-from tracker.evaluation.identity import identity
+from tracker.evaluation.measures.clear import clear
+from tracker.evaluation.measures.hota import hota
+from tracker.evaluation.measures.identity import identity
 from tracker.sequences.sequence import GroundTruth
 
 metrics = pytest.importorskip(

@@ -7,12 +7,12 @@ import pytest
 
 from tests.evaluation.scenes import by_hand, comparison, tracks_of, truth_of
 from tracker.camera import Camera
-from tracker.evaluation.clear import clear
-from tracker.evaluation.gospa import gospa
-from tracker.evaluation.hota import hota
-from tracker.evaluation.identity import identity
-from tracker.evaluation.matching import Measure
-from tracker.evaluation.ospa import ospa, ospa2, ospa2_whole
+from tracker.evaluation.measures.clear import clear
+from tracker.evaluation.measures.gospa import gospa
+from tracker.evaluation.measures.hota import hota
+from tracker.evaluation.measures.identity import identity
+from tracker.evaluation.measures.matching import Measure
+from tracker.evaluation.measures.ospa import ospa, ospa2, ospa2_whole
 from tracker.evaluation.pixels import pixels
 from tracker.evaluation.positions import cardinality_error, positions
 

@@ -19,7 +19,7 @@ from tests.evaluation.scenes import (
 )
 from tracker.camera import Camera
 from tracker.evaluation import EvaluationSettings, evaluate
-from tracker.evaluation.matching import to_rows
+from tracker.evaluation.measures.matching import to_rows
 from tracker.trajectories import Trajectories
 
 CAMERA = Camera(

@@ -22,9 +22,9 @@ from tests.evaluation.scenes import (
     walks,
 )
 from tracker.evaluation import Evaluation, EvaluationSettings, evaluate
-from tracker.evaluation.gospa import gospa_parts
-from tracker.evaluation.matching import Measure, assign, match
-from tracker.evaluation.ospa import ospa, ospa2, ospa2_whole, ospa_parts
+from tracker.evaluation.measures.gospa import gospa_parts
+from tracker.evaluation.measures.matching import Measure, assign, match
+from tracker.evaluation.measures.ospa import ospa, ospa2, ospa2_whole, ospa_parts
 
 ORDERS = st.sampled_from([1.0, 1.5, 2.0, 4.0])
 CUTOFFS = st.sampled_from([0.3, 1.0, 2.0])

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy import ndarray
 from scipy.spatial.transform import Rotation
 
 from tests.formats.rig import SIZE, boxes, cameras, walks
@@ -30,9 +31,11 @@ def toml(folder: Path, *, scale: float = 1.0, size: tuple[int, int] = SIZE) -> N
     (folder / "calibration.toml").write_text("\n".join(lines))
 
 
-def detections(folder: Path, first: int = 0, *, size: tuple[int, int] = SIZE) -> None:
+def detections(
+    folder: Path, first: int = 0, *, size: tuple[int, int] = SIZE, places: ndarray = PLACES
+) -> None:
     for camera in cameras():
-        frames, found = boxes(camera, PLACES)
+        frames, found = boxes(camera, places)
         found = found * np.tile(np.array(size) / SIZE, 2)
         rows = [
             f"{f + first},{','.join(map(str, b))}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from numpy import ndarray
 from tests.formats.rig import SIZE, boxes, cameras, read, walks
 from tracker.checks.reading import read_boxes
 from tracker.formats.detections.body import NOSE_HEIGHT, boxes_of
-from tracker.formats.pieces import DetectionPiece, TruthPiece
+from tracker.formats.pieces import DetectionPiece, FormatError, TruthPiece
 
 CAMERA = cameras()[0]
 FRAMES, BOXES = boxes(CAMERA, walks())
@@ -121,6 +122,51 @@ def test_results_of_ultralytics(tmp_path: Path) -> None:
     piece = _detections(files[0], *files)
     assert piece.format == "Ultralytics results"
     _assert_boxes(piece)
+
+
+@pytest.mark.parametrize("index", [True, False], ids=["pandas", "polars"])
+def test_tables_of_ultralytics(tmp_path: Path, index: bool) -> None:
+    """With the box as Python writes it, in one cell; data frames of pandas number their rows."""
+    files = []
+    for frame in np.unique(FRAMES):
+        rows = [["", *_HEAD] if index else _HEAD]
+        for number, box in enumerate(BOXES[FRAMES == frame]):
+            corners = dict(zip(("x1", "y1", "x2", "y2"), _corners(box), strict=True))
+            row = ["person", 0, 0.7, repr(corners)]
+            rows.append([number, *row] if index else row)
+        files.append(tmp_path / f"frame{frame}.csv")
+        with files[-1].open("w", newline="") as file:
+            csv.writer(file).writerows(rows)
+    piece = _detections(files[0], *files)
+    assert (piece.format, piece.layout) == ("Ultralytics results", "xyxy")
+    _assert_boxes(piece)
+    np.testing.assert_array_equal(piece.scores, 0.7)
+
+
+_HEAD = ["name", "class", "confidence", "box"]
+
+
+def test_a_sink_of_supervision_with_a_detectors_own_columns(tmp_path: Path) -> None:
+    """Names of classes, and what else the detections carry, follow the columns of every sink."""
+    path = tmp_path / "out.csv"
+    head = ["x_min", "y_min", "x_max", "y_max", "class_id", "confidence", "tracker_id",
+            "class_name", "frame_index", "processing_time"]  # fmt: skip
+    rows = [
+        [*_corners(b), 0, 0.6, n, "person", int(f), 0.02]
+        for n, (f, b) in enumerate(zip(FRAMES, BOXES, strict=True))
+    ]
+    other = [1, 1, 9, 9, 56, 0.9, 99, "chair", 0, 0.02]
+    path.write_text("\n".join(",".join(map(str, row)) for row in [head, other, *rows]))
+    piece = _detections(path)
+    assert piece.format == "supervision sink"
+    _assert_boxes(piece)
+
+
+def test_a_sink_without_frames_says_what_is_missing(tmp_path: Path) -> None:
+    path = tmp_path / "out.csv"
+    path.write_text("x_min,y_min,x_max,y_max,class_id,confidence,tracker_id\n1,2,30,40,0,0.9,\n")
+    with pytest.raises(FormatError, match='expected a column "frame"'):
+        read(path)
 
 
 @pytest.mark.parametrize("form", ["csv", "json"])
@@ -242,4 +288,46 @@ def test_alphapose(tmp_path: Path) -> None:
     path.write_text(json.dumps([record]))
     piece = _detections(path)
     assert (piece.format, piece.frames.tolist()) == ("AlphaPose JSON", [12])
+    np.testing.assert_allclose(piece.boxes[0, 1] + piece.boxes[0, 3], 900.0, atol=1.0)
+
+
+@pytest.mark.parametrize(
+    ("form", "people", "joints"),
+    [("open", "people", "pose_keypoints_2d"), ("cmu", "bodies", "joints")],
+)
+def test_the_other_forms_of_alphapose(tmp_path: Path, form: str, people: str, joints: str) -> None:
+    """All pictures in one file, by their names; or a file a picture."""
+    figure = _stick_figure(600.0)
+    figure["neck"] = [500, figure["ls"][1]]
+    names = ["nose", "neck", "rs", "re", "rw", "ls", "le", "lw", "rh", "rk", "ra", "lh", "lk", "la",
+             "eyes", "eyes2", "eyes", "eyes2"]  # fmt: skip
+    pose = [value for name in names for value in (*figure[name], 0.8)]
+    pictures = {
+        f"{frame}.jpg": {"version": "AlphaPose v0.3", people: [{joints: pose}] * count}
+        for frame, count in ((3, 1), (12, 2))
+    }
+    whole = tmp_path / f"{form}.json"
+    whole.write_text(json.dumps(pictures))
+    files = []
+    for name, one in pictures.items():
+        files.append(tmp_path / name.replace("jpg", "json"))
+        files[-1].write_text(json.dumps(one))
+    for piece in (_detections(whole), _detections(files[0], *files)):
+        assert piece.frames.tolist() == [3, 12, 12]
+        np.testing.assert_allclose(piece.boxes[:, 1] + piece.boxes[:, 3], 900.0, atol=1.0)
+        np.testing.assert_allclose(piece.boxes[:, 1], 300.0, atol=4.0)
+
+
+@pytest.mark.parametrize("count", [26, 136])
+def test_alphapose_with_the_joints_of_halpe(tmp_path: Path, count: int) -> None:
+    figure = _stick_figure(600.0)
+    figure["crown"] = [500, 300.0]
+    names = [*COCO, "crown", *["nose"] * (count - 18)]
+    pose = [value for name in names for value in (*figure[name], 0.8)]
+    path = tmp_path / "alphapose-results.json"
+    path.write_text(json.dumps([{"image_id": "cam1_0007.jpg", "category_id": 1,
+                                 "keypoints": pose, "score": 3.1, "box": [1, 2, 3, 4],
+                                 "idx": [0.0]}]))  # fmt: skip
+    piece = _detections(path)
+    assert (piece.camera, piece.frames.tolist()) == ("cam1", [7])
     np.testing.assert_allclose(piece.boxes[0, 1] + piece.boxes[0, 3], 900.0, atol=1.0)

@@ -14,7 +14,7 @@ from app.command.main import main
 from tests.formats.recorded import PLACES, detections, settled_of, toml, videos
 from tests.formats.rig import FLIP, HALF_EXTENTS, SIZE, boxes, cameras
 from tracker.formats.pieces import FormatError
-from tracker.importing.names import match, short_names
+from tracker.importing.finding.names import match, short_names
 from tracker.importing.options import ImportOptions
 from tracker.importing.settling import Settled
 from tracker.importing.writing import write

@@ -137,7 +137,7 @@ def test_it_is_served_read_only(served: TestClient) -> None:
     ):
         answer = served.request(method, path, json=body)
         assert answer.status_code == 403, path
-        assert "only looked at" in answer.json()["error"]["message"]
+        assert "only looked at" in answer.json()["detail"]
     state = served.get("/api/state").json()["run"]
     assert (state["state"], state["done"]) == ("done", 30)
 

@@ -1,9 +1,9 @@
 """Make what the manual says of the code and of the records anew: ``python3 -m tests.manual``.
 
 ``--record`` first runs experiments (all that are named, or every one) and keeps their tables,
-from which alone the page of results is made; ``--sweeps`` runs short pieces over values of
-parameters, and keeps what the pictures of the page of tuning show; ``--machines`` exchanges what
-differs between machines, one thing at a time.
+from which alone the page of results is made; ``--keep`` takes what one has written; ``--sweeps``
+runs short pieces over values of parameters, and keeps what the pictures of the page of tuning
+show; ``--machines`` exchanges what differs between machines, one thing at a time.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import sys
 from pathlib import Path
 
 from tests.conftest import DATA
-from tests.manual import machines, results, sweeps
 from tests.manual.places import ROOT, made_pages
+from tests.manual.records import machines, results, sweeps
 from tracker.experiments import EXPERIMENTS
 
 
@@ -24,12 +24,18 @@ def main() -> int:
     parser.add_argument(
         "--record", nargs="*", metavar="EXPERIMENT", choices=[*EXPERIMENTS, []], default=None
     )
+    parser.add_argument(
+        "--keep", nargs="+", type=Path, metavar="FILE", default=[],
+        help="take what `multiview-phd experiment` wrote into the records",
+    )  # fmt: skip
     parser.add_argument("--sweeps", nargs="*", metavar="GROUP|KEY", default=None)
     parser.add_argument("--machines", action="store_true")
     parser.add_argument("--data", type=Path, default=DATA, help="folder of the real recordings")
     arguments = parser.parse_args()
     if arguments.record is not None:
         results.record(arguments.record or list(EXPERIMENTS), arguments.data)
+    for path in arguments.keep:
+        results.keep(path)
     if arguments.sweeps is not None:
         sweeps.record(arguments.sweeps, arguments.data)
     if arguments.machines:

@@ -29,7 +29,8 @@ def between(text: str, name: str, made: str) -> str:
 
 def made_pages() -> dict[Path, Callable[[], str]]:
     """Every file that is made, whole or in part, and how."""
-    from tests.manual import command_line, results, rooms, tuning
+    from tests.manual import command_line, rooms, tuning
+    from tests.manual.records import results
     from tracker.writing import json_file
 
     return {

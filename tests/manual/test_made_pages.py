@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.manual import results, sweeps
 from tests.manual.places import PAGES, ROOT, between, made_pages
 from tests.manual.plots import picture
+from tests.manual.records import results, sweeps
 from tracker.parameters import PARAMETERS
 
 
@@ -30,11 +30,15 @@ def test_the_records_hold_every_number_of_the_tables() -> None:
             assert f"| {' | '.join(row)} |" in page
 
 
-def test_a_shortened_run_is_no_record(tmp_path: Path) -> None:
+def test_a_shortened_run_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    document = json.loads((results.FOLDER / "cmc.json").read_text(encoding="utf-8"))
+    monkeypatch.setattr(results, "FOLDER", tmp_path / "records")
+    results.FOLDER.mkdir()
     path = tmp_path / "cmc.json"
-    path.write_text(json.dumps({"quick": True}), encoding="utf-8")
-    with pytest.raises(ValueError, match="leave out --quick"):
+    for quick, seeds, form in ((True, None, "--quick"), (False, 3, "--seeds 3"), (False, None, "")):
+        path.write_text(json.dumps({**document, "quick": quick, "seeds": seeds}), encoding="utf-8")
         results.keep(path)
+        assert (f"`multiview-phd experiment cmc {form}`" in results.page()) == bool(form)
 
 
 def test_the_sweeps_are_of_parameters_that_there_are() -> None:

@@ -11,8 +11,8 @@ import pytest
 from pydantic import Field
 
 from app.web.server import ROUTERS
-from tests.manual import sweeps
 from tests.manual.places import PAGES, ROOT
+from tests.manual.records import sweeps
 from tracker.formats.protocol import Format
 from tracker.formats.registry import FORMATS
 from tracker.parameters import PARAMETERS, methods

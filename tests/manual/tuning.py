@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from app.command.flags import describe_range, show
-from tests.manual import sweeps
 from tests.manual.plots import picture
+from tests.manual.records import sweeps
 from tracker.parameters import GROUPS, METHODS, PARAMETERS, Parameter, RunParameters
 
 STAGES = {

@@ -16,7 +16,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.camera import Camera
-from tracker.evaluation.matching import Comparison, Rows, assign
+from tracker.evaluation.measures.matching import Comparison, Rows, assign
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +95,7 @@ def pixels(
     """Score every camera.
 
     At each step the boxes of one picture are paired one to one by the protocol of
-    :mod:`tracker.evaluation.matching`, with the distance 1 − IoU and the gate
+    :mod:`tracker.evaluation.measures.matching`, with the distance 1 − IoU and the gate
     1 − ``overlap``. What matched a don't-care row in space is already set aside.
 
     Args:

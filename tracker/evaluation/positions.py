@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.evaluation.matching import (
+from tracker.evaluation.measures.matching import (
     Comparison,
     Matches,
     Measure,

@@ -9,13 +9,13 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.camera import Camera
-from tracker.evaluation.clear import clear
 from tracker.evaluation.figures import DEFINITIONS, Figure
-from tracker.evaluation.gospa import gospa
-from tracker.evaluation.hota import hota
-from tracker.evaluation.identity import identity
-from tracker.evaluation.matching import Comparison, Measure, Tracks, prepare
-from tracker.evaluation.ospa import ospa, ospa2, ospa2_whole
+from tracker.evaluation.measures.clear import clear
+from tracker.evaluation.measures.gospa import gospa
+from tracker.evaluation.measures.hota import hota
+from tracker.evaluation.measures.identity import identity
+from tracker.evaluation.measures.matching import Comparison, Measure, Tracks, prepare
+from tracker.evaluation.measures.ospa import ospa, ospa2, ospa2_whole
 from tracker.evaluation.pixels import CameraScore, pixels
 from tracker.evaluation.positions import cardinality_error, positions
 from tracker.evaluation.result import Evaluation, Pairs, Series

@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 from numpy import ndarray
 
-from tracker.evaluation.clear import Clear
-from tracker.evaluation.identity import Identity
-from tracker.evaluation.matching import Comparison
+from tracker.evaluation.measures.clear import Clear
+from tracker.evaluation.measures.identity import Identity
+from tracker.evaluation.measures.matching import Comparison
 from tracker.evaluation.positions import Positions
 
 PersonStatus = Literal["mostly tracked", "partly tracked", "mostly lost"]

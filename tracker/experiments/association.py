@@ -15,7 +15,7 @@ from tracker import parameters as table
 from tracker import single_view
 from tracker.boxes import Boxes
 from tracker.evaluation.figures import number
-from tracker.evaluation.matching import assign
+from tracker.evaluation.measures.matching import assign
 from tracker.experiments.clips import clip as clips
 from tracker.experiments.clips.association import CLIPS, together
 from tracker.experiments.clips.clip import Clip
@@ -76,7 +76,7 @@ class Tracked:
 
 def run(context: Context) -> Result:
     """Every method on every clip with every seed, and every threshold over the change of light."""
-    seeds = list(range(QUICK_SEEDS if context.quick else SEEDS))
+    seeds = list(range(context.seeds_of(SEEDS, QUICK_SEEDS)))
     items = [(clip, seed) for clip in CLIPS for seed in seeds]
     answers = spread(
         _track,

@@ -40,7 +40,7 @@ def run(context: Context) -> Result:
     """Track with every seed, and fuse the boxes of every choice of cameras."""
     sequence = runs.recording(context, RECORDING)
     steps = min(QUICK_STEPS, sequence.frames) if context.quick else sequence.frames
-    seeds = list(range(QUICK_SEEDS if context.quick else SEEDS))
+    seeds = list(range(context.seeds_of(SEEDS, QUICK_SEEDS)))
     parameters = parameters_of(sequence)
     count = len(sequence.views)
     choices = [c for size in range(count, 0, -1) for c in combinations(range(count), size)]

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from tracker.evaluation.figures import number
-from tracker.evaluation.matching import assign
+from tracker.evaluation.measures.matching import assign
 from tracker.evaluation.pixels import box_overlaps
 from tracker.experiments.fig1 import QUICK_STEPS, ROOM
 from tracker.experiments.laboratory import runs

@@ -67,7 +67,7 @@ def run(context: Context) -> Result:
     """Track with every seed, by both cameras and by each alone, and set the errors side by side."""
     sequence = runs.room(context, ROOM, QUICK_STEPS if context.quick else None)
     steps = QUICK_RUN_STEPS if context.quick else sequence.frames
-    seeds = list(range(QUICK_SEEDS if context.quick else SEEDS))
+    seeds = list(range(context.seeds_of(SEEDS, QUICK_SEEDS)))
     parameters = parameters_of(sequence)
     work = partial(_one_seed, folder=sequence.folder, parameters=parameters, steps=steps)
     answers = spread(work, seeds, context, words=f"{len(seeds)} seeds", steps=steps * len(seeds))

@@ -21,7 +21,7 @@ from tracker import single_view
 from tracker.assignment import linear_sum_assignment
 from tracker.boxes import Boxes
 from tracker.evaluation.figures import number
-from tracker.evaluation.matching import assign
+from tracker.evaluation.measures.matching import assign
 from tracker.experiments import cameras
 from tracker.experiments.clips import clip as clips
 from tracker.experiments.laboratory import runs
@@ -102,7 +102,7 @@ def clip(seed: int) -> clips.Clip:
 
 def run(context: Context) -> Result:
     """Follow the two in every clip, and the people of the recording in each of its cameras."""
-    seeds = QUICK_SEEDS if context.quick else SEEDS
+    seeds = context.seeds_of(SEEDS, QUICK_SEEDS)
     measured: dict[str, dict[str, Any]] = {name: {"errors": [], "seconds": 0.0, "switches": 0}
                                            for name in methods()}  # fmt: skip
     first: dict[str, list[ViewResult]] = {}

@@ -15,7 +15,7 @@ from numpy import ndarray
 from tracker import parameters as table
 from tracker import single_view
 from tracker.evaluation.figures import number
-from tracker.evaluation.matching import assign
+from tracker.evaluation.measures.matching import assign
 from tracker.experiments import cameras
 from tracker.experiments.clips import clip as clips
 from tracker.experiments.clips.ppf import CLIPS
@@ -94,7 +94,7 @@ class Followed:
 
 def run(context: Context) -> Result:
     """Every filter on every clip, and on the cameras of the real recording, with every seed."""
-    seeds = QUICK_SEEDS if context.quick else SEEDS
+    seeds = context.seeds_of(SEEDS, QUICK_SEEDS)
     with tempfile.TemporaryDirectory(prefix="multiview-phd-") as folder:
         scenes = list(_drawn(context, Path(folder)))
         real, notes = _recorded(context)

@@ -13,7 +13,6 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
-from scipy.special import gammaincinv
 
 from tracker.kernels import linear_algebra
 from tracker.kernels.intensity import merging
@@ -261,6 +260,8 @@ def gate_distance(probability: float, dimension: int) -> float:
         probability: P_G, 0 … 1.
         dimension: d.
     """
+    from scipy.special import gammaincinv  # a server starts without it
+
     return float(2.0 * gammaincinv(dimension / 2.0, probability))
 
 

@@ -48,3 +48,5 @@ class ImportOptions:
     """The room's lowest and highest corner."""
     half_extents: Corner | None = None
     """Half width, depth and height of what is tracked, metres."""
+    entrances: tuple[tuple[Corner, Corner], ...] = ()
+    """Of each the position and the standard deviations, metres."""

@@ -33,7 +33,7 @@ def as_sequence(settled: Settled, name: str) -> Sequence:
         folder=Path(),
         fps=settled.fps,
         frames=settled.frames,
-        room=Room(np.asarray(room.minimum), np.asarray(room.maximum)),
+        room=Room(np.asarray(room.minimum), np.asarray(room.maximum), settled.entrances),
         target_half_extents=np.asarray(room.half_extents),
         views=views,
         ground_truth=settled.truth,

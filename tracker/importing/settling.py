@@ -15,15 +15,15 @@ from tracker.camera import Camera
 from tracker.checks.reading import Reading, read_boxes, to_camera
 from tracker.checks.readings import Open, Seen, find_meaning
 from tracker.formats.pieces import FormatError, Layout, RawCamera
-from tracker.importing.calibrations import camera_sets
+from tracker.importing.finding.calibrations import camera_sets
+from tracker.importing.finding.geometry import read_poses
+from tracker.importing.finding.matching import MatchedCamera, match_all
+from tracker.importing.finding.pictures import picture_sizes, scaled
+from tracker.importing.finding.times import CameraTime, Times, first_index, frames_of, settle_times
+from tracker.importing.finding.truths import settle_truth
 from tracker.importing.gathering import Taken
-from tracker.importing.geometry import read_poses
-from tracker.importing.matching import MatchedCamera, match_all
 from tracker.importing.options import ImportOptions
-from tracker.importing.pictures import picture_sizes, scaled
-from tracker.importing.times import CameraTime, Times, first_index, frames_of, settle_times
-from tracker.importing.truths import settle_truth
-from tracker.sequences.sequence import Detections, GroundTruth
+from tracker.sequences.sequence import Detections, Entrance, GroundTruth
 
 ROOM_MARGIN = 1.0
 """Metres on each side: a room that is too large costs little, who is outside is lost."""
@@ -57,6 +57,8 @@ class Settled:
     """As it is written."""
     suggested: Suggestion
     """As it was found out."""
+    entrances: tuple[Entrance, ...]
+    """Of the room; none unless they are wished."""
     truth: GroundTruth | None
     calibration: str
     """What its file was recognised as."""
@@ -121,6 +123,7 @@ def settle(taken: Sequence[Taken], options: ImportOptions | None = None) -> Sett
         times.frames,
         room,
         suggested,
+        _entrances(options),
         truth,
         matched.format,
         reading,
@@ -165,6 +168,17 @@ def _as_told(room: Suggestion, options: ImportOptions) -> Suggestion:
                 f"room: expected {axis} to end above {low:g} m, where it begins, found {high:g} m"
             )
     return replace(room, minimum=minimum, maximum=maximum)
+
+
+def _entrances(options: ImportOptions) -> tuple[Entrance, ...]:
+    """Those that are wished."""
+    for position, sigma in options.entrances:
+        if not (np.isfinite(position).all() and np.isfinite(sigma).all() and min(sigma) > 0.0):
+            raise FormatError(
+                "entrances: expected x, y, z and three positive standard deviations in metres, "
+                f"found {position} and {sigma}"
+            )
+    return tuple(Entrance(np.array(place), np.array(sigma)) for place, sigma in options.entrances)
 
 
 def _told(raw: RawCamera, options: ImportOptions) -> RawCamera:

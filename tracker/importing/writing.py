@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,6 +11,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.formats.pieces import FormatError
+from tracker.importing.bringing import Told, bring, bring_images
 from tracker.importing.settling import Settled, SettledView
 from tracker.placing import replacing, write_whole
 from tracker.sequences.sequence import Detections, GroundTruth
@@ -20,7 +19,14 @@ from tracker.sequences.sequence import Detections, GroundTruth
 FILE = "sequence.toml"
 
 
-def write(settled: Settled, folder: Path, name: str, *, copy: bool = False) -> list[str]:
+def write(
+    settled: Settled,
+    folder: Path,
+    name: str,
+    *,
+    copy: bool = False,
+    copied: Told = lambda more: None,
+) -> list[str]:
     """Write ``sequence.toml``, boxes and truth; bring the pictures in.
 
     Pictures inside the folder stay where they are. Others are linked (a second name of the same
@@ -31,9 +37,10 @@ def write(settled: Settled, folder: Path, name: str, *, copy: bool = False) -> l
         folder: It must not hold a sequence yet.
         name: Of the sequence.
         copy: Copy the pictures, also where they could be linked.
+        copied: Called with how many more bytes are copied; what it raises ends the writing.
 
     Returns:
-        What was copied or linked, a sentence each.
+        What was copied though a link was wanted, a sentence each.
 
     Raises:
         FormatError: If there is a sequence in the folder already.
@@ -45,7 +52,7 @@ def write(settled: Settled, folder: Path, name: str, *, copy: bool = False) -> l
     told: list[str] = []
     tables = []
     for view, own in zip(settled.views, names, strict=True):
-        tables.append(_camera(view, own, folder, copy, told))
+        tables.append(_camera(view, own, folder, copy, copied, told))
     truth = ""
     if settled.truth is not None:
         _write_truth(folder / "ground_truth.csv", settled.truth)
@@ -59,6 +66,7 @@ def write(settled: Settled, folder: Path, name: str, *, copy: bool = False) -> l
         "[room]",
         f"min = {_list(settled.room.minimum)}",
         f"max = {_list(settled.room.maximum)}",
+        *_entrances(settled),
         "",
         "[target]",
         f"half_extents = {_list(settled.room.half_extents)}",
@@ -70,16 +78,35 @@ def write(settled: Settled, folder: Path, name: str, *, copy: bool = False) -> l
     return told
 
 
-def _camera(view: SettledView, name: str, folder: Path, copy: bool, told: list[str]) -> str:
+def _entrances(settled: Settled) -> list[str]:
+    """The lines of the room's entrances."""
+    if not settled.entrances:
+        return []
+    tables = [
+        f"  {{ position = {_list(one.position)}, sigma = {_list(one.sigma)} }},"
+        for one in settled.entrances
+    ]
+    return ["entrances = [", *tables, "]"]
+
+
+def _camera(
+    view: SettledView, name: str, folder: Path, copy: bool, copied: Told, told: list[str]
+) -> str:
     camera = view.camera
     lines = ["[[camera]]", f"name = {_text(_plain_name(camera.name))}"]
     lines.append(f"image_size = [{camera.image_size[0]}, {camera.image_size[1]}]")
     matched = view.matched
     if matched.video is not None:
-        place = _bring(matched.video.path, folder, name, copy, told)
+        path = matched.video.path
+        place, instead = bring(path, folder, name, copy, copied)
+        if instead:
+            told.append(f"{path.name}: copied, since it cannot be linked from there")
         lines.append(f"video = {_text(place)}")
     elif matched.images is not None:
-        lines.append(f"images = {_text(_bring_images(matched.images.files, folder, name, copy))}")
+        place, instead = bring_images(matched.images.files, folder, name, copy, copied)
+        if instead:
+            told.append(f"{name}: pictures copied, since they cannot be linked from there")
+        lines.append(f"images = {_text(place)}")
     timing = view.time.timing
     lines += [] if timing.fps is None else [f"fps = {_number(timing.fps)}"]
     lines += [f"time_offset = {_number(timing.time_offset)}"] if timing.time_offset else []
@@ -101,48 +128,6 @@ def _camera(view: SettledView, name: str, folder: Path, copy: bool, told: list[s
         "",
     ]
     return "\n".join(lines)
-
-
-def _bring(path: Path, folder: Path, name: str, copy: bool, told: list[str]) -> str:
-    """A file by its path inside the folder; linked or copied into it where it is outside."""
-    real, home = path.resolve(), folder.resolve()
-    if not copy and real.is_relative_to(home):
-        return real.relative_to(home).as_posix()
-    target = folder / f"{name}{path.suffix.lower()}"
-    if target.exists():
-        target.unlink()
-    if not copy:
-        try:
-            os.link(real, target)
-            return target.name
-        except OSError:  # another file system, or one without links
-            told.append(f"{path.name}: copied, since it cannot be linked from there")
-    shutil.copyfile(real, target)
-    return target.name
-
-
-def _bring_images(files: Sequence[Path], folder: Path, name: str, copy: bool) -> str:
-    """Pictures under numbers that sort as they follow each other."""
-    own = folder / name
-    own.mkdir(exist_ok=True)
-    width = len(str(len(files)))
-    for number, path in enumerate(files):
-        if not path.exists():  # missing in the row of their numbers: the hole stays
-            continue
-        _bring_as(path, own / f"{number:0{width}}{path.suffix.lower()}", copy)
-    return f"{name}/*{files[0].suffix.lower()}"
-
-
-def _bring_as(path: Path, target: Path, copy: bool) -> None:
-    if target.exists():
-        return
-    if not copy:
-        try:
-            os.link(path.resolve(), target)
-            return
-        except OSError:
-            pass
-    shutil.copyfile(path, target)
 
 
 def _plain_name(name: str) -> str:

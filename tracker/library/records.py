@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 from tracker.library.columns import KeptTracks
 from tracker.parameters import RunParameters
 
-Source = Literal["track", "page", "bundle"]
+Source = Literal["track", "page", "bundle", "batch"]
 
 HEADLINES = (
     "mota", "idf1", "hota", "ospa", "position_error", "misses", "false_positives", "id_switches",
@@ -60,7 +60,8 @@ class KeptRun(NamedTuple):
     code: str
     """Hash of the code that computes, as in the keys of stages."""
     source: str
-    """Who computed it: ``track``, ``page``, or ``bundle`` where it was taken from a file."""
+    """Who computed it: ``track``, ``batch``, ``page``, or ``bundle`` where it was taken from a
+    file."""
     targets: int
     """How many tracks."""
     mota: float | None

@@ -186,6 +186,14 @@ class Library:
             )
         return named[0]
 
+    def with_key(self, key: str) -> KeptRun | None:
+        """The run of this recording, these parameters, seed and code; None where it is not kept."""
+        with self._reading() as connection:
+            row = connection.execute(
+                f"{_RUNS} WHERE runs.key = ? AND deleted IS NULL ORDER BY runs.id DESC", (key,)
+            ).fetchone()
+            return None if row is None else KeptRun._make(row)
+
     def result(self, number: int) -> Result:
         """One run with its parameters, figures and tracks.
 

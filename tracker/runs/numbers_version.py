@@ -19,7 +19,7 @@ from tracker.parameters.registry import ORIGINS
 _ROOT = Path(__file__).resolve().parents[1]
 
 _NO_PART = ("evaluation", "experiments", "sequences/rendering", "export.py", "library", "writing",
-            "doubts", "corrections/log.py", "corrections/merging.py")  # fmt: skip
+            "doubts", "corrections/log.py", "corrections/merging.py", "studies")  # fmt: skip
 """What looks at results or makes recordings; a change of it changes no run."""
 
 _LATER: dict[Stage, tuple[str, ...]] = {

@@ -36,9 +36,18 @@ def read_camera(name: str, image_size: tuple[int, int], fields: Fields) -> Camer
             )
         projection = fields.matrix("projection", 3, 4)
         try:
-            return Camera.from_projection(name, image_size, projection)
+            with np.errstate(all="ignore"):
+                camera = Camera.from_projection(name, image_size, projection)
         except ValueError as error:
             raise fields.error("projection", str(error)) from None
+        _check_size(fields, "projection", camera.intrinsics)
+        if not np.abs(camera.translation).max() <= LARGEST:
+            raise fields.error(
+                "projection",
+                f"expected a camera within {LARGEST:g} m of the origin, found one at "
+                f"{np.abs(camera.translation).max():.4g} m",
+            )
+        return camera
     missing = [key for key in ("K", "R", "t") if key not in fields]
     if missing:
         raise SequenceError(
@@ -68,25 +77,27 @@ def _intrinsics(fields: Fields) -> Float[ndarray, "3 3"]:
     if matrix[0, 0] <= 0.0 or matrix[1, 1] <= 0.0:
         found = f"{matrix[0, 0]:g} and {matrix[1, 1]:g}"
         raise fields.error("K", f"expected focal lengths fx and fy above 0 pixels, found {found}")
-    focal = matrix[[0, 1], [0, 1]]
-    if focal.min() < LEAST_FOCAL or focal.max() > LARGEST:
-        raise fields.error(
-            "K",
-            f"expected focal lengths fx and fy from {LEAST_FOCAL:g} to {LARGEST:g} pixels, found "
-            f"{focal[0]:g} and {focal[1]:g}",
-        )
-    if np.abs(matrix[:2]).max() > LARGEST:
-        largest = np.abs(matrix[:2]).max()
-        raise fields.error(
-            "K", f"expected numbers of at most {LARGEST:g} pixels, found {largest:g}"
-        )
+    _check_size(fields, "K", matrix)
     return matrix
+
+
+def _check_size(fields: Fields, field: str, matrix: Float[ndarray, "3 3"]) -> None:
+    """Whether K is one that a camera can have, so that nothing later overflows."""
+    focal = matrix[[0, 1], [0, 1]]
+    if not (np.abs(matrix).max() <= LARGEST and focal.min() >= LEAST_FOCAL):
+        raise fields.error(
+            field,
+            f"expected focal lengths fx and fy from {LEAST_FOCAL:g} to {LARGEST:g} pixels, and "
+            f"nothing larger in K, found fx = {focal[0]:.4g}, fy = {focal[1]:.4g} and "
+            f"{np.abs(matrix).max():.4g} at most",
+        )
 
 
 def _rotation(fields: Fields) -> Float[ndarray, "3 3"]:
     matrix = fields.matrix("R", 3, 3)
     error = float(np.abs(matrix @ matrix.T - np.eye(3)).max())
-    determinant = float(np.linalg.det(matrix))
+    with np.errstate(all="ignore"):  # of what is no rotation at all
+        determinant = float(np.linalg.det(matrix))
     if error > ROTATION_TOLERANCE:
         raise fields.error(
             "R",

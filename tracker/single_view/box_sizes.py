@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
-from scipy.special import ndtri
 
 from tracker.camera import Camera
 from tracker.filters import models
@@ -181,7 +180,7 @@ class BoxSizes:
 def _bring_to_entrance_heights(positions: Float[ndarray, "N 3"], room: Room) -> None:
     """Move most of the positions to the heights of the entrances, in turn, in place."""
     moved = positions[: round(AT_ENTRANCE_HEIGHT * len(positions))]
-    spread = ndtri(_even_points(len(moved))[:, 2])
+    spread = _normals(_even_points(len(moved))[:, 2])
     for number, entrance in enumerate(room.entrances):
         mine = slice(number, None, len(room.entrances))
         moved[mine, 2] = entrance.position[2] + HEIGHT_FACTOR * entrance.sigma[2] * spread[mine]
@@ -192,6 +191,14 @@ def _even_points(count: int) -> Float[ndarray, "N 3"]:
     growth = 1.2207440846057596  # the real root of x⁴ = x + 1
     steps = np.arange(1, count + 1)[:, None] * growth ** -np.arange(1.0, 4.0)
     return steps % 1.0
+
+
+def _normals(points: Float[ndarray, " *S"]) -> Float[ndarray, " *S"]:
+    """The values below which a standard normal one lies with these probabilities."""
+    from scipy.special import ndtri  # a server starts without it
+
+    normals: Float[ndarray, " *S"] = ndtri(points)
+    return normals
 
 
 def _cells(
@@ -218,7 +225,7 @@ def entrance_boxes(
         weight: Of each component.
     """
     births = models.entrance_births(room, weight)
-    normals = ndtri(_even_points(500))
+    normals = _normals(_even_points(500))
     means, covariances = [], []
     for mean, covariance in zip(births.means, births.covariances, strict=True):
         positions = mean + normals * np.sqrt(np.diag(covariance))

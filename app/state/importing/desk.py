@@ -113,7 +113,8 @@ class Desk:
             ) from None
         with self._lock:
             self._drafts[draft.key] = draft
-            waiting = [key for key, d in self._drafts.items() if d.known.phase != "writing"]
+            begun = ("writing", "copying")
+            waiting = [key for key, d in self._drafts.items() if d.known.phase not in begun]
         for key in waiting[:-MOST_DRAFTS]:
             self.discard(key)
         return draft

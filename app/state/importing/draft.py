@@ -6,28 +6,34 @@ import logging
 import re
 import shutil
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import cv2
 import numpy as np
 
 from app.errors import sentence
-from app.state.importing.looking import Looked, look_into
 from app.state.importing.uploads import Upload
-from app.state.importing.wish import Wish, options_of
+from app.state.importing.wish import Wish, looks_alike, options_of
 from tracker.formats.pieces import FormatError, ImagesPiece, VideoPiece
-from tracker.importing.gathering import Taken, gather
-from tracker.importing.settling import Settled, SettledView, settle
-from tracker.importing.writing import FILE, write
 from tracker.pipeline import Cancelled
+from tracker.sequences.reader import FILE
 from tracker.sequences.video import VideoDecoder, VideoError, index_video, read_image
+
+if TYPE_CHECKING:
+    from app.state.importing.looking import Looked
+    from tracker.importing.gathering import Taken
+    from tracker.importing.settling import Settled, SettledView
 
 logger = logging.getLogger("app")
 
-Phase = Literal["uploading", "reading", "settled", "failed", "writing", "written"]
+Phase = Literal["uploading", "reading", "settled", "failed", "writing", "copying", "written"]
+"""While it is copying, it is a recording that can be opened already."""
+
+_BEGUN: tuple[Phase, ...] = ("writing", "copying", "written")
 
 PICTURE_WIDTH = 256
 FILES = "files"
@@ -52,6 +58,10 @@ class Known:
     folder: Path | None = None
     """Where it was written."""
     told: tuple[str, ...] = field(default_factory=tuple)
+    copied: int = 0
+    """Bytes that were copied, of :attr:`Draft.size`."""
+    copying_since: float = 0.0
+    """Seconds of ``time.monotonic``, when that began."""
 
 
 class Draft:
@@ -98,12 +108,11 @@ class Draft:
     def wish(self, wish: Wish) -> None:
         """Have it otherwise; what follows is found out anew, where it is more than the name."""
         with self._lock:
-            if self._known.phase in ("writing", "written"):
+            if self._known.phase in _BEGUN:
                 return
             before = self._known.wish
             self._tell(wish=wish)
-            same = replace(before, name="", copy=False) == replace(wish, name="", copy=False)
-            if not same and self._gathered:
+            if not looks_alike(before, wish) and self._gathered:
                 self._look_again()
 
     def check_open(self) -> None:
@@ -112,7 +121,7 @@ class Draft:
         Raises:
             FormatError: If it is, or was.
         """
-        if self._known.phase in ("writing", "written"):
+        if self._known.phase in _BEGUN:
             raise FormatError("this recording is being written already; import the rest by itself")
 
     def arrived(self) -> None:
@@ -158,6 +167,11 @@ class Draft:
                 if stop.is_set():
                     raise Cancelled
                 self._tell(**changes)
+
+        # the readers of all formats: a server starts without them
+        from app.state.importing.looking import look_into
+        from tracker.importing.gathering import gather
+        from tracker.importing.settling import settle
 
         try:
             with self._lock:
@@ -216,21 +230,26 @@ class Draft:
             if place.exists():
                 raise FormatError(f"there is a recording {place.name} already; choose another name")
             self._stop.set()
-            self._tell(phase="writing", busy=False, error="")
+            began = time.monotonic()
+            self._tell(phase="writing", busy=False, error="", copied=0, copying_since=began)
         arguments = (known.taken, known.wish, place, then)
         threading.Thread(target=self._write, args=arguments, name="import", daemon=True).start()
 
     def _write(
         self, taken: tuple[Taken, ...], wish: Wish, place: Path, then: Callable[[Path], object]
     ) -> None:
+        from tracker.importing.bringing import copy_links, links_in
+        from tracker.importing.settling import settle
+        from tracker.importing.writing import write
+
         try:
             # what was wished last may not have been looked into yet
             settled = settle(taken, options_of(wish, taken))
-            copied = wish.copy and self.upload is None
-            told = write(settled, self.folder, wish.name or place.name, copy=copied)
+            # linked first, so that it can be opened at once; what cannot be is copied here
+            told = write(settled, self.folder, wish.name or place.name, copied=self._copied)
             self.folder.replace(place)
         except Exception as error:
-            if not isinstance(error, ValueError | OSError):
+            if not isinstance(error, ValueError | OSError | Cancelled):
                 logger.exception("writing an import failed")
             with self._lock:
                 # else it could not be tried again under another name
@@ -239,15 +258,31 @@ class Draft:
                 if self._given_up:
                     shutil.rmtree(self.folder, ignore_errors=True)
             return
-        self._tell(phase="written", folder=place, told=tuple(told))
+        if not wish.copy or self.upload is not None or not links_in(place):
+            self._tell(phase="written", folder=place, told=tuple(told))
+            then(place)
+            return
+        self._tell(phase="copying", folder=place, told=tuple(told))
         then(place)
+        try:
+            copy_links(place, self._copied)
+        except Cancelled:
+            told.append("the copying was stopped: what is not copied is linked")
+        except OSError as error:
+            told.append(f"not all files are copied, the others are linked: {sentence(error)}")
+        self._tell(phase="written", told=tuple(told))
+
+    def _copied(self, more: int) -> None:
+        if self._given_up:
+            raise Cancelled
+        self._tell(copied=self._known.copied + more)
 
     def discard(self) -> None:
         """Give it up; what was uploaded for it is removed."""
         with self._lock:
             self._stop.set()
             self._given_up = True
-            if self._known.phase not in ("writing", "written"):
+            if self._known.phase not in _BEGUN:
                 shutil.rmtree(self.folder, ignore_errors=True)
 
 

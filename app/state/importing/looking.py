@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from app.state.entrances import entrances_of
 from app.state.importing.plan import Plan, draw_plan
 from tracker.agreement.consensus import Consensus
+from tracker.agreement.entrances import Door
 from tracker.checks import Check
 from tracker.checks.boxes import check_boxes, listen
 from tracker.checks.cameras import check_lenses, check_places
@@ -18,12 +20,17 @@ from tracker.checks.timing import check_counting, check_time
 from tracker.importing.preview import as_sequence
 from tracker.importing.remedies import for_import
 from tracker.importing.settling import Settled
-from tracker.pipeline import Cancelled
+from tracker.parameters import METHODS
+from tracker.pipeline import Cancelled, compute
+from tracker.runs.fitting import default_parameters, unfit_methods
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
 MOST_STEPS = 200
 """Of which pictures are compared; boxes are compared at all steps."""
+
+MOST_TRACKED = 1500
+"""Steps of the first run, which tells where people come in."""
 
 FEW = 0.25
 """Of the share of boxes that meet in the best pair: a pair with less is odd."""
@@ -50,6 +57,12 @@ class Looked:
     checks: tuple[Check, ...] = ()
     pairs: tuple[Pair, ...] = ()
     offsets: tuple[CameraOffset, ...] = ()
+    doors: tuple[Door, ...] = ()
+    """Where the tracks of a first run on the boxes begin and end."""
+    fitting: Mapping[str, str] = field(default_factory=dict)
+    """The methods that it is tracked with unless somebody wishes otherwise."""
+    unfit: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    """The methods that cannot work on it, each with the reason."""
     under_way: str = "boxes"
     """What is being looked into; empty when all is done."""
 
@@ -65,9 +78,9 @@ def look_into(settled: Settled, name: str, cancelled: Callable[[], bool]) -> Ite
     Raises:
         Cancelled: As soon as it is noticed.
     """
-    looked = Looked(draw_plan(settled, None))
-    yield looked
     sequence = as_sequence(settled, name)
+    looked = _with_methods(Looked(draw_plan(settled, None)), sequence)
+    yield looked
     told = listen(sequence, exchanges=len(sequence.views) <= EVERY_ORDER)
     _stop_if(cancelled)
     checks = [*check_boxes(sequence, told), check_lenses(sequence.cameras)]
@@ -94,7 +107,29 @@ def look_into(settled: Settled, name: str, cancelled: Callable[[], bool]) -> Ite
     _stop_if(cancelled)
     timing = list(check_time(sequence, found=offsets))
     found = _for_import((*checks, *timing, *counting), settled)
-    yield replace(looked, checks=found, offsets=offsets, under_way="")
+    looked = replace(looked, checks=found, offsets=offsets, under_way="first tracks")
+    if agreed is not None and sequence.has_detections:
+        yield looked
+        looked = replace(looked, doors=tuple(_doors(sequence, cancelled)))
+    yield replace(looked, under_way="")
+
+
+def _with_methods(looked: Looked, sequence: Sequence) -> Looked:
+    try:
+        values = default_parameters(sequence)
+    except ValueError:  # neither pictures nor boxes: it cannot be imported yet
+        return looked
+    fitting = {str(key): str(getattr(values, key)) for key in METHODS}
+    unfit = {str(key): names for key, names in unfit_methods(sequence, values).items()}
+    return replace(looked, fitting=fitting, unfit=unfit)
+
+
+def _doors(sequence: Sequence, cancelled: Callable[[], bool]) -> list[Door]:
+    """Where the people of the boxes come in; pictures are not looked at."""
+    views = tuple(replace(view, video=None, images=()) for view in sequence.views)
+    sequence = replace(sequence, views=views)
+    values = default_parameters(sequence)
+    return entrances_of(compute(sequence, values, steps=MOST_TRACKED, cancelled=cancelled))
 
 
 def _for_import(checks: Iterable[Check], settled: Settled) -> tuple[Check, ...]:

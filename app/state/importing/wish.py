@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tracker.checks import Check
 from tracker.formats.pieces import (
@@ -22,8 +22,10 @@ from tracker.formats.pieces import (
     Up,
     VideoPiece,
 )
-from tracker.importing.gathering import Taken
 from tracker.importing.options import Corner, ImportOptions
+
+if TYPE_CHECKING:
+    from tracker.importing.gathering import Taken
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +50,20 @@ class Wish:
     """A camera, and the label of a file that is its."""
     room: tuple[Corner, Corner] | None = None
     half_extents: Corner | None = None
+    entrances: tuple[tuple[Corner, Corner], ...] = ()
+    """Of each the position and the standard deviations, metres."""
+    methods: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    """What it is to be tracked with, by the parameter that chooses a method."""
     copy: bool = False
 
 
 WORDS = tuple(one.name for one in fields(Wish))
+
+
+def looks_alike(one: Wish, other: Wish) -> bool:
+    """Whether the files say the same under both wishes."""
+    later = {"name": "", "copy": False, "methods": {}, "entrances": ()}
+    return replace(one, **later) == replace(other, **later)  # type: ignore[arg-type]
 
 
 def options_of(wish: Wish, taken: Sequence[Taken]) -> ImportOptions:
@@ -77,6 +89,7 @@ def options_of(wish: Wish, taken: Sequence[Taken]) -> ImportOptions:
         offsets=wish.offsets,
         room=wish.room,
         half_extents=wish.half_extents,
+        entrances=wish.entrances,
     )
 
 

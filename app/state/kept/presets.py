@@ -7,8 +7,9 @@ time, so that none undoes what another saved.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from app.errors import sentence
 from app.state.kept.json_files import read_json, set_aside, write_json
@@ -45,8 +46,16 @@ class OwnPresets:
         Raises:
             ParameterError: If the name is empty, too long or a built-in preset's.
         """
-        now, name = self._workbench.snapshot(), _checked(name)
-        values = table.changed(now.parameters, now.defaults)
+        now = self._workbench.snapshot()
+        self.keep(name, table.changed(now.parameters, now.defaults))
+
+    def keep(self, name: str, values: Mapping[str, Any]) -> None:
+        """Keep values, by key against the defaults, under a name.
+
+        Raises:
+            ParameterError: If the name is empty, too long or a built-in preset's.
+        """
+        name = _checked(name)
         self._change(lambda presets: {**presets, name: values})
 
     def rename(self, name: str, new: str) -> None:
@@ -100,10 +109,7 @@ class OwnPresets:
     def _read(self, path: Path) -> Presets:
         """What the file has; a spoilt one is set aside, and what is known stays."""
         try:
-            found = read_json(path)
-            good = isinstance(found, dict) and all(isinstance(v, dict) for v in found.values())
-            if not good:
-                raise ValueError(f"{path.name}: expected an object of values for each name")
+            return _valid(read_json(path))
         except FileNotFoundError:
             return self._workbench.snapshot().presets
         except (OSError, ValueError) as error:
@@ -116,8 +122,27 @@ class OwnPresets:
                 else f"{path} was left as it is.",
             )
             return self._workbench.snapshot().presets
-        presets: Presets = found
-        return presets
+
+
+def keep_preset(path: Path, name: str, values: Mapping[str, Any]) -> None:
+    """Put a preset into the file without a workbench; the next start shows it.
+
+    Raises:
+        ParameterError: If the name does not do.
+        ValueError: If the file is not as it was written.
+        OSError: If it cannot be written.
+    """
+    name = _checked(name)
+    with locked(path):
+        presets = _valid(read_json(path)) if path.is_file() else {}
+        write_json(path, {**presets, name: dict(values)})
+
+
+def _valid(found: Any) -> Presets:
+    """What a file held, if it is an object of values for each name."""
+    if not isinstance(found, dict) or not all(isinstance(v, dict) for v in found.values()):
+        raise ValueError("expected an object of values for each name")
+    return found
 
 
 def _checked(name: str) -> str:

@@ -10,6 +10,7 @@ from app.models.base import Model, Vector
 from app.state.importing.draft import Phase
 from tracker.checks import Status
 from tracker.formats.pieces import Axes, Direction, Layout, Unit, Up
+from tracker.parameters import MethodKey
 
 
 class AnnouncedFile(Model):
@@ -61,6 +62,10 @@ class ImportWish(Model):
     """A camera, and the label of a file that is its."""
     room: tuple[Vector, Vector] | None = None
     half_extents: Vector | None = None
+    entrances: list[tuple[Vector, Vector]] = Field(default_factory=list, max_length=50)
+    """Of each the position and the standard deviations, metres."""
+    methods: dict[MethodKey, str | None] = Field(default_factory=dict)
+    """What it is to be tracked with; null, or not there: what fits."""
     copy_files: bool = False
     """Whether what lies elsewhere on the disk is copied, not linked."""
 
@@ -141,6 +146,8 @@ class ImportedPlan(Model):
     height: int
     seen: list[int]
     """How many cameras see the floor, by cell, rows along y."""
+    entrances: list[tuple[float, float, float, float]]
+    """Of those that are wished, else of those that are suggested: x, y and how wide they are."""
     cameras: list[tuple[float, float, float, float]]
     """x, y, direction and half the angle across, radians."""
     feet: list[tuple[float, float]]
@@ -178,6 +185,15 @@ class ImportInfo(Model):
     suggested: tuple[Vector, Vector] | None
     half_extents: Vector | None
     suggested_half_extents: Vector | None
+    entrances: list[tuple[Vector, Vector]]
+    """Suggested where tracks of a first run begin and end: position, standard deviations."""
+    fitting: dict[str, str]
+    """What it is tracked with unless somebody wishes otherwise, by what chooses a method."""
+    unfit: dict[str, dict[str, str]]
+    """Methods that cannot work on it, each with the reason."""
+    copied: int
+    """Bytes, of the files that become its own."""
+    megabytes_per_second: float
     truth: int
     """People in the truth; 0 where there is none."""
     has_boxes: bool

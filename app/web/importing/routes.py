@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
@@ -29,6 +30,7 @@ from app.web.importing.models import (
 from app.web.importing.sheet.start import start_sheet
 from app.web.importing.views import info_of, wish_of
 from tracker.formats.pieces import FormatError
+from tracker.parameters import ParameterError, RunParameters, with_values
 from tracker.sequences import library
 
 router = APIRouter(prefix="/api", responses=ERRORS)
@@ -63,7 +65,7 @@ Own = Annotated[Draft, Depends(_draft)]
 def _complaining() -> Iterator[None]:
     try:
         yield
-    except (UploadError, FormatError, OSError) as error:
+    except (UploadError, FormatError, ParameterError, OSError) as error:
         words = sentence(error)
         raise ApiError(422, "cannot_import", f"{words[:1].upper()}{words[1:]}.") from None
 
@@ -208,13 +210,19 @@ def picture(draft: Own, camera: Annotated[str, Query(max_length=4096)]) -> Respo
 
 
 @router.post("/import/{key}/write")
-def write(told: WriteRequest, draft: Own, jobs: Work) -> ImportInfo:
-    """Write the recording, and open it."""
+def write(told: WriteRequest, draft: Own, bench: Bench, jobs: Work) -> ImportInfo:
+    """Write the recording, and open it; it is tracked with the methods that are wished."""
+    methods = draft.known.wish.methods
+    with _complaining():
+        with_values(RunParameters(), methods)
+
+    def track(done: Future[None]) -> None:
+        if not done.cancelled() and done.exception() is None:
+            bench.set_parameters(methods, "api")
 
     def then(folder: Path) -> None:
         if told.open:
-            future = jobs.open(str(folder))
-            future.add_done_callback(lambda done: done.cancelled() or done.exception())
+            jobs.open(str(folder)).add_done_callback(track)
 
     with _complaining():
         draft.write(then)

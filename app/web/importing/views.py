@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import shutil
+import time
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from app.models.base import Vector
 from app.state.importing.draft import Draft, Known
-from app.state.importing.looking import Looked
 from app.state.importing.wish import WORDS, Wish, mended, places
 from app.web.importing.models import (
     ImportedCamera,
@@ -26,7 +27,11 @@ from app.web.importing.sheet.draft import draft_sheet
 from tracker.checks import Check
 from tracker.checks.synchronisation import CameraOffset
 from tracker.formats.pieces import DetectionPiece
-from tracker.importing.settling import Settled, SettledView
+
+if TYPE_CHECKING:
+    from app.state.importing.looking import Looked
+    from tracker.agreement.entrances import Door
+    from tracker.importing.settling import Settled, SettledView
 
 MOST_OFFSETS = 241
 """Values of a curve of agreement."""
@@ -38,8 +43,9 @@ MOST_LISTED = 200
 def wish_of(told: ImportWish) -> Wish:
     """As the draft takes it."""
     values = {name: getattr(told, name) for name in WORDS if name != "copy"}
-    for name in ("swap", "left_out", "files"):
+    for name in ("swap", "left_out", "files", "entrances"):
         values[name] = tuple(values[name])
+    values["methods"] = {key: method for key, method in told.methods.items() if method}
     values["name"] = told.name.strip()
     return Wish(**values, copy=told.copy_files)
 
@@ -47,9 +53,9 @@ def wish_of(told: ImportWish) -> Wish:
 def _wish_info(wish: Wish, changes: Mapping[str, Any] | None = None) -> ImportWish:
     values: dict[str, Any] = {name: getattr(wish, name) for name in WORDS} | dict(changes or {})
     values["copy_files"] = values.pop("copy")
-    for name in ("swap", "left_out", "files"):
+    for name in ("swap", "left_out", "files", "entrances"):
         values[name] = list(values[name])
-    for name in ("names", "offsets"):
+    for name in ("names", "offsets", "methods"):
         values[name] = dict(values[name])
     return ImportWish(**values)
 
@@ -82,7 +88,12 @@ def _info(draft: Draft) -> ImportInfo:
         cameras=[] if settled is None else [_camera(view, known) for view in settled.views],
         checks=[] if looked is None else [_check(one, known.wish) for one in looked.checks],
         pairs=[] if looked is None else _pairs(looked),
-        plan=None if looked is None else _plan(looked),
+        plan=None if looked is None else _plan(looked, known.wish),
+        entrances=[] if looked is None else [_door(one) for one in looked.doors],
+        fitting={} if looked is None else dict(looked.fitting),
+        unfit={} if looked is None else {key: dict(why) for key, why in looked.unfit.items()},
+        copied=known.copied,
+        megabytes_per_second=_speed(known),
         folder="" if known.folder is None else str(known.folder),
     )
 
@@ -202,8 +213,18 @@ def _pairs(looked: Looked) -> list[ImportedPair]:
     ]
 
 
-def _plan(looked: Looked) -> ImportedPlan:
+def _door(door: Door) -> tuple[Vector, Vector]:
+    return _vector(door.position), _vector(door.sigma)
+
+
+def _speed(known: Known) -> float:
+    seconds = time.monotonic() - known.copying_since
+    return round(known.copied / 1e6 / seconds, 1) if known.copied and seconds > 0.0 else 0.0
+
+
+def _plan(looked: Looked, wish: Wish) -> ImportedPlan:
     plan = looked.plan
+    doors = wish.entrances or [_door(one) for one in looked.doors]
     return ImportedPlan(
         x=plan.origin[0],
         y=plan.origin[1],
@@ -211,6 +232,7 @@ def _plan(looked: Looked) -> ImportedPlan:
         width=plan.seen.shape[1],
         height=plan.seen.shape[0],
         seen=plan.seen.ravel().tolist(),
+        entrances=[(*place[:2], *sigma[:2]) for place, sigma in doors],
         cameras=list(plan.cameras),
         feet=[(round(float(x), 3), round(float(y), 3)) for x, y in plan.feet],
     )

@@ -183,8 +183,10 @@ def _entrances(sequence: Sequence) -> str:
     ]  # fmt: skip
     heads = ("Entrance", *(f"#{signs[part]}{axis}  m" for part in parts for axis in AXES), "#")
     add = _send("Add an entrance", "POST teach/entrances")
+    suggest = _send("Suggest from the tracks", "POST teach/entrances/suggested")
     words = " People are born anywhere in the room." if not rows else ""
-    return (table("Entrances, in metres", heads, rows) if rows else "") + line(add, words)
+    listed = table("Entrances, in metres", heads, rows) if rows else ""
+    return listed + line(add, " ", suggest, words)
 
 
 def _saving(snapshot: Snapshot, teaching: Teaching) -> str:

@@ -64,7 +64,7 @@ export function mountOpening({ store, actions }) {
 			actions.note("info", `${next.wish.name} was imported`, next.folder);
 		} else {
 			show(next.sheet);
-			if (next.busy || next.phase === "writing" || next.phase === "reading")
+			if (next.busy || ["writing", "copying", "reading"].includes(next.phase))
 				timer = setTimeout(
 					() => info && attempt(async () => take(await getJson(`/api/import/${next.key}`))),
 					ASK_AGAIN,

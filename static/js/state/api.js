@@ -1,30 +1,24 @@
 /** The way to the server: requests with one error shape, and a socket that comes back by itself. */
 
-/** A failure told by the server, or a server that cannot be reached. */
+/** A failure told by the server (RFC 9457), or a server that cannot be reached. */
 export class ApiError extends Error {
 	/** @param {number} status  0 where no answer came @param {ApiFailure} failure */
 	constructor(status, failure) {
-		super(failure.message);
+		super(failure.detail);
 		this.status = status;
 		this.code = failure.code;
-		this.field = failure.field;
 		this.hint = failure.hint;
 	}
 }
 
 /** @param {Response} response */
 async function failureOf(response) {
-	try {
-		const body = await response.json();
-		if (body && body.error && typeof body.error.message === "string")
-			return new ApiError(response.status, body.error);
-	} catch {
-		// Not our error body: a proxy or a crash. The status has to do.
-	}
+	const failure = await response.json().catch(() => null);
+	if (failure?.detail) return new ApiError(response.status, failure);
+	// A proxy's or a crash's: the status has to do.
 	return new ApiError(response.status, {
 		code: "http",
-		message: `The server answered ${response.status} ${response.statusText}.`,
-		field: null,
+		detail: `The server answered ${response.status} ${response.statusText}.`,
 		hint: "The terminal that runs multiview-phd says more.",
 	});
 }
@@ -39,9 +33,7 @@ export async function request(path, options) {
 		if (error instanceof DOMException && error.name === "AbortError") throw error;
 		throw new ApiError(0, {
 			code: "unreachable",
-			message: "The server cannot be reached.",
-			field: null,
-			hint: null,
+			detail: "The server cannot be reached.",
 		});
 	}
 	if (!response.ok) throw await failureOf(response);
@@ -126,6 +118,11 @@ export function openStream(path, on) {
 			tries += 1;
 			timer = setTimeout(connect, wait);
 			on.lost(Date.now() + wait);
+			// Started anew it wants another token.
+			fetch(path).then(
+				({ status }) => status === 401 && location.reload(),
+				() => {},
+			);
 		};
 	}
 

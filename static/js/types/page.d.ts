@@ -35,7 +35,7 @@ type Bookmark = { step: number; note: string };
 /** A line of the palette. */
 type Offer = { title: string; keys: string[]; run: () => void };
 
-type ApiFailure = { code: string; message: string; field: string | null; hint: string | null };
+type ApiFailure = { code: string; detail: string; hint?: string | null };
 
 /** Each value stands for `stride` steps, the first from step `first` on. */
 type Buckets = { first: number; stride: number };

@@ -360,7 +360,7 @@ declare namespace Server {
 	interface ImportInfo {
 		key: string;
 		version: number;
-		phase: "uploading" | "reading" | "settled" | "failed" | "writing" | "written";
+		phase: "uploading" | "reading" | "settled" | "failed" | "writing" | "copying" | "written";
 		busy: boolean;
 		/** What is being looked into. */
 		under_way: string;
@@ -387,6 +387,15 @@ declare namespace Server {
 		suggested: [[number, number, number], [number, number, number]] | null;
 		half_extents: [number, number, number] | null;
 		suggested_half_extents: [number, number, number] | null;
+		/** Suggested where tracks of a first run begin and end: position, standard deviations. */
+		entrances: [[number, number, number], [number, number, number]][];
+		/** What it is tracked with unless somebody wishes otherwise, by what chooses a method. */
+		fitting: Record<string, string>;
+		/** Methods that cannot work on it, each with the reason. */
+		unfit: Record<string, Record<string, string>>;
+		/** Bytes, of the files that become its own. */
+		copied: number;
+		megabytes_per_second: number;
 		/** People in the truth; 0 where there is none. */
 		truth: number;
 		/** Whether every camera has boxes. */
@@ -424,8 +433,20 @@ declare namespace Server {
 		files: [string, string][];
 		room: [[number, number, number], [number, number, number]] | null;
 		half_extents: [number, number, number] | null;
+		/** Of each the position and the standard deviations, metres. */
+		entrances: [[number, number, number], [number, number, number]][];
+		/** What it is to be tracked with; null, or not there: what fits. */
+		methods: Record<"single_view" | "fusion_method" | "smoothing_method", string | null>;
 		/** Whether what lies elsewhere on the disk is copied, not linked. */
 		copy_files: boolean;
+	}
+
+	/** How much of the leading figure's variance a parameter explains by itself. */
+	interface ImportanceInfo {
+		key: string;
+		share: number;
+		/** Standard deviation, over trials drawn with replacement. */
+		spread: number;
 	}
 
 	/** A camera with what belongs to it. */
@@ -498,6 +519,8 @@ declare namespace Server {
 		height: number;
 		/** How many cameras see the floor, by cell, rows along y. */
 		seen: number[];
+		/** Of those that are wished, else of those that are suggested: x, y and how wide they are. */
+		entrances: [number, number, number, number][];
 		/** x, y, direction and half the angle across, radians. */
 		cameras: [number, number, number, number][];
 		feet: [number, number][];
@@ -576,6 +599,18 @@ declare namespace Server {
 		low: number[];
 		high: number[];
 		mean: number[];
+	}
+
+	/** A figure that trials can be judged by. */
+	interface ObjectiveInfo {
+		key: string;
+		name: string;
+		help: string;
+		/** Whether more of it is better. */
+		higher: boolean;
+		unit: string;
+		digits: number;
+		needs_truth: boolean;
 	}
 
 	/** A sequence on its way. */
@@ -693,6 +728,27 @@ declare namespace Server {
 		courses: Course[];
 	}
 
+	/** A parameter, or the choice of a method, with the range that is tried. */
+	interface RangeInfo {
+		key: string;
+		label: string;
+		symbol: string;
+		unit: string;
+		help: string;
+		kind: "float" | "int" | "bool" | "choice";
+		/** Of its definition. */
+		minimum: number | null;
+		maximum: number | null;
+		low: number | null;
+		high: number | null;
+		log: boolean;
+		/** Of what is no range. */
+		choices: any[];
+		default: any;
+		/** Today's value. */
+		now: any;
+	}
+
 	/** A recording that can be opened. */
 	interface RecordingCard {
 		name: string;
@@ -772,6 +828,16 @@ declare namespace Server {
 		stands_for: string;
 		/** What its result lacks: pictures that were missing, files that changed. */
 		warnings: string[];
+	}
+
+	/** What answers at a scheduler's address. */
+	interface SchedulerInfo {
+		address: string;
+		workers: number;
+		threads: number;
+		machines: string[];
+		/** Why it cannot be used. */
+		error: string | null;
 	}
 
 	/** Every parameter, method and preset. */
@@ -895,6 +961,90 @@ declare namespace Server {
 		cardinality: number;
 	}
 
+	/** Everything of a study but its trials. */
+	interface Study {
+		info: StudyInfo;
+		/** As its file has it. */
+		definition: Record<string, any>;
+		toml: string;
+		objectives: ObjectiveInfo[];
+		varied: RangeInfo[];
+		status: StudyStatus;
+		/** Number of the best trial; 0 where nothing is better than the defaults. */
+		best: number | null;
+		/** Trials that no other beats in all objectives. */
+		front: number[];
+		/** Empty while there are too few trials. */
+		importance: ImportanceInfo[];
+		importance_trials: number;
+		sentences: string[];
+	}
+
+	/** What a study would take. */
+	interface StudyCost {
+		runs: number;
+		/** Null where nothing is known of how long a run takes. */
+		seconds: number | null;
+		bytes: number;
+		words: string;
+		/** Why it would be refused. */
+		error: string | null;
+	}
+
+	/** A study as it could be defined from what is open. */
+	interface StudyDraft {
+		/** One that is free. */
+		name: string;
+		recordings: string[];
+		has_truth: boolean;
+		parameters: RangeInfo[];
+		/** Those that it would have. */
+		objectives: string[];
+		/** Those that it could have. */
+		choices: ObjectiveInfo[];
+		/** Cores of the machine. */
+		workers: number;
+		/** What is not in the study though it is on the screen; empty for nothing. */
+		words: string;
+	}
+
+	/** A study in a line. */
+	interface StudyInfo {
+		name: string;
+		state: "new" | "running" | "stopped" | "done" | "failed";
+		/** What it waits for, or why it ended. */
+		words: string;
+		/** Trials that ended. */
+		done: number;
+		trials: number;
+		/** When it was at work last, seconds since 1970. */
+		touched: number;
+		seconds_left: number | null;
+		/** Name of the leading figure. */
+		objective: string;
+		/** Its best value. */
+		best: number | null;
+		default: number | null;
+	}
+
+	/** All studies, the one that was at work last first. */
+	interface StudyList {
+		folder: string;
+		studies: StudyInfo[];
+	}
+
+	/** What a study does now. */
+	interface StudyStatus {
+		/** That ended since it was started. */
+		runs: number;
+		/** Since then. */
+		seconds: number;
+		seconds_left: number | null;
+		/** Share of the workers' time in which they worked. */
+		busy: number | null;
+		workers: WorkerInfo[];
+	}
+
 	/** A person's identity switched. */
 	interface Switch {
 		step: number;
@@ -1009,6 +1159,53 @@ declare namespace Server {
 		fades: boolean;
 	}
 
+	/** A trial with its runs and what repeats them. */
+	interface TrialDetail {
+		trial: TrialInfo;
+		runs: TrialRun[];
+		commands: string[];
+	}
+
+	/** A trial that ended. */
+	interface TrialInfo {
+		number: number;
+		state: "complete" | "pruned" | "failed";
+		values: Record<string, any>;
+		/** Over recordings and seeds; null where it failed. */
+		objectives: number[] | null;
+		/** Of each over the seeds. */
+		spreads: (number | null)[];
+		figures: Record<string, number>;
+		/** Whether people overlap too little with the cameras that were left out. */
+		vetoed: boolean;
+		words: string;
+		/** Of its runs. */
+		seconds: number;
+		/** Seconds since 1970. */
+		ended: number;
+	}
+
+	/** Trials that ended after a moment. */
+	interface TrialList {
+		trials: TrialInfo[];
+		/** To be given as `after` the next time. */
+		last: number;
+	}
+
+	/** One run of a trial. */
+	interface TrialRun {
+		/** Hash of recording, values, seed and code. */
+		key: string;
+		recording: string;
+		seed: number;
+		figures: Record<string, number | null>;
+		seconds: number;
+		worker: string;
+		machine: string;
+		/** Hash of its tracks. */
+		tracks: string;
+	}
+
 	/** Where a person really is. */
 	interface Truth {
 		id: number;
@@ -1032,5 +1229,18 @@ declare namespace Server {
 		agreed: number;
 		/** Mean overlap of its boxes with the people whom the others found; null without both. */
 		overlap: number | null;
+	}
+
+	/** A worker of a study that runs. */
+	interface WorkerInfo {
+		name: string;
+		machine: string;
+		/** What it waits for; empty while it works on a run. */
+		words: string;
+		trial: number | null;
+		recording: string | null;
+		seed: number | null;
+		/** Seconds since 1970. */
+		since: number;
 	}
 }

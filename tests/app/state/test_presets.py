@@ -104,7 +104,7 @@ def test_the_routes(client: TestClient) -> None:
     assert client.delete("/api/presets/night").json()["presets"] == []
     answer = client.delete("/api/presets/night")
     assert answer.status_code == 422
-    assert "none is saved" in answer.json()["error"]["message"]
+    assert "none is saved" in answer.json()["detail"]
     wait_until(run_is(client, "done"))
 
 

@@ -57,9 +57,9 @@ def tracks(client: TestClient) -> str:
 
 def complaint(answer: Any) -> str:
     assert answer.status_code == 422, answer.text
-    error = answer.json()["error"]
+    error = answer.json()
     assert error["hint"] == "Nothing was changed, and nothing is lost."
-    return str(error["message"])
+    return str(error["detail"])
 
 
 def test_the_first_template_makes_the_colour_methods_usable(client: TestClient) -> None:
@@ -182,6 +182,19 @@ def test_a_box_that_sticks_out_is_cut_at_the_border(client: TestClient) -> None:
     folder = Path(str(client.app.state.workbench.snapshot().sequence.folder))  # type: ignore[attr-defined]
     (template,) = read_sequence(folder).templates
     assert template.box.tolist() == [0.0, 120.0, 14.0, 24.0]
+
+
+def test_entrances_are_suggested_by_the_tracks(client: TestClient) -> None:
+    entrance = state(client)["sequence"]["room"]["entrances"][0]
+    words = complaint(client.post("/api/teach/entrances/suggested"))
+    assert words.startswith("The tracks begin and end together at no other place")
+    client.delete("/api/teach/entrances/0")
+    done(client)
+    answer = client.post("/api/teach/entrances/suggested")
+    assert answer.status_code == 200, answer.text
+    (found,) = state(client)["sequence"]["room"]["entrances"]
+    assert found["position"][:2] == pytest.approx(entrance["position"][:2], abs=0.4)
+    assert "teach/entrances/suggested" in client.get("/api/tables/teach").text
 
 
 def test_saving_keeps_a_backup_and_reopens_to_the_same_run(

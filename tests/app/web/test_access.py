@@ -60,7 +60,7 @@ def test_without_a_token_every_route_answers_with_what_to_do(closed: TestClient)
         answer = closed.request(method, path)
         assert answer.status_code == 401, path
         assert answer.headers["www-authenticate"] == "Bearer"
-        assert answer.json()["error"]["code"] == "no_token"
+        assert answer.json()["code"] == "no_token"
 
 
 @pytest.mark.parametrize("path", ["/", "/?sequence=crossing", "/manual/", "/docs", "/viser/"])

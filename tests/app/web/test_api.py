@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from app.web import api
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tests.app.folders import FRAMES
@@ -32,14 +33,18 @@ def empty(data: Path) -> Iterator[TestClient]:
         yield client
 
 
+PROBLEM = {"type", "title", "status", "detail", "code", "field", "hint"}
+
+
 def assert_error(answer: Any, status: int, code: str, *words: str) -> None:
     assert answer.status_code == status
-    assert set(answer.json()) == {"error"}
-    error = answer.json()["error"]
-    assert set(error) == {"code", "message", "field", "hint"}
+    assert answer.headers["content-type"] == "application/problem+json"
+    error = answer.json()
+    assert set(error) == PROBLEM
+    assert error["status"] == status
     assert error["code"] == code
     for word in words:
-        assert word in error["message"]
+        assert word in error["detail"]
 
 
 def test_state(client: TestClient) -> None:
@@ -225,7 +230,7 @@ def test_a_value_that_does_not_fit(
         "/api/parameters", json={"changes": {"fusion.birth_rate": 1.0, **changes}}
     )
     assert_error(answer, 422, "bad_parameter", *words)
-    assert answer.json()["error"]["field"] == next(iter(changes))
+    assert answer.json()["field"] == next(iter(changes))
     assert client.get("/api/state").json()["parameters"] == before["parameters"]
 
 
@@ -248,9 +253,9 @@ def test_every_failure_has_the_one_shape(
 ) -> None:
     answer = client.request(method, path, json=json)
     assert answer.status_code == status
-    error = answer.json()["error"]
-    assert set(error) == {"code", "message", "field", "hint"}
-    assert error["message"]
+    error = answer.json()
+    assert set(error) == PROBLEM
+    assert error["detail"]
 
 
 def test_a_failure_of_our_own_has_the_one_shape_too(
@@ -350,91 +355,14 @@ def test_the_page_and_its_files_are_checked_by_their_etag(client: TestClient) ->
 
 def test_every_route_is_documented(client: TestClient) -> None:
     document = client.get("/openapi.json").json()
-    routes = {(method.upper(), path) for path, item in document["paths"].items() for method in item}
-    assert {
-        ("GET", "/api/state"),
-        ("POST", "/api/presets"),
-        ("PATCH", "/api/presets/{name}"),
-        ("DELETE", "/api/presets/{name}"),
-        ("GET", "/api/tables/runs"),
-        ("POST", "/api/run/again/{number}"),
-        ("GET", "/api/schema"),
-        ("GET", "/api/sequences"),
-        ("POST", "/api/sequence"),
-        ("PATCH", "/api/parameters"),
-        ("POST", "/api/parameters/reset"),
-        ("POST", "/api/parameters/preset"),
-        ("POST", "/api/run"),
-        ("POST", "/api/run/cancel"),
-        ("GET", "/api/picture/{sequence_key}/{camera}/{step}.jpg"),
-        ("GET", "/api/foreground/{sequence_key}/{camera}/{step}.png"),
-        ("GET", "/api/likelihood/{sequence_key}/{camera}/{step}.png"),
-        ("POST", "/api/teach/templates"),
-        ("PATCH", "/api/teach/templates/{index}"),
-        ("DELETE", "/api/teach/templates/{index}"),
-        ("PATCH", "/api/teach/room/{side}/{axis}"),
-        ("POST", "/api/teach/entrances"),
-        ("PATCH", "/api/teach/entrances/{index}/{part}/{axis}"),
-        ("DELETE", "/api/teach/entrances/{index}"),
-        ("POST", "/api/teach/editing"),
-        ("POST", "/api/teach/restore"),
-        ("POST", "/api/teach/discard"),
-        ("POST", "/api/teach/save"),
-        ("POST", "/api/teach/copy"),
-        ("GET", "/api/teach/swatch/{sequence_key}/{camera}/{step}/{box}.png"),
-        ("GET", "/api/teach/histogram/{sequence_key}/{camera}/{step}/{box}.svg"),
-        ("GET", "/api/tables/teach"),
-        ("GET", "/api/tables/step/{step}"),
-        ("GET", "/api/tables/events"),
-        ("GET", "/api/tables/changes"),
-        ("GET", "/api/tables/compare"),
-        ("GET", "/api/step/{step}"),
-        ("GET", "/api/timeline"),
-        ("GET", "/api/export/tracks.csv"),
-        ("GET", "/api/export/report.html"),
-        ("GET", "/api/exports"),
-        ("POST", "/api/exports"),
-        ("DELETE", "/api/exports"),
-        ("GET", "/api/exports/formats"),
-        ("GET", "/api/exports/file"),
-        ("GET", "/api/library"),
-        ("GET", "/api/library/thumbnail/{recording}.jpg"),
-        ("GET", "/api/library/recordings/{recording}/runs"),
-        ("GET", "/api/library/runs/{number}"),
-        ("GET", "/api/library/runs/{number}/drawn"),
-        ("GET", "/api/library/compared"),
-        ("PATCH", "/api/library/runs/{number}"),
-        ("POST", "/api/library/runs/{number}/open"),
-        ("POST", "/api/library/runs/{number}/pin"),
-        ("POST", "/api/library/delete"),
-        ("POST", "/api/library/take-back"),
-        ("POST", "/api/import"),
-        ("POST", "/api/import/path"),
-        ("DELETE", "/api/import/{key}"),
-        ("GET", "/api/import/{key}"),
-        ("POST", "/api/import/{key}/arrived"),
-        ("POST", "/api/import/{key}/files"),
-        ("PUT", "/api/import/{key}/files/{number}"),
-        ("GET", "/api/import/{key}/picture"),
-        ("PUT", "/api/import/{key}/wish"),
-        ("POST", "/api/import/{key}/write"),
-        ("GET", "/api/recordings"),
-        ("GET", "/api/recordings/picture"),
-        ("POST", "/api/teach/target"),
-        ("PATCH", "/api/teach/target/{axis}"),
-        ("GET", "/api/evaluation"),
-        ("GET", "/api/evaluation/series"),
-        ("GET", "/api/evaluation/comparison"),
-        ("POST", "/api/run/pin"),
-        ("DELETE", "/api/run/pin"),
-        ("PATCH", "/api/layers"),
-        ("POST", "/api/view"),
-        ("POST", "/api/theme"),
-        ("PATCH", "/api/trail"),
-        ("POST", "/api/sensitivity"),
-        ("POST", "/api/seek"),
-        ("POST", "/api/select"),
-    } == {route for route in routes if route[1].startswith("/api/")}
+    source = Path(api.__file__).parent
+    hidden = [
+        path.relative_to(source).as_posix()
+        for path in source.rglob("*.py")
+        if "include_in_schema=False" in path.read_text(encoding="utf-8")
+    ]
+    assert sorted(hidden) == ["gateway.py", "server.py"]  # viser's pages, and the page itself
+    assert {"/api/state", "/api/schema", "/api/step/{step}"} <= set(document["paths"])
     for item in document["paths"].values():
         for operation in item.values():
             assert operation["description"].rstrip().endswith(".")

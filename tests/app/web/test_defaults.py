@@ -91,7 +91,7 @@ def test_what_was_asked_for_wrongly_is_told_where_to_find_what_there_is(
 ) -> None:
     def hint(answer: Any) -> str:
         assert_error(answer, 422, "bad_parameter")
-        words: str = answer.json()["error"]["hint"]
+        words: str = answer.json()["hint"]
         return words
 
     wrong = client.patch("/api/parameters", json={"changes": {"fusion.clutter_rate": -1.0}})

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
 
+from app.web.importing.models import ImportInfo
+from app.web.importing.sheet.draft import draft_sheet
 from app.web.server import Settings, create_app
-from tests.app.conftest import ADDRESS, wait_until
-from tests.formats.recorded import detections, toml, videos
+from tests.app.conftest import ADDRESS, run_is, wait_until
+from tests.formats.recorded import PLACES, detections, settled_of, toml, videos
+from tracker.importing import bringing
+from tracker.importing.writing import write
+from tracker.pipeline import Cancelled
+from tracker.sequences.reader import read_sequence
 
 PIECE = 4096
 
@@ -161,21 +169,141 @@ def test_a_folder_of_the_disk_is_not_copied(client: TestClient, files: Path, dat
     assert again == {"draft": None, "first": 0, "recording": str(data / "walk-2")}
 
 
+def test_entrances_and_methods_are_chosen_on_the_sheet(
+    client: TestClient, files: Path, data: Path
+) -> None:
+    places = PLACES.copy()
+    places[:25, 3] = 1e3  # the fourth comes in later
+    detections(files, places=places)
+    info = _settled(client, _send(client, files))
+    assert info["fitting"]["single_view"] == "none"
+    assert "has none; name a video" in info["unfit"]["single_view"]["jpda"]
+    ((place, sigma),) = info["entrances"]
+    assert place == pytest.approx(PLACES[25, 3].tolist(), abs=0.5)
+    assert 'class="entrance suggested"' in info["sheet"]
+    assert "Use it" in info["sheet"]
+    methods = {"single_view": None, "fusion_method": "sequential_phd"}
+    chosen = _wish(client, info, entrances=[[place, sigma]], methods=methods)
+    assert 'class="entrance"' in chosen["sheet"]
+    assert chosen["wish"]["methods"] == {"fusion_method": "sequential_phd"}
+    wrong = _wish(client, info, methods={"single_view": "guessing"})
+    answer = client.post(f"/api/import/{wrong['key']}/write", json={})
+    assert "guessing" in answer.json()["detail"]
+    chosen = _wish(client, info, entrances=[[place, sigma]], methods=methods)
+    client.post(f"/api/import/{chosen['key']}/write", json={})
+
+    def methods_now() -> dict[str, Any]:
+        return client.get("/api/state").json()["methods"]
+
+    wait_until(lambda: methods_now()["fusion_method"] == "sequential_phd")
+    wait_until(run_is(client, "done"))
+    state = client.get("/api/state").json()
+    assert methods_now()["single_view"] == "none"
+    assert state["sequence"]["room"]["entrances"] == [{"position": place, "sigma": sigma}]
+    assert state["teaching"]["unsaved"] == 0
+
+
+def test_a_recording_is_open_before_its_copies_are_there(
+    client: TestClient, files: Path, data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    inside = files.rename(data / "walk")
+    videos(inside, size=(320, 180), frames=60)
+    held = threading.Event()
+    copy = bringing._copy
+
+    def slowly(*arguments: Any) -> None:
+        assert held.wait(60.0)
+        copy(*arguments)
+
+    monkeypatch.setattr(bringing, "_copy", slowly)
+    begun = client.post("/api/import/path", json={"path": "walk"}).json()["draft"]
+    info = _wish(client, _settled(client, begun["key"]), copy_files=True)
+    client.post(f"/api/import/{info['key']}/write", json={})
+    wait_until(run_is(client, "done"))
+    now = client.get(f"/api/import/{info['key']}").json()
+    assert now["phase"] == "copying"
+    assert ">Stop<" in now["sheet"]
+    key = client.get("/api/state").json()["sequence"]["key"]
+    first, own = inside / "cam1.avi", data / "walk-2/cam1.avi"
+    assert own.stat().st_ino == first.stat().st_ino
+    held.set()
+    wait_until(lambda: _settled(client, info["key"])["phase"] == "written")
+    assert own.stat().st_ino != first.stat().st_ino
+    assert own.read_bytes() == first.read_bytes()
+    assert _settled(client, info["key"])["copied"] == sum(
+        path.stat().st_size for path in inside.glob("*.avi")
+    )
+    # what is known of its content stays known
+    client.post("/api/sequence", json={"name": str(data / "walk-2")})
+    assert client.get("/api/state").json()["sequence"]["key"] == key
+
+
+def test_copying_can_be_stopped(client: TestClient, files: Path, data: Path) -> None:
+    inside = files.rename(data / "walk")
+    videos(inside, size=(320, 180), frames=60)
+    folder = data / "taken"
+    settled = settled_of(inside)
+    write(settled, folder, "taken")
+    assert len(bringing.links_in(folder)) == 4
+    calls = []
+
+    def stop(more: int) -> None:
+        calls.append(more)
+        if len(calls) == 2:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        bringing.copy_links(folder, stop)
+    assert len(bringing.links_in(folder)) == 3
+    assert sorted(path.name for path in folder.glob("*.avi")) == [
+        f"cam{k}.avi" for k in (1, 2, 3, 4)
+    ]
+    assert not list(folder.glob(".*"))
+    assert read_sequence(folder).frames == 60
+
+
+def test_pairs_of_many_cameras_stand_in_a_square(client: TestClient, files: Path) -> None:
+    info = _settled(client, _send(client, files))
+    assert "pair-grid" not in info["sheet"]
+    many = ImportInfo(**info)
+    names = [f"cam{k}" for k in range(1, 13)]
+    cameras = [many.cameras[0].model_copy(update={"name": name, "key": name}) for name in names]
+    pairs = [
+        many.pairs[0].model_copy(
+            update={
+                "first": a,
+                "second": b,
+                "pixels": 9.5 if b == "cam12" else 1.5,
+                "odd": a == "cam3",
+            }
+        )
+        for a, b in combinations(names, 2)
+    ]
+    sheet = draft_sheet(many.model_copy(update={"cameras": cameras, "pairs": pairs}))
+    grid = sheet[sheet.index("pair-grid") :]
+    assert grid.count("their boxes meet") == 66
+    # what is odd comes first, the farthest apart of it before
+    listed = [part.split("</li>")[0] for part in grid.split("<li")[1:]]
+    assert len(listed) == 8
+    assert listed[0].startswith(' class="w">cam3 – cam12')
+    assert all("cam3 – " in one for one in listed)
+
+
 def test_an_import_that_is_given_up_leaves_nothing(
     client: TestClient, files: Path, data: Path
 ) -> None:
     key = _send(client, files)
     assert client.delete(f"/api/import/{key}").status_code == 204
     answer = client.get(f"/api/import/{key}")
-    assert (answer.status_code, answer.json()["error"]["code"]) == (404, "no_import")
+    assert (answer.status_code, answer.json()["code"]) == (404, "no_import")
     wait_until(lambda: not list(data.iterdir()))
 
 
 def test_what_cannot_be_imported_is_told(client: TestClient, data: Path, tmp_path: Path) -> None:
-    outside = client.post("/api/import/path", json={"path": str(tmp_path)}).json()["error"]
-    assert "expected files below the data folder" in outside["message"]
+    outside = client.post("/api/import/path", json={"path": str(tmp_path)}).json()
+    assert "expected files below the data folder" in outside["detail"]
     bad = client.post("/api/import", json={"files": [{"path": "../a", "bytes": 1}]})
-    assert "leads elsewhere" in bad.json()["error"]["message"]
+    assert "leads elsewhere" in bad.json()["detail"]
     assert list(data.iterdir()) == []
     folder = tmp_path / "alone"
     folder.mkdir()
@@ -184,13 +312,13 @@ def test_what_cannot_be_imported_is_told(client: TestClient, data: Path, tmp_pat
     assert (info["phase"], info["cameras"]) == ("failed", [])
     assert "no calibration was found" in info["error"]
     written = client.post(f"/api/import/{info['key']}/write", json={})
-    assert "No calibration was found" in written.json()["error"]["message"]
+    assert "No calibration was found" in written.json()["detail"]
     toml(folder)
     text = (folder / "calibration.toml").read_bytes()
     more = [{"path": "calibration.toml", "bytes": len(text)}]
     added = client.post(f"/api/import/{info['key']}/files", json={"files": more}).json()
     early = client.post(f"/api/import/{info['key']}/arrived")
-    assert "are here; drop the rest" in early.json()["error"]["message"]
+    assert "are here; drop the rest" in early.json()["detail"]
     client.put(f"/api/import/{info['key']}/files/{added['first']}", content=text)
     client.post(f"/api/import/{info['key']}/arrived")
     assert len(_settled(client, info["key"])["cameras"]) == 4

@@ -174,7 +174,7 @@ def test_names_stars_notes_and_deletion(kept: TestClient) -> None:
     assert runs_of(kept)[0]["name"] == "baseline"
     answer = kept.post("/api/library/delete", json={"runs": [999]})
     assert answer.status_code == 409
-    assert "no run 999" in answer.json()["error"]["message"]
+    assert "no run 999" in answer.json()["detail"]
 
 
 def test_the_preview_has_what_is_drawn(kept: TestClient) -> None:
@@ -224,7 +224,7 @@ def test_a_damaged_library_is_told_and_the_workbench_goes_on(data: Path, path: P
         assert any(r["name"] == "numbers" for r in told["recordings"])
         answer = client.get("/api/library/runs/1")
         assert answer.status_code == 409
-        assert "damaged" in answer.json()["error"]["message"]
+        assert "damaged" in answer.json()["detail"]
     assert path.read_bytes() == b"not a database " * 100
 
 

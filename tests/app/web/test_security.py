@@ -43,7 +43,7 @@ def test_a_foreign_host_gets_nothing(client: TestClient, host: str) -> None:
     for path in ("/", "/api/state", "/viser/", "/openapi.json", "/static/js/main.js"):
         answer = client.get(path, headers={"host": host})
         assert answer.status_code == 421
-        assert answer.json()["error"]["code"] == "foreign_host"
+        assert answer.json()["code"] == "foreign_host"
     with (
         pytest.raises(WebSocketDisconnect),
         connect(client, host=host),
@@ -69,7 +69,7 @@ def test_a_foreign_page_may_not_write(client: TestClient, origin: str) -> None:
     ]:
         answer = client.request(method, path, json=body, headers={"origin": origin})
         assert answer.status_code == 403
-        assert answer.json()["error"]["code"] == "foreign_origin"
+        assert answer.json()["code"] == "foreign_origin"
     assert client.get("/api/state").json()["version"] == before
 
 
@@ -98,7 +98,7 @@ def test_bodies_are_small(client: TestClient) -> None:
     body = b'{"changes":{},"origin":"' + b"x" * LARGEST_BODY + b'"}'
     answer = client.patch("/api/parameters", content=body)
     assert answer.status_code == 413
-    assert answer.json()["error"]["code"] == "too_large"
+    assert answer.json()["code"] == "too_large"
 
     def piecewise() -> object:
         for start in range(0, len(body), 65536):
@@ -106,7 +106,7 @@ def test_bodies_are_small(client: TestClient) -> None:
 
     answer = client.patch("/api/parameters", content=piecewise())  # type: ignore[arg-type]
     assert answer.status_code == 413
-    assert answer.json()["error"]["code"] == "too_large"
+    assert answer.json()["code"] == "too_large"
 
 
 def test_no_other_page_may_frame_ours(client: TestClient) -> None:

@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 from plotly.subplots import make_subplots
 
-from tracker.evaluation.matching import Tracks
+from tracker.evaluation.measures.matching import Tracks
 from tracker.evaluation.result import Evaluation
 from tracker.sequences.sequence import Sequence
 

@@ -10,7 +10,7 @@ from plotly.offline import get_plotlyjs
 
 from tracker import __version__
 from tracker.evaluation.figures import SOURCES
-from tracker.evaluation.matching import Tracks
+from tracker.evaluation.measures.matching import Tracks
 from tracker.evaluation.report.figures import DARK, over_time, top_view
 from tracker.evaluation.report.tables import (
     camera_table,

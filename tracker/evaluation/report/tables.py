@@ -11,7 +11,7 @@ import numpy as np
 from tracker import parameters as table
 from tracker.evaluation.difference import Difference, compare
 from tracker.evaluation.figures import number
-from tracker.evaluation.matching import Tracks
+from tracker.evaluation.measures.matching import Tracks
 from tracker.evaluation.report.figures import DARK, colour
 from tracker.evaluation.result import Evaluation
 from tracker.parameters import METHODS, PARAMETERS, RunParameters

@@ -40,6 +40,8 @@ class Context:
 
     quick: bool = False
     """Shortened to what shows the direction of each claim."""
+    seeds: int | None = None
+    """How many seeds each case is run with; None for the experiment's own number."""
     data: Path | None = None
     """Folder of real recordings; None where there are none."""
     output: Path | None = None
@@ -53,6 +55,15 @@ class Context:
     """Asked now and then; an experiment that hears yes raises ``tracker.pipeline.Cancelled``."""
     shared: dict[str, Any] = field(default_factory=dict, compare=False)
     """Runs that several experiments use."""
+
+    def seeds_of(self, whole: int, quick: int) -> int:
+        """How many seeds each case is run with.
+
+        Args:
+            whole: The experiment's own number.
+            quick: The same where it is shortened.
+        """
+        return self.seeds or (quick if self.quick else whole)
 
 
 @dataclass(frozen=True, slots=True)

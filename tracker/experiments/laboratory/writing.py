@@ -17,12 +17,15 @@ def can_draw() -> bool:
     return importlib.util.find_spec("matplotlib") is not None
 
 
-def document(experiment: Experiment, result: Result, *, quick: bool) -> dict[str, Any]:
+def document(
+    experiment: Experiment, result: Result, *, quick: bool, seeds: int | None
+) -> dict[str, Any]:
     """Everything that was found, as JSON takes it."""
     return {
         "experiment": experiment.name,
         "version": __version__,
         "quick": quick,
+        "seeds": seeds,
         "claim": experiment.claim,
         "findings": [
             {"claim": f.claim, "found": f.found, "verdict": f.verdict} for f in result.findings
@@ -37,7 +40,12 @@ def document(experiment: Experiment, result: Result, *, quick: bool) -> dict[str
 
 
 def write(
-    experiment: Experiment, result: Result, folder: Path, *, quick: bool = False
+    experiment: Experiment,
+    result: Result,
+    folder: Path,
+    *,
+    quick: bool = False,
+    seeds: int | None = None,
 ) -> list[Path]:
     """Write ``NAME.json`` and, where there is a figure and something to
     draw it, ``NAME.png``.
@@ -47,6 +55,7 @@ def write(
         result: What it found.
         folder: Made where it is not there.
         quick: Whether it was shortened.
+        seeds: How many it was run with in place of its own number.
 
     Returns:
         The files.
@@ -56,7 +65,10 @@ def write(
     """
     folder.mkdir(parents=True, exist_ok=True)
     text = json.dumps(
-        document(experiment, result, quick=quick), indent=1, ensure_ascii=False, allow_nan=False
+        document(experiment, result, quick=quick, seeds=seeds),
+        indent=1,
+        ensure_ascii=False,
+        allow_nan=False,
     )
     contents = {folder / f"{experiment.name}.json": (text + "\n").encode()}
     if result.figure is not None and can_draw():

@@ -1,8 +1,11 @@
 """OpenPose's key points: JSON a frame, with ``people`` and ``pose_keypoints_2d``.
 
-AlphaPose's ``--format open`` and Pose2Sim's RTMLib write the same. Frames count from 0.
+Pose2Sim's RTMLib writes the same. AlphaPose's ``--format open`` writes it a frame or, in one
+file, by the pictures' names; its ``--format cmu`` calls the fields ``bodies`` and ``joints``.
+Frames count from 0.
 
-Source: Cao et al., "OpenPose", IEEE TPAMI 43(1), 2021, and its "Output" page.
+Sources: Cao et al., "OpenPose", IEEE TPAMI 43(1), 2021, and its "Output" page; Fang et al.,
+"AlphaPose", IEEE TPAMI 45(6), 2023, and its "Output format" page.
 """
 
 from __future__ import annotations
@@ -24,15 +27,18 @@ NAME = "OpenPose key points JSON"
 KIND: Kind = "detections"
 SERIES = True
 
-FIELD = "pose_keypoints_2d"
+FIELDS = (("people", "pose_keypoints_2d"), ("bodies", "joints"))
+"""What the list of people and a person's joints are called."""
 
 
 def recognise(file: SourceFile) -> Certainty:
-    """JSON with people, who have pose_keypoints_2d where there is anybody."""
+    """JSON with people, who have joints where there is anybody."""
     head = file.head_text.lstrip()
-    if head[:1] != "{" or '"people"' not in head[:2000]:
-        return Certainty.NO
-    return Certainty.SURE if FIELD in head else Certainty.LIKELY
+    if head[:1] == "{":
+        for people, joints in FIELDS:
+            if f'"{people}"' in head[:2000]:
+                return Certainty.SURE if f'"{joints}"' in head else Certainty.LIKELY
+    return Certainty.NO
 
 
 def read(file: SourceFile) -> Iterator[Piece]:
@@ -41,18 +47,10 @@ def read(file: SourceFile) -> Iterator[Piece]:
     poses: list[Any] = []
     last = 0
     for place, path in enumerate(file.series):
-        member = file.member(path)
-        frame = _frame(path)
-        frame = place if frame is None else frame
-        last = max(last, frame)
-        values = member.json
-        people = values.get("people") if isinstance(values, dict) else None
-        if not is_list_of_tables(people):
-            raise member.error('expected a list "people" of tables')
-        assert isinstance(people, list)
-        for person in people:
-            frames.append(frame)
-            poses.append(person.get(FIELD))
+        for frame, found_there in _people(file.member(path), place):
+            last = max(last, frame)
+            frames += [frame] * len(found_there)
+            poses += found_there
     found = read_people(file, poses)
     boxes = np.zeros((0, 4)) if found is None else found.boxes
     joints = np.zeros((0, 25, 3)) if found is None else found.joints
@@ -75,6 +73,20 @@ def read(file: SourceFile) -> Iterator[Piece]:
         last_frame=last,
         keypoints=joints[keep],
     )
+
+
+def _people(file: SourceFile, place: int) -> Iterator[tuple[int, list[Any]]]:
+    """Each frame of a file with its people's joints; one frame, unless pictures are named."""
+    values = file.json
+    named = isinstance(values, dict) and not any(people in values for people, _ in FIELDS)
+    by_frame: dict[Any, Any] = values if named else {file.path.name: values}
+    for at, (name, one) in enumerate(by_frame.items(), place):
+        known = [f for f in FIELDS if isinstance(one, dict) and is_list_of_tables(one.get(f[0]))]
+        if not known:
+            raise file.error('expected a list "people" of tables')
+        people, joints = known[0]
+        frame = _frame(Path(name))
+        yield at if frame is None else frame, [person.get(joints) for person in one[people]]
 
 
 def _frame(path: Path) -> int | None:

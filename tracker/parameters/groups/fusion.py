@@ -77,7 +77,7 @@ class FusionParams(Params):
         float,
         Field(ge=0.05, le=10.0),
         ui("σ_a", unit="m/s per √s", step=0.05, log=True, when=_VELOCITY, essential=True),
-    ] = 0.8
+    ] = 0.5
     """Constant velocity: how much a person's speed changes in one second, along each axis."""
 
     vertical_share: Annotated[

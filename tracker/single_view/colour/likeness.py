@@ -11,7 +11,6 @@ import logging
 import numpy as np
 from jaxtyping import Float, Float16, Int, UInt8, UInt16
 from numpy import ndarray
-from scipy.special import softmax
 
 from tracker import colour
 from tracker.boxes import Boxes
@@ -65,6 +64,8 @@ class Likeness:
             picture: BGR.
             boxes: Centre and half sizes, pixels; equal probabilities outside the picture.
         """
+        from scipy.special import softmax  # a server starts without it
+
         people = len(self._model.names)
         told = np.full((len(boxes), people), 1.0 / people)
         inside, bins, corner = _covered(picture, boxes, self._model.space)

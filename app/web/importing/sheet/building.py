@@ -8,7 +8,7 @@ stands for the control's value and ``"#"`` for its number times ``data-scale``. 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from app.web.tables.markup import Cell, Markup, escaped, written
@@ -86,12 +86,31 @@ def number_field(
 
 
 def select(
-    name: str, label: str, choices: Iterable[tuple[str, str]], now: str, wish: dict[str, Any]
+    name: str,
+    label: str,
+    choices: Iterable[tuple[str, str]],
+    now: str,
+    wish: dict[str, Any],
+    off: Mapping[str, str] | None = None,
 ) -> Markup:
-    """A choice that changes the wish."""
+    """A choice that changes the wish.
+
+    Args:
+        name: Of the element.
+        label: What is chosen.
+        choices: Values and words.
+        now: The value.
+        wish: As of every control.
+        off: Values that cannot be chosen, each with the reason.
+    """
+    why = off or {}
     options = [
-        element("option", words, value=value, selected=value == now) for value, words in choices
-    ]
+        element(
+            "option", words, value=value, selected=value == now, disabled=value in why,
+            title=why.get(value),
+        )
+        for value, words in choices
+    ]  # fmt: skip
     return element("select", options, id=name, aria_label=label, data_wish=wish)
 
 

@@ -10,6 +10,7 @@ from app.web.importing.sheet.building import (
     element,
     field,
     icon,
+    size_text,
 )
 from app.web.importing.sheet.cameras import cameras_table, ready
 from app.web.importing.sheet.settings import checks_part, room_part, target_part
@@ -61,6 +62,15 @@ def _files(info: ImportInfo) -> Markup:
     return element("div", rows, class_="in-scroll in-files", tabindex=0)
 
 
+def _copying(info: ImportInfo) -> str:
+    if not info.copied:
+        return ""
+    return (
+        f", {size_text(info.copied)} of {size_text(info.bytes)} copied, "
+        f"{info.megabytes_per_second:.0f} MB/s"
+    )
+
+
 def _foot(info: ImportInfo) -> Markup:
     odd = sum(one.status == "warning" for one in info.checks)
     done = sum(ready(info, camera) for camera in info.cameras)
@@ -68,7 +78,8 @@ def _foot(info: ImportInfo) -> Markup:
     words = {
         "uploading": "Uploading",
         "reading": "Reading the files",
-        "writing": "Writing the recording",
+        "writing": f"Writing the recording{_copying(info)}",
+        "copying": f"It is open{_copying(info)}; until then the files are links",
     }.get(
         info.phase,
         f"{done} of {len(info.cameras)} cameras ready, {things}. Nothing is written before you "
@@ -77,20 +88,24 @@ def _foot(info: ImportInfo) -> Markup:
     kind = "busy" if info.phase != "settled" else "warn" if odd else "good"
     if info.error:
         words, kind = info.error[:1].upper() + info.error[1:], "bad"
-    part = info.received / info.bytes if info.bytes else 1.0
+    uploads = info.phase == "uploading"
+    moving = uploads or (info.phase in ("writing", "copying") and info.copied > 0)
+    part = (info.received if uploads else info.copied) / info.bytes if info.bytes else 1.0
     bar = element(
-        "span", element("i"), class_="bar", role="progressbar", aria_label="Upload",
-        aria_valuemin=0, aria_valuemax=100, aria_valuenow=round(100 * part),
-        style=f"--part:{part:.4f}", hidden=info.phase != "uploading",
+        "span", element("i"), class_="bar", role="progressbar",
+        aria_label="Upload" if uploads else "Copy",
+        aria_valuemin=0, aria_valuemax=100, aria_valuenow=round(100 * min(part, 1.0)),
+        style=f"--part:{min(part, 1.0):.4f}", hidden=not moving,
     )  # fmt: skip
     off = not can_be_written(info)
+    stops = info.phase in ("uploading", "writing", "copying")
     return element(
         "footer",
         element("span", class_=f"dot {kind}"),
         bar,
         element("span", words, class_="cut say", role="status", title=words),
         GROW,
-        button("Stop" if info.phase == "uploading" else "Cancel", "give-up", "tall"),
+        button("Stop" if stops else "Cancel", "give-up", "tall"),
         button("Only import", "import", "box tall", disabled=off),
         button(joined(Markup("Import and track"), element("kbd", "Ctrl ↵")), "track", "main tall",
                disabled=off),

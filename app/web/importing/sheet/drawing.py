@@ -41,6 +41,7 @@ def plan_picture(info: ImportInfo, words: str) -> Markup:
         element("path", class_="feet", d="".join(
             f"M{x - plan.x:.3f} {high - y + plan.y:.3f}h0" for x, y in plan.feet
         )),
+        [_entrance(info, number, pixel) for number in range(len(plan.entrances))],
         [one for number in range(len(plan.cameras)) for one in _camera(info, plan, number, pixel)],
         element("rect", class_="box"),
         faces,
@@ -75,6 +76,20 @@ def _tint(plan: ImportedPlan) -> list[Markup]:
         element("path", class_=f"floor seen-{count}", d="".join(pieces[count]))
         for count in sorted(pieces)
     ]
+
+
+def _entrance(info: ImportInfo, number: int, pixel: float) -> Markup:
+    """A disc where people come in; hollow while it is only suggested."""
+    plan = info.plan
+    assert plan is not None
+    x, y, wide, deep = plan.entrances[number]
+    high = plan.height * plan.cell
+    return element(
+        "ellipse",
+        class_="entrance" if info.wish.entrances else "entrance suggested",
+        cx=f"{x - plan.x:.3f}", cy=f"{high - (y - plan.y):.3f}",
+        rx=f"{max(wide, 4 * pixel):.3f}", ry=f"{max(deep, 4 * pixel):.3f}",
+    )  # fmt: skip
 
 
 def _camera(info: ImportInfo, plan: ImportedPlan, number: int, pixel: float) -> list[Markup]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from app.web.importing.models import ImportedCheck, ImportInfo
+from app.web.importing.models import ImportedCheck, ImportedPair, ImportInfo
 from app.web.importing.sheet.building import (
     GROW,
     element,
@@ -19,11 +19,23 @@ from app.web.importing.sheet.building import (
 )
 from app.web.importing.sheet.drawing import plan_picture
 from app.web.tables.markup import Cell, Markup, joined
+from tracker.parameters import METHODS, MethodKey
 from tracker.sequences.sequence import PRESETS
 
 AXES = "xyz"
 UPS = ("x", "y", "z", "-x", "-y", "-z")
 FOUND = "as found"
+
+MOST_LISTED = 6
+"""Cameras whose pairs are listed one by one; those of more stand in a square."""
+
+MOST_WORST = 8
+
+STAGES: dict[MethodKey, str] = {
+    "single_view": "In each camera",
+    "fusion_method": "Fusion",
+    "smoothing_method": "Hindsight",
+}
 
 SIGNS = {"good": ("tick", "good"), "warning": ("warn", "warn"), "absent": ("minus", "none")}
 
@@ -76,6 +88,7 @@ def room_part(info: ImportInfo) -> Markup:
         _choice("Axes", "axes", wish.axes, info.axes, ("opencv", "opengl")),
         _choice("Boxes", "boxes", wish.boxes, "", ("ltwh", "xyxy", "cxcywh")),
         _choice("First frame", "first_index", wish.first_index, "", (0, 1)),
+        _entrances(info),
         element("div", _label("Floor seen by", "cameras"),
                 element("div", cover, class_="keyline small")),
         restore,
@@ -96,6 +109,20 @@ def _face(info: ImportInfo, end: int, axis: int) -> Markup:
     label = f"Room, {('from', 'to')[end]} {AXES[axis]}, metres"
     value = info.room[end][axis]
     return number_field(f"in-room-{end}-{axis}", label, value, {"room": corners}, step=0.05)
+
+
+def _entrances(info: ImportInfo) -> Markup | None:
+    """Where people come in, as tracks of a first run show it; used where that is wished."""
+    used, found = info.wish.entrances, info.entrances
+    if not used and not found:
+        return None
+    if used:
+        use = wishing("Use none", {"entrances": []})
+        return element("div", _label("Entrances", f"{len(used)} used"), use)
+    one = len(found) == 1
+    note = f"found: {len(found)} where tracks begin and end"
+    use = wishing("Use it" if one else f"Use all {len(found)}", {"entrances": found})
+    return element("div", _label("Entrances", note), use)
 
 
 def _choice(
@@ -154,6 +181,8 @@ def _line(status: str, name: str, words: str, *more: Cell) -> Markup:
 def _pairs(info: ImportInfo) -> Markup | None:
     if not info.pairs:
         return None
+    if len(info.cameras) > MOST_LISTED:
+        return _grid(info)
     cells = [
         element(
             "span",
@@ -166,6 +195,44 @@ def _pairs(info: ImportInfo) -> Markup | None:
     ]
     return element("div", cells, class_="pairs", role="group",
                    aria_label="How far boxes of two cameras miss each other")  # fmt: skip
+
+
+def _grid(info: ImportInfo) -> Markup:
+    """All pairs as a square, pixels without their sign, and the worst beside it."""
+    names = [camera.name for camera in info.cameras]
+    by_names = {frozenset((pair.first, pair.second)): pair for pair in info.pairs}
+    heads = [element("th", str(number + 1), title=name) for number, name in enumerate(names)]
+    rows = []
+    for number, name in enumerate(names):
+        cells = [
+            _cell(by_names.get(frozenset((name, other))), name, other) for other in names[:number]
+        ]
+        rows.append(element("tr", element("th", f"{number + 1} {name}", scope="row"), cells))
+    table = element(
+        "table",
+        element("thead", element("tr", element("td"), heads)),
+        element("tbody", rows),
+        aria_label="How far boxes of two cameras miss each other, pixels",
+    )
+    worst = sorted(info.pairs, key=lambda pair: (not pair.odd, -(pair.pixels or 0.0)))
+    listed = [
+        element("li", f"{pair.first} – {pair.second} ", element("b", _pixels(pair, " px")),
+                class_="w" if pair.odd else None)
+        for pair in worst[:MOST_WORST]
+    ]  # fmt: skip
+    beside = element("div", small("worst first"), element("ol", listed))
+    return element("div", table, beside, class_="pair-grid")
+
+
+def _cell(pair: ImportedPair | None, first: str, second: str) -> Markup:
+    if pair is None:
+        return element("td", "", title=f"{first} – {second}: nothing to compare")
+    words = f"{first} – {second}: {100 * pair.share:.0f} % of their boxes meet"
+    return element("td", _pixels(pair), class_="w" if pair.odd else None, title=words)
+
+
+def _pixels(pair: ImportedPair, sign: str = "") -> str:
+    return "none" if pair.pixels is None else f"{pair.pixels:.1f}{sign}"
 
 
 def target_part(info: ImportInfo) -> Markup:
@@ -196,8 +263,6 @@ def target_part(info: ImportInfo) -> Markup:
         class_="choice own",
         aria_current="true" if pressed < 0 else None,
     )
-    boxes = "The boxes: no templates are needed."
-    colours = "Colours: drag boxes on the pictures once it is open."
     return element(
         "section",
         heading("Target"),
@@ -205,11 +270,31 @@ def target_part(info: ImportInfo) -> Markup:
         heading("Kept"),
         _kept(info),
         heading("Then track with"),
-        element("p", boxes if info.has_boxes else colours),
+        _methods(info),
         class_="in-scroll",
         tabindex=0,
         aria_label="Target and place",
     )
+
+
+def _methods(info: ImportInfo) -> Markup:
+    """What it is tracked with: what fits, or what is chosen here."""
+    boxes = "By the boxes: no templates are needed."
+    colours = "By what moves, until boxes are dragged on the pictures for colours."
+    rows = []
+    for key, words in STAGES.items():
+        fits = info.fitting.get(key, "")
+        choices = [("", f"{fits} (fits)" if fits else FOUND), *((m, m) for m in METHODS[key])]
+        rows.append(
+            element(
+                "label",
+                words,
+                select(f"in-{key}", words, choices, info.wish.methods.get(key) or "",
+                       {"methods": {**info.wish.methods, key: "$"}}, info.unfit.get(key)),
+                class_="lab",
+            )
+        )  # fmt: skip
+    return joined(element("p", boxes if info.has_boxes else colours), *rows)
 
 
 def _same(one: Sequence[float], other: Sequence[float]) -> bool:

@@ -1,0 +1,335 @@
+"""``study``: define, run, show, go on, best, export, in a terminal."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+from app.command.study_flags import (
+    BestOfStudy,
+    ExportStudy,
+    ListStudies,
+    NewStudy,
+    ResumeStudy,
+    RunStudy,
+    ShowStudy,
+    StopStudy,
+    Study,
+    Where,
+)
+from app.command.terminal import Bar, CommandError, print_table, say
+from tracker.studies.errors import StudyError
+from tracker.studies.store import Status, Store, Trial, create, find, stores, studies_folder
+
+if TYPE_CHECKING:
+    from tracker.studies.work.cluster import DaskCrew
+
+INTERRUPTED = 130
+
+_BEST = 10
+"""Trials that ``study show`` lists."""
+
+
+def study(command: Study) -> int:
+    """Run one of the commands; returns the exit status.
+
+    Raises:
+        StudyError: If a study, or its file, is not as it must be.
+    """
+    action = command.action
+    if isinstance(action, NewStudy):
+        _new(action)
+        return 0
+    folder = action.studies or studies_folder()
+    match action:
+        case RunStudy():
+            from tracker.studies.definition import read_definition
+
+            return run(create(read_definition(action.file), folder), action, as_json=action.json)
+        case ResumeStudy():
+            return run(find(action.study, folder), action, as_json=action.json)
+        case ListStudies():
+            _list(stores(folder), action)
+        case ShowStudy():
+            _show(action, folder)
+        case StopStudy():
+            store = find(action.study, folder)
+            store.ask_to_stop()
+            say(f"the study {store.name} is asked to stop; `study resume` goes on")
+        case BestOfStudy():
+            _best(find(action.study, folder), action)
+        case ExportStudy():
+            _export(find(action.study, folder), action)
+    return 0
+
+
+def _new(command: NewStudy) -> None:
+    from tracker.placing import replacing
+    from tracker.studies.example import example
+
+    file = command.file
+    if file.exists():
+        raise CommandError(f"{file} exists; name a file that does not")
+    if file.suffix != ".toml":
+        raise CommandError(f"{file}: expected the name of a .toml file")
+    with replacing(file) as begun:
+        begun.write_text(example(file.stem, command.recording or ("room44-3p",)), encoding="utf-8")
+    say(f"{file} is written: change it, then `multiview-phd study run {shlex.quote(str(file))}`")
+
+
+@contextmanager
+def to_be_stopped() -> Iterator[threading.Event]:
+    """Ctrl-C and the wish of the system to end are only noted; a second Ctrl-C is raised."""
+    heard = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield heard
+        return
+
+    def note(number: int, frame: FrameType | None) -> None:
+        if heard.is_set() and number == signal.SIGINT:
+            signal.default_int_handler(number, frame)
+        heard.set()
+
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield heard
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def crew_of(where: Where) -> Iterator[Any]:
+    """What makes the workers that the flags name; they end with this."""
+    from tracker.studies.work.cluster import ADDRESS, DaskCrew
+
+    if where.workers is not None and where.workers < 1:
+        raise CommandError(f"--workers: expected a whole number from 1, got {where.workers}")
+    made: list[DaskCrew] = []
+
+    def make(tell: Any) -> DaskCrew:
+        scheduler = where.scheduler or os.environ.get(ADDRESS) or None
+        made.append(DaskCrew(scheduler, workers=where.workers, tell=tell))
+        return made[0]
+
+    try:
+        yield make
+    finally:
+        for crew in made:
+            crew.close()
+
+
+def run(store: Store, where: Where, *, as_json: bool = False) -> int:
+    """Run a study, or go on with it; returns the exit status."""
+    from tracker.studies.running import run_study
+
+    before: list[str] = []
+    with (
+        to_be_stopped() as stopped,
+        store.running() as writer,
+        crew_of(where) as crew,
+        Bar(store.name, "trial") as bar,
+    ):
+
+        def told(status: Status) -> None:
+            if status.words and status.words not in before[-1:] and status.state == "running":
+                before.append(status.words)
+                say(status.words)
+            if status.done:
+                bar.at(status.done, status.trials)
+
+        status = run_study(store, writer, crew, told=told, stopped=stopped.is_set)
+    if as_json:
+        _print({"study": store.name, "state": status.state, "trials": len(store.trials())})
+    else:
+        _tell_end(store, status)
+    return INTERRUPTED if status.state == "stopped" and stopped.is_set() else 0
+
+
+def _tell_end(store: Store, status: Status) -> None:
+    words = f"; {status.words}" if status.words else ""
+    say(
+        f"{store.name}: {status.done} of {status.trials} trials, {status.runs} runs in "
+        f"{status.seconds:.0f} s{words}"
+    )
+    if status.done:
+        _show_trials(store)
+
+
+def _list(found: list[Store], command: ListStudies) -> None:
+    rows: list[dict[str, Any]] = []
+    for store in found:
+        status = store.status()
+        rows.append(
+            {
+                "study": store.name,
+                "state": status.state,
+                "done": len(store.trials()),
+                "trials": store.definition().trials,
+                "touched": store.touched(),
+                "words": status.words,
+            }
+        )
+    if command.json:
+        _print(rows)
+        return
+    print_table(
+        ("study", "state", ">done", ">trials", "last", ""),
+        [
+            (
+                row["study"], row["state"], str(row["done"]), str(row["trials"]),
+                time.strftime("%Y-%m-%d %H:%M", time.localtime(row["touched"])), row["words"],
+            )
+            for row in rows
+        ],
+    )  # fmt: skip
+
+
+def _show(command: ShowStudy, folder: Path) -> None:
+    store, number = _named(command.what, folder)
+    if number is None:
+        if command.command:
+            raise CommandError("--command: name a trial by its number, as in `study show 12`")
+        if command.json:
+            _print(_everything(store))
+            return
+        status = store.status()
+        say(
+            f"{store.name}: {status.state}, {status.done} of {status.trials} trials"
+            + (f"; {status.words}" if status.words else "")
+        )
+        _show_trials(store)
+        return
+    trial = store.trial(number)
+    if command.command:
+        from tracker.studies.commands import track_commands
+
+        sys.stdout.writelines(f"{one}\n" for one in track_commands(store.definition(), trial))
+    elif command.json:
+        outcomes = [store.outcome(row.key) for row in trial.jobs]
+        _print({**trial.to_json(), "runs": [o.to_json() for o in outcomes if o is not None]})
+    else:
+        _show_trial(store, trial)
+
+
+def _named(what: tuple[str, ...], folder: Path) -> tuple[Store, int | None]:
+    """The study and the trial that are meant."""
+    if len(what) > 2 or (len(what) == 2 and not what[1].isdecimal()):
+        raise CommandError(f"expected [STUDY] [TRIAL], got {' '.join(what)}")
+    if len(what) == 2:
+        return find(what[0], folder), int(what[1])
+    alone = what[0] if what else None
+    if alone is not None and alone.isdecimal() and not (folder / alone).exists():
+        return find(None, folder), int(alone)
+    return find(alone, folder), None
+
+
+def _show_trials(store: Store) -> None:
+    from tracker.studies.summary import summary_of
+
+    summary = summary_of(store)
+    keys = [key for key, _ in summary.importance[:6]] or [
+        one.key for one in summary.definition.varied[:6]
+    ]
+    named = [one.key.rpartition(".")[2] for one in summary.definition.varied if one.key in keys]
+    keys = [one.key for one in summary.definition.varied if one.key in keys]
+    rows = []
+    for trial in summary.ranked[:_BEST]:
+        assert trial.objectives is not None
+        measured = [
+            one.words(value, spread)
+            for one, value, spread in zip(
+                summary.objectives, trial.objectives, trial.spreads, strict=True
+            )
+        ]
+        values = [_value(trial.values.get(key)) for key in keys]
+        rows.append((str(trial.number), *measured, *values, summary.remark(trial)))
+    print_table((">trial", *(f">{one.name}" for one in summary.objectives), *named, ""), rows)
+    for sentence in summary.sentences():
+        say(sentence)
+
+
+def _show_trial(store: Store, trial: Trial) -> None:
+    facts = {
+        "trial": f"{trial.number} of {store.name}, {trial.state}",
+        **({"": trial.words} if trial.words else {}),
+        **{f"value {key}": _value(value) for key, value in trial.values.items()},
+        **{key: _value(value) for key, value in trial.figures.items()},
+        "vetoed": "yes" if trial.vetoed else "no",
+        "seconds": f"{trial.seconds:.1f}",
+        **{f"run {row.key}": f"{row.recording}, seed {row.seed}" for row in trial.jobs},
+    }
+    print_table(("what", "value"), list(facts.items()))
+
+
+def _best(store: Store, command: BestOfStudy) -> None:
+    from tracker.studies.summary import summary_of
+
+    summary = summary_of(store)
+    best = summary.best
+    if best is None:
+        raise StudyError(f"study {store.name}: no trial has ended; `study resume` goes on")
+    changes = summary.changes(best)
+    if command.save_as is not None:
+        save_preset(command.save_as, {**summary.definition.held(), **changes})
+    if command.json:
+        _print({**best.to_json(), "changes": changes, "front": summary.front})
+        return
+    for sentence in summary.sentences():
+        say(sentence)
+    print_table(
+        ("parameter", "default", "best"),
+        [(key, _value(summary.defaults.get(key)), _value(v)) for key, v in changes.items()],
+    )
+
+
+def save_preset(name: str, values: dict[str, Any]) -> None:
+    """Keep values as a preset of one's own.
+
+    Raises:
+        ParameterError: If the name does not do.
+    """
+    from app.state.kept.presets import keep_preset
+    from tracker.folders import settings_folder
+
+    keep_preset(settings_folder() / "presets.json", name, values)
+    say(f"kept as the preset {name!r}, which the page lists")
+
+
+def _export(store: Store, command: ExportStudy) -> None:
+    from tracker.studies.report import write_csv, write_json, write_report
+
+    writers = {".csv": write_csv, ".json": write_json, ".html": write_report}
+    output = command.output
+    if output.suffix.lower() not in writers:
+        raise CommandError(f"--output {output}: expected the name of a .csv, .json or .html file")
+    writers[output.suffix.lower()](output, store)
+    say(f"{store.name}, {len(store.trials())} trials, written to {output}")
+
+
+def _everything(store: Store) -> dict[str, Any]:
+    from tracker.studies.report import everything
+
+    return everything(store)
+
+
+def _value(value: Any) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _print(value: Any) -> None:
+    sys.stdout.write(json.dumps(value, allow_nan=False, ensure_ascii=False) + "\n")

@@ -1,0 +1,135 @@
+"""Studies as the messages of :mod:`app.web.studies.models`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from app.state.snapshot import Snapshot
+from app.state.studies.desk import StudyDesk
+from app.web.studies import models
+from tracker import parameters as table
+from tracker.folders import cache_folder
+from tracker.parameters import METHODS, PARAMETERS
+from tracker.studies.definition import Varied
+from tracker.studies.objectives import Objective
+from tracker.studies.space import around
+from tracker.studies.store import Store, Trial
+
+_METHOD_HELP = {
+    "single_view": "Method of stage 1.",
+    "fusion_method": "Method of stage 2.",
+    "smoothing_method": "Method of stage 3.",
+}
+
+
+def study_of(desk: StudyDesk, store: Store) -> models.Study:
+    """A study but its trials."""
+    summary, status = desk.summary(store), store.status()
+    defaults = summary.defaults
+    return models.Study(
+        info=models.StudyInfo(**desk.info(store)),
+        definition=summary.definition.to_json(),
+        toml=summary.definition.to_toml(),
+        objectives=[objective_of(one) for one in summary.objectives],
+        varied=[
+            range_of(one, defaults.get(one.key), summary.definition.start.get(one.key))
+            for one in summary.definition.varied
+        ],
+        status=models.StudyStatus(
+            runs=status.runs,
+            seconds=status.seconds,
+            seconds_left=status.seconds_left,
+            busy=status.busy,
+            workers=[models.WorkerInfo(**one) for one in status.workers],
+        ),
+        best=None if summary.best is None else summary.best.number,
+        front=summary.front,
+        importance=[
+            models.ImportanceInfo(key=key, share=share, spread=spread)
+            for key, (share, spread) in summary.importance
+        ],
+        importance_trials=summary.importance_trials,
+        sentences=summary.sentences(),
+    )
+
+
+def objective_of(one: Objective) -> models.ObjectiveInfo:
+    """A figure that trials are judged by."""
+    return models.ObjectiveInfo(
+        key=one.key,
+        name=one.name,
+        help=one.help,
+        higher=one.higher,
+        unit=one.unit,
+        digits=one.digits,
+        needs_truth=one.of == "truth",
+    )
+
+
+def range_of(one: Varied, default: Any, now: Any) -> models.RangeInfo:
+    """A varied parameter."""
+    parameter = PARAMETERS.get(one.key)
+    own = default if default is not None or parameter is None else parameter.default
+    return models.RangeInfo(
+        key=one.key,
+        label=one.key.replace("_", " ").capitalize() if parameter is None else parameter.label,
+        symbol="" if parameter is None else parameter.symbol,
+        unit="" if parameter is None else parameter.unit,
+        help=_METHOD_HELP.get(one.key, "") if parameter is None else parameter.help,
+        kind="choice" if parameter is None else parameter.kind,
+        minimum=None if parameter is None else parameter.minimum,
+        maximum=None if parameter is None else parameter.maximum,
+        low=one.low,
+        high=one.high,
+        log=one.log,
+        choices=list(one.choices),
+        default=own,
+        now=own if now is None else now,
+    )
+
+
+def trial_of(trial: Trial) -> models.TrialInfo:
+    """A trial that ended."""
+    told = asdict(trial)
+    del told["jobs"]
+    return models.TrialInfo(**told)
+
+
+def place_of(snapshot: Snapshot) -> str:
+    """What opens the recording again, wherever the program is started."""
+    sequence = snapshot.sequence
+    assert sequence is not None
+    folder = sequence.folder.absolute()
+    return snapshot.opened_as if folder.is_relative_to(cache_folder()) else str(folder)
+
+
+def ranges_of(snapshot: Snapshot, keys: list[str] | None) -> list[models.RangeInfo]:
+    """Ranges around today's values.
+
+    Args:
+        snapshot: Of the workbench.
+        keys: Which parameters; None for the essential ones that have an effect.
+
+    Raises:
+        ParameterError: If there is none of a key.
+    """
+    now, defaults = snapshot.parameters, snapshot.defaults
+    if keys is None:
+        keys = [
+            key for key in table.shown_keys(now) if key in PARAMETERS and PARAMETERS[key].essential
+        ]
+    found = []
+    for key in keys:
+        if key not in PARAMETERS and key not in METHODS:
+            table.with_values(now, {key: None})  # says what is wrong
+        own, default = table.value(now, key), table.value(defaults, key)
+        if key == "single_view":
+            fit = [
+                one for one in METHODS["single_view"] if one not in snapshot.unfit["single_view"]
+            ]
+            one = Varied(key, choices=tuple(fit))
+        else:
+            one = around(key, own, default)
+        found.append(range_of(one, default, own))
+    return found

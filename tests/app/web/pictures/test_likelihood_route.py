@@ -1,0 +1,65 @@
+"""The likelihood of a person's colours over a picture, as the page lays it over."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy import ndarray
+from starlette.testclient import TestClient
+
+from app.web.pictures.likelihood import heat
+from app.web.server import Settings, create_app
+from tests.app.conftest import ADDRESS, run_is, wait_until
+from tracker.single_view.colour.likelihood_map import COLUMNS
+
+
+@pytest.fixture(scope="module")
+def numbers(data: Path) -> Iterator[TestClient]:
+    app = create_app(Settings(sequence="numbers", data=data, with_viser=False))
+    with TestClient(app, base_url=ADDRESS) as client:
+        wait_until(run_is(client, "done"))
+        yield client
+
+
+def decoded(content: bytes) -> ndarray:
+    picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
+    assert picture is not None
+    return picture
+
+
+def test_the_likelier_the_denser() -> None:
+    shown = decoded(heat(np.array([[-np.inf, -10.0, -2.0]]), -20.0))
+    assert shown.shape == (1, 3, 4)
+    assert shown[0, 0, 3] == 0
+    assert 0 < shown[0, 1, 3] < shown[0, 2, 3]
+
+
+def test_a_step_names_its_map_which_may_be_kept(numbers: TestClient) -> None:
+    key = numbers.get("/api/state").json()["sequence"]["key"]
+    step = numbers.get("/api/step/5").json()
+    named = step["cameras"][0]["likelihood"]
+    path = f"/api/likelihood/{key}/0/5.png"
+    answer = numbers.get(path, params={"run": named})
+    assert answer.status_code == 200
+    assert "immutable" in answer.headers["cache-control"]
+    assert decoded(answer.content).shape[1] == COLUMNS
+    assert numbers.get(path).headers["cache-control"] == "no-cache"
+    assert numbers.get(path).content == answer.content
+
+
+def test_what_there_is_no_map_of(numbers: TestClient, client: TestClient) -> None:
+    key = numbers.get("/api/state").json()["sequence"]["key"]
+    for path in ("nothing/0/5.png", f"{key}/9/5.png", f"{key}/0/999.png", f"{key}/0/5.png?run=x"):
+        answer = numbers.get(f"/api/likelihood/{path}")
+        assert answer.status_code == 404, path
+        assert answer.json()["code"] == "no_likelihood"
+    boxes_only = client.get("/api/step/5").json()["cameras"][0]
+    assert boxes_only["likelihood"] is None
+    key = client.get("/api/state").json()["sequence"]["key"]
+    answer = client.get(f"/api/likelihood/{key}/0/5.png")
+    assert answer.status_code == 404
+    assert "has no picture of step 5" in answer.json()["detail"]

@@ -1,0 +1,1 @@
+"""Joint probabilistic data association."""

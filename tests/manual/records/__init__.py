@@ -1,0 +1,1 @@
+"""What the manual prints of runs: made once, kept as JSON."""

@@ -1,0 +1,133 @@
+"""The page of results: tables and findings of experiments, from the records of their runs."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from tests.manual.places import RECORDS, ROOT, between
+from tests.manual.records import machines, recordings
+from tracker.experiments import EXPERIMENTS
+
+FOLDER = RECORDS / "experiments"
+KEPT = ("experiment", "version", "form", "claim", "findings", "table", "notes")
+"""What the page needs of an experiment's document; all else is made anew with the run."""
+
+OWN_MACHINE = ("steps/s", "frames/s")
+"""Columns that tell of the machine more than of the method: they are not printed."""
+
+SMALLER = "A smaller form, run as `multiview-phd experiment {experiment} {form}`."
+
+INTRODUCTION = """# Results
+
+Every table on this page is printed from a record under `static/manual/records/`, and a test holds
+the two equal. The records are made anew by one command in a checkout, with the real recordings in
+a folder `DIR`:
+
+```sh
+python3 -m tests.manual --record --data DIR
+```
+
+One experiment alone, figure included, is run by `multiview-phd experiment NAME --data DIR`; what
+took too long to be run whole says in which smaller form it was. The
+rooms are rendered and come with the program; AV16.3 and the Curtin recordings are real
+([sources](methods.md#sources)). *Found* is the share of true positions with an estimate within
+the stated distance, *error* the mean distance of those that are matched; every other figure is
+defined in [`tracker.evaluation`](api/evaluation.md).
+"""
+
+
+def record(names: list[str], data: Path) -> None:
+    """Run experiments as the program's users do, and keep what the page prints.
+
+    Args:
+        names: Which ones.
+        data: The folder of the real recordings.
+
+    Raises:
+        subprocess.CalledProcessError: If one cannot be run.
+    """
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        with tempfile.TemporaryDirectory() as folder:
+            line = [sys.executable, "-m", "app", "experiment", name]
+            line += ["--output", folder, "--data", str(data)]
+            subprocess.run(line, check=True, cwd=ROOT)
+            keep(Path(folder, f"{name}.json"))
+
+
+def keep(path: Path) -> None:
+    """Take an experiment's document into the records, with the form in which it was run."""
+    document = json.loads(path.read_text(encoding="utf-8"))
+    flags = ["--quick"] if document["quick"] else []
+    flags += [f"--seeds {document['seeds']}"] if document["seeds"] else []
+    document["form"] = " ".join(flags)
+    table = document["table"]
+    columns = [k for k, word in enumerate(table["head"]) if word not in OWN_MACHINE]
+    document["table"] = {
+        "head": [table["head"][k] for k in columns],
+        "rows": [[row[k] for k in columns] for row in table["rows"]],
+    }
+    text = json.dumps({key: document[key] for key in KEPT}, indent=1, ensure_ascii=False)
+    (FOLDER / f"{document['experiment']}.json").write_text(text + "\n", encoding="utf-8")
+
+
+def kept() -> list[dict[str, Any]]:
+    """The records, in the order in which the experiments are run."""
+    paths = [FOLDER / f"{name}.json" for name in EXPERIMENTS]
+    return [json.loads(p.read_text(encoding="utf-8")) for p in paths if p.is_file()]
+
+
+def page() -> str:
+    """The whole page."""
+    documents = kept()
+    parts = [INTRODUCTION, "## Claims of the papers, run again", "", _claims(documents), ""]
+    for document in documents:
+        parts += [f"## {document['experiment']}", "", f"> {document['claim']}", ""]
+        if document["form"]:
+            parts += [SMALLER.format(**document), ""]
+        parts += [_table(document["table"]), ""]
+        parts += [f"{note}\n" for note in document["notes"]]
+    parts += [recordings.section(), machines.section()]
+    return "\n".join(parts).rstrip() + "\n"
+
+
+def readme() -> str:
+    """The README with its table of figures."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    shown = next(d for d in kept() if d["experiment"] == "sequences")
+    wanted = [
+        "sequence",
+        "tracks",
+        "cameras",
+        "people",
+        "MOTA",
+        "IDF1",
+        "HOTA",
+        "error (m)",
+        "found",
+    ]
+    columns = [shown["table"]["head"].index(word) for word in wanted]
+    rows = [[row[k] for k in columns] for row in shown["table"]["rows"]]
+    return between(text, "results", _table({"head": wanted, "rows": rows}))
+
+
+def _claims(documents: list[dict[str, Any]]) -> str:
+    rows = [
+        [f"`{d['experiment']}`", f["claim"], f"**{f['verdict']}**", f["found"]]
+        for d in documents
+        for f in d["findings"]
+    ]
+    return _table({"head": ["experiment", "claim", "", "found"], "rows": rows})
+
+
+def _table(table: dict[str, Any]) -> str:
+    def line(cells: list[str]) -> str:
+        return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
+
+    rule = f"|{'---|' * len(table['head'])}"
+    return "\n".join([line(table["head"]), rule, *map(line, table["rows"])])

@@ -1,0 +1,151 @@
+"""Studies over HTTP: defined from the sliders, run by a process of their own, read, used."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.web.server import Settings, create_app
+from tests.studies.small import Serial, made_up, recording, run
+from tracker.studies.store import find
+
+ADDRESS = "http://127.0.0.1:8000"
+RANGES = {"fusion.detection_probability": {"low": 0.6, "high": 0.98}, "fusion.clutter_rate": {}}
+
+
+@pytest.fixture
+def client(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
+    """A server with a small recording of boxes open, and a folder of studies."""
+    monkeypatch.setenv("MULTIVIEW_PHD_STUDIES", str(tmp_path / "studies"))
+    place = recording(tmp_path / "recording")
+    app = create_app(Settings(sequence=str(place), with_viser=False))
+    with TestClient(app, base_url=ADDRESS) as client:
+        until = time.monotonic() + 60.0
+        while client.get("/api/state").json()["run"]["state"] != "done":
+            assert time.monotonic() < until
+            time.sleep(0.02)
+        yield client
+
+
+def define(client: TestClient, **fields: Any) -> dict[str, Any]:
+    wish = {"name": "mine", "parameters": RANGES, "trials": 5, "objectives": ["score"], **fields}
+    answer = client.post("/api/studies", json=wish)
+    assert answer.status_code == 200, answer.text
+    found: dict[str, Any] = answer.json()
+    return found
+
+
+def test_a_draft_has_ranges_around_todays_values(client: TestClient) -> None:
+    client.patch("/api/parameters", json={"changes": {"fusion.clutter_rate": 12}})
+    draft = client.get("/api/studies/draft").json()
+    assert draft["has_truth"]
+    assert draft["objectives"] == ["hota", "idf1", "speed"]
+    rate = next(one for one in draft["parameters"] if one["key"] == "fusion.clutter_rate")
+    assert rate["low"] <= rate["default"] < rate["now"] == 12.0 <= rate["high"]
+    asked = client.get("/api/studies/draft?keys=fusion.birth_rate,single_view").json()["parameters"]
+    assert [one["key"] for one in asked] == ["fusion.birth_rate", "single_view"]
+    assert "colour_phd" not in asked[1]["choices"]  # the recording has no pictures
+    wrong = client.get("/api/studies/draft?keys=fusion.birth_rat")
+    assert wrong.status_code == 422
+    assert "did you mean fusion.birth_rate" in wrong.json()["error"]["message"]
+
+
+def test_it_is_told_what_a_study_takes_or_why_it_is_refused(client: TestClient) -> None:
+    wish = {"name": "mine", "parameters": RANGES, "trials": 5, "seeds": 3}
+    cost = client.post("/api/studies/estimate", json=wish).json()
+    assert cost["runs"] == 15
+    assert cost["error"] is None
+    assert cost["words"].startswith("up to 15 runs")
+    wish["parameters"] = {"fusion.detection_probability": {"high": 1.5}}
+    cost = client.post("/api/studies/estimate", json=wish).json()
+    assert "must be between" in cost["error"]
+    refused = client.post("/api/studies", json=wish)
+    assert refused.status_code == 422
+    assert "must be between" in refused.json()["error"]["message"]
+
+
+def test_what_is_on_the_sliders_is_held_and_tried(client: TestClient) -> None:
+    changes = {"fusion.clutter_rate": 12, "fusion.acceleration_sigma": 2.5}
+    client.patch("/api/parameters", json={"changes": changes})
+    made = define(client)
+    assert made["info"]["state"] == "new"
+    assert made["definition"]["values"] == {"fusion.acceleration_sigma": 2.5}
+    assert made["definition"]["start"] == {"fusion.clutter_rate": 12.0}
+    again = client.post(
+        "/api/studies", json={"name": "mine", "parameters": RANGES, "objectives": ["score"]}
+    )
+    assert again.status_code == 422
+    assert 'there is a study "mine" already' in again.json()["error"]["message"]
+
+
+def test_trials_are_read_used_and_kept(client: TestClient, tmp_path: Path) -> None:
+    define(client, trials=30)
+    store = find("mine", tmp_path / "studies")
+    run(store, Serial(made_up(lambda v: float(v.get("fusion.clutter_rate", 3.0)) / 50.0)))
+    told = client.get("/api/studies/mine").json()
+    assert told["info"]["done"] == 30
+    assert told["importance"][0]["key"] == "fusion.clutter_rate"
+    assert told["importance"][0]["share"] > 0.5
+    best = told["best"]
+    trials = client.get("/api/studies/mine/trials").json()
+    assert len(trials["trials"]) == 30
+    assert client.get(f"/api/studies/mine/trials?after={trials['last']}").json()["trials"] == []
+    detail = client.get(f"/api/studies/mine/trials/{best}").json()
+    assert detail["commands"][0].startswith("multiview-phd track ")
+    state = client.post(f"/api/studies/mine/trials/{best}/use").json()
+    for key, value in detail["trial"]["values"].items():
+        assert state["parameters"][key] == value
+    assert set(state["changed"]) <= set(detail["trial"]["values"])
+    kept = client.post(f"/api/studies/mine/trials/{best}/preset", json={"name": "found"}).json()
+    assert kept["presets"] == ["found"]
+    assert kept["preset"] == "found"
+    back = client.post("/api/studies/mine/trials/0/use").json()
+    assert back["changed"] == []
+    report = client.get("/api/studies/mine/export/report.html")
+    assert "<h1>Study mine</h1>" in report.text
+    table = client.get("/api/studies/mine/export/trials.csv").text.splitlines()
+    assert len(table) == 31
+    assert client.get("/api/studies/mine/export/study.json").json()["best"] == best
+
+
+def test_what_is_not_there_is_told(client: TestClient) -> None:
+    for path in ("/api/studies/nothing", "/api/studies/nothing/trials"):
+        answer = client.get(path)
+        assert answer.status_code == 404
+        assert 'expected the study "nothing", found none' in answer.json()["error"]["message"]
+    define(client)
+    answer = client.get("/api/studies/mine/trials/3")
+    assert answer.status_code == 404
+    assert "no trial 3 has ended" in answer.json()["error"]["message"]
+    looked = client.post("/api/studies/scheduler", json={"address": "tcp://127.0.0.1:9"}).json()
+    assert looked["error"].startswith("there is no Dask scheduler at tcp://127.0.0.1:9")
+
+
+@pytest.mark.full
+def test_a_process_of_its_own_runs_it_and_is_stopped(client: TestClient) -> None:
+    define(client, trials=500)
+    with client.websocket_connect("ws://127.0.0.1:8000/api/stream") as socket:
+        started = client.post("/api/studies/mine/start", json={"workers": 1}).json()
+        assert started["info"]["state"] == "running"
+        again = client.post("/api/studies/mine/start")
+        assert again.status_code == 409
+        assert "runs already" in again.json()["error"]["message"]
+        heard: list[dict[str, Any]] = []
+        until = time.monotonic() + 60.0
+        while not heard or heard[-1]["done"] < 2:
+            assert time.monotonic() < until
+            message = socket.receive_json()
+            if message["type"] == "study":
+                heard.append(message["study"])
+    workers = client.get("/api/studies/mine").json()["status"]["workers"]
+    assert len(workers) == 1
+    assert client.delete("/api/studies/mine").status_code == 409
+    stopped = client.post("/api/studies/mine/stop").json()
+    assert stopped["info"]["state"] == "stopped"
+    assert stopped["info"]["done"] >= 2
+    assert client.delete("/api/studies/mine").json()["studies"] == []

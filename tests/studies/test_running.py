@@ -1,0 +1,217 @@
+"""A study runs, is ended at any moment, goes on, and does nothing twice."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.studies.small import Serial, definition, made_up, recording, run
+from tracker.studies.errors import StudyError
+from tracker.studies.store import JOURNAL, Store, create
+from tracker.studies.summary import summary_of
+from tracker.studies.work.jobs import Job, Outcome
+
+
+def near(values: dict[str, Any]) -> float:
+    """Best where p_D is .8 and λ_c is 1."""
+    p = values.get("fusion.detection_probability", 0.95)
+    rate = values.get("fusion.clutter_rate", 3.0)
+    return 1.0 - (p - 0.8) ** 2 - 0.05 * math.log(rate) ** 2
+
+
+def study(folder: Path, **fields: Any) -> Store:
+    return create(definition(folder, **fields), folder / "studies")
+
+
+def test_the_first_trial_is_the_default_and_real_runs_are_scored(tmp_path: Path) -> None:
+    store = study(tmp_path, trials=3)
+    crew = Serial()
+    status = run(store, crew)
+    assert status.state == "done"
+    trials = store.trials()
+    assert [one.number for one in trials] == [0, 1, 2]
+    assert trials[0].values == {
+        "fusion.detection_probability": 0.95, "fusion.clutter_rate": 3.0,
+    }  # fmt: skip
+    for one in trials:
+        outcome = store.outcome(one.jobs[0].key)
+        assert outcome is not None
+        figures = outcome.figures
+        assert one.objectives == (pytest.approx((figures["hota"] + figures["idf1"]) / 2.0),)
+        assert len(outcome.tracks) == 24
+        assert figures["speed"] > 0.0
+
+
+def test_a_search_finds_what_is_better(tmp_path: Path) -> None:
+    store = study(tmp_path, trials=60, prune=False)
+    run(store, Serial(made_up(near)))
+    summary = summary_of(store)
+    assert summary.best is not None
+    assert summary.best.objectives[0] > near({}) + 0.02
+    assert summary.best.values["fusion.detection_probability"] == pytest.approx(0.8, abs=0.08)
+    assert {key for key, _ in summary.importance} == set(summary.defaults)
+    assert all(0.0 <= share <= 1.0 and spread >= 0.0 for _, (share, spread) in summary.importance)
+
+
+@pytest.mark.parametrize("after", [0, 1, 3, 7, 10])
+def test_a_study_that_is_ended_goes_on_and_does_nothing_twice(tmp_path: Path, after: int) -> None:
+    recording(tmp_path / "other")
+    fields = {"trials": 6, "seeds": 2, "recordings": ["recording", "other"], "prune": False}
+    whole = study(tmp_path, name="whole", **fields)
+    run(whole, Serial(made_up(near)))
+    store = study(tmp_path, name="ended", **fields)
+    first = Serial(made_up(near), stop_after=after)
+    with pytest.raises(KeyboardInterrupt):
+        run(store, first)
+    assert store.status().state == "stopped"
+    ended = store.trials()
+    second = Serial(made_up(near))
+    run(store, second)
+    assert not set(first.done) & set(second.done)
+    assert store.trials()[: len(ended)] == ended
+    assert len(store.trials()) == 6
+    assert len(first.done) + len(second.done) == len(set(first.done) | set(second.done))
+    # until it was ended it asked for what the other did
+    same = [one.values for one in store.trials()[: max(1, len(ended))]]
+    assert same == [one.values for one in whole.trials()[: len(same)]]
+
+
+def test_a_record_that_was_cut_off_is_gone_on_with(tmp_path: Path) -> None:
+    store = study(tmp_path, trials=4)
+    with pytest.raises(KeyboardInterrupt):
+        run(store, Serial(made_up(near), stop_after=2))
+    journal = store.folder / JOURNAL
+    journal.write_bytes(journal.read_bytes()[:-7])
+    run(store, Serial(made_up(near)))
+    assert [one.number for one in store.trials()] == [0, 1, 2, 3]
+
+
+def test_the_same_values_are_run_once(tmp_path: Path) -> None:
+    choices = {"smoothing_method": {"choices": ["none", "positions"]}}
+    store = study(tmp_path, trials=9, parameters=choices, prune=False, search="random")
+    crew = Serial(made_up(lambda values: 0.5))
+    run(store, crew)
+    assert len(store.trials()) == 9
+    assert len(crew.done) == len(set(crew.done)) <= 3
+
+
+def test_a_grid_tries_all_and_no_more(tmp_path: Path) -> None:
+    parameters = {
+        "fusion.clutter_rate": {"low": 1, "high": 9, "steps": 3},
+        "smoothing_method": {"choices": ["none", "positions"]},
+    }
+    store = study(tmp_path, trials=20, parameters=parameters, search="grid", prune=False)
+    run(store, Serial(made_up(near)))
+    tried = [tuple(sorted(one.values.items())) for one in store.trials()]
+    assert len(tried) == 7  # the defaults, then the grid
+    assert len(set(tried[1:])) == 6
+    small = study(tmp_path, name="small grid", trials=5, parameters=parameters, search="grid")
+    with pytest.raises(StudyError, match="more combinations than the 5 trials"):
+        run(small, Serial(made_up(near)))
+
+
+def test_hopeless_trials_are_given_up_after_their_first_runs(tmp_path: Path) -> None:
+    store = study(tmp_path, trials=40, seeds=6, search="random")
+    crew = Serial(made_up(near))
+    run(store, crew)
+    trials = store.trials()
+    pruned = [one for one in trials if one.state == "pruned"]
+    assert pruned
+    assert all(len(one.jobs) == 2 for one in pruned)
+    complete = sorted(one.objectives[0] for one in trials if one.state == "complete")
+    best = max(near(one.values) for one in trials)
+    assert complete[-1] == pytest.approx(best)
+    assert len(crew.done) < 40 * 6
+
+
+def test_several_objectives_have_a_front(tmp_path: Path) -> None:
+    def do(job: Job) -> Outcome:
+        p = dict(job.values).get("fusion.detection_probability", 0.95)
+        figures = {"score": p, "speed": 100.0 * (1.0 - p)}
+        return Outcome(job.key, "done", figures=figures, seconds=0.01)
+
+    store = study(tmp_path, trials=12, objectives=["score", "speed"])
+    run(store, Serial(do))
+    summary = summary_of(store)
+    assert len(summary.front) == 12
+    assert summary.best.number == max(summary.trials, key=lambda t: t.objectives[0]).number
+
+
+def test_a_trial_that_fails_keeps_no_other_up(tmp_path: Path) -> None:
+    def do(job: Job) -> Outcome:
+        if dict(job.values).get("fusion.clutter_rate", 3.0) < 1.0:
+            return Outcome(job.key, "failed", "it was too quiet")
+        return made_up(near)(job)
+
+    store = study(tmp_path, trials=20, search="random")
+    run(store, Serial(do))
+    failed = [one for one in store.trials() if one.state == "failed"]
+    assert failed
+    assert all(one.words == "it was too quiet" and one.objectives is None for one in failed)
+    assert len(store.trials()) == 20
+
+
+def test_defaults_that_fail_end_the_study(tmp_path: Path) -> None:
+    store = study(tmp_path)
+    with pytest.raises(StudyError, match=r"the defaults cannot be run, .*: no way"):
+        run(store, Serial(lambda job: Outcome(job.key, "failed", "no way")))
+    assert store.status().state == "failed"
+    assert "no way" in store.status().words
+
+
+def test_people_who_leave_the_pictures_are_vetoed(tmp_path: Path) -> None:
+    recording(tmp_path / "blind", truth=False)
+
+    def do(job: Job) -> Outcome:
+        p = dict(job.values).get("fusion.detection_probability", 0.95)
+        overlap = 0.6 if p > 0.8 else 0.2  # agreement alone would choose the lowest
+        return Outcome(job.key, "done", figures={"identity": 1.0 - p}, overlap=overlap)
+
+    store = study(tmp_path, trials=30, recordings=["blind"], objectives=[], prune=False)
+    run(store, Serial(do))
+    summary = summary_of(store)
+    assert [one.key for one in summary.objectives] == ["identity"]
+    assert any(one.vetoed for one in summary.trials)
+    assert all(one.vetoed == (one.values["fusion.detection_probability"] <= 0.8)
+               for one in summary.trials)  # fmt: skip
+    assert summary.best.values["fusion.detection_probability"] > 0.8
+    assert any("no truth was looked at" in one for one in summary.sentences())
+
+
+def test_what_needs_a_truth_is_told_where_there_is_none(tmp_path: Path) -> None:
+    recording(tmp_path / "blind", truth=False)
+    store = study(tmp_path, recordings=["blind"], objectives=["idf1"])
+    with pytest.raises(StudyError, match="idf1 needs a truth, and numbers has none; take identity"):
+        run(store, Serial())
+
+
+def test_two_studies_of_one_name_are_told(tmp_path: Path) -> None:
+    store = study(tmp_path)
+    assert study(tmp_path).folder == store.folder
+    with pytest.raises(StudyError, match='there is another study "small"'):
+        study(tmp_path, trials=7)
+    with store.running():
+        assert store.is_running()
+        with pytest.raises(StudyError, match="is run by another process"), store.running():
+            pass
+    assert not store.is_running()
+
+
+def test_a_recording_that_changed_since_is_told(tmp_path: Path) -> None:
+    store = study(tmp_path, trials=2)
+    run(store, Serial(made_up(near)))
+    boxes = tmp_path / "recording" / "cam1.csv"
+    boxes.write_text(boxes.read_text(encoding="utf-8").replace("20.5", "21.5"), encoding="utf-8")
+    with pytest.raises(StudyError, match="has changed since the study small began"):
+        run(store, Serial(made_up(near)))
+
+
+def test_the_time_ends_it(tmp_path: Path) -> None:
+    store = study(tmp_path, trials=10_000, minutes=0.01)
+    status = run(store, Serial(made_up(near)))
+    assert status.state == "done"
+    assert "minutes are over" in status.words
+    assert 0 < len(store.trials()) < 10_000

@@ -1,0 +1,1 @@
+"""CLEAR, identity, HOTA, OSPA and GOSPA: what tracks are measured by."""

@@ -1,0 +1,103 @@
+"""HOTA: detection and association in balance, over all strictnesses of localisation.
+
+[LODTGLL21] Luiten, Ošep, Dendorfer, Torr, Geiger, Leal-Taixé, Leibe, "HOTA: a
+higher order metric for evaluating multi-object tracking", IJCV 129, 2021.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.assignment import linear_sum_assignment
+from tracker.evaluation.measures.matching import Comparison
+
+ALPHAS = np.arange(1, 20) * 0.05
+"""The strictnesses: similarity from which a pair counts, 0.05 … 0.95."""
+
+_TINY = np.finfo(float).eps
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hota:
+    """The scores at each α; the figures are their means."""
+
+    detection: Float[ndarray, " A"]
+    """DetA = TP / (TP + FN + FP)."""
+    association: Float[ndarray, " A"]
+    """AssA: mean over the pairs of TPA / (TPA + FNA + FPA); 0 without pairs."""
+    localisation: Float[ndarray, " A"]
+    """LocA: mean similarity of the pairs; 1 at an α without pairs."""
+
+    @property
+    def hota(self) -> Float[ndarray, " A"]:
+        """√(DetA · AssA)."""
+        return np.asarray(np.sqrt(self.detection * self.association))
+
+
+def hota(comparison: Comparison) -> Hota | None:
+    """HOTA with the similarity 1 − distance / gate, 0 from the gate on.
+
+    With a gate of 1 m, α = 0.05 asks for 0.95 m and α = 0.95 for 0.05 m. At each
+    step the pairs maximise similarity times the alignment of their whole tracks;
+    a pair counts at every α up to its similarity [LODTGLL21].
+
+    None where there are neither people nor estimates; zeros (LocA 1) where there
+    is only one of them.
+    """
+    truth, tracks = comparison.truth, comparison.tracks
+    people, estimates = len(truth), len(tracks)
+    if not people and not estimates:
+        return None
+    similarities = [
+        np.maximum(1.0 - distances / comparison.measure.gate, 0.0)
+        for distances in comparison.distances
+    ]
+    present = np.bincount(truth.indices, minlength=len(truth.names))[:, None]
+    reported = np.bincount(tracks.indices, minlength=len(tracks.names))
+    aligned = np.zeros((len(truth.names), len(tracks.names)))
+    for step, similarity in enumerate(similarities):
+        if similarity.size:
+            rivals = similarity.sum(axis=0) + similarity.sum(axis=1)[:, None] - similarity
+            share = np.divide(
+                similarity, rivals, out=np.zeros_like(similarity), where=rivals > _TINY
+            )
+            aligned[np.ix_(truth.indices[truth.at(step)], tracks.indices[tracks.at(step)])] += share
+    alignment = aligned / np.maximum(present + reported - aligned, _TINY)
+
+    who, which, close = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0)]
+    for step, similarity in enumerate(similarities):
+        if similarity.size:
+            persons = truth.indices[truth.at(step)]
+            ids = tracks.indices[tracks.at(step)]
+            score = alignment[np.ix_(persons, ids)] * similarity
+            rows, columns = linear_sum_assignment(score, maximize=True)
+            who.append(persons[rows])
+            which.append(ids[columns])
+            close.append(similarity[rows, columns])
+    return _scores(
+        np.concatenate(who), np.concatenate(which), np.concatenate(close), present, reported
+    )
+
+
+def _scores(
+    who: ndarray, which: ndarray, close: ndarray, present: ndarray, reported: ndarray
+) -> Hota:
+    """DetA, AssA and LocA at each α from all pairs of all steps and their similarity."""
+    people, estimates = int(present.sum()), int(reported.sum())
+    detection, association, localisation = np.zeros(19), np.zeros(19), np.ones(19)
+    shape = (len(present), len(reported))
+    for a, alpha in enumerate(ALPHAS):
+        counted = close >= alpha - _TINY
+        pairs = int(counted.sum())
+        detection[a] = pairs / (people + estimates - pairs)
+        if pairs:
+            flat = np.ravel_multi_index((who[counted], which[counted]), shape)
+            together = np.bincount(flat, minlength=shape[0] * shape[1]).reshape(shape)
+            overlap = together / np.maximum(present + reported - together, 1)
+            association[a] = float((together * overlap).sum()) / pairs
+            localisation[a] = float(close[counted].mean())
+    return Hota(detection, association, localisation)

@@ -1,0 +1,69 @@
+"""Identity precision, recall and F1: one track for one person over the whole sequence.
+
+[RSZCT16] Ristani, Solera, Zou, Cucchiara, Tomasi, "Performance measures and a data
+set for multi-target, multi-camera tracking", ECCV workshops 2016.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Int
+from numpy import ndarray
+
+from tracker.assignment import linear_sum_assignment
+from tracker.evaluation.measures.matching import Comparison
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Identity:
+    """The best one-to-one map of people and tracks, and its counts."""
+
+    true_positives: int
+    """IDTP: people-steps at which the person's own track is within the gate."""
+    false_positives: int
+    """IDFP: the other estimates."""
+    false_negatives: int
+    """IDFN: the other people-steps."""
+    track_of: Int[ndarray, " K"]
+    """For each person the index of his track in the tracks' names; −1 without one."""
+
+    @property
+    def precision(self) -> float | None:
+        """IDP = IDTP / estimates; None without estimates."""
+        estimates = self.true_positives + self.false_positives
+        return self.true_positives / estimates if estimates else None
+
+    @property
+    def recall(self) -> float | None:
+        """IDR = IDTP / people-steps; None without people."""
+        people = self.true_positives + self.false_negatives
+        return self.true_positives / people if people else None
+
+    @property
+    def f1(self) -> float | None:
+        """IDF1 = 2 IDTP / (estimates + people-steps); None without both."""
+        both = 2 * self.true_positives + self.false_positives + self.false_negatives
+        return 2 * self.true_positives / both if both else None
+
+
+def identity(comparison: Comparison) -> Identity:
+    """Give each person at most one track so that IDTP is largest.
+
+    IDTP of a map counts the steps at which a person and his track both exist and
+    lie within the gate of each other; the largest IDTP also has the fewest IDFP
+    and IDFN together.
+    """
+    truth, tracks = comparison.truth, comparison.tracks
+    together = np.zeros((len(truth.names), len(tracks.names)), dtype=np.int64)
+    for step, distances in enumerate(comparison.distances):
+        rows, columns = np.nonzero(distances <= comparison.measure.gate)
+        who, which = truth.indices[truth.at(step)], tracks.indices[tracks.at(step)]
+        together[who[rows], which[columns]] += 1
+    people, own = linear_sum_assignment(together, maximize=True)
+    right = together[people, own]
+    track_of = np.full(len(truth.names), -1)
+    track_of[people[right > 0]] = own[right > 0]
+    hits = int(right.sum())
+    return Identity(hits, len(tracks) - hits, len(truth) - hits, track_of)

@@ -1,0 +1,135 @@
+"""OSPA per step and OSPA(2) over tracks.
+
+[SVV08] Schuhmacher, Vo, Vo, "A consistent metric for performance evaluation of
+multi-object filters", IEEE Transactions on Signal Processing 56(8), 2008.
+[BVV20] Beard, Vo, Vo, "A solution for large-scale multi-object tracking", IEEE
+Transactions on Signal Processing 68, 2020.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.assignment import linear_sum_assignment
+from tracker.evaluation.measures.matching import Comparison
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ospa:
+    """OSPA of every step with its two parts."""
+
+    distance: Float[ndarray, " S"]
+    localisation: Float[ndarray, " S"]
+    cardinality: Float[ndarray, " S"]
+
+
+def ospa_parts(
+    distances: Float[ndarray, "M N"], *, cutoff: float, order: float
+) -> tuple[float, float, float]:
+    """OSPA between two finite sets, and its localisation and cardinality part.
+
+    With m <= n elements and d^(c) = min(d, c) [SVV08], equation (3):
+
+        localisation^p = 1/n min over assignments Σ_i d^(c)(x_i, y_π(i))^p
+        cardinality^p  = 1/n c^p (n − m)
+        OSPA^p = localisation^p + cardinality^p
+
+    Two empty sets are at distance 0; one empty set is at distance c of any other.
+
+    Args:
+        distances: Of every element of the first set to every one of the second.
+        cutoff: c > 0, in the unit of the distances.
+        order: p >= 1.
+    """
+    smaller, larger = sorted(distances.shape)
+    if larger == 0:
+        return 0.0, 0.0, 0.0
+    costs = np.minimum(distances, cutoff) ** order
+    near = float(costs[linear_sum_assignment(costs)].sum()) / larger if smaller else 0.0
+    count = cutoff**order * (larger - smaller) / larger
+    return (near + count) ** (1.0 / order), near ** (1.0 / order), count ** (1.0 / order)
+
+
+def ospa(comparison: Comparison, *, cutoff: float, order: float) -> Ospa:
+    """OSPA of each step; see :func:`ospa_parts`."""
+    parts = [ospa_parts(d, cutoff=cutoff, order=order) for d in comparison.distances]
+    columns = np.array(parts, dtype=float).reshape(-1, 3).T
+    return Ospa(*columns)
+
+
+def ospa2(
+    comparison: Comparison, *, cutoff: float, order: float, window: int
+) -> Float[ndarray, " S"]:
+    """OSPA(2) at each step t: OSPA between the two sets of tracks over a window.
+
+    The base distance of a true track f and an estimated track g, both restricted
+    to the steps t − w + 1 … t, is the mean of the cut distance over the steps at
+    which at least one of them exists [BVV20]:
+
+        d(f, g) = 1/|D_f ∪ D_g| Σ_{s ∈ D_f ∪ D_g} d^(c)({f(s)}, {g(s)}),
+
+    where the cut distance is min(|f(s) − g(s)|, c) where both exist and c where
+    one does. OSPA of the tracks that exist in the window then follows with cut-off
+    c and order p. A window without tracks on either side gives 0.
+
+    Args:
+        comparison: Truth and estimates. A don't-care step belongs to no domain.
+        cutoff: c > 0, in the unit of the distances.
+        order: p >= 1 of the outer OSPA; the time average is of order 1.
+        window: w >= 1 steps; the first steps have what there is.
+    """
+    sums = _Window(comparison, cutoff)
+    values = np.zeros(comparison.steps)
+    for step in range(comparison.steps):
+        sums.add(step, 1)
+        if step >= window:
+            sums.add(step - window, -1)
+        values[step] = sums.distance(order)
+    return values
+
+
+def ospa2_whole(comparison: Comparison, *, cutoff: float, order: float) -> float | None:
+    """OSPA(2) with all steps as its window; None without steps. See :func:`ospa2`."""
+    sums = _Window(comparison, cutoff)
+    for step in range(comparison.steps):
+        sums.add(step, 1)
+    return sums.distance(order) if comparison.steps else None
+
+
+class _Window:
+    """Running sums over the steps in a window, for every pair of a true and an estimated track."""
+
+    def __init__(self, comparison: Comparison, cutoff: float) -> None:
+        people, tracks = len(comparison.truth.names), len(comparison.tracks.names)
+        self.comparison, self.cutoff = comparison, cutoff
+        self.near = np.zeros((people, tracks))  # Σ min(d, c) where both exist
+        self.both = np.zeros((people, tracks), dtype=np.int64)
+        self.truth_life = np.zeros(people, dtype=np.int64)
+        self.track_life = np.zeros(tracks, dtype=np.int64)
+
+    def add(self, step: int, sign: int) -> None:
+        """Take a step in (1) or out (−1)."""
+        truth, tracks = self.comparison.truth, self.comparison.tracks
+        people = truth.indices[truth.at(step)]
+        estimates = tracks.indices[tracks.at(step)]
+        self.truth_life[people] += sign
+        self.track_life[estimates] += sign
+        if len(people) and len(estimates):
+            pairs = np.ix_(people, estimates)
+            self.near[pairs] += sign * np.minimum(self.comparison.distances[step], self.cutoff)
+            self.both[pairs] += sign
+
+    def distance(self, order: float) -> float:
+        """OSPA of the tracks in the window."""
+        rows, columns = np.flatnonzero(self.truth_life), np.flatnonzero(self.track_life)
+        pairs = np.ix_(rows, columns)
+        together = self.both[pairs]
+        union = self.truth_life[rows, None] + self.track_life[columns] - together
+        # what rounding leaves in a running sum must not outlive the pair
+        near = np.where(together > 0, np.maximum(self.near[pairs], 0.0), 0.0)
+        base = (near + self.cutoff * (union - together)) / union
+        return ospa_parts(base, cutoff=self.cutoff, order=order)[0]

@@ -1,0 +1,171 @@
+"""Many recordings with the same values: every run kept in the library, none computed twice."""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from tracker import pipeline
+from tracker.library.keeping import recording_of
+from tracker.library.records import KeptRun
+from tracker.library.store import Library
+from tracker.parameters import changed, with_values
+from tracker.sequences.library import open_sequence
+from tracker.sequences.reader import FILE
+from tracker.sequences.sequence import Sequence as Recording
+from tracker.sequences.sequence import SequenceError
+from tracker.studies.errors import StudyError
+from tracker.studies.work.cluster import Crew
+from tracker.studies.work.jobs import job_of
+from tracker.studies.work.recordings import content_of
+
+WAIT_SECONDS = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class BatchRun:
+    """One run of a batch, or why there is none."""
+
+    recording: str
+    """As it was named."""
+    seed: int
+    run: KeptRun | None
+    words: str = ""
+    """Why there is none."""
+    computed: bool = False
+    """Whether it was computed now, rather than found in the library."""
+
+
+def places_of(names: Sequence[str]) -> list[str]:
+    """What a list of names stands for: rooms, folders, patterns of folders, files of names.
+
+    Raises:
+        StudyError: If one stands for nothing.
+    """
+    from tracker.sequences.rendering import ROOMS
+
+    found: list[str] = []
+    for name in names:
+        if name.startswith("@"):
+            found += places_of(_listed(Path(name[1:])))
+        elif name in ROOMS:
+            found.append(name)
+        elif Path(name).exists():
+            found.append(str(Path(name).absolute()))
+        else:
+            some = [path for path in sorted(glob.glob(name)) if (Path(path) / FILE).is_file()]
+            if not some:
+                raise StudyError(
+                    f"{name}: expected a rendered room, a folder, a pattern of folders with a "
+                    f"{FILE}, or @FILE with one a line, found nothing"
+                )
+            found += [str(Path(path).absolute()) for path in some]
+    return list(dict.fromkeys(found))
+
+
+def _listed(file: Path) -> list[str]:
+    try:
+        lines = file.read_text(encoding="utf-8").splitlines()
+    except OSError as error:
+        raise StudyError(f"@{file}: cannot be read ({error.strerror})") from None
+    words = [line.strip() for line in lines]
+    names = [word for word in words if word and not word.startswith("#")]
+    folder = file.absolute().parent
+    return [str(folder / name) if (folder / name).exists() else name for name in names]
+
+
+def run_batch(
+    places: Sequence[str],
+    changes: Mapping[str, Any],
+    seeds: int,
+    library: Library,
+    budget: int,
+    crew: Callable[[], Crew],
+    told: Callable[[int, int], None] = lambda done, total: None,
+    stopped: Callable[[], bool] = lambda: False,
+) -> list[BatchRun]:
+    """Track recordings and keep every run as it ends.
+
+    A recording that cannot be read or tracked is told of and keeps no other one up.
+
+    Args:
+        places: Rooms and folders.
+        changes: Values by key, against each recording's own defaults.
+        seeds: Runs of each recording.
+        library: Keeps the runs; what it has already is not computed again.
+        budget: How many untouched runs stay in it.
+        crew: Makes the workers, once there is something to compute.
+        told: Called with the runs that are there and their number.
+        stopped: Asked now and then; then what is there is given back.
+
+    Raises:
+        StudyError: If the workers cannot work on.
+        LibraryError: If a run cannot be kept.
+    """
+    found: dict[tuple[str, int], BatchRun] = {}
+    wanted: dict[str, list[tuple[str, int]]] = {}
+    jobs = []
+    total = len(places) * seeds
+    for place in places:
+        try:
+            sequence = open_sequence(place)
+            parameters = with_values(pipeline.default_parameters(sequence), changes)
+        except (SequenceError, ValueError, OSError) as error:
+            words = " ".join(str(error).split())
+            found |= {(place, seed): BatchRun(place, seed, None, words) for seed in range(seeds)}
+            continue
+        for seed in range(seeds):
+            key = pipeline.stage_keys(sequence, parameters, seed)["tracks"]
+            if (kept := library.with_key(key)) is not None:
+                found[place, seed] = BatchRun(place, seed, kept)
+                continue
+            job = _job(sequence, place, parameters, seed)
+            if job.key not in wanted:
+                jobs.append(job)
+            wanted.setdefault(job.key, []).append((place, seed))
+    told(len(found), total)
+    if jobs:
+        workers = crew()
+        for number, job in enumerate(jobs):
+            workers.submit(job, -number)
+        while wanted and not stopped():
+            for outcome in workers.finished(WAIT_SECONDS):
+                run = None
+                if outcome.kept is not None:
+                    recording, new = outcome.kept
+                    here, _ = wanted[outcome.key][0]
+                    # a worker may have it in another place: what counts is where it is here
+                    recording = recording_of(open_sequence(here), here, recording.thumbnail)
+                    new = replace(new, digest=recording.digest, key=_key(here, new))
+                    run = library.run(library.keep(recording, new, budget))
+                for place, seed in wanted.pop(outcome.key, ()):
+                    found[place, seed] = BatchRun(place, seed, run, outcome.words, True)
+                told(len(found), total)
+    return [
+        found[place, seed] for place in places for seed in range(seeds) if (place, seed) in found
+    ]
+
+
+def _key(place: str, new: Any) -> str:
+    """Of the run on the recording as it lies here."""
+    sequence = open_sequence(place)
+    parameters = with_values(pipeline.default_parameters(sequence), new.changes)
+    return pipeline.stage_keys(sequence, parameters, new.seed)["tracks"]
+
+
+def _job(sequence: Recording, place: str, parameters: Any, seed: int) -> Any:
+    job = job_of(
+        sequence,
+        place,
+        content_of(sequence),
+        parameters,
+        changed(parameters, pipeline.default_parameters(sequence)),
+        seed,
+        truth=sequence.ground_truth is not None,
+        agreement=False,
+        timed=False,
+    )
+    return replace(job, keep=True)

@@ -1,0 +1,43 @@
+"""A trial as commands: what repeats it by hand, bit for bit."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+from typing import Any
+
+from tracker import pipeline
+from tracker.parameters import changed, with_values
+from tracker.sequences.library import open_sequence
+from tracker.studies.definition import Definition
+from tracker.studies.store import JobRow, Trial
+
+
+def track_commands(definition: Definition, trial: Trial) -> list[str]:
+    """The ``track`` command of each run of a trial.
+
+    Args:
+        definition: Of its study.
+        trial: It.
+
+    Raises:
+        SequenceError: If a recording cannot be read any more.
+    """
+    return [_command(definition, trial, row) for row in trial.jobs]
+
+
+def changes_of(definition: Definition, trial: Trial, recording: str) -> dict[str, Any]:
+    """The values of a trial against the recording's own defaults, by key."""
+    defaults = pipeline.default_parameters(open_sequence(recording))
+    values = trial.values if trial.number else {}
+    return changed(with_values(defaults, {**definition.held(), **values}), defaults)
+
+
+def _command(definition: Definition, trial: Trial, row: JobRow) -> str:
+    words = ["multiview-phd", "track", row.recording, "--no-corrections", "--seed", str(row.seed)]
+    for key, value in changes_of(definition, trial, row.recording).items():
+        text = json.dumps(value) if not isinstance(value, str) else value
+        words += ["--set", f"{key}={text}"]
+    name = f"{definition.name} trial {trial.number} {Path(row.recording).name} seed {row.seed}"
+    return shlex.join([*words, "--output", f"{name.replace(' ', '-')}.csv"])

@@ -1,0 +1,144 @@
+"""What a study may seek: any figure of the evaluation, speed, or identity without a truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from tracker.evaluation import DEFINITIONS
+from tracker.studies.errors import StudyError
+
+Of = Literal["truth", "run", "agreement"]
+"""What a figure needs: a truth, nothing but the run, or other looks at the recording."""
+
+
+@dataclass(frozen=True, slots=True)
+class Objective:
+    """A figure that trials are judged by."""
+
+    key: str
+    name: str
+    higher: bool
+    """Whether more of it is better."""
+    of: Of
+    unit: str = ""
+    digits: int = 3
+    help: str = ""
+
+    def better(self, one: float, other: float) -> bool:
+        """Whether one value beats another."""
+        return one > other if self.higher else one < other
+
+    def words(self, value: float, spread: float | None) -> str:
+        """A value as a table shows it, with what the seeds make of it."""
+        about = "" if spread is None else f" ± {spread:.{self.digits}f}"
+        return f"{value:.{self.digits}f}{about}"
+
+
+SCORE = Objective(
+    "score", "(HOTA + IDF1) / 2", True, "truth", "", 4,
+    "Mean of HOTA and IDF1: where people are, and who they are.",
+)  # fmt: skip
+SPEED = Objective(
+    "speed", "Speed", True, "run", "steps/s", 1,
+    "Steps a second of processor time, whether or not stage 1 was taken from an earlier run.",
+)  # fmt: skip
+IDENTITY = Objective(
+    "identity", "Identity without truth", True, "agreement", "", 3,
+    "J = IDF1(forward, backwards) × mean over cameras of IDF1(all, all but one); no trial whose "
+    "people overlap less with a camera that was left out than the default's is ever best.",
+)  # fmt: skip
+
+OBJECTIVES: dict[str, Objective] = {
+    **{
+        d.key: Objective(
+            d.key, d.name, d.direction == "higher", "truth", d.unit.replace("{d}", "m"), d.digits,
+            d.help,
+        )
+        for d in DEFINITIONS
+        if d.direction in ("higher", "lower")
+    },
+    **{one.key: one for one in (SCORE, SPEED, IDENTITY)},
+}  # fmt: skip
+"""All of them by their keys."""
+
+WITH_TRUTH = ("hota", "idf1", "speed")
+WITHOUT_TRUTH = ("identity",)
+
+VETO = 0.05
+"""By how much the overlap in a left-out camera may be below the default's before a trial is
+vetoed: intersection over union, mean over cameras."""
+
+
+def chosen(objectives: Sequence[str], has_truth: Mapping[str, bool]) -> tuple[Objective, ...]:
+    """The objectives of a study, those that fit its recordings where none is named.
+
+    Args:
+        objectives: Their keys.
+        has_truth: Of each recording.
+
+    Raises:
+        StudyError: If one needs a truth that a recording does not have.
+    """
+    if not objectives:
+        objectives = WITH_TRUTH if all(has_truth.values()) else WITHOUT_TRUTH
+    found = tuple(OBJECTIVES[key] for key in dict.fromkeys(objectives))
+    for one in found:
+        for recording, there in has_truth.items():
+            if one.of == "truth" and not there:
+                raise StudyError(
+                    f"objectives: {one.key} needs a truth, and {recording} has none; take "
+                    "identity, or leave that recording out"
+                )
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Mean:
+    """A figure over recordings and seeds."""
+
+    value: float
+    spread: float | None
+    """Standard deviation over the seeds of its mean over the recordings; None for one seed."""
+
+
+def mean_over(values: Mapping[tuple[str, int], float]) -> Mean:
+    """Mean over the recordings of the mean over seeds, and its spread over seeds.
+
+    Args:
+        values: By recording and seed.
+    """
+    recordings = sorted({recording for recording, _ in values})
+    seeds = sorted({seed for _, seed in values})
+    of_recording = [np.mean([v for (r, _), v in values.items() if r == one]) for one in recordings]
+    whole = [seed for seed in seeds if all((recording, seed) in values for recording in recordings)]
+    spread = None
+    if len(whole) > 1:
+        of_seed = [np.mean([values[recording, seed] for recording in recordings]) for seed in whole]
+        spread = float(np.std(of_seed, ddof=1))
+    return Mean(float(np.mean(of_recording)), spread)
+
+
+def front(
+    rows: Iterable[tuple[int, Sequence[float]]], objectives: Sequence[Objective]
+) -> list[int]:
+    """The trials that no other one beats in one objective without losing in another.
+
+    Args:
+        rows: Number and values of each trial.
+        objectives: Of the values.
+    """
+    every = list(rows)
+    if not every:
+        return []
+    signs = np.array([1.0 if one.higher else -1.0 for one in objectives])
+    values = np.array([v for _, v in every], dtype=np.float64) * signs
+    kept = []
+    for index, (number, _) in enumerate(every):
+        no_worse = (values >= values[index]).all(axis=1)
+        if not (no_worse & (values > values[index]).any(axis=1)).any():
+            kept.append(number)
+    return kept

@@ -1,0 +1,412 @@
+"""A study at work: asks for trials, has their runs done, keeps what comes back.
+
+Everything that ended is on disk before the sampler hears of it, so that the program may be ended
+at any moment: the next start goes on with the trials that were under way, and takes the runs that
+ended from the disk.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from tracker.studies import importance
+from tracker.studies.definition import Definition
+from tracker.studies.errors import StudyError
+from tracker.studies.judging import Judge
+from tracker.studies.opened import Recordings, open_recordings
+from tracker.studies.sampling import Sampler
+from tracker.studies.space import defaults_of
+from tracker.studies.store import JOURNAL, JobRow, Status, Store, Trial, Writer
+from tracker.studies.work.cluster import Crew
+from tracker.studies.work.jobs import Job, Outcome, code_version
+
+SECONDS_BETWEEN = 0.5
+"""How often the status is written and the wish to stop is heard."""
+
+AHEAD = 1
+"""Runs that wait beside each one under way, so that no worker waits for the sampler."""
+
+IMPORTANCE_GROWTH = 1.25
+"""What matters is found out anew when there are so many times more trials."""
+
+LAST_SECONDS = 60.0
+"""At most so long the end of a study waits for it."""
+
+
+@dataclass(eq=False)
+class _Active:
+    """A trial under way."""
+
+    number: int
+    values: dict[str, Any]
+    jobs: list[tuple[JobRow, Job]]
+    sent: int = 0
+    outcomes: dict[str, Outcome] = field(default_factory=dict)
+
+    @property
+    def is_back(self) -> bool:
+        """Whether all runs that were sent have ended."""
+        return len(self.outcomes) >= len({row.key for row, _ in self.jobs[: self.sent]})
+
+
+def run_study(
+    store: Store,
+    writer: Writer,
+    crew: Callable[[Callable[[str], None]], Crew],
+    *,
+    told: Callable[[Status], None] = lambda status: None,
+    stopped: Callable[[], bool] = lambda: False,
+) -> Status:
+    """Run a study, or go on with it, to its end.
+
+    Args:
+        store: Its folder.
+        writer: From :meth:`~tracker.studies.store.Store.running`.
+        crew: Makes the workers; given whom to tell what is being waited for.
+        told: Called with the status now and then.
+        stopped: Asked as often.
+
+    Returns:
+        The status at the end: ``done``, or ``stopped`` where that was asked for.
+
+    Raises:
+        StudyError: If it cannot go on, with what to do; the status says the same.
+    """
+    study = _Running(store, writer, told, stopped)
+    try:
+        study.prepare()
+        study.crew = crew(study.wait_for)
+        study.work()
+        study.say()
+    except StudyError as error:
+        study.state, study.words = "failed", str(error)
+        study.say()
+        raise
+    except BaseException:
+        study.state, study.words = "stopped", "interrupted; nothing that ended before is lost"
+        study.say()
+        raise
+    finally:
+        study.close()
+    return study.status
+
+
+class _Running:
+    """One start of a study."""
+
+    crew: Crew
+
+    def __init__(
+        self,
+        store: Store,
+        writer: Writer,
+        told: Callable[[Status], None],
+        stopped: Callable[[], bool],
+    ) -> None:
+        self._store, self._writer, self._told, self._stopped = store, writer, told, stopped
+        self._definition: Definition = store.definition()
+        self._active: dict[int, _Active] = {}
+        self._waiting: dict[str, list[_Active]] = {}
+        self._queue: list[dict[str, Any]] = []
+        self._begin = time.monotonic()
+        self._spent = float(store.told("spent") or 0.0)
+        self._warm: float | None = None
+        self._warm_seconds = 0.0
+        self._runs = 0
+        self._said = 0.0
+        self._slots = 1
+        self._importance: Callable[[], Any | None] | None = None
+        self._weighed = 0
+        self.state: Any = "running"
+        self.words = ""
+        self.status = Status("running")
+
+    def prepare(self) -> None:
+        """Open the recordings, and take up what was done before."""
+        self.wait_for("opening the recordings")
+        definition = self._definition
+        self._recordings: Recordings = open_recordings(definition, self.wait_for)
+        self._check_same()
+        ended = self._store.trials()
+        self._judge = Judge(self._recordings.objectives, ended, self._writer.outcome)
+        self._ended = {trial.number for trial in ended}
+        self._sampler = Sampler(
+            self._store.folder / JOURNAL,
+            definition,
+            self._recordings.objectives,
+            self._recordings.bases,
+        )
+        self._asked = self._sampler.asked
+        by_number = {trial.number: trial for trial in ended}
+        for number in self._sampler.open_trials():
+            values = self._sampler.again(number)
+            if number in by_number:  # ended before the sampler heard of it
+                self._sampler_hears(by_number[number])
+            else:
+                self._take_up(number, values)
+        self._first_values()
+
+    def close(self) -> None:
+        """Close what the sampler keeps."""
+        if hasattr(self, "_sampler"):
+            self._sampler.close()
+
+    def _check_same(self) -> None:
+        """Old trials stand beside new ones only where nothing but the values differs."""
+        recordings = [one.told() for one in self._recordings.every]
+        before = self._store.told("recordings")
+        if before is not None:
+            for one, other in zip(before, recordings, strict=True):
+                if one["content"] != other["content"]:
+                    raise StudyError(
+                        f"{other['place']} has changed since the study {self._store.name} began; "
+                        "its trials cannot be set beside new ones: give the study a new name"
+                    )
+            if self._store.told("code") != code_version():
+                raise StudyError(
+                    f"the study {self._store.name} was begun by another version of the program; "
+                    "its trials cannot be set beside new ones: give the study a new name"
+                )
+            return
+        self._writer.tell("recordings", recordings)
+        self._writer.tell("code", code_version())
+        self._writer.tell("objectives", [asdict(one) for one in self._recordings.objectives])
+
+    def _first_values(self) -> None:
+        """What is tried before the sampler chooses: the defaults, where somebody was, a grid."""
+        definition, base = self._definition, self._recordings.bases[0]
+        defaults = defaults_of(definition.varied, base)
+        self._queue = [defaults]
+        if definition.start and dict(definition.start) != {
+            key: defaults[key] for key in definition.start
+        }:
+            self._queue.append({**defaults, **definition.start})
+        self._fixed = len(self._queue)
+        self._trials = definition.trials
+        if definition.search == "grid":
+            self._queue += self._sampler.grid()
+            self._trials = len(self._queue)
+        self._queue = self._queue[self._asked :]
+
+    # the loop
+
+    def work(self) -> None:
+        """Until all trials have ended, the time is over, or somebody stops it."""
+        self._slots = self.crew.slots
+        self.words = ""
+        self._begin = time.monotonic()
+        for active in list(self._active.values()):
+            self._send(active)
+        while not self._stopped() and not self._store.asked_to_stop():
+            self._fill()
+            if not self._active:
+                self.state, self.words = "done", self._why_done()
+                self._weigh(last=True)
+                return
+            for outcome in self.crew.finished(SECONDS_BETWEEN):
+                self._came(outcome)
+            self._settle()
+            self._now_and_then()
+        self.state = "stopped"
+        self.words = "stopped; `multiview-phd study resume` goes on"
+
+    def _fill(self) -> None:
+        """Ask for trials until nobody will wait."""
+        while len(self._waiting) < self._slots * (1 + AHEAD) and self._may_ask():
+            values = self._queue.pop(0) if self._queue else None
+            number, drawn = self._sampler.ask(values)
+            self._asked = number + 1
+            if number < self._fixed and values is not None:
+                drawn = values if number == 0 else drawn | values
+            self._send(self._take_up(number, drawn))
+            self._settle()
+
+    def _may_ask(self) -> bool:
+        if self._asked >= self._trials or self._stopped():
+            return False
+        return self._asked < 1 or self._minutes_left() > 0.0
+
+    def _minutes_left(self) -> float:
+        if self._definition.minutes is None:
+            return float("inf")
+        return self._definition.minutes - (self._spent + self._seconds()) / 60.0
+
+    def _seconds(self) -> float:
+        return time.monotonic() - self._begin
+
+    def _take_up(self, number: int, values: dict[str, Any]) -> _Active:
+        if number == 0:
+            values = defaults_of(self._definition.varied, self._recordings.bases[0])
+        # on each recording its own defaults: nothing is changed
+        jobs = self._recordings.jobs({} if number == 0 else values)
+        active = self._active[number] = _Active(number, values, jobs)
+        return active
+
+    def _send(self, active: _Active) -> None:
+        """Have the next runs of a trial done; those that ended before are there at once."""
+        first = self._judge.first_runs(len(active.jobs), self._definition.prune)
+        upto = first if active.sent == 0 else len(active.jobs)
+        for _, job in active.jobs[active.sent : upto]:
+            kept = self._writer.outcome(job.key)
+            if kept is not None and kept.became == "done":
+                active.outcomes[job.key] = kept
+            elif job.key in self._waiting:
+                self._waiting[job.key].append(active)
+            else:
+                self._waiting[job.key] = [active]
+                self.crew.submit(job, -active.number)
+        active.sent = upto
+
+    def _came(self, outcome: Outcome) -> None:
+        if outcome.became == "done":
+            self._writer.keep(outcome)
+        self._runs += 1
+        if self._warm is None:
+            self._warm = time.monotonic()
+        else:
+            self._warm_seconds += outcome.seconds
+        for active in self._waiting.pop(outcome.key, ()):
+            active.outcomes[outcome.key] = outcome
+
+    def _settle(self) -> None:
+        """End the trials whose runs have ended; none before the defaults, by which it is judged."""
+        for active in sorted(self._active.values(), key=lambda one: one.number):
+            while active.is_back and active.number in self._active:
+                failed = next((o for o in active.outcomes.values() if o.became != "done"), None)
+                if failed is not None and active.number == 0:
+                    raise StudyError(
+                        f"the defaults cannot be run, so that nothing can be set against them: "
+                        f"{failed.words}"
+                    )
+                if active.number != 0 and 0 not in self._ended:
+                    break
+                whole = active.sent == len(active.jobs)
+                if failed is None and not whole:
+                    rows = [row for row, _ in active.jobs[: active.sent]]
+                    hopeless = self._judge.is_hopeless(rows, active.outcomes)
+                    if not hopeless or active.number < self._fixed:
+                        self._send(active)
+                        continue
+                self._end(active, failed)
+
+    def _end(self, active: _Active, failed: Outcome | None) -> None:
+        rows = tuple(row for row, _ in active.jobs[: active.sent])
+        words = "the defaults" if active.number == 0 else ""
+        if active.number == 1 and self._fixed > 1:
+            words = "where you were"
+        trial = self._judge.trial(
+            active.number,
+            active.values,
+            rows,
+            active.outcomes,
+            pruned=active.sent < len(active.jobs),
+            words=failed.words if failed is not None else words,
+            failed=failed is not None,
+        )
+        self._writer.end(trial)
+        self._sampler_hears(trial)
+        self._ended.add(trial.number)
+        del self._active[active.number]
+
+    def _sampler_hears(self, trial: Trial) -> None:
+        values = None if trial.state == "failed" else self._judge.for_sampler(trial)
+        self._sampler.tell(trial.number, values, pruned=trial.state == "pruned")
+
+    # what is told
+
+    def wait_for(self, words: str) -> None:
+        """Say what is being waited for."""
+        self.words = words
+        self.say()
+
+    def _now_and_then(self) -> None:
+        if time.monotonic() - self._said >= SECONDS_BETWEEN:
+            self._slots = self.crew.slots
+            self.words = "" if self.crew.workers() else "waits for a worker"
+            self._weigh()
+            self.say()
+
+    def say(self) -> None:
+        """Write down how far it is."""
+        seconds = self._seconds()
+        done = len(getattr(self, "_ended", ()))
+        self.status = Status(
+            self.state,
+            self.words,
+            done=done,
+            trials=getattr(self, "_trials", self._definition.trials),
+            runs=self._runs,
+            seconds=seconds,
+            seconds_left=self._left(done, seconds),
+            busy=self._busy(),
+            workers=self._working(),
+            process=os.getpid(),
+            written=time.time(),
+        )
+        self._writer.say(self.status)
+        if hasattr(self, "_trials"):
+            self._writer.tell("spent", self._spent + seconds)
+        self._told(self.status)
+        self._said = time.monotonic()
+
+    def _working(self) -> list[dict[str, Any]]:
+        """Each worker with the trial that it is at."""
+        if self.state != "running" or not hasattr(self, "crew"):
+            return []
+        found = []
+        for one in self.crew.workers():
+            told: dict[str, Any] = {"trial": None, "recording": None, "seed": None}
+            for active in self._waiting.get(one.job or "", ())[:1]:
+                row = next(row for row, _ in active.jobs if row.key == one.job)
+                told = {"trial": active.number, "recording": row.recording, "seed": row.seed}
+            words = one.words or ("" if told["trial"] is not None else "waits for a run")
+            found.append(
+                {"name": one.name, "machine": one.machine, "words": words, "since": one.since}
+                | told
+            )
+        return found
+
+    def _left(self, done: int, seconds: float) -> float | None:
+        before = getattr(self, "_before", None)
+        if before is None:
+            self._before = before = done
+        if done - before < 2 or self.state != "running":
+            return None
+        left = (self._trials - done) * seconds / (done - before)
+        return max(0.0, min(left, 60.0 * self._minutes_left()))
+
+    def _busy(self) -> float | None:
+        if self._warm is None or self._runs < 2 * self._slots:
+            return None
+        elapsed = time.monotonic() - self._warm
+        return min(1.0, self._warm_seconds / (elapsed * self._slots)) if elapsed > 0.0 else None
+
+    def _why_done(self) -> str:
+        if len(self._ended) >= self._trials:
+            return ""
+        return f"the {self._definition.minutes:g} minutes are over"
+
+    def _weigh(self, *, last: bool = False) -> None:
+        """Have a worker find out what matters, when there is much more to tell from."""
+        if self._importance is not None and (found := self._importance()) is not None:
+            self._writer.tell("importance", found)
+            self._importance = None
+        complete, before = self._judge.complete, self._weighed
+        needed = before + 1 if last else before * IMPORTANCE_GROWTH
+        if len(complete) >= max(importance.FEWEST, needed):
+            self._weighed = len(complete)
+            rows = [(trial.values, trial.objectives) for trial in complete if trial.objectives]
+            defaults = defaults_of(self._definition.varied, self._recordings.bases[0])
+            self._importance = self.crew.call(
+                importance.importance, self._definition.varied, rows, defaults
+            )
+        until = time.monotonic() + LAST_SECONDS
+        while last and self._importance is not None and time.monotonic() < until:
+            time.sleep(0.02)
+            if (found := self._importance()) is not None:
+                self._writer.tell("importance", found)
+                self._importance = None

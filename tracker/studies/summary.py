@@ -1,0 +1,127 @@
+"""A study as it is read: trials in their order, what is best, what matters, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from tracker.studies.definition import Definition
+from tracker.studies.judging import best_of, front_of, usable
+from tracker.studies.objectives import IDENTITY, OBJECTIVES, WITH_TRUTH, Objective
+from tracker.studies.store import Status, Store, Trial
+from tracker.without_truth.estimate import WARNING
+
+BETTER_SIGMAS = 2.0
+"""A difference within so many standard deviations over the seeds is said to be no sure one."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Summary:
+    """What is told of a study."""
+
+    name: str
+    definition: Definition
+    status: Status
+    objectives: tuple[Objective, ...]
+    trials: tuple[Trial, ...]
+    best: Trial | None
+    """None where none ended. The defaults, where nothing is better."""
+    front: list[int]
+    """Trials that no other beats in all objectives."""
+    importance: list[tuple[str, tuple[float, float]]]
+    """Share of the variance of the first objective and its standard deviation, largest first;
+    nothing before there are enough trials."""
+    importance_trials: int
+
+    @property
+    def default(self) -> Trial | None:
+        """The trial of the defaults."""
+        return next((one for one in self.trials if one.number == 0), None)
+
+    @property
+    def defaults(self) -> dict[str, Any]:
+        """What the varied parameters are by default."""
+        return dict(self.default.values) if self.default is not None else {}
+
+    @property
+    def ranked(self) -> list[Trial]:
+        """Those that may be taken, the best first."""
+        left, found = usable(self.trials), []
+        while left and (best := best_of(left, self.objectives)) is not None:
+            found.append(best)
+            left.remove(best)
+        return found
+
+    def changes(self, trial: Trial) -> dict[str, Any]:
+        """What a trial has that is not the default."""
+        return {k: v for k, v in trial.values.items() if self.defaults.get(k) != v}
+
+    def remark(self, trial: Trial) -> str:
+        """What a trial is."""
+        words = [trial.words] if trial.words else []
+        if self.best is not None and trial.number == self.best.number:
+            words.insert(0, "best")
+        elif trial.number in self.front and len(self.objectives) > 1:
+            words.insert(0, "on the front")
+        return ", ".join(words)
+
+    def sentences(self) -> list[str]:
+        """What there is to say of it."""
+        found = []
+        best, default = self.best, self.default
+        lead = self.objectives[0]
+        if best is not None and default is not None:
+            assert best.objectives is not None
+            assert default.objectives is not None
+            if best.number == 0:
+                found.append("the default is as good: nothing better was found")
+            else:
+                here, there = best.objectives[0], default.objectives[0]
+                sure = ""
+                spreads = [s for s in (best.spreads[0], default.spreads[0]) if s is not None]
+                if spreads and abs(here - there) < BETTER_SIGMAS * max(spreads):
+                    sure = ", which is within what the seeds make of it"
+                found.append(
+                    f"best is trial {best.number}: {lead.name} {lead.words(here, None)}, the "
+                    f"default has {lead.words(there, None)}{sure}"
+                )
+        if self.importance and best is not None:
+            key, (share, spread) = self.importance[0]
+            found.append(
+                f"{key} matters most: {100 * share:.0f} ± {100 * spread:.0f} % of what "
+                f"{lead.name} varies"
+            )
+        if lead.key == IDENTITY.key:
+            found.append(f"no truth was looked at. {WARNING}")
+        return found
+
+
+def summary_of(store: Store) -> Summary:
+    """Read a study.
+
+    Raises:
+        StudyError: If its files are not as they must be.
+    """
+    definition, trials = store.definition(), store.trials()
+    objectives = objectives_of(store, definition)
+    importance = store.told("importance") or {"trials": 0, "shares": {}}
+    return Summary(
+        store.name,
+        definition,
+        store.status(),
+        objectives,
+        tuple(trials),
+        best_of(trials, objectives),
+        front_of(trials, objectives),
+        [(key, (pair[0], pair[1])) for key, pair in importance["shares"].items()],
+        importance["trials"],
+    )
+
+
+def objectives_of(store: Store, definition: Definition) -> tuple[Objective, ...]:
+    """As they were chosen when it began; before that as its definition has them."""
+    told: Sequence[dict[str, Any]] | None = store.told("objectives")
+    if told is not None:
+        return tuple(OBJECTIVES[one["key"]] for one in told)
+    return tuple(OBJECTIVES[key] for key in definition.objectives or WITH_TRUTH)

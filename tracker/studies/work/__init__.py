@@ -1,0 +1,1 @@
+"""What a study has computed: jobs, where their recordings are, workers, and the cluster."""

@@ -1,0 +1,324 @@
+"""Workers by Dask: a cluster of processes on this machine, or one that is there.
+
+Everything that distributes, restarts and counts workers is Dask's. What is ours: a job is sent
+under its own key, a recording goes where it cannot be read, and what a worker waits for is told.
+"""
+
+from __future__ import annotations
+
+import importlib
+import logging
+import queue
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from tracker.experiments.laboratory.pool import cores
+from tracker.kernels import compilation
+from tracker.studies.errors import StudyError
+from tracker.studies.work import recordings, working
+from tracker.studies.work.jobs import Job, Outcome
+
+ADDRESS = "DASK_SCHEDULER_ADDRESS"
+"""Environment variable: the cluster's scheduler, where none is named."""
+
+TOPIC = "multiview-phd"
+
+CONNECT_SECONDS = 10.0
+
+Told = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerState:
+    """One worker as far as it has told."""
+
+    name: str
+    machine: str
+    words: str
+    """What it does or waits for."""
+    job: str | None
+    """Key of its job."""
+    since: float
+    """Seconds since 1970."""
+
+
+class Crew(Protocol):
+    """Who does the jobs."""
+
+    @property
+    def slots(self) -> int:
+        """How many jobs are done at a time; at least 1."""
+
+    def submit(self, job: Job, priority: int = 0) -> None:
+        """Have a job done; of several those of higher priority come first."""
+
+    def finished(self, seconds: float) -> list[Outcome]:
+        """What has ended, waiting for the first so long.
+
+        Raises:
+            StudyError: If the crew cannot work on; nothing that ended before is lost.
+        """
+
+    def call(self, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any | None]:
+        """Have something else computed; what is given back has it once it is there."""
+
+    def workers(self) -> list[WorkerState]:
+        """All that there are."""
+
+
+def compile_first(tell: Told) -> None:
+    """Have this machine's kernels compiled before its workers start."""
+    if not compilation.is_compiled():
+        tell(working.COMPILING)
+        line = [sys.executable, "-m", "tracker.warm_up"]
+        subprocess.run(line, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, check=False)
+
+
+def _do(job: Job) -> Outcome:
+    """A job as Dask's task."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    name = str(worker.address)
+
+    def tell(words: str) -> None:
+        told = {"worker": name, "words": words, "job": job.key, "machine": working.machine()}
+        worker.log_event(TOPIC, told)
+
+    tell("")
+    return working.work(job, tell, name)
+
+
+def look_at(address: str, seconds: float) -> dict[str, Any]:
+    """Who works for a scheduler: ``workers``, ``threads``, ``machines``.
+
+    Raises:
+        StudyError: If there is none at the address.
+    """
+    distributed: Any = importlib.import_module("distributed")  # slow, and without types
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    try:
+        with distributed.Client(address, timeout=seconds, set_as_default=False) as client:
+            workers = client.scheduler_info(n_workers=-1).get("workers", {})
+    except (OSError, TimeoutError, ValueError) as error:
+        raise _no_scheduler(address, error) from None
+    return {
+        "workers": len(workers),
+        "threads": sum(int(about.get("nthreads", 1)) for about in workers.values()),
+        "machines": sorted({str(about.get("host", "")) for about in workers.values()}),
+    }
+
+
+def _no_scheduler(address: str | None, error: Exception) -> StudyError:
+    return StudyError(
+        f"there is no Dask scheduler at {address} ({_words(error)}); start one by "
+        "`dask scheduler`, name another address, or leave it out to work on this machine"
+    )
+
+
+class DaskCrew:
+    """Jobs as tasks of a Dask cluster; close it, or use ``with``."""
+
+    def __init__(
+        self,
+        scheduler: str | None = None,
+        *,
+        workers: int | None = None,
+        tell: Told = lambda words: None,
+        do: Callable[[Job], Outcome] = _do,
+        processes: bool = True,
+        sent_bytes: int = recordings.SENT_BYTES,
+    ) -> None:
+        """Start workers on this machine, or join a cluster.
+
+        Args:
+            scheduler: Address of one that is there; None for this machine.
+            workers: How many on this machine; as many as there are cores, if none is named.
+            tell: Told what is being waited for.
+            do: What a worker does with a job.
+            processes: Whether the workers of this machine are processes rather than threads.
+            sent_bytes: A recording up to this size is sent to a worker that cannot read it.
+
+        Raises:
+            StudyError: If there is no scheduler at the address.
+        """
+        distributed: Any = importlib.import_module("distributed")  # slow, and without types
+
+        for name in ("distributed", "distributed.worker", "distributed.nanny"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+        self._do, self._address, self._sent_bytes = do, scheduler, sent_bytes
+        self._ended: queue.SimpleQueue[tuple[Any, Job]] = queue.SimpleQueue()
+        self._futures: dict[str, Any] = {}
+        self._states: dict[str, WorkerState] = {}
+        self._lock = threading.Lock()
+        self._sent: set[tuple[str, str]] = set()
+        self._cluster: Any = None
+        self._closed = False
+        if scheduler is None:
+            self._cluster = self._start(workers or cores(), processes, tell)
+        target = scheduler if scheduler is not None else self._cluster
+        try:
+            self._client: Any = distributed.Client(
+                target, timeout=CONNECT_SECONDS, set_as_default=False
+            )
+        except (OSError, TimeoutError, ValueError) as error:
+            self.close()
+            raise _no_scheduler(scheduler, error) from None
+        self._client.subscribe_topic(TOPIC, self._heard)
+
+    def _start(self, count: int, processes: bool, tell: Told) -> Any:
+        distributed: Any = importlib.import_module("distributed")  # slow, and without types
+
+        if processes:
+            compile_first(tell)
+        tell(f"starting {count} worker{'s' if count > 1 else ''}")
+        own = {"preload": ["tracker.studies.work.local"]} if processes else {}
+        environment = {"NUMBA_NUM_THREADS": "1"}
+        return distributed.LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            processes=processes,
+            dashboard_address=None,
+            worker_dashboard_address=None,
+            memory_limit=0,  # what a run takes is bounded by its recording
+            silence_logs=logging.CRITICAL,
+            **({"env": environment} if processes else {}),
+            **own,
+        )
+
+    def __enter__(self) -> DaskCrew:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the workers of this machine; those of another cluster only forget our jobs."""
+        self._closed = True
+        client = getattr(self, "_client", None)
+        if client is not None:
+            client.close(timeout=5.0)
+        if self._cluster is not None:
+            self._cluster.close(timeout=10.0)
+
+    @property
+    def slots(self) -> int:
+        """How many jobs are done at a time; at least 1."""
+        return max(1, sum(self._threads().values()))
+
+    def _threads(self) -> Mapping[str, int]:
+        workers = self._client.scheduler_info(n_workers=-1).get("workers", {})
+        return {address: int(about.get("nthreads", 1)) for address, about in workers.items()}
+
+    def submit(self, job: Job, priority: int = 0) -> None:
+        """Have a job done; of several those of higher priority come first."""
+        future = self._client.submit(
+            self._do, job, key=f"{TOPIC}-{job.key}-{time.monotonic_ns()}",
+            pure=False, priority=priority, retries=0,
+        )  # fmt: skip
+        self._futures[job.key] = future
+        future.add_done_callback(lambda done: self._ended.put((done, job)))
+
+    def finished(self, seconds: float) -> list[Outcome]:
+        """What has ended, waiting for the first so long.
+
+        Raises:
+            StudyError: If the scheduler is gone, or a worker has another version or no recording.
+        """
+        found: list[Outcome] = []
+        until = time.monotonic() + seconds
+        while True:
+            left = 0.0 if found else max(0.0, until - time.monotonic())
+            try:
+                future, job = self._ended.get(timeout=left) if left else self._ended.get_nowait()
+            except queue.Empty:
+                return found
+            outcome = self._outcome(future, job)
+            if outcome is not None:
+                found.append(outcome)
+
+    def _outcome(self, future: Any, job: Job) -> Outcome | None:
+        self._futures.pop(job.key, None)
+        if future.status in ("cancelled", "lost"):
+            raise StudyError(
+                f"the scheduler at {self._address or 'this machine'} is gone; every run that ended "
+                "is kept: start it again and go on by `multiview-phd study resume`"
+            )
+        if future.status == "error":
+            error = future.exception()
+            words = _words(error)
+            if type(error).__name__ == "KilledWorker":
+                words = "every worker that tried it died: it takes too much memory, or crashes"
+            elif isinstance(error, ImportError):
+                raise StudyError(
+                    f"a worker of {self._address} does not have this program ({words}); install "
+                    "multiview-phd of the same version there"
+                )
+            return Outcome(job.key, "failed", words)
+        outcome: Outcome = future.result()
+        if outcome.became == "version":
+            raise StudyError(
+                f"worker {outcome.worker} on {outcome.machine} has another version of the program "
+                f"(code {outcome.words}, here {job.code}); install the same one there, with the "
+                "same NumPy, SciPy, OpenCV and Numba"
+            )
+        if outcome.became == "unreadable":
+            self._send(job, outcome)
+            self.submit(job, priority=1)
+            return None
+        return outcome
+
+    def _send(self, job: Job, outcome: Outcome) -> None:
+        """Put a recording on the machine of a worker that cannot read it."""
+        if (job.content, outcome.worker) in self._sent:
+            raise StudyError(
+                f"worker {outcome.worker} cannot read {job.place} though it was sent there "
+                f"({outcome.words})"
+            )
+        self._sent.add((job.content, outcome.worker))
+        try:
+            from tracker.sequences.library import open_sequence
+
+            data = recordings.packed(open_sequence(job.place).folder, self._sent_bytes)
+        except (StudyError, OSError) as error:
+            raise StudyError(
+                f"worker {outcome.worker} on {outcome.machine} cannot read {job.place} "
+                f"({outcome.words}), and {_words(error)}"
+            ) from None
+        sent = self._client.submit(
+            recordings.unpack, job.content, data, workers=[outcome.worker], pure=False
+        )
+        sent.result(timeout=600.0)
+
+    def call(self, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any | None]:
+        """Have something else computed; what is given back has it once it is there."""
+        future = self._client.submit(function, *arguments, pure=False, priority=10)
+        return lambda: future.result() if future.status == "finished" else None
+
+    def _heard(self, event: tuple[float, Any]) -> None:
+        _, told = event
+        with self._lock:
+            self._states[told["worker"]] = WorkerState(
+                told["worker"], told["machine"], told["words"], told["job"], time.time()
+            )
+
+    def workers(self) -> list[WorkerState]:
+        """All that there are."""
+        if self._closed:
+            return []
+        there = self._threads()
+        with self._lock:
+            known = dict(self._states)
+        return [
+            known.get(name, WorkerState(name, "", "waits for its first job", None, time.time()))
+            for name in sorted(there)
+        ]
+
+
+def _words(error: BaseException | None) -> str:
+    return " ".join(str(error).split()) or type(error).__name__

@@ -1,0 +1,126 @@
+"""Recordings by their content: the same on every machine, wherever they lie."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import tempfile
+import tomllib
+import zipfile
+from pathlib import Path
+from typing import Any
+
+from tracker.folders import cache_folder
+from tracker.placing import filling
+from tracker.sequences.library import open_sequence
+from tracker.sequences.reader import FILE
+from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.studies.errors import StudyError
+
+SENT_BYTES = 256 << 20
+"""A recording up to this size is sent to a worker that cannot read it."""
+
+
+def files_of(folder: Path) -> list[Path]:
+    """``sequence.toml`` and every file below the folder that it names, sorted.
+
+    Whatever a field of it says that is a file, or a pattern of files, counts.
+    """
+    found = {folder / FILE}
+    text = (folder / FILE).read_text(encoding="utf-8")
+    for word in _words(tomllib.loads(text)):
+        try:
+            found |= {path for path in folder.glob(word) if path.is_file()}
+        except (ValueError, NotImplementedError, OSError):  # no path that could be one
+            continue
+    return sorted(found)
+
+
+def _words(value: Any) -> list[str]:
+    if isinstance(value, dict):
+        return [word for one in value.values() for word in _words(one)]
+    if isinstance(value, list):
+        return [word for one in value for word in _words(one)]
+    return [value] if isinstance(value, str) and value else []
+
+
+def content_of(sequence: Sequence) -> str:
+    """Hash of all files of a recording: kept beside the caches by their sizes and times."""
+    known = cache_folder() / "contents" / sequence.digest
+    try:
+        return known.read_text(encoding="ascii")
+    except OSError:
+        pass
+    digest = hashlib.sha256()
+    for path in files_of(sequence.folder):
+        digest.update(path.relative_to(sequence.folder).as_posix().encode() + b"\0")
+        with path.open("rb") as file:
+            digest.update(hashlib.file_digest(file, "sha256").digest())
+    content = digest.hexdigest()[:24]
+    try:
+        known.parent.mkdir(parents=True, exist_ok=True)
+        handle, begun = tempfile.mkstemp(dir=known.parent)
+        with os.fdopen(handle, "w", encoding="ascii") as file:
+            file.write(content)
+        os.replace(begun, known)
+    except OSError:
+        pass  # it is found out anew the next time
+    return content
+
+
+def packed(folder: Path, limit: int = SENT_BYTES) -> bytes:
+    """A recording as one ZIP file in memory.
+
+    Raises:
+        StudyError: If it is larger than the limit; it says how large it is.
+    """
+    files = files_of(folder)
+    size = sum(path.stat().st_size for path in files)
+    if size > limit:
+        raise StudyError(
+            f"it has {size / 1e6:.0f} MB, and more than {limit / 1e6:.0f} MB are not sent; put it "
+            "where every worker reads it under the same path"
+        )
+    whole = io.BytesIO()
+    with zipfile.ZipFile(whole, "w", zipfile.ZIP_STORED) as archive:
+        for path in files:
+            archive.write(path, path.relative_to(folder).as_posix())
+    return whole.getvalue()
+
+
+def sent_folder(content: str) -> Path:
+    """Where a recording is that was sent to this machine."""
+    return cache_folder() / "recordings" / content
+
+
+def unpack(content: str, data: bytes) -> str:
+    """Put a recording that was sent where :func:`opened` finds it; the place."""
+    folder = sent_folder(content)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    if not (folder / FILE).is_file():
+        try:
+            with filling(folder) as begun, zipfile.ZipFile(io.BytesIO(data)) as archive:
+                archive.extractall(begun)
+        except FileExistsError:
+            if not (folder / FILE).is_file():  # else another worker of this machine was first
+                raise
+    return str(folder)
+
+
+def opened(place: str, content: str) -> Sequence:
+    """A recording with this content: from its place, or as it was sent.
+
+    Raises:
+        SequenceError: If neither has it.
+    """
+    try:
+        found = open_sequence(place)
+        if content_of(found) == content:
+            return found
+        why = f"{place} has other files here than where the study was started"
+    except (SequenceError, OSError) as error:
+        why = " ".join(str(error).split())
+    if (sent_folder(content) / FILE).is_file():
+        return open_sequence(sent_folder(content))
+    raise SequenceError(why)
