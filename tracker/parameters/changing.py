@@ -105,7 +105,7 @@ def _checked(parameter: Parameter, new: Any) -> Any:
         raise ParameterError(
             parameter.key,
             f"must be between {parameter.minimum:g} and {parameter.maximum:g}{unit}, "
-            f"got {_shown(new)}",
+            f"got {new if isinstance(new, str) and len(new) < 30 else _shown(new)}",
         )
     return number
 
