@@ -193,6 +193,8 @@ class Evaluate:
             help_behavior_hint="(optional)",
         ),
     ] = None
+    truth: Annotated[Path | None, arg(metavar="TRUTH.csv", help_behavior_hint="(optional)")] = None
+    """Another truth than the sequence's own, for instance that of `corrections truth`."""
     json: FlagCreatePairsOff[bool] = False
     """Print everything as JSON instead of tables."""
     html: Annotated[Path | None, arg(metavar="REPORT.html", help_behavior_hint="(optional)")] = None
@@ -200,7 +202,7 @@ class Evaluate:
 
     def changes(self) -> dict[str, str]:
         """The settings asked for, by name."""
-        own = {"sequence", "tracks", "json", "html"}
+        own = {"sequence", "tracks", "truth", "json", "html"}
         return {k: v for k, v in vars(self).items() if k not in own and v is not None}
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Literal
 
 from app.models.base import Model, Vector
+from app.models.correcting import CorrectionsState
 from app.state.snapshot import RunPhase
 
 
@@ -144,6 +145,8 @@ class ViserInfo(Model):
 class State(Model):
     """Everything that all pages share, but for the results themselves."""
 
+    session: str
+    """Another for every start of the server."""
     version: int
     """Grows with every change; of two states the larger is the newer."""
     sequence: SequenceInfo | None
@@ -175,6 +178,7 @@ class State(Model):
     run: RunInfo
     pinned: PinnedInfo | None
     teaching: TeachingInfo
+    corrections: CorrectionsState
     viser: ViserInfo
 
 

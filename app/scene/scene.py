@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 import viser
+from jaxtyping import UInt8
 
 from app.colours import PALETTES, Theme
 from app.scene import geometry
@@ -26,6 +27,11 @@ from app.state.workbench import Workbench
 from tracker.pipeline import Run
 from tracker.sequences.sequence import Room
 from tracker.trajectories import Trajectories
+
+Rgb = UInt8[np.ndarray, "H W 3"]
+
+PICTURE_SECONDS = 20.0
+"""A browser without a graphics card takes a while to draw."""
 
 
 class Scene:
@@ -63,6 +69,31 @@ class Scene:
             Exception: What went wrong while drawing.
         """
         return self._worker.wait(timeout)
+
+    def picture(self, width: int, height: int) -> Rgb:
+        """What the browser that came last shows, on the ground of the theme.
+
+        Args:
+            width: Pixels.
+            height: As well.
+
+        Raises:
+            LookupError: If no browser looks at the view, or it does not answer.
+        """
+        clients = self._server.get_clients()
+        if not clients:
+            raise LookupError("no browser shows the 3D view")
+        client = clients[max(clients)]
+        try:
+            drawn = client.get_render(
+                height, width, transport_format="png", timeout=PICTURE_SECONDS
+            )
+        except (TimeoutError, RuntimeError) as error:
+            raise LookupError("the browser did not draw the 3D view") from error
+        ground = np.asarray(PALETTES[self._shown.theme].canvas, dtype=float)
+        share = drawn[..., 3:4] / 255.0
+        mixed: Rgb = (drawn[..., :3] * share + ground * (1.0 - share)).round().astype(np.uint8)
+        return mixed
 
     def close(self) -> None:
         """Stop following; the nodes stay as they are."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -11,6 +12,7 @@ from typing import Any, Literal
 from app.colours import Theme
 from app.state.scores import Scores
 from tracker import parameters as table
+from tracker.corrections import Correction
 from tracker.parameters import MethodKey, RunParameters
 from tracker.pipeline import Run
 from tracker.runs.fitting import unfit_methods
@@ -19,7 +21,7 @@ from tracker.sequences.sequence import Sequence
 
 Change = Literal[
     "sequence", "opening", "parameters", "playhead", "selection", "layers", "view", "theme",
-    "run", "progress", "evaluation", "pinned", "presets", "taught", "editing",
+    "run", "progress", "evaluation", "pinned", "presets", "taught", "editing", "corrections",
 ]  # fmt: skip
 """What is another now: ``run`` is a run's beginning and its end, ``progress`` its new steps,
 ``taught`` another room or other templates of the same recording."""
@@ -133,7 +135,11 @@ class Snapshot:
     """The values that a reset returns to: of methods, those that fit the sequence."""
     parameters_origin: str = ""
     """Who changed the parameters last, so that a client is not sent its own change."""
+    session: str = field(default_factory=lambda: secrets.token_hex(4))
+    """Another for every start of the program."""
     presets: Presets = field(default_factory=lambda: MappingProxyType({}))
+    corrections: tuple[Correction, ...] = ()
+    """What was put right by hand in the open sequence."""
     playhead: int = 0
     playhead_origin: str = ""
     sought: bool = False

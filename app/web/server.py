@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import uvicorn
 from fastapi import FastAPI, Request
@@ -21,6 +22,8 @@ from app import errors
 from app.errors import sentence
 from app.paths import static_folder
 from app.state import opening_step
+from app.state.correcting import Correcting
+from app.state.doubting import Doubting
 from app.state.importing.desk import Desk
 from app.state.kept.crashes import Crashes
 from app.state.kept.history import History
@@ -39,6 +42,7 @@ from app.state.workers.keeper import Keeper
 from app.state.workers.sensitivity import Sensitivity
 from app.web import api, description, gateway, stream, teaching_routes
 from app.web.access import Access, Keys
+from app.web.corrections import routes as corrections
 from app.web.entrance import LARGEST_MESSAGE, Entrance, start_viser
 from app.web.evaluation import course_routes, identity_routes
 from app.web.evaluation import routes as evaluation
@@ -47,7 +51,7 @@ from app.web.importing import routes as importing
 from app.web.library import export_routes
 from app.web.library import routes as library
 from app.web.manual import Manual
-from app.web.pictures import foreground, likelihood_routes
+from app.web.pictures import foreground, likelihood_routes, view_routes
 from app.web.pictures.jpegs import Pictures
 from app.web.pictures.likelihood import Likelihoods
 from app.web.pictures.swatches import Swatches
@@ -64,16 +68,21 @@ from tracker.pipeline import Cancelled
 from tracker.runs.stage_cache import StageCache
 from tracker.studies.store import studies_folder
 
+if TYPE_CHECKING:
+    from app.scene.scene import Scene
+
 logger = logging.getLogger("app")
 
 ROUTERS = (
     api.router,
     foreground.router,
     likelihood_routes.router,
+    view_routes.router,
     tables.router,
     event_tables.router,
     teaching_routes.router,
     teaching_tables.router,
+    corrections.router,
     evaluation.router,
     identity_routes.router,
     course_routes.router,
@@ -199,6 +208,10 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     teaching = app.state.teaching = Teaching(
         workbench, settings.data, settings_folder() / "unsaved" if kept else None
     )
+    correcting = app.state.correcting = Correcting(
+        workbench, settings_folder() / "corrections" if kept else None
+    )
+    app.state.doubting = Doubting()
     given = Path(settings.sequence or "").expanduser()
     roots = [given] if settings.sequence and given.is_dir() else []
     desk = app.state.desk = Desk(settings.data, roots)
@@ -218,7 +231,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         settings.say(words)
         workbench.notify("warn", words)
     opening_step.follow(workbench)
-    room = _Room(workbench, teaching, sensitivity)
+    room = app.state.room = _Room(workbench, teaching, sensitivity)
     if settings.with_viser:
         door.prepare()
         # the page is served meanwhile; requests for the 3D view wait
@@ -242,6 +255,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
             await asyncio.gather(starting, return_exceptions=True)
         told.stop()
         teaching.close()
+        correcting.close()
         recents.close()
         desk.close()
         pictures.close()
@@ -293,6 +307,7 @@ class _Room:
         self._workbench = workbench
         self._sensitivity = sensitivity
         self._teaching = teaching
+        self.scene: Scene | None = None
         self._parts: list[Callable[[], object]] = []
 
     def open(self, entrance: Entrance) -> None:
@@ -303,7 +318,8 @@ class _Room:
 
         server = start_viser(entrance)
         self._parts.append(server.stop)
-        self._parts.append(Scene(server, self._workbench).close)
+        self.scene = Scene(server, self._workbench)
+        self._parts.append(self.scene.close)
         self._parts.append(RoomEditing(server, self._workbench, self._teaching).close)
         self._parts.append(Controls(server, self._workbench, self._sensitivity).close)
 

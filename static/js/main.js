@@ -81,6 +81,7 @@ const brought = /** @type {const} */ ([
 	"drawTemplate",
 	"checkIdentities",
 	"plot",
+	"keepLayout",
 ]);
 for (const name of brought) {
 	const early = async (/** @type {any} */ what = undefined) => {

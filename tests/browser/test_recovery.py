@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from playwright.sync_api import Page, expect
 
-from tests.browser.looking import readout, shown_in_3d, until, viser
+from tests.browser.looking import ask, readout, shown_in_3d, until, viser
 from tests.browser.serving import Server
 
 
@@ -23,3 +23,27 @@ def test_the_page_and_the_3d_view_recover_where_they_were(page: Page, server: Se
     until(page, lambda: readout(page) == "20", "the page is where it was", 60.0)
     scene = viser(page)
     until(page, lambda: shown_in_3d(scene) == "20", "so is the 3D view", 60.0)
+
+
+def test_a_new_start_takes_up_where_this_browser_was(page: Page, server: Server) -> None:
+    ask(server, "PATCH", "parameters", {"changes": {"fusion.detection_probability": 0.8}})
+    server.wait_for_run()
+    page.get_by_role("tab", name="Runs").click()
+    page.keyboard.press("Home")
+    for _ in range(3):
+        page.keyboard.press("PageDown")
+    until(page, lambda: readout(page) == "30", "step 30")
+    until(page, lambda: "step=30" in page.url and "0.8" in page.url, "the address")
+    page.goto(f"{server.address}static/icon.svg")
+    server.stop()
+    server.start()
+    server.wait_for_run(120.0)
+    assert server.get("/api/state").json()["changed"] == []
+    page.goto(server.address)
+    until(page, lambda: readout(page) == "30", "the step", 60.0)
+    server.wait(lambda state: state["parameters"]["fusion.detection_probability"] == 0.8)
+    expect(page.get_by_role("tab", name="Runs")).to_have_attribute("aria-selected", "true")
+    # somebody who goes elsewhere on purpose is not taken back
+    page.goto(f"{server.address}?step=4")
+    until(page, lambda: readout(page) == "4", "the address wins", 60.0)
+    ask(server, "POST", "parameters/reset", {})

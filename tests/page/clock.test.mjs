@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import * as clock from "../../static/js/play/clock.js";
+import { pace } from "../../static/js/play/pace.js";
 
 const HOW = { fps: 25, speed: 1, direction: 1, first: 0, last: 99, loop: false };
 
@@ -117,4 +118,42 @@ test("a typed step or time is understood, anything else is not", () => {
   assert.equal(clock.parseStep("9999", 25, 1500), 1499);
   for (const wrong of ["", "abc", "-3", "1e3", "s"])
     assert.equal(clock.parseStep(wrong, 25, 1500), null);
+});
+
+test("the 3D view is left alone longer where steps come late, and sooner again where they do not", () => {
+  assert.equal(clock.restOf3d(0, 40, 40), 0);
+  const late = clock.restOf3d(0, 90, 40);
+  assert.ok(late >= 400);
+  assert.ok(clock.restOf3d(late, 90, 40) > late);
+  assert.equal(clock.restOf3d(1400, 90, 40), 1500);
+  assert.ok(clock.restOf3d(1000, 40, 40) < 1000);
+});
+
+test("another window draws no more often than it may, and at once when it is touched", async () => {
+  const listeners = {};
+  const frames = [];
+  const view = {
+    requestAnimationFrame: (act) => frames.push(act),
+    cancelAnimationFrame: () => {},
+    addEventListener: (name, act) => (listeners[name] = act),
+  };
+  let apart = 0;
+  pace(view, () => apart);
+  const drawn = [];
+  const draw = () => frames.splice(0).forEach((act) => act(0));
+  view.requestAnimationFrame(() => drawn.push("at once"));
+  draw();
+  apart = 60;
+  view.requestAnimationFrame(() => drawn.push("later"));
+  const cancelled = view.requestAnimationFrame(() => drawn.push("never"));
+  view.cancelAnimationFrame(cancelled);
+  draw();
+  assert.deepEqual(drawn, ["at once"]);
+  await new Promise((done) => setTimeout(done, 90));
+  draw();
+  assert.deepEqual(drawn, ["at once", "later"]);
+  listeners.wheel({});
+  view.requestAnimationFrame(() => drawn.push("touched"));
+  draw();
+  assert.deepEqual(drawn, ["at once", "later", "touched"]);
 });

@@ -88,6 +88,10 @@ def thumbnail_of(sequence: Sequence, reader: FrameReader | None = None) -> bytes
     return None
 
 
+CURVE = 300
+"""Values of a curve that is kept in small."""
+
+
 def kept_of(run: Run) -> KeptTracks:
     """What is kept of a run's result."""
     tracks = run.tracks
@@ -120,7 +124,9 @@ def run_of(
     """
     parameters = run.parameters
     figures = {}
+    ospa: tuple[float, ...] = ()
     if evaluation is not None and evaluation.has_truth:
+        ospa = _in_small(evaluation.series.ospa)
         figures = {figure.definition.key: figure.value for figure in evaluation.figures}
     if missing := sum(gap.missing for gap in gaps(run)):
         figures[MISSING] = missing
@@ -142,7 +148,16 @@ def run_of(
         targets=len(np.unique(run.tracks.ids)),
         figures=figures,
         kept=kept_of(run),
+        ospa=ospa,
     )
+
+
+def _in_small(values: ndarray) -> tuple[float, ...]:
+    """The mean over each of equally many steps."""
+    starts = np.arange(0, len(values), max(1, -(-len(values) // CURVE)))
+    sizes = np.diff(np.append(starts, len(values)))
+    means = np.add.reduceat(values, starts) / sizes if len(values) else values
+    return tuple(means.round(3).tolist())
 
 
 def remarks_of(result: Result) -> tuple[str, ...]:

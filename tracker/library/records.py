@@ -131,6 +131,8 @@ class Result:
     """All of them as they were written."""
     figures: dict[str, Any]
     kept: KeptTracks
+    ospa: tuple[float, ...] = ()
+    """Its mean over equally many steps each, metres; empty without a truth."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -171,5 +173,7 @@ class NewRun:
     targets: int
     figures: dict[str, float | int | None]
     kept: KeptTracks
+    ospa: tuple[float, ...] = ()
+    """Its mean over equally many steps each, metres; empty without a truth."""
     name: str = ""
     note: str = ""

@@ -39,6 +39,9 @@ CHECKED_BYTES = 64 << 20
 """A file up to this size is looked through before the first write, so that a damaged one is
 never written to."""
 
+OSPA = "ospa over time"
+"""Beside a run's figures: a curve in small."""
+
 _RUN = ", ".join(
     {
         "recording_name": "recordings.name",
@@ -214,8 +217,9 @@ class Library:
             parameters, unknown = parameters_of(values)
             kept = columns.unpack(row[2])
             place, key, digest, machine = row[3:]
+            ospa = tuple(figures.pop(OSPA, ()))
             return Result(
-                run, place, key, digest, machine, parameters, unknown, values, figures, kept
+                run, place, key, digest, machine, parameters, unknown, values, figures, kept, ospa
             )
 
     def size(self) -> int:
@@ -243,7 +247,8 @@ class Library:
         Returns:
             The run's number.
         """
-        packed = (_deflated(new.parameters), _deflated(new.figures), columns.pack(new.kept))
+        figures = {**new.figures, OSPA: list(new.ospa)} if new.ospa else new.figures
+        packed = (_deflated(new.parameters), _deflated(figures), columns.pack(new.kept))
         with self._writing() as connection:
             place = self._recording(connection, recording)
             known = connection.execute(
@@ -257,10 +262,8 @@ class Library:
                 )
                 if new.figures:  # scored anew, perhaps by another gate: the list tells the same
                     told_of = ", ".join(f"{name} = ?" for name in HEADLINES)
-                    figures = [new.figures.get(name) for name in HEADLINES]
-                    connection.execute(
-                        f"UPDATE runs SET {told_of} WHERE id = ?", (*figures, number)
-                    )
+                    told = [new.figures.get(name) for name in HEADLINES]
+                    connection.execute(f"UPDATE runs SET {told_of} WHERE id = ?", (*told, number))
             connection.execute(
                 "INSERT OR REPLACE INTO results VALUES (?, ?, ?, ?)", (number, *packed)
             )
@@ -271,6 +274,24 @@ class Library:
             )
             connection.execute("DELETE FROM runs WHERE deleted < ?", (time.time() - UNDO_SECONDS,))
             return int(number)
+
+    def move(self, recording: int, place: str) -> None:
+        """Have a recording opened from another place from now on.
+
+        Raises:
+            LibraryError: If there is no such recording, or another one lies at that place.
+        """
+        with self._writing() as connection:
+            taken = connection.execute(
+                "SELECT name FROM recordings WHERE place = ? AND id <> ?", (place, recording)
+            ).fetchone()
+            if taken is not None:
+                raise LibraryError(f"{self.path}: {place} is recording {taken[0]} already")
+            changed = connection.execute(
+                "UPDATE recordings SET place = ? WHERE id = ?", (place, recording)
+            )
+            if not changed.rowcount:
+                raise LibraryError(f"{self.path}: there is no recording {recording}")
 
     def rename(self, number: int, name: str) -> None:
         """Give a run a name; an empty one takes it away."""

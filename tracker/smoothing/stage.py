@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Sequence as Many
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -19,11 +20,18 @@ from tracker.single_view.protocol import ViewResult
 from tracker.smoothing import identities, lifetimes, pieces, reading
 from tracker.smoothing.calibration import Calibration
 from tracker.smoothing.paths import Links, Paths
-from tracker.smoothing.result import Decision, Smoothed
+from tracker.smoothing.result import Decision, Joined, Smoothed
 from tracker.smoothing.smoother import Fitted, Shared, Smoother
 
 _SEEN = 0.5
 """Association probability from which a camera counts as seeing a person."""
+
+
+class _Decided(NamedTuple):
+    """What was decided of who is who, and between what."""
+
+    decisions: list[Decision]
+    joined: Joined | None = None
 
 
 class Positions:
@@ -62,11 +70,11 @@ class Positions:
         existences = np.where(had, 1.0, lifetimes.UNSURE)
         links = reading.read_links(fused, paths, smoother.cameras)
         check()
-        paths, existences, links, learnt, decisions = self._named(
+        paths, existences, links, learnt, decided = self._named(
             smoother, paths, existences, links, views, check, corrections
         )
         fitted, shared, learnt = _settled(smoother, paths, existences, links, p, learnt, check)
-        return _finished(smoother, fitted, shared, learnt, p, decisions)
+        return _finished(smoother, fitted, shared, learnt, p, decided)
 
     def _named(
         self,
@@ -77,10 +85,10 @@ class Positions:
         views: Many[tuple[ViewResult, ...]],
         check: Callable[[], None],
         corrections: Many[Correction],
-    ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, list[Decision]]:
+    ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, _Decided]:
         """The tracks of people, with which existence each row asks for boxes, and what was learnt
         on the way: here the filter's own."""
-        return paths, existences, links, None, []
+        return paths, existences, links, None, _Decided([])
 
 
 class Identities(Positions):
@@ -95,7 +103,7 @@ class Identities(Positions):
         views: Many[tuple[ViewResult, ...]],
         check: Callable[[], None],
         corrections: Many[Correction],
-    ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, list[Decision]]:
+    ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, _Decided]:
         p = self._parameters.smoothing
         contested = pieces.contested(paths, links)
         fitted, shared, learnt = _settled(smoother, paths, existences, links, p, None, check)
@@ -106,7 +114,7 @@ class Identities(Positions):
         check()
         learnt = learnt.of_people(found.origins)
         existences = np.where(found.had, 1.0, lifetimes.UNSURE)
-        return found.paths, existences, found.links, learnt, found.decisions
+        return found.paths, existences, found.links, learnt, _Decided(found.decisions, found.joined)
 
 
 def _settled(
@@ -138,7 +146,7 @@ def _finished(
     shared: Shared,
     learnt: Calibration,
     p: SmoothingParams,
-    decisions: list[Decision],
+    decided: _Decided,
 ) -> Smoothed:
     """The tracks with their ends settled, and what is nobody left out."""
     longer, existences = lifetimes.extended(
@@ -175,8 +183,9 @@ def _finished(
         paths.covariances[rows],
         there[rows],
         seen[rows],
-        tuple(sorted([*decisions, *removed], key=lambda one: (one.step, one.label))),
+        tuple(sorted([*decided.decisions, *removed], key=lambda one: (one.step, one.label))),
         learnt,
+        decided.joined,
     )
 
 

@@ -38,10 +38,12 @@ def preview(
     tracks: Sequence[TrackLife],
     people: Sequence[float],
     courses: Sequence[Course],
+    ospa: Sequence[float],
 ) -> str:
-    """Lanes, people, ways from above, and what differs."""
+    """Lanes, people, OSPA, ways from above, and what differs."""
+    curves = _curve("People", "", people) + (_curve("OSPA", " m", ospa) if ospa else "")
     return (
-        f'<div class="pv-lanes">{_lanes(run, frames, tracks)}{_people(people)}</div>'
+        f'<div class="pv-lanes">{_lanes(run, frames, tracks)}{curves}</div>'
         f'<div class="pv-top">{_ways(courses)}</div>'
         f'<dl class="pv-facts">{_facts(run)}</dl>'
     )
@@ -136,15 +138,17 @@ def _lanes(run: KeptRunInfo, frames: int, tracks: Sequence[TrackLife]) -> str:
     )
 
 
-def _people(people: Sequence[float]) -> str:
-    most = max([1.0, *people])
+def _curve(word: str, unit: str, values: Sequence[float]) -> str:
+    """A staircase over the steps; people are whole, everything else ends where it is largest."""
+    most = max([0.1 if unit else 1.0, *values])
+    top = f"{most:.2f}{unit}" if unit else f"{most:.0f}"
     points = " ".join(
-        f"{at},{most - count:g}" for k, count in enumerate(people) for at in (k, k + 1)
+        f"{at},{most - value:g}" for k, value in enumerate(values) for at in (k, k + 1)
     )
     return (
-        f'<div class="crowd"><span>People<br><span class="q">0–{most:.0f}</span></span>'
-        f'<svg viewBox="0 0 {max(1, len(people))} {most:g}" preserveAspectRatio="none" role="img" '
-        f'aria-label="People over time, at most {most:.0f}"><polyline points="{points}"/></svg>'
+        f'<div class="crowd"><span>{word}<br><span class="q">0–{top}</span></span>'
+        f'<svg viewBox="0 0 {max(1, len(values))} {most:g}" preserveAspectRatio="none" role="img" '
+        f'aria-label="{word} over time, at most {top}"><polyline points="{points}"/></svg>'
         "</div>"
     )
 

@@ -111,6 +111,14 @@ class Preview(Model):
     people: list[float]
     """Targets at each of equally many steps, their mean."""
     courses: list[Course]
+    ospa: list[float]
+    """Its mean over equally many steps each, metres; empty without a truth."""
+
+
+class Place(Model):
+    """Where a recording lies now."""
+
+    place: str = Field(min_length=1, max_length=4096)
 
 
 class RunChanges(Model):

@@ -127,6 +127,29 @@ def runs(recording: int, opened: Opened) -> models.KeptRuns:
         raise no_library(error) from None
 
 
+@router.post("/recordings/{recording}/place")
+async def move(recording: int, wish: models.Place, opened: Opened) -> models.RecordingInfo:
+    """Say where a recording lies now, of which only the runs were still there."""
+    folder = Path(wish.place).expanduser()
+    try:
+        known = next((r for r in opened.recordings() if r.id == recording), None)
+        if known is None:
+            raise ApiError(404, "no_recording", f"There is no recording {recording}.")
+        with told_in_the_answer(
+            known.name, field="place", hint="Its runs stay readable all the same."
+        ):
+            sequence = await asyncio.to_thread(sequences.open_sequence, str(folder))
+            if sequence.digest != known.digest:
+                raise ValueError(
+                    f"{folder}: expected the recording of which these runs are, found another "
+                    f"content ({sequence.name})"
+                )
+        opened.move(recording, str(sequence.folder.absolute()))
+        return next(_recording(r) for r in opened.recordings() if r.id == recording)
+    except LibraryError as error:
+        raise no_library(error) from None
+
+
 @router.get("/runs/{number}")
 def run(number: int, opened: Opened) -> models.Preview:
     """One kept run in small: its facts, lanes, people and ways from above."""
@@ -139,6 +162,7 @@ def run(number: int, opened: Opened) -> models.Preview:
         tracks=preview.lanes(tracks, result.run.steps, fps),
         people=preview.people(tracks, result.run.steps),
         courses=preview.courses(tracks, fps),
+        ospa=list(result.ospa),
     )
 
 
@@ -146,7 +170,7 @@ def run(number: int, opened: Opened) -> models.Preview:
 def drawn(number: int, opened: Opened) -> str:
     """One kept run in small, as a part of the page."""
     told = run(number, opened)
-    return drawing.preview(told.run, told.frames, told.tracks, told.people, told.courses)
+    return drawing.preview(told.run, told.frames, told.tracks, told.people, told.courses, told.ospa)
 
 
 @router.get("/compared", response_class=HTMLResponse)

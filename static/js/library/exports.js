@@ -1,5 +1,5 @@
 /** Runs leave: a menu of forms, then each is written by the server and saved by the browser. */
-import { fill, h, icon } from "../elements/dom.js";
+import { choices, fill, h, icon } from "../elements/dom.js";
 import { getJson } from "../state/api.js";
 
 const ASKS_MS = 250;
@@ -30,20 +30,46 @@ export function exportMenu({ actions, chosen, say }) {
 		const { left, top } = button.getBoundingClientRect();
 		Object.assign(menu.style, { left: `${left}px`, bottom: `${innerHeight - top + 6}px` });
 		menu.querySelector("button")?.focus();
+		void list();
 	});
 	menu.addEventListener("keydown", (event) => {
 		const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
-		if (!step) return;
+		if (!step || part.contains(/** @type {Node} */ (event.target))) return;
 		const all = [...menu.querySelectorAll("button")];
 		const at = all.indexOf(/** @type {HTMLButtonElement} */ (document.activeElement));
 		all[(at + step + all.length) % all.length].focus();
 		event.preventDefault();
 		event.stopPropagation();
 	});
-	void getJson("/api/exports/formats").then(({ formats }) =>
+	const [first, last] = ["first step", "last step"].map((words) =>
+		h("input", { type: "number", min: 0, placeholder: words, "aria-label": `Video, ${words}` }),
+	);
+	const speed = h("select", { "aria-label": "Video, speed" });
+	choices(
+		/** @type {any} */ (speed),
+		[1, 0.5, 0.25, 0.1].map((value) => [value, value === 1 ? "real speed" : `${value}×`]),
+		1,
+	);
+	const part = h(
+		"div",
+		{ class: "video-part" },
+		h("b", {}, "Of a video"),
+		h("span", {}, first, " – ", last, " ", speed),
+	);
+	let listed = false;
+
+	/** Once the server has told them; asked again when the menu is opened again. */
+	async function list() {
+		if (listed) return;
+		const told = await getJson("/api/exports/formats").catch((error) => error);
+		if (told instanceof Error) {
+			fill(menu, h("p", { class: "small" }, `What can be written is not known: ${told.message}`));
+			return;
+		}
+		listed = true;
 		fill(
 			menu,
-			formats.map((/** @type {Server.FormatInfo} */ form) =>
+			told.formats.map((/** @type {Server.FormatInfo} */ form) =>
 				h(
 					"button",
 					{
@@ -54,13 +80,26 @@ export function exportMenu({ actions, chosen, say }) {
 					h("span", { class: "small" }, form.help),
 				),
 			),
-		),
-	);
+			part,
+		);
+		menu.querySelector("button")?.focus();
+	}
+
+	/** Which part of a video, and how fast. */
+	const wanted = () => ({
+		first: first.valueAsNumber || 0,
+		last: Number.isFinite(last.valueAsNumber) ? last.valueAsNumber : null,
+		speed: Number(speed.value),
+	});
 
 	/** @param {Server.FormatInfo} form */
 	async function write(form) {
 		for (const run of chosen()) {
-			let now = await actions.ask("POST", "exports", { format: form.name, run });
+			let now = await actions.ask("POST", "exports", {
+				format: form.name,
+				run,
+				...(form.video ? wanted() : {}),
+			});
 			if (!now) return;
 			const { number } = now;
 			while (now.state === "writing" && now.number === number) {

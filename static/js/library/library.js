@@ -2,6 +2,7 @@
 import { fill, h, icon, one } from "../elements/dom.js";
 import { getJson, request } from "../state/api.js";
 import { exportMenu } from "./exports.js";
+import { lostRecording } from "./lost.js";
 import { runsTable } from "./runs.js";
 import { factsOf, has, many, size, titleOf, when } from "./words.js";
 
@@ -49,6 +50,13 @@ export function mountLibrary(root, { store, actions }) {
 		tick: (run) => tick(run.id),
 	});
 	const empty = h("div", { class: "blank", hidden: true });
+	const gone = lostRecording({
+		moved: (told) => {
+			recording = told;
+			void refresh();
+		},
+		actions,
+	});
 	const picked = h("b");
 	const line = h("span", { role: "status", class: "gone-line" });
 	const stop = h("button", { class: "btn" }, "Stop");
@@ -115,7 +123,16 @@ export function mountLibrary(root, { store, actions }) {
 		h(
 			"section",
 			{ class: "pane runs", "aria-label": "Runs" },
-			h("div", { class: "pane-head" }, title, sub, h("span", { class: "grow" }), only),
+			h(
+				"div",
+				{ class: "pane-head" },
+				title,
+				sub,
+				h("span", { class: "grow" }),
+				only,
+				table.chooser,
+			),
+			gone.element,
 			table.element,
 			empty,
 			bar,
@@ -226,6 +243,7 @@ export function mountLibrary(root, { store, actions }) {
 				),
 			);
 		table.show(matching, chosen, focused);
+		gone.show(recording);
 		fill(picked, `${chosen.size} chosen`);
 		tools.hidden = !chosen.size;
 		side.disabled = chosen.size < 2 || chosen.size > 4;

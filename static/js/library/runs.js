@@ -1,5 +1,5 @@
 /** The table of a recording's runs. */
-import { h, icon } from "../elements/dom.js";
+import { fill, h, icon } from "../elements/dom.js";
 import { grid } from "../elements/grid.js";
 import { figure, partsOf, when } from "./words.js";
 
@@ -28,6 +28,26 @@ function pills(run) {
 		.map((change) => h("span", { class: "pc" }, symbol(change), " ", change.value));
 	const more = run.changes.length - PILLS;
 	return h("span", { title: all }, shown, more > 0 ? h("span", { class: "pc" }, `+${more}`) : null);
+}
+
+const COLUMNS = "library columns";
+
+/** @returns {string[]} columns that this browser does not show */
+function recall() {
+	try {
+		return JSON.parse(localStorage.getItem(COLUMNS) ?? "[]");
+	} catch {
+		return [];
+	}
+}
+
+/** @param {string[]} hidden */
+function keep(hidden) {
+	try {
+		localStorage.setItem(COLUMNS, JSON.stringify(hidden));
+	} catch {
+		// Without storage they come back with the next start.
+	}
 }
 
 /**
@@ -120,8 +140,50 @@ export function runsTable(on) {
 		attributes: (run) => ({ "data-run": run.id }),
 	});
 
+	/** Words of the columns that somebody does not want. @type {Set<string>} */
+	const hidden = new Set(recall());
+	const hide = () => {
+		for (const row of table.element.querySelectorAll("tr"))
+			[...row.cells].forEach((cell, k) => (cell.hidden = hidden.has(columns[k]?.word)));
+	};
+	const menu = h("div", { class: "menu plots", popover: "auto", "aria-label": "Columns" });
+	fill(
+		menu,
+		columns
+			.filter(({ word }) => word && word !== "Run")
+			.map(({ word }) =>
+				h(
+					"label",
+					{},
+					h("input", {
+						type: "checkbox",
+						checked: !hidden.has(word),
+						onchange: () => {
+							if (!hidden.delete(word)) hidden.add(word);
+							keep([...hidden]);
+							hide();
+						},
+					}),
+					h("b", {}, word),
+				),
+			),
+	);
+	const chooser = h(
+		"button",
+		{ class: "btn", "aria-haspopup": "true" },
+		"Columns",
+		icon("i-down", "s"),
+	);
+	chooser.popoverTargetElement = menu;
+	menu.addEventListener("toggle", () => {
+		const { right, bottom } = chooser.getBoundingClientRect();
+		Object.assign(menu.style, { right: `${innerWidth - right}px`, top: `${bottom + 4}px` });
+	});
+
 	return {
 		element: table.element,
+		/** What chooses the columns. */
+		chooser: [chooser, menu],
 		/**
 		 * @param {Server.KeptRunInfo[]} runs
 		 * @param {Set<number>} chosen
@@ -140,6 +202,7 @@ export function runsTable(on) {
 				if (run.id === focused) row.tabIndex = 0;
 				else if (focused !== null) row.tabIndex = -1;
 			});
+			hide();
 		},
 	};
 }

@@ -1,5 +1,6 @@
 /** The 3D pane: viser's page inside ours, with its layers and view points. */
 import { all, fill, h, icon, parts } from "../elements/dom.js";
+import { pace } from "../play/pace.js";
 
 /** What draws WebGL here where it is no graphics card; empty where it is one, or not told. */
 function softwareRenderer() {
@@ -11,7 +12,7 @@ function softwareRenderer() {
 }
 
 /** @type {Pane} */
-export function mountView3d(root, { store, actions, retry, press }) {
+export function mountView3d(root, { store, actions, playback, retry, press }) {
 	const { views, frame, blank, trail } = parts(root);
 	let path = "";
 	let reachable = false;
@@ -19,14 +20,16 @@ export function mountView3d(root, { store, actions, retry, press }) {
 	/** @type {Timer} */
 	let timer;
 
-	if (softwareRenderer())
+	if (softwareRenderer()) {
+		playback.slow3d();
 		actions.note(
 			"info",
 			"The 3D view is drawn without a graphics card",
-			"It follows a few times a second; pictures, timeline and tables keep their speed.",
+			"While it plays it follows about once a second; pictures, timeline and tables keep their speed.",
 			undefined,
 			"software",
 		);
+	}
 
 	/**
 	 * Load viser's page, but only once it answers: a browser's error page inside ours says nothing.
@@ -49,16 +52,19 @@ export function mountView3d(root, { store, actions, retry, press }) {
 	}
 	// After a click into 3D its document has the keys; ours come first, but for those that move its
 	// camera.
-	frame.addEventListener("load", () =>
-		frame.contentWindow?.addEventListener(
+	frame.addEventListener("load", () => {
+		const view = frame.contentWindow;
+		if (!view) return;
+		pace(view, playback.rest3d);
+		view.addEventListener(
 			"keydown",
 			(event) => {
 				if (/^(Arrow.*|[wasdqe])$/i.test(event.key) && !event.ctrlKey && !event.metaKey) return;
 				if (press(event)) event.stopImmediatePropagation();
 			},
 			true,
-		),
-	);
+		);
+	});
 
 	function cover() {
 		const { link, server } = store.get();

@@ -55,14 +55,15 @@ export function advance({ step, rest }, seconds, how) {
 }
 
 /**
- * How long the 3D view is to be left alone after it was told a step, while it plays: where the page
- * comes too late to its own steps, 3D follows more rarely, and more often again where there is time.
+ * How long the 3D view is to be left alone after it was told a step and after it drew, while it
+ * plays: where the page comes too late to its own steps, 3D follows more rarely, and more often
+ * again where there is time.
  * @param {number} wait  milliseconds, so far
  * @param {number} elapsed  milliseconds between two of the page's frames
  * @param {number} due  milliseconds a step
  */
 export const restOf3d = (wait, elapsed, due) =>
-	elapsed > 1.4 * due ? Math.min(1500, Math.max(120, wait * 1.3)) : wait < 40 ? 0 : wait * 0.985;
+	elapsed > 1.4 * due ? Math.min(1500, Math.max(400, wait * 1.5)) : wait < 40 ? 0 : wait * 0.985;
 
 /**
  * The steps to have ready, nearest first: the step itself, then ahead in the direction of

@@ -17,6 +17,9 @@ const JUMP = 12;
 /** After a jump nothing else is read for so long, milliseconds: who jumps again needs all there is. */
 const STILL = 200;
 
+/** How long the 3D view is left alone at first where it is slow, milliseconds. */
+const SLOW_3D = 1000;
+
 /** How many steps of the shown run are there. @param {Readonly<PageState>} state */
 export function shownDone({ basis, run, timeline }) {
 	return run && basis === run.key ? run.done : (timeline?.done ?? 0);
@@ -240,6 +243,10 @@ export function createPlayback(store, sendSeek) {
 	});
 
 	return {
+		/** How long the 3D view is left alone now, milliseconds. */
+		rest3d: () => (store.get().playing ? wait : 0),
+		/** It is drawn without a graphics card: it begins by being left alone. */
+		slow3d: () => (wait = SLOW_3D),
 		/** @param {(frame: Frame) => void} painter */
 		onPaint(painter) {
 			painters.push(painter);

@@ -4,6 +4,7 @@
  */
 import { all, one } from "../elements/dom.js";
 import { recorded } from "../draw/svg.js";
+import { request } from "../state/api.js";
 
 /** Of a PNG, pixels a CSS pixel. */
 const SHARP = 2;
@@ -59,9 +60,23 @@ function save(blob, name) {
 
 /** @param {Context} context */
 export function mountKeep({ store, actions }) {
+	/** The 3D view, as the browser draws it once more for the server. */
+	async function keepView() {
+		const { offsetWidth: width, offsetHeight: height } = one(".stage");
+		actions.note("info", "The 3D view is drawn", "It is saved as soon as it is there.");
+		const answer = await request(`/api/view/picture.png?width=${width}&height=${height}`).catch(
+			(error) => error,
+		);
+		if (answer instanceof Error)
+			return actions.note("error", answer.message, /** @type {any} */ (answer).hint ?? "");
+		const { sequence, shown } = store.get();
+		save(await answer.blob(), `${sequence?.name ?? "view"}-3d-${Math.max(0, shown)}.png`);
+	}
+
 	actions.keepPicture = async (what) => {
 		const [name, kind] = what.split(" ");
 		const pane = one(`.${name}`);
+		if (name === "view") return keepView();
 		const svg = svgOf(pane, await recorded(/** @type {any[]} */ (all("canvas", pane))));
 		const { sequence, shown } = store.get();
 		const file = `${sequence?.name ?? "pane"}-${name}-${Math.max(0, shown)}.${kind}`;

@@ -12,10 +12,17 @@ const MOST = 12;
  * @param {(parameter: Server.ParameterInfo) => void} edit  asks for a parameter's value
  * @returns {Offer[]}
  */
-export function offersOf({ sequences, timeline, schema, server, link }, actions, edit) {
-	if (link !== "open") return [];
+export function offersOf(state, actions, edit) {
+	const { sequences, timeline, schema, server, link, layouts } = state;
+	const own = Object.keys(layouts).map((name) => ({
+		title: `Layout ${name}, your own`,
+		keys: [],
+		run: () => actions.arrange(name),
+	}));
+	if (link !== "open") return own;
 	const shown = new Set(server?.shown ?? []);
 	return [
+		...own,
 		...(schema?.parameters ?? [])
 			.filter(({ key }) => shown.has(key))
 			.map((parameter) => ({

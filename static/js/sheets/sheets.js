@@ -47,9 +47,12 @@ export function mountSheets({ store, actions }) {
 	let found = [];
 	/** Whose value is asked for.  @type {Server.ParameterInfo | null} */
 	let asked = null;
+	/** Whether a name for the layout is asked for. */
+	let naming = false;
 
 	/** @returns {Offer[]} */
 	function offered() {
+		if (naming) return layoutOffers();
 		if (asked) return valueOffers(asked);
 		const commands = search(input.value).map((command) => ({
 			title: command.title,
@@ -57,6 +60,23 @@ export function mountSheets({ store, actions }) {
 			run: () => perform(command, actions),
 		}));
 		return [...commands, ...matching(offersOf(store.get(), actions, edit), input.value)];
+	}
+	/** Keep the layout under what is typed, or forget one. @returns {Offer[]} */
+	function layoutOffers() {
+		const { layout, layouts } = store.get();
+		const name = input.value.trim();
+		const { [name]: _, ...others } = layouts;
+		const forget = Object.keys(layouts).map((own) => ({
+			title: `Forget layout ${own}`,
+			keys: [],
+			run: () =>
+				store.set({
+					layouts: Object.fromEntries(Object.entries(layouts).filter(([one]) => one !== own)),
+				}),
+		}));
+		if (!name) return forget;
+		const title = name in layouts ? `Replace layout ${name}` : `Keep as layout ${name}`;
+		return [{ title, keys: [], run: () => store.set({ layouts: { ...others, [name]: layout } }) }];
 	}
 	/** @param {Server.ParameterInfo} parameter */
 	function edit(parameter) {
@@ -83,7 +103,9 @@ export function mountSheets({ store, actions }) {
 		at = Math.max(0, Math.min(at, found.length - 1));
 		input.placeholder = asked
 			? `${asked.label}: ${rangeOf(asked)}, now ${store.get().server?.parameters[asked.key]}`
-			: "Command, parameter, recording or track";
+			: naming
+				? "Name of this layout"
+				: "Command, parameter, recording or track";
 		const option = (/** @type {Offer} */ one, /** @type {number} */ index) =>
 			h(
 				"div",
@@ -99,7 +121,11 @@ export function mountSheets({ store, actions }) {
 				h("span", { class: "grow" }),
 				signs(one.keys),
 			);
-		const none = asked ? `${asked.help} ${rangeOf(asked)}` : "Nothing here has these words.";
+		const none = naming
+			? "Type a name, then Enter. The palette finds the layout by it."
+			: asked
+				? `${asked.help} ${rangeOf(asked)}`
+				: "Nothing here has these words.";
 		fill(list, found.length ? found.map(option) : h("p", {}, none));
 		choose(at);
 	}
@@ -113,9 +139,15 @@ export function mountSheets({ store, actions }) {
 	/** @param {Offer} one */
 	function run(one) {
 		asked = null;
+		naming = false;
 		palette.close();
 		one.run();
 	}
+	actions.keepLayout = () => {
+		actions.palette();
+		naming = true;
+		offer();
+	};
 	store.on(["timeline", "sequences"], () => palette.open && offer());
 	input.addEventListener("input", () => {
 		at = 0;
@@ -131,6 +163,7 @@ export function mountSheets({ store, actions }) {
 	actions.palette = () => {
 		if (palette.open) return palette.close();
 		asked = null;
+		naming = false;
 		input.value = "";
 		at = 0;
 		palette.showModal();

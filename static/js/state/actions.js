@@ -318,7 +318,7 @@ export function createActions({ store, seek, send, receive }) {
 		trail: (changes) => void actions.ask("PATCH", "trail", changes),
 		fadeTrails: () => actions.trail({ fades: !store.get().server?.trail.fades }),
 		arrange(name) {
-			store.set({ layout: LAYOUTS[name] });
+			store.set({ layout: LAYOUTS[name] ?? store.get().layouts[name] ?? {} });
 			if (name === "compare") actions.showTab("compare");
 		},
 		toggle: (what) => store.set({ [what]: !store.get()[what] }),
@@ -334,6 +334,7 @@ export function createActions({ store, seek, send, receive }) {
 		openSheet() {},
 		palette() {},
 		bookmark() {},
+		keepLayout() {},
 		plot() {},
 		zoom() {},
 	};

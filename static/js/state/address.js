@@ -18,11 +18,31 @@ const NOWHERE = {
 	view: {},
 };
 
+/** Where this browser was last. @param {{session: string, search: string, kept: number | null}} last */
+function note(last) {
+	try {
+		localStorage.setItem("last", JSON.stringify(last));
+	} catch {
+		// Without storage the next start begins anew.
+	}
+}
+
+/** @returns {{session?: string, search?: string, kept?: number | null}} */
+function recall() {
+	try {
+		return JSON.parse(localStorage.getItem("last") ?? "{}");
+	} catch {
+		return {};
+	}
+}
+
 /** @param {Store<PageState>} store @param {Actions} actions */
 export function createAddress(store, actions) {
 	const { place: named, unknown } = readPlace(location.search);
 	/** Where to go as soon as its sequence is open. */
 	let place = named;
+	/** A run of the library that was shown there. @type {number | null} */
+	let keptRun = null;
 	/** The address without the step and the view: what the back button goes back over. */
 	let standing = "";
 	/** @type {Timer} */
@@ -58,9 +78,28 @@ export function createAddress(store, actions) {
 			sequence && place.sequence && [sequence.name, sequence.opened_as].includes(place.sequence),
 		);
 
+	/**
+	 * A server that was started since this browser was here last, and that nobody has used: go back
+	 * to where it was left, unless the address or another recording says otherwise.
+	 * @param {Server.State} server
+	 */
+	function takeUp(server) {
+		if (location.search.length > 1) return;
+		const { session, search, kept } = recall();
+		if (!search || session === server.session) return;
+		const { place: last } = readPlace(search);
+		const { sequence, opening } = server;
+		const open = opening ? [opening.name] : sequence ? [sequence.name, sequence.opened_as] : null;
+		if (open && !open.includes(last.sequence ?? "")) return;
+		place = kept ? { ...last, values: null } : last;
+		if (kept) keptRun = kept;
+	}
+
 	/** Open the place's sequence; where that fails, what is open is looked at as usual. */
 	function open() {
-		if (place.sequence) void actions.open(place.sequence);
+		if (keptRun) void actions.ask("POST", `library/runs/${keptRun}/open`);
+		else if (place.sequence) void actions.open(place.sequence);
+		keptRun = null;
 	}
 
 	/** Go to the place as far as the open sequence is the place's. @param {Server.State} server */
@@ -150,6 +189,7 @@ export function createAddress(store, actions) {
 				(search || location.pathname) + location.hash,
 			);
 		standing = next;
+		note({ session: server.session, search, kept: server.run.kept });
 		document.title = `${server.sequence.name} · multiview-phd`;
 	}
 	const seen = /** @type {const} */ ([
@@ -187,7 +227,8 @@ export function createAddress(store, actions) {
 		waitsFor: (server) => isThere(server.sequence),
 		/** Of the first state: open what the address names, unless it is open. @param {Server.State} server */
 		begin(server) {
-			if (!isThere(server.sequence) && server.opening?.name !== place.sequence) open();
+			takeUp(server);
+			if (keptRun || (!isThere(server.sequence) && server.opening?.name !== place.sequence)) open();
 		},
 		/** The server is away or was started anew: come back to here. @param {Server.State} server */
 		returnTo(server) {

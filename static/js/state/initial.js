@@ -13,6 +13,7 @@ const KEPT = /** @type {const} */ ([
 	"realTime",
 	"turn",
 	"plots",
+	"layouts",
 ]);
 
 /** @returns {Partial<PageState>} */
@@ -62,6 +63,7 @@ export function initialState() {
 		bookmarks: [],
 		layers3d: {},
 		plots: [],
+		layouts: {},
 		large: null,
 		tab: "tracks",
 		eventKind: "",

@@ -124,6 +124,8 @@ interface PageState {
 	scores: Scores | null;
 	/** Of the run whose identities were checked without truth last. */
 	identity: Server.IdentityInfo | null;
+	/** Layouts of somebody's own, by name. */
+	layouts: Record<string, PageState["layout"]>;
 	/** What is plotted of the selected track, by the server's names. */
 	plots: string[];
 	/** What the timeline plots. */
@@ -258,7 +260,10 @@ interface Actions {
 	/** Something of the selected track over time, there or away; the menu where nothing is named. */
 	plot: (name?: string) => void;
 	wholePictures: () => void;
-	arrange: (name: "inspect" | "tune" | "compare") => void;
+	/** By the name of a layout, ours or one's own. */
+	arrange: (name: string) => void;
+	/** This layout under a name that is asked for. */
+	keepLayout: () => void;
 	/** Mark the shown step, or go to its note. */
 	bookmark: () => void;
 	/** Of the timeline; above 1 shows more steps. */

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -59,6 +60,36 @@ def test_finished_runs_are_kept_with_their_figures(kept: TestClient) -> None:
     # what was never opened can be opened from there all the same
     (never,) = [r for r in listed["recordings"] if r["name"] == "numbers"]
     assert (never["id"], never["runs"]) == (None, 0)
+
+
+def test_a_preview_has_the_distance_to_the_truth_in_small(kept: TestClient) -> None:
+    changed, _ = runs_of(kept)
+    ospa = kept.get("/api/evaluation/series").json()["ospa"]
+    told = kept.get(f"/api/library/runs/{changed['id']}").json()["ospa"]
+    np.testing.assert_allclose(told, ospa, atol=2e-3)
+    assert "OSPA over time" in kept.get(f"/api/library/runs/{changed['id']}/drawn").text
+
+
+def test_a_recording_that_was_moved_is_found_again(data: Path, path: Path, tmp_path: Path) -> None:
+    before, after = tmp_path / "before", tmp_path / "after"
+    shutil.copytree(data / "crossing", before)
+    with application(data, path, str(before)) as client:
+        wait_until(lambda: len(runs_of(client)) == 1)
+        before.rename(after)
+        (recording,) = [
+            r for r in client.get("/api/library").json()["recordings"] if r["place"] == str(before)
+        ]
+        assert recording["missing"]
+        address = f"/api/library/recordings/{recording['id']}/place"
+        other = client.post(address, json={"place": str(data / "numbers")})
+        assert other.status_code == 422
+        assert "another content" in other.json()["detail"]
+        told = client.post(address, json={"place": str(after)}).json()
+        assert (told["place"], told["missing"]) == (str(after), None)
+        number = runs_of(client)[0]["id"]
+        shown = client.post(f"/api/library/runs/{number}/open").json()
+        wait_until(lambda: client.get("/api/state").json()["run"]["kept"] == number)
+        assert "detail" not in shown
 
 
 def test_a_run_that_was_deleted_and_is_made_again_is_kept_again(kept: TestClient) -> None:
@@ -196,7 +227,7 @@ def test_what_is_drawn_says_what_there_is_and_is_escaped(kept: TestClient) -> No
     text = kept.get(f"/api/library/runs/{number}/drawn").text
     assert f"Lanes of run {number}: 2 tracks over 120 steps" in text
     assert "0.95 → " in text
-    assert text.count("<polyline") == 3
+    assert text.count("<polyline") == 4
     assert "<script" not in text
     told = kept.get("/api/library/compared", params={"runs": [number, other]}).text
     assert "&lt;b&gt;x" in told

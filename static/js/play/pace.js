@@ -1,0 +1,57 @@
+/**
+ * How often another document of this window draws: viser goes on drawing for a while after each
+ * change, and where there is no graphics card each of its frames is one that pictures and overlays
+ * have to wait for.
+ */
+
+/** Who turns or moves the 3D view wants every frame, for so long after, milliseconds. */
+const TOUCHED = 400;
+
+/**
+ * Have a window's animation frames at least so far apart.
+ * @param {Window} view
+ * @param {() => number} apart  milliseconds; 0: as they come
+ */
+export function pace(view, apart) {
+	const ask = view.requestAnimationFrame.bind(view);
+	const cancel = view.cancelAnimationFrame.bind(view);
+	/** Those that wait, by a number of ours. @type {Map<number, Timer>} */
+	const waiting = new Map();
+	/** What the browser calls those that have waited. @type {Map<number, number>} */
+	const asked = new Map();
+	let [last, touched, counted] = [0, -Infinity, 2 ** 31];
+
+	for (const name of ["pointerdown", "pointermove", "wheel"])
+		view.addEventListener(
+			name,
+			(event) => {
+				if (name !== "pointermove" || /** @type {PointerEvent} */ (event).buttons)
+					touched = performance.now();
+			},
+			{ capture: true, passive: true },
+		);
+	view.requestAnimationFrame = (act) => {
+		const now = performance.now();
+		const rest = now - touched < TOUCHED ? 0 : last + apart() - now;
+		if (rest <= 0) return ask(drawn(act));
+		const own = (counted += 1);
+		const then = () => {
+			waiting.delete(own);
+			const known = ask((time) => (asked.delete(own), drawn(act)(time)));
+			asked.set(own, known);
+		};
+		waiting.set(own, setTimeout(then, rest));
+		return own;
+	};
+	view.cancelAnimationFrame = (number) => {
+		clearTimeout(waiting.get(number));
+		waiting.delete(number);
+		cancel(asked.get(number) ?? number);
+		asked.delete(number);
+	};
+	/** @param {FrameRequestCallback} act @returns {FrameRequestCallback} */
+	const drawn = (act) => (time) => {
+		last = performance.now();
+		act(time);
+	};
+}
