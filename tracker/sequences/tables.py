@@ -12,7 +12,7 @@ from numpy import ndarray
 
 from tracker.sequences.clock import Clock
 from tracker.sequences.csv_columns import Columns, read_columns
-from tracker.sequences.fields import SMALLEST, Fields
+from tracker.sequences.fields import SMALLEST, Fields, shown
 from tracker.sequences.media import locate
 from tracker.sequences.sequence import Detections, GroundTruth, SequenceError
 
@@ -219,10 +219,10 @@ def _known_steps(path: Path, where: str, frames: int) -> Bool[ndarray, " F"] | N
             known = np.zeros(frames, dtype=bool)
             for part in ranges.split():
                 first, _, last = part.partition("-")
-                if not (first.isdecimal() and (last or first).isdecimal()):
+                if not (first.isdecimal() and (last or first).isdecimal() and len(part) < 20):
                     raise SequenceError(
                         f"{where}, line {number}: {KNOWN_STEPS}: expected ranges like "
-                        f"0-99 150-300, found {part}"
+                        f"0-99 150-300, found {shown(part)}"
                     )
                 known[int(first) : int(last or first) + 1] = True
             return known
