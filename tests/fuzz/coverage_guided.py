@@ -6,11 +6,15 @@ no sentence ends it with the input that led there, in ``crash-*`` beside the cor
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from random import Random
+
+from tracker import kernels
 
 Reader = Callable[[Path, bytes], None]
 
@@ -114,10 +118,14 @@ def main() -> int:
     except ImportError:
         print("atheris is not installed: nothing was run")
         return 0
-    atheris.instrument_imports(include=["tracker"], enable_loader_override=False).__enter__()
     with tempfile.TemporaryDirectory(prefix="multiview-phd-fuzz-") as place:
         work = Path(place) / "case"
         work.mkdir()
+        # the kernels are compiled from their bytecode, which must stay as it is: they come first
+        for module in pkgutil.walk_packages(kernels.__path__, f"{kernels.__name__}."):
+            importlib.import_module(module.name)
+        with atheris.instrument_imports(include=["tracker"]):
+            tried(reader, work, b"")
         corpus = seeds(Path(place))
         words = [sys.argv[0], f"-max_total_time={seconds}", "-rss_limit_mb=4096", "-timeout=10"]
         words += [f"-seed={Random().randrange(1, 2**31)}", str(corpus)]
