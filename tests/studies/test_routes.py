@@ -52,7 +52,7 @@ def test_a_draft_has_ranges_around_todays_values(client: TestClient) -> None:
     assert "colour_phd" not in asked[1]["choices"]  # the recording has no pictures
     wrong = client.get("/api/studies/draft?keys=fusion.birth_rat")
     assert wrong.status_code == 422
-    assert "did you mean fusion.birth_rate" in wrong.json()["error"]["message"]
+    assert "did you mean fusion.birth_rate" in wrong.json()["detail"]
 
 
 def test_it_is_told_what_a_study_takes_or_why_it_is_refused(client: TestClient) -> None:
@@ -66,7 +66,7 @@ def test_it_is_told_what_a_study_takes_or_why_it_is_refused(client: TestClient) 
     assert "must be between" in cost["error"]
     refused = client.post("/api/studies", json=wish)
     assert refused.status_code == 422
-    assert "must be between" in refused.json()["error"]["message"]
+    assert "must be between" in refused.json()["detail"]
 
 
 def test_what_is_on_the_sliders_is_held_and_tried(client: TestClient) -> None:
@@ -80,7 +80,7 @@ def test_what_is_on_the_sliders_is_held_and_tried(client: TestClient) -> None:
         "/api/studies", json={"name": "mine", "parameters": RANGES, "objectives": ["score"]}
     )
     assert again.status_code == 422
-    assert 'there is a study "mine" already' in again.json()["error"]["message"]
+    assert 'there is a study "mine" already' in again.json()["detail"]
 
 
 def test_trials_are_read_used_and_kept(client: TestClient, tmp_path: Path) -> None:
@@ -117,11 +117,11 @@ def test_what_is_not_there_is_told(client: TestClient) -> None:
     for path in ("/api/studies/nothing", "/api/studies/nothing/trials"):
         answer = client.get(path)
         assert answer.status_code == 404
-        assert 'expected the study "nothing", found none' in answer.json()["error"]["message"]
+        assert 'expected the study "nothing", found none' in answer.json()["detail"]
     define(client)
     answer = client.get("/api/studies/mine/trials/3")
     assert answer.status_code == 404
-    assert "no trial 3 has ended" in answer.json()["error"]["message"]
+    assert "no trial 3 has ended" in answer.json()["detail"]
     looked = client.post("/api/studies/scheduler", json={"address": "tcp://127.0.0.1:9"}).json()
     assert looked["error"].startswith("there is no Dask scheduler at tcp://127.0.0.1:9")
 
@@ -134,7 +134,7 @@ def test_a_process_of_its_own_runs_it_and_is_stopped(client: TestClient) -> None
         assert started["info"]["state"] == "running"
         again = client.post("/api/studies/mine/start")
         assert again.status_code == 409
-        assert "runs already" in again.json()["error"]["message"]
+        assert "runs already" in again.json()["detail"]
         heard: list[dict[str, Any]] = []
         until = time.monotonic() + 60.0
         while not heard or heard[-1]["done"] < 2:

@@ -65,6 +65,8 @@ interface PageState {
 	server: Server.State | null;
 	/** The newest progress, also between two states. */
 	run: Server.RunInfo | null;
+	/** The study that had news last. */
+	study: Server.StudyInfo | null;
 	schema: Server.Schema | null;
 	/** That is open, and of it:. */
 	sequence: Server.SequenceInfo | null;
