@@ -147,7 +147,7 @@ def tell_all(words: str) -> None:
 
 def work(seed: int, deadline: float) -> int:
     """One worker: a case a seed, told as a line of JSON before and after."""
-    from tests.fuzz.cases import Fell, make_bases, try_case
+    from tests.fuzz.cases import LONGEST_SECONDS, Fell, make_bases, try_case
     from tests.fuzz.damage import Damage, drawn
 
     faulthandler.enable()
@@ -170,7 +170,7 @@ def work(seed: int, deadline: float) -> int:
 
         def fault(base: str, damages: list[Damage]) -> str | None:
             try:
-                told = try_case(bases[base], damages, place)
+                told = try_case(bases[base], damages, place, LONGEST_SECONDS)
             except Fell as fell:
                 return str(fell)
             except BaseException as error:
