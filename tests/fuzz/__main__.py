@@ -53,6 +53,10 @@ def main() -> int:
         print("fuzz: every index is checked", flush=True)
     seed = secrets.randbelow(2**40) if arguments.seed is None else arguments.seed
     print(f"fuzz: seed {seed}", flush=True)
+    good = [sys.executable, "-m", "tests.fuzz", "0", "--work", "0"]
+    if subprocess.run(good, stdout=subprocess.DEVNULL).returncode:  # compiles what is missing
+        print("fuzz: a good recording does not run", flush=True)
+        return 1
     deadline = time.monotonic() + 60.0 * arguments.minutes
     counts: Counter[str] = Counter()
     threads = [
