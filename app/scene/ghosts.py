@@ -52,7 +52,7 @@ class GhostNodes:
         self._boxes.show(
             edges.reshape(-1, 2, 3), np.repeat(palette.of(tracks.ids[now]), 12, axis=0)[:, None]
         )
-        ends = np.flatnonzero(np.append(ids[1:] != ids[:-1], True)) if len(ids) else []
+        ends = np.flatnonzero(np.append(ids[1:] != ids[:-1], True))[: len(ids)]
         self._names.show(
             [
                 Tag(
