@@ -7,6 +7,9 @@ the first time too. ``python3 -m tests --all`` checks the rest as well: all of t
 browser, processes, recordings, long forms, benchmarks and mutants; what has already
 passed on these very files is not run again.
 
+``python3 -m tests --fuzz 60`` damages recordings for an hour: whatever is done to their files,
+the program must answer with a sentence or a sound run.
+
 ``python3 -m tests --only tests -- -k camera`` runs some of it; what follows ``--`` goes
 to pytest. How long what takes is written in ``tests/README.md``.
 """
@@ -148,6 +151,11 @@ def test_runs(arguments: list[str]) -> dict[str, Check]:
     }
 
 
+def fuzzing(minutes: float, *how: str) -> tuple[str, ...]:
+    """Damaged recordings for some minutes, other ones each time."""
+    return (PYTHON, "-m", "tests.fuzz", f"{minutes:g}", "--workers", str(WORKERS), *how)
+
+
 def digest() -> str:
     """Of all files that a check may read."""
     found = hashlib.sha256(sys.version.encode())
@@ -176,6 +184,7 @@ def main() -> int:
     kernels = Check("kernels", ((PYTHON, "-m", "tracker.warm_up"),))
     benchmarks = Check("benchmarks", ((PYTHON, "-m", "tests.benchmarks", "--short"),))
     mutants = Check("mutants", ((PYTHON, "-m", "tests.mutate"),))
+    fuzz = Check("fuzz", (fuzzing(1.0), fuzzing(1.0, "--bounds")))
     names = [check.name for check in (*page, *code, kernels, *test_runs([]).values())]
 
     parser = argparse.ArgumentParser(
@@ -187,17 +196,24 @@ def main() -> int:
     parser.add_argument(
         "--only",
         action="append",
-        choices=[*names, benchmarks.name, mutants.name],
+        choices=[*names, benchmarks.name, mutants.name, fuzz.name],
         help="run only this, repeatable",
+    )
+    parser.add_argument(
+        "--fuzz", type=float, metavar="MINUTES", help="only damage recordings, for so long"
     )
     parser.add_argument("pytest", nargs="*", help="arguments for pytest, after --")
     arguments = parser.parse_args()
     only: list[str] = arguments.only or []
     tests, full_tests = test_runs(arguments.pytest).values()
 
-    if only:
+    if arguments.fuzz is not None:
         install()
-        everything = [*page, *code, kernels, tests, full_tests, benchmarks, mutants]
+        longer = Check("fuzz", (fuzzing(arguments.fuzz),))
+        failed = [] if longer.run(shown=True) else [longer.name]
+    elif only:
+        install()
+        everything = [*page, *code, kernels, tests, full_tests, benchmarks, mutants, fuzz]
         failed = [c.name for c in everything if c.name in only and not c.run(shown=True)]
     else:
         failed = []
@@ -215,7 +231,7 @@ def main() -> int:
             if not failed and not arguments.pytest:
                 PASSED.write_text(before, encoding="utf-8")
         if arguments.all:
-            later = (full_tests, benchmarks, mutants)
+            later = (full_tests, benchmarks, mutants, fuzz)
             failed += [check.name for check in later if not check.run(shown=True)]
     if failed:
         print(f"failed: {', '.join(dict.fromkeys(failed))}", file=sys.stderr)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 import dataclasses
 import io
 import os
+import re
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +19,7 @@ from hypothesis import strategies as st
 from tests.engine import synthetic
 from tracker import __version__, export
 from tracker.parameters import METHODS, PARAMETERS, RunParameters, value, with_values
+from tracker.sequences.csv_columns import guarded, unguarded
 from tracker.sequences.sequence import Sequence, SequenceError
 from tracker.trajectories import Trajectories
 
@@ -248,3 +252,32 @@ def test_what_is_wrong_in_a_track_file_is_said(
 def test_a_file_that_is_not_there_is_said(tmp_path: Path) -> None:
     with pytest.raises(SequenceError, match=r"tracks\.csv: cannot be read \(No such file"):
         export.read_tracks_csv(tmp_path / "tracks.csv")
+
+
+FORMULAS = ["=1+1", "+1", "-1", "@SUM(A1)", "'=1", "=HYPERLINK('http://x')", "a;=1", "x"]
+
+
+@pytest.mark.parametrize("name", FORMULAS)
+def test_a_name_is_no_formula_and_comes_back(tmp_path: Path, name: str) -> None:
+    first, *others = SEQUENCE.views
+    camera = first.camera
+    named = replace(camera, name=name)
+    views = (replace(first, camera=named), *others)
+    sequence = replace(SEQUENCE, name=f"{name}, {name}", views=views)
+    path = tmp_path / "tracks.csv"
+    remark = f'40 pictures of camera "{name}" are missing'
+    export.save_tracks_csv(path, sequence, TRACKS, PARAMETERS_OF_RUN, 5, remarks=(remark,))
+    for line in path.read_text(encoding="utf-8").splitlines():
+        for cells in (csv.reader([line]), csv.reader([line], delimiter=";")):
+            for cell in next(cells):
+                risky = re.match(r"\s*[=+\-@]", cell)
+                assert not risky or re.fullmatch(r"-?[\d.]+(,.*)?", cell), line
+    found = export.read_tracks_csv(path)
+    assert found.settings["sequence"] == sequence.name
+    assert list(found.boxes) == [one.camera.name for one in views]
+    assert found.remarks == (remark,)
+
+
+@given(st.text(alphabet="=+-@',; a\t\r"))
+def test_what_is_guarded_is_what_it_was(text: str) -> None:
+    assert unguarded(guarded(text)) == text

@@ -268,6 +268,7 @@ def test_the_same_seed_gives_the_same_files(tmp_path: Path) -> None:
         render("room35-2p", tmp_path / name, frames=3, cameras=3, seed=seed)
     files = sorted(path.name for path in (tmp_path / "a").iterdir())
     assert files == [
+        "SHA256SUMS",
         "cam1.avi",
         "cam2.avi",
         "cam3.avi",

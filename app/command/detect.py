@@ -27,7 +27,7 @@ def detect(command: Detect) -> None:
     from tracker import parameters as table
     from tracker import pipeline
     from tracker.boxes import Boxes
-    from tracker.placing import file_names
+    from tracker.placing import file_names, replacing
     from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
 
@@ -59,7 +59,8 @@ def detect(command: Detect) -> None:
         boxes = np.concatenate([Boxes(view.measurements).left_top for view in views])
         scores = np.concatenate([view.measurement_scores for view in views])
         frames = np.repeat(np.arange(len(views)), [len(view.measurements) for view in views])
-        _write(command.output / f"{file}.csv", frames, boxes, scores)
+        with replacing(command.output / f"{file}.csv") as begun:
+            _write(begun, frames, boxes, scores)
         counts.append(f"{camera.name} {len(boxes)}")
     say(f"boxes in {sequence.frames} steps: {', '.join(counts)}; written to {command.output}")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from contextlib import closing
 from dataclasses import asdict, replace
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from app.command.flags import Evaluate
-from app.command.terminal import Bar, CommandError, print_table, say
+from app.command.terminal import Bar, CommandError, print_json, print_table, say
 from app.state.workers.compiling import Compiling
 from tracker import __version__, export
 from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
@@ -72,8 +71,7 @@ def evaluate(command: Evaluate) -> None:
         )
     if command.json:
         head = {"version": __version__, "sequence": sequence.name, "file": str(command.tracks)}
-        text = json.dumps({**head, **evaluation.to_json()}, allow_nan=False)
-        sys.stdout.write(text + "\n")
+        print_json({**head, **evaluation.to_json()})
     else:
         print_evaluation(evaluation)
     done = "" if tracks.done is None else f" of {sequence.frames} (the file is partial)"
@@ -136,7 +134,7 @@ def estimate_without_truth(command: Evaluate) -> None:
             "overlap": dict(zip(names, found.overlaps, strict=False)),
             "doubts": [asdict(doubt) for doubt in found.doubts],
         }
-        sys.stdout.write(json.dumps(document, allow_nan=False) + "\n")
+        print_json(document)
     else:
         _print_estimate(found, names)
     say(WARNING)

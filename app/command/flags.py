@@ -71,6 +71,9 @@ class Serve:
     """The file that finished runs are kept in."""
     keep: Annotated[int, arg(metavar="INT")] = KEEP
     """Kept runs without star, name, note and tags that stay, the newest ones; 0 keeps none."""
+    memory: Annotated[float | None, arg(metavar="GB", help_behavior_hint="(optional)")] = None
+    """Memory for what is kept for speed, pictures and columns of runs; half of the machine, and
+    no more than 1 GB, where it is not said."""
 
 
 @dataclass

@@ -178,6 +178,8 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
         )
     check_data(command.data)
     _check_keep(command.keep)
+    if command.memory is not None and not 0.0625 <= command.memory <= 65536.0:
+        raise ParameterError("--memory", f"expected 0.0625 to 65536 GB, got {command.memory:g}")
     gc.disable()  # a seventh of the time: nothing that is imported ever goes
     from app.state.workers.jobs import locate
     from app.web import server
@@ -231,6 +233,7 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
             keep_on_disk=True,
             library=None if isinstance(run, Result) else command.library or library_file(),
             keep=command.keep,
+            memory=None if command.memory is None else int(command.memory * 2**30),
             run=run,
             say=say,
         )

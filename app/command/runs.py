@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections.abc import Callable
@@ -24,11 +23,12 @@ from app.command.arguments.library import (
     ShowRun,
     StarRun,
 )
-from app.command.terminal import Bar, CommandError, print_table, say
+from app.command.terminal import Bar, CommandError, print_json, print_table, say
 from tracker.folders import library_file
 from tracker.library import KEEP, repair
 from tracker.library.records import HEADLINES, KeptRun, Result
 from tracker.library.store import Library, open_library
+from tracker.visible import visible
 
 DAMAGED = 1
 
@@ -70,7 +70,7 @@ def runs(command: Runs, serve: Callable[[OpenRun, Result], int]) -> int:
             case CollectRuns():
                 gone, freed = library.collect(KEEP if action.keep is None else action.keep)
                 if action.json:
-                    _print({"deleted": gone, "freed_bytes": freed})
+                    print_json({"deleted": gone, "freed_bytes": freed})
                 else:
                     say(f"{gone} runs gone, {freed / 1e6:.1f} MB freed")
     return serve(action, result) if isinstance(action, OpenRun) else 0
@@ -97,7 +97,7 @@ def bundle(command: Bundle) -> None:
     write_bundle(output, result, sequence, videos=command.videos)
     size = output.stat().st_size
     if command.json:
-        _print({"run": result.run.id, "file": str(output), "bytes": size})
+        print_json({"run": result.run.id, "file": str(output), "bytes": size})
     else:
         say(f"{result.run.title}, {size / 1e6:.1f} MB, written to {output}")
 
@@ -117,7 +117,7 @@ def check(command: LibraryCommand) -> int:
     }
     if not command.json:
         for complaint in found.complaints:
-            sys.stdout.write(f"{complaint}\n")
+            sys.stdout.write(f"{visible(complaint)}\n")
         say(f"{path}: {found.runs} runs can be read, {len(found.complaints)} complaints")
     status = DAMAGED if found.complaints else 0
     if command.repair and found.complaints:
@@ -127,7 +127,7 @@ def check(command: LibraryCommand) -> int:
         if not command.json:
             say(f"{saved} runs saved, {lost} rows lost; the damaged file is kept as {aside}")
     if command.json:
-        _print(told)
+        print_json(told)
     return status
 
 
@@ -154,7 +154,7 @@ def _list(library: Library, command: ListRuns) -> None:
 
 def _tell(command: OfLibrary, found: list[KeptRun]) -> None:
     if command.json:
-        _print([run.to_json() for run in found])
+        print_json([run.to_json() for run in found])
         return
     print_table(
         (">run", "", "name", "recording", "began", "methods", "differs", ">MOTA", ">IDF1",
@@ -184,7 +184,7 @@ def _show(library: Library, command: ShowRun) -> None:
             "parameters": result.values,
             "figures": result.figures,
         }
-        _print({**told, "rows": len(result.kept.tracks)})
+        print_json({**told, "rows": len(result.kept.tracks)})
         return
     facts = {
         "run": run.title,
@@ -226,7 +226,7 @@ def _export(library: Library, command: ExportRun) -> None:
         options = Options(command.first, command.last, command.speed, writing.at)
         save(command.output, form, written, options)
     if command.json:
-        _print({"run": result.run.id, "format": form.name, "file": str(command.output)})
+        print_json({"run": result.run.id, "format": form.name, "file": str(command.output)})
     else:
         say(f"{result.run.title} as {form.word}, written to {command.output}")
 
@@ -243,7 +243,7 @@ def _delete(library: Library, command: DeleteRuns) -> None:
     numbers = [library.find(text).id for text in command.runs]
     size = library.delete(numbers)
     if command.json:
-        _print({"deleted": numbers, "bytes": size})
+        print_json({"deleted": numbers, "bytes": size})
         return
     listed = " ".join(map(str, numbers))
     say(f"{len(numbers)} runs deleted, {size / 1e6:.1f} MB; `runs delete --undo {listed}` "
@@ -254,7 +254,7 @@ def _diff(library: Library, command: DiffRuns) -> None:
     a, b = (library.result(library.find(text).id) for text in (command.first, command.second))
     told = difference(a.run, a.values, b.run, b.values)
     if command.json:
-        _print({"first": a.run.id, "second": b.run.id, **told})
+        print_json({"first": a.run.id, "second": b.run.id, **told})
         return
     print_table(
         ("what", a.run.title, b.run.title),
@@ -294,7 +294,3 @@ def _number(value: float | int | None) -> str:
     if value is None:
         return "–"
     return f"{value:.3f}" if isinstance(value, float) else str(value)
-
-
-def _print(value: Any) -> None:
-    sys.stdout.write(json.dumps(value, allow_nan=False, ensure_ascii=False) + "\n")

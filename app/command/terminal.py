@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
+
+from tracker.visible import visible
 
 
 class CommandError(Exception):
@@ -25,8 +28,8 @@ def check_data(data: Path | None) -> None:
 
 
 def say(text: str) -> None:
-    """One line on standard error."""
-    sys.stderr.write(f"multiview-phd: {text}\n")
+    """One line on standard error; what of names and paths cannot be printed is written out."""
+    sys.stderr.write(f"multiview-phd: {visible(text)}\n")
     sys.stderr.flush()
 
 
@@ -63,6 +66,8 @@ def print_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         head: The columns' names; one that begins with ``>`` stands over numbers.
         rows: Cells of text.
     """
+    rows = [[visible(cell) for cell in row] for row in rows]
+    head = [visible(name) for name in head]
     right = [name.startswith(">") for name in head]
     names = [name.removeprefix(">") for name in head]
     widths = [max(map(len, column)) for column in zip(names, *rows, strict=True)]
@@ -81,3 +86,11 @@ def print_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         ]
         sys.stdout.write("  ".join(cells).rstrip() + "\n")
         sys.stdout.writelines(" " * indent + line + "\n" for line in others)
+
+
+def print_json(value: Any) -> None:
+    """One line on standard output, for programs; characters that cannot be printed as escapes."""
+    text = json.dumps(value, allow_nan=False, ensure_ascii=False)
+    if not text.isprintable():
+        text = json.dumps(value, allow_nan=False)
+    sys.stdout.write(text + "\n")

@@ -24,7 +24,7 @@ from app.state.snapshot import Change
 from app.state.workbench import Workbench
 from tracker import pipeline
 from tracker.parameters import RunParameters
-from tracker.sequences.reader import FILE
+from tracker.sequences.reader import FILE, given_folder
 from tracker.sequences.sequence import Sequence, SequenceError
 from tracker.sequences.writing import saving
 from tracker.sequences.writing.teaching import Values, changes, taught_values, with_taught
@@ -69,6 +69,10 @@ class Teaching:
     def close(self) -> None:
         """Stop following."""
         self._unsubscribe()
+
+    def draft_of(self, folder: Path) -> Path | None:
+        """The file that keeps what was taught of a sequence and not saved; None where all is."""
+        return self._drafts.file_of(folder)
 
     # what a person does
 
@@ -234,7 +238,8 @@ class Teaching:
         with self._lock:
             sequence, saved = self._sequence(), self._workbench.snapshot().saved
             assert saved is not None
-            if not folder.expanduser().is_absolute():
+            folder = given_folder(folder)
+            if not folder.is_absolute():
                 folder = self.copies_in() / folder
             copied = saving.save_copy(sequence, saved, folder)
             self._drafts.forget(sequence.folder)

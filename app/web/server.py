@@ -26,9 +26,11 @@ from app.state import opening_step
 from app.state.correcting import Correcting
 from app.state.doubting import Doubting
 from app.state.importing.desk import Desk
+from app.state.kept.crashes import Crashes
 from app.state.kept.history import History
 from app.state.kept.presets import OwnPresets
 from app.state.kept.recents import Recents
+from app.state.memory import Budget
 from app.state.studies.desk import StudyDesk
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench
@@ -123,6 +125,8 @@ class Settings:
     """The file that keeps runs; None: they are not kept."""
     keep: int = KEEP
     """How many untouched runs stay in it."""
+    memory: int | None = None
+    """Bytes that may be kept for speed; None for half of the machine, or less."""
     run: int | Result | None = None
     """A run of it that is shown at once, instead of a sequence; or one that lies elsewhere, which
     is only looked at: nothing is computed, and nothing can be changed."""
@@ -190,12 +194,21 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     settings: Settings = app.state.settings
     workbench = app.state.workbench = Workbench()
     kept, looked_at = settings.keep_on_disk, isinstance(settings.run, Result)
+    budget = Budget.of(settings.memory)
+    crashes = Crashes(settings_folder() / "starts" if kept else None)
+    crashed = crashes.tidy()
+    crashes.watch()
     jobs = app.state.jobs = Jobs(
         workbench,
         data=settings.data,
         detector=settings.detector,
         seed=settings.seed,
-        cache=StageCache.on_disk(in_background) if kept else StageCache(),
+        cache=StageCache.on_disk(in_background, budget.columns)
+        if kept
+        else StageCache(memory_bytes=budget.columns),
+        picture_bytes=budget.pictures,
+        crashes=crashes,
+        draft_of=lambda folder: teaching.draft_of(folder),
         compiling=Compiling(settings.say) if kept and not looked_at else None,
         computes=not looked_at,
     )
@@ -228,6 +241,9 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
     told.start()
+    for words in crashed:
+        settings.say(words)
+        workbench.notify("warn", words)
     opening_step.follow(workbench)
     room = app.state.room = _Room(workbench, teaching, sensitivity)
     if settings.with_viser:
@@ -272,6 +288,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
                 )
             )
         )
+        crashes.close()
 
 
 def _say_failure(name: str) -> Callable[..., None]:

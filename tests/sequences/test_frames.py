@@ -259,7 +259,7 @@ def test_times_that_cannot_be_trusted_are_not(folders: dict[str, Path]) -> None:
 def test_what_is_no_video_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "text.avi"
     path.write_bytes(content)
-    with pytest.raises(VideoError, match="no picture in it can be decoded"):
+    with pytest.raises(VideoError, match=r"no picture in it can be|first bytes|empty"):
         index_video(path)
 
 

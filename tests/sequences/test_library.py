@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -10,7 +13,10 @@ import pytest
 from tests.synthetic import write_sequence
 from tracker.folders import cache_folder
 from tracker.sequences import library, rendering
+from tracker.sequences.reader import read_sequence
+from tracker.sequences.rendering.writing import SUMS, is_whole, whole_folder
 from tracker.sequences.sequence import SequenceError
+from tracker.sequences.writing.saving import save, save_copy
 
 
 @pytest.fixture(autouse=True)
@@ -30,7 +36,8 @@ def rendered(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     ) -> None:
         names.append(name)
         progress(1, 2)
-        write_sequence(folder, frames=2, cameras=cameras)
+        with whole_folder(folder) as work:
+            write_sequence(work, frames=2, cameras=cameras)
         progress(2, 2)
 
     monkeypatch.setattr(rendering, "render", quick)
@@ -68,6 +75,111 @@ def test_a_cached_room_that_was_spoilt_is_rendered_again(rendered: list[str], sp
     (folder / spoilt).unlink()
     assert library.open_sequence("room24-2p", progress=told).has_pictures
     assert rendered == ["room24-2p"] * 2
+
+
+def cut(path: Path) -> None:
+    os.truncate(path, path.stat().st_size // 2)
+
+
+def flip(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 4
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize("spoil", [cut, flip])
+@pytest.mark.parametrize("name", ["sequence.toml", "cam1.mp4", "ground_truth.csv", SUMS])
+def test_a_cached_room_that_is_not_what_was_rendered_is_rendered_again(
+    rendered: list[str], spoil: Callable[[Path], None], name: str
+) -> None:
+    def told(*_: int) -> None: ...
+
+    folder = library.open_sequence("room24-2p", progress=told).folder
+    spoil(folder / name)
+    assert not is_whole(folder)
+    again = library.open_sequence("room24-2p", progress=told)
+    assert is_whole(folder)
+    assert not again.warnings
+    assert rendered == ["room24-2p"] * 2
+
+
+def test_what_a_dead_process_began_to_render_is_swept_away(rendered: list[str]) -> None:
+    def told(*_: int) -> None: ...
+
+    place = library.rendered_folder("room24-2p")
+    left = place.with_name(f".0123abcd.part.{place.name}")
+    (left / "deep").mkdir(parents=True)
+    fresh = place.with_name(f".4567abcd.part.{place.name}")
+    fresh.mkdir()
+    os.utime(left, (1e9, 1e9))
+    library.open_sequence("room24-2p", progress=told)
+    assert not left.exists()
+    assert fresh.exists()  # somebody may be at it now
+
+
+NAMES = ["~nosuch", "a\0b", "x" * 300, "x/" * 3000, "\x1b[31m", "a\nb", "\ud800"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_name_that_no_file_can_have_gets_a_sentence(name: str, tmp_path: Path) -> None:
+    sequence = read_sequence(write_sequence(tmp_path / "room", frames=2))
+    for attempt in (
+        lambda: library.open_sequence(name),
+        lambda: save_copy(sequence, sequence, Path(name)),
+    ):
+        with pytest.raises(SequenceError) as told:
+            attempt()
+        assert str(told.value).isprintable()
+
+
+def test_a_bad_folder_takes_no_other_from_the_list(tmp_path: Path) -> None:
+    good = write_sequence(tmp_path / "good", frames=2, container=None)
+    text = (good / "sequence.toml").read_text(encoding="utf-8")
+    spoilt = {
+        "digits": text.replace("25.0", "1" + "0" * 400),
+        "hexadecimal": text.replace("25.0", "0x" + "f" * 9000),
+        "deep": text.replace('"numbers"', "[" * 900 + "]" * 900),
+        "dotted": text + "\nroom" + ".a" * 5000 + " = 1\n",
+        "long": text.replace('"numbers"', f'"{"n" * 5000}"'),
+        "escape": text.replace('"numbers"', '"\\u001b[31mred"'),
+        "huge": text + "#" * 5_000_000,
+        "table": text.replace("fps = 25.0", "fps = { a = 1 }"),
+    }
+    for name, bad in spoilt.items():
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / "sequence.toml").write_text(bad, encoding="utf-8")
+    (tmp_path / "folder" / "sequence.toml").mkdir(parents=True)
+    (tmp_path / "circle").mkdir()
+    (tmp_path / "circle" / "sequence.toml").symlink_to(tmp_path / "circle" / "sequence.toml")
+    (tmp_path / "zeros").mkdir()
+    (tmp_path / "zeros" / "sequence.toml").symlink_to("/dev/zero")
+    (tmp_path / "pipe").mkdir()
+    os.mkfifo(tmp_path / "pipe" / "sequence.toml")
+    begin = time.monotonic()
+    entries = {entry.name: entry for entry in library.available(tmp_path)}
+    assert time.monotonic() - begin < 5.0
+    assert entries["good"].ready
+    for name in {*spoilt, "folder", "circle", "zeros", "pipe"}:
+        assert not entries[name].ready, name
+        error = entries[name].error
+        assert error
+        assert error.isprintable()
+        assert len(error) < 500
+
+
+def test_a_file_that_is_a_link_out_of_the_folder_is_neither_read_nor_saved(tmp_path: Path) -> None:
+    folder = write_sequence(tmp_path / "room", frames=2)
+    opened = library.open_sequence(folder)
+    outside = tmp_path / "outside.toml"
+    (folder / "sequence.toml").rename(outside)
+    before = outside.read_bytes()
+    (folder / "sequence.toml").symlink_to(outside)
+    with pytest.raises(SequenceError, match="expected a file in the folder, found a link"):
+        library.open_sequence(folder)
+    with pytest.raises(SequenceError, match="expected a file in the folder, found a link"):
+        save(opened, opened)
+    assert outside.read_bytes() == before
 
 
 def test_a_folder_is_opened_by_its_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,13 +6,17 @@ changed by it.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 from tracker.checks.boxes import check_boxes, listen
 from tracker.checks.cameras import check_lenses, check_places
 from tracker.checks.check import Check, Remedy, Status
 from tracker.checks.readings import EVERY_ORDER
 from tracker.checks.timing import check_counting, check_time
 from tracker.sequences.frames import FrameReader
-from tracker.sequences.sequence import Sequence
+from tracker.sequences.sequence import Detections, Sequence
 
 __all__ = ["Check", "Remedy", "Status", "check"]
 
@@ -36,6 +40,7 @@ def check(
             calibrations exchanged among many cameras.
         reader: Of the pictures; one is opened where it is needed and none is given.
     """
+    sequence = _surest(sequence)
     told = listen(sequence, exchanges=not quick or len(sequence.views) <= EVERY_ORDER)
     found = [*check_boxes(sequence, told)]
     lenses = check_lenses(sequence.cameras)
@@ -47,3 +52,24 @@ def check(
     if told is not None:
         found.append(check_counting(sequence))
     return found
+
+
+_MOST_BOXES = 60
+"""Of one camera at one step that the checks look at: the pairs of two cameras are their product."""
+
+
+def _surest(sequence: Sequence) -> Sequence:
+    """With no more boxes at a step than the checks need, those of the highest scores."""
+    views = []
+    for view in sequence.views:
+        own = view.detections
+        if own is not None and len(own.frames) > _MOST_BOXES:
+            order = np.lexsort([-own.scores, own.frames])
+            frames = own.frames[order]
+            rank = np.arange(len(frames)) - np.searchsorted(frames, frames)
+            kept = np.sort(order[rank < _MOST_BOXES])
+            if len(kept) < len(frames):
+                fewer = Detections(own.frames[kept], own.boxes[kept], own.scores[kept])
+                view = replace(view, detections=fewer)
+        views.append(view)
+    return replace(sequence, views=tuple(views))

@@ -27,11 +27,14 @@ def check_lenses(cameras: Many[Camera]) -> Check:
         across = 2.0 * float(np.arctan(width / (2.0 * k[0, 0])))
         off = np.abs(k[:2, 2] / [width, height] - 0.5)
         if (off > _OFF_CENTRE).any():
-            other = f"{2.0 * k[0, 2]:.0f}×{2.0 * k[1, 2]:.0f}"
+            advice = "correct it"
+            if (k[:2, 2] > 1.0).all():
+                other = f"{2.0 * k[0, 2]:.0f}×{2.0 * k[1, 2]:.0f}"
+                times = f"{width / (2.0 * k[0, 2]):.3g}"
+                advice = f"K is likely of one of {other}: multiply its first two rows by {times}"
             told.append(
                 f"{camera.name}: the middle of its lens, ({k[0, 2]:.0f}, {k[1, 2]:.0f}), is far "
-                f"from the middle of a picture of {width}×{height}; K is likely of one of {other}: "
-                f"multiply its first two rows by {width / (2.0 * k[0, 2]):.3g}"
+                f"from the middle of a picture of {width}×{height}; {advice}"
             )
         elif not _NARROWEST < across < _WIDEST:
             told.append(

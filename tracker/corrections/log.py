@@ -51,12 +51,22 @@ def place_of(folder: Path) -> Path:
     """
     beside = folder / FILE
     rendered = folder.absolute().is_relative_to(cache_folder())
+    if _leads_out(beside):
+        return own_place(folder)
     if not rendered and (
         os.access(beside, os.W_OK) if beside.exists() else os.access(folder, os.W_OK)
     ):
         return beside
     own = own_place(folder)
     return own if own.exists() or rendered or not beside.exists() else _first_of(own, beside)
+
+
+def _leads_out(beside: Path) -> bool:
+    """Whether the log of a recording is a link, which its reader and writer must not follow."""
+    try:
+        return beside.is_symlink() and not beside.resolve().is_relative_to(beside.parent.resolve())
+    except (OSError, RuntimeError):  # a circle of links
+        return True
 
 
 def own_place(folder: Path) -> Path:
@@ -87,6 +97,8 @@ def read_log(path: Path) -> tuple[Correction, ...]:
     try:
         if not path.exists():
             return ()
+        if not path.is_file():
+            raise CorrectionError(f"{path}: expected a file, found a folder, pipe or device")
         if path.stat().st_size > _MOST_BYTES:
             raise CorrectionError(f"{path}: expected a log of at most {_MOST_BYTES >> 20} MB")
         text = path.read_bytes().decode("utf-8-sig")
@@ -120,6 +132,10 @@ def parse(text: str, where: str) -> tuple[Correction, ...]:
         values = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise CorrectionError(f"{where}: not TOML: {error}") from None
+    except (RecursionError, ValueError):
+        raise CorrectionError(
+            f"{where}: not TOML: expected a few levels and numbers of at most 18 digits, found more"
+        ) from None
     strange = sorted(set(values) - {"format", "correction"})
     if strange:
         raise CorrectionError(

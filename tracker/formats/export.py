@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 from tracker.camera import Camera
+from tracker.placing import write_whole
 
 Form = Literal["opencv", "pose2sim"]
 
@@ -39,7 +40,8 @@ def save_calibration(path: Path, cameras: Sequence[Camera], form: Form) -> None:
     if form == "opencv":
         _save_opencv(path, cameras, keys)
     else:
-        path.write_text("\n".join(map(_table, keys, cameras)) + _END, encoding="utf-8")
+        text = "\n".join(map(_table, keys, cameras)) + _END
+        write_whole(path, text.encode("utf-8"))
 
 
 _END = "\n[metadata]\nadjusted = false\nerror = 0.0\n"
@@ -58,7 +60,7 @@ def _save_opencv(path: Path, cameras: Sequence[Camera], keys: Sequence[str]) -> 
             storage.write(f"T_{key}", np.asarray(camera.translation, dtype=float)[:, None])
     finally:
         text = storage.releaseAndGetString()
-    path.write_text(text, encoding="utf-8")
+    write_whole(path, text.encode("utf-8"))
 
 
 def _table(key: str, camera: Camera) -> str:

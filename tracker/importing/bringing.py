@@ -48,6 +48,7 @@ def bring_images(
     linked = [
         _place(path.resolve(), own / f"{number:0{width}}{path.suffix.lower()}", copy, told)
         for number, path in enumerate(files)
+        if path.exists()  # one missing in the row of their numbers stays missing
     ]
     return f"{name}/*{files[0].suffix.lower()}", not copy and not all(linked)
 

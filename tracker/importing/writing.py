@@ -13,7 +13,7 @@ from numpy import ndarray
 from tracker.formats.pieces import FormatError
 from tracker.importing.bringing import Told, bring, bring_images
 from tracker.importing.settling import Settled, SettledView
-from tracker.placing import replacing
+from tracker.placing import replacing, write_whole
 from tracker.sequences.sequence import Detections, GroundTruth
 
 FILE = "sequence.toml"
@@ -113,7 +113,7 @@ def _camera(
     if timing.stamps is not None:
         file = f"{name}_times.csv"
         rows = "\n".join(map(_number, timing.stamps))
-        (folder / file).write_text(f"frame_time\n{rows}\n", encoding="utf-8")
+        write_whole(folder / file, f"frame_time\n{rows}\n".encode())
         lines.append(f"timestamps = {_text(file)}")
     if view.detections is not None:
         file = f"{name}.csv"
@@ -153,7 +153,8 @@ def _write_boxes(path: Path, detections: Detections) -> None:
             strict=True,
         )
     ]  # fmt: skip
-    path.write_text("\n".join(["frame,left,top,width,height,score", *rows]) + "\n", "utf-8")
+    text = "\n".join(["frame,left,top,width,height,score", *rows]) + "\n"
+    write_whole(path, text.encode())
 
 
 def _write_truth(path: Path, truth: GroundTruth) -> None:
@@ -164,7 +165,7 @@ def _write_truth(path: Path, truth: GroundTruth) -> None:
             truth.valid.tolist(), strict=True,
         )
     ]  # fmt: skip
-    path.write_text("\n".join(["frame,id,x,y,z,valid", *rows]) + "\n", "utf-8")
+    write_whole(path, ("\n".join(["frame,id,x,y,z,valid", *rows]) + "\n").encode())
 
 
 def _text(text: str) -> str:

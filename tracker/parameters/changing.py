@@ -10,6 +10,7 @@ from typing import Any
 
 from tracker.parameters.run import RunParameters
 from tracker.parameters.table import METHODS, PARAMETERS, Parameter
+from tracker.visible import visible
 
 _READ = {key: attrgetter(key) for key in (*METHODS, *PARAMETERS)}
 """How the value of each key is read: a slider asks for all of them many times."""
@@ -48,46 +49,57 @@ def with_values(parameters: RunParameters, changes: Mapping[str, Any]) -> RunPar
     data = parameters.model_dump()
     for key, new in changes.items():
         if key in METHODS:
-            if new not in METHODS[key]:
-                raise ParameterError(key, f"expected one of {', '.join(METHODS[key])}, got {new!r}")
+            if not isinstance(new, str) or new not in METHODS[key]:
+                raise ParameterError(
+                    key, f"expected one of {', '.join(METHODS[key])}, got {_shown(new)}"
+                )
             data[key] = new
         elif key in PARAMETERS:
             group, name = key.split(".", 1)
             data[group][name] = _checked(PARAMETERS[key], new)
         else:
-            raise ParameterError(key, _unknown(key))
+            raise ParameterError(visible(key[:100]), _unknown(key))
     return RunParameters.model_validate(data)
 
 
+def _shown(value: Any) -> str:
+    """What was given, short: a number as it is, anything else as Python writes it."""
+    try:
+        text = repr(value)
+    except ValueError:  # Python writes no whole number of thousands of digits
+        return "a number with thousands of digits"
+    return visible(text if len(text) <= 60 else f"{text[:57]}…")
+
+
 def _unknown(key: str) -> str:
-    near = difflib.get_close_matches(key, [*PARAMETERS, *METHODS], n=1, cutoff=0.5)
+    near = difflib.get_close_matches(key[:100], [*PARAMETERS, *METHODS], n=1, cutoff=0.5)
     hint = f"did you mean {near[0]}? " if near else ""
     return f"there is no such parameter; {hint}`multiview-phd parameters` lists them all"
 
 
 def _checked(parameter: Parameter, new: Any) -> Any:
     if parameter.kind == "choice":
-        if new not in parameter.choices:
+        if not isinstance(new, str) or new not in parameter.choices:
             choices = ", ".join(parameter.choices)
-            raise ParameterError(parameter.key, f"expected one of {choices}, got {new!r}")
+            raise ParameterError(parameter.key, f"expected one of {choices}, got {_shown(new)}")
         return new
     if parameter.kind == "bool":
         words = {"true": True, "on": True, "1": True, "false": False, "off": False, "0": False}
         known = words.get(str(new).lower())
         if known is None:
-            raise ParameterError(parameter.key, f"expected true or false, got {new!r}")
+            raise ParameterError(parameter.key, f"expected true or false, got {_shown(new)}")
         return known
     try:
         if isinstance(new, bool):
             raise TypeError
         number = float(new)
     except (TypeError, ValueError):
-        raise ParameterError(parameter.key, f"expected a number, got {new!r}") from None
+        raise ParameterError(parameter.key, f"expected a number, got {_shown(new)}") from None
     except OverflowError:  # a whole number of more digits than any other number has
         number = math.inf if new > 0 else -math.inf
     if parameter.kind == "int":
         if number != int(number) if abs(number) < 1e18 else True:
-            raise ParameterError(parameter.key, f"expected a whole number, got {new!r}")
+            raise ParameterError(parameter.key, f"expected a whole number, got {_shown(new)}")
         number = int(number)
     assert parameter.minimum is not None
     assert parameter.maximum is not None
@@ -95,7 +107,8 @@ def _checked(parameter: Parameter, new: Any) -> Any:
         unit = f" {parameter.unit}" if parameter.unit else ""
         raise ParameterError(
             parameter.key,
-            f"must be between {parameter.minimum:g} and {parameter.maximum:g}{unit}, got {new}",
+            f"must be between {parameter.minimum:g} and {parameter.maximum:g}{unit}, "
+            f"got {new if isinstance(new, str) and len(new) < 30 else _shown(new)}",
         )
     return number
 

@@ -87,10 +87,13 @@ class StageCache:
         self._lock = threading.Lock()
 
     @staticmethod
-    def on_disk(start: Callable[[Callable[[], object]], object] | None = None) -> StageCache:
+    def on_disk(
+        start: Callable[[Callable[[], object]], object] = lambda work: work(),
+        memory_bytes: int = MEMORY_BYTES,
+    ) -> StageCache:
         """With files in the cache folder."""
         files = StageFiles(cache_folder() / "stages")
-        return StageCache(files=files) if start is None else StageCache(files=files, start=start)
+        return StageCache(memory_bytes=memory_bytes, files=files, start=start)
 
     @property
     def used_bytes(self) -> int:
@@ -146,6 +149,12 @@ class StageCache:
         """Keep the people of all steps."""
         if self._get("tracks", key) is None:
             self._put("tracks", key, tracks)
+
+    def clear(self) -> None:
+        """Let go of everything in memory."""
+        with self._lock:
+            self._kept.clear()
+            self._used = 0
 
     def _get(self, stage: Stage, key: str) -> Any:
         with self._lock:

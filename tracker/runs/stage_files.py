@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 from numpy.lib.npyio import NpzFile
 
+from tracker.placing import sync_folder
 from tracker.runs.columns import pack, unpack
 from tracker.single_view.protocol import ViewResult
 
@@ -123,6 +124,7 @@ class StageFiles:
                 file.flush()
                 os.fsync(file.fileno())
             os.replace(begun, path)
+            sync_folder(self._folder)
         except OSError as error:
             logger.warning("%s cannot be written: %s", path, error)
             if begun is not None:

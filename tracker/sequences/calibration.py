@@ -9,11 +9,14 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.camera import Camera
-from tracker.sequences.fields import Fields, listed, shown
+from tracker.sequences.fields import LARGEST, Fields, listed, shown
 from tracker.sequences.sequence import Room, SequenceError
 
 POSE = ("K", "distortion", "lens", "R", "t")
 """The fields that, without ``projection``, say how a camera sees."""
+
+LEAST_FOCAL = 0.1
+"""Pixels; of a real camera it is about the size of its picture."""
 
 ROTATION_TOLERANCE = 2e-3
 """How far R Rᵀ may be from the identity: entries written with three decimals pass."""
@@ -33,9 +36,18 @@ def read_camera(name: str, image_size: tuple[int, int], fields: Fields) -> Camer
             )
         projection = fields.matrix("projection", 3, 4)
         try:
-            return Camera.from_projection(name, image_size, projection)
+            with np.errstate(all="ignore"):
+                camera = Camera.from_projection(name, image_size, projection)
         except ValueError as error:
             raise fields.error("projection", str(error)) from None
+        _check_size(fields, "projection", camera.intrinsics)
+        if not np.abs(camera.translation).max() <= LARGEST:
+            raise fields.error(
+                "projection",
+                f"expected a camera within {LARGEST:g} m of the origin, found one at "
+                f"{np.abs(camera.translation).max():.4g} m",
+            )
+        return camera
     missing = [key for key in ("K", "R", "t") if key not in fields]
     if missing:
         raise SequenceError(
@@ -65,13 +77,27 @@ def _intrinsics(fields: Fields) -> Float[ndarray, "3 3"]:
     if matrix[0, 0] <= 0.0 or matrix[1, 1] <= 0.0:
         found = f"{matrix[0, 0]:g} and {matrix[1, 1]:g}"
         raise fields.error("K", f"expected focal lengths fx and fy above 0 pixels, found {found}")
+    _check_size(fields, "K", matrix)
     return matrix
+
+
+def _check_size(fields: Fields, field: str, matrix: Float[ndarray, "3 3"]) -> None:
+    """Whether K is one that a camera can have, so that nothing later overflows."""
+    focal = matrix[[0, 1], [0, 1]]
+    if not (np.abs(matrix).max() <= LARGEST and focal.min() >= LEAST_FOCAL):
+        raise fields.error(
+            field,
+            f"expected focal lengths fx and fy from {LEAST_FOCAL:g} to {LARGEST:g} pixels, and "
+            f"nothing larger in K, found fx = {focal[0]:.4g}, fy = {focal[1]:.4g} and "
+            f"{np.abs(matrix).max():.4g} at most",
+        )
 
 
 def _rotation(fields: Fields) -> Float[ndarray, "3 3"]:
     matrix = fields.matrix("R", 3, 3)
     error = float(np.abs(matrix @ matrix.T - np.eye(3)).max())
-    determinant = float(np.linalg.det(matrix))
+    with np.errstate(all="ignore"):  # of what is no rotation at all
+        determinant = float(np.linalg.det(matrix))
     if error > ROTATION_TOLERANCE:
         raise fields.error(
             "R",

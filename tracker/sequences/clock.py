@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,9 @@ FIELDS = ("fps", "time_offset", "timestamps")
 """The fields of a camera that give it a clock of its own."""
 
 _LONGEST_OFFSET = 86400.0
+
+_LATEST = 1e19
+"""Of a time stamp: some count from 1970, in nanoseconds."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,7 +130,7 @@ def read_timing(fields: Fields, folder: Path, where: str, stamps: Path | None) -
     """
     timing = Timing(
         first_frame=fields.integer("first_frame", 0),
-        fps=fields.number("fps", above=0.0, at_most=1000.0) if "fps" in fields else None,
+        fps=fields.rate("fps") if "fps" in fields else None,
         time_offset=fields.number("time_offset", above=-_LONGEST_OFFSET, at_most=_LONGEST_OFFSET)
         if "time_offset" in fields
         else 0.0,
@@ -154,7 +156,7 @@ def _stamps(file: Path, where: str, camera: str) -> tuple[float, ...]:
         where,
         needed=("frame_time",),
         optional={"port": -1.0, "cam_id": -1.0},
-        largest=math.inf,  # some count from 1970, in nanoseconds
+        largest=_LATEST,
     )
     ports = columns.values["port" if "port" in columns.names else "cam_id"]
     rows = np.ones(len(columns), dtype=bool)

@@ -35,6 +35,15 @@ def unguarded(text: str) -> str:
     return _GUARDED.sub(r"\1", text)
 
 
+MOST_BYTES = 256 * 2**20
+"""Of a file: some hours of a crowd."""
+
+MOST_ROWS = 5_000_000
+
+MOST_COLUMNS = 10_000
+"""A track file has four a camera."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
     """Named columns of finite numbers, N rows in the file's order.
@@ -142,7 +151,8 @@ def read_columns(
     optional = optional or {}
     lines, numbers = _lines(path, where)
     header = (lines[0] if lines else "").strip()
-    names = tuple(called(cell.strip()) for cell in next(csv.reader([header]), []))
+    first = numbers[0] if numbers else 1
+    names = tuple(called(cell.strip()) for cell in _cells(header, where, first))
     _check_header(names, where, numbers[0] if numbers else 1, needed, optional)
     # a column may be needed although its cells may be empty
     wanted = [name for name in dict.fromkeys((*needed, *optional, *blank)) if name in names]
@@ -160,6 +170,12 @@ def read_columns(
 def _lines(path: Path, where: str) -> tuple[list[str], list[int]]:
     """The header and the rows, without line ends, and their line numbers."""
     try:
+        size = path.stat().st_size
+        if size > MOST_BYTES:
+            raise SequenceError(
+                f"{where}: expected a table of at most {MOST_BYTES / 2**20:.0f} MB, found "
+                f"{size / 2**20:,.0f} MB; split the recording"
+            )
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise SequenceError(f"{where}: cannot be read ({error.strerror})") from None
@@ -175,7 +191,21 @@ def _lines(path: Path, where: str) -> tuple[list[str], list[int]]:
         if line.strip() and (lines or not line.startswith("#")):
             lines.append(line.rstrip("\r"))
             numbers.append(number)
+    if len(lines) > MOST_ROWS + 1:
+        raise SequenceError(
+            f"{where}, line {numbers[-1]}: expected at most {MOST_ROWS:,} rows, found "
+            f"{len(lines) - 1:,}; split the recording"
+        )
     return lines, numbers
+
+
+def _cells(line: str, where: str, number: int) -> list[str]:
+    try:
+        return next(csv.reader([line]), [])
+    except csv.Error as error:  # a cell of hundreds of kilobytes
+        raise SequenceError(
+            f"{where}, line {number}: expected numbers between commas, found what is none ({error})"
+        ) from None
 
 
 def _check_header(
@@ -185,6 +215,10 @@ def _check_header(
     needed: tuple[str, ...],
     optional: Mapping[str, float],
 ) -> None:
+    if len(names) > MOST_COLUMNS:
+        raise SequenceError(
+            f"{where}, line {line}: expected at most {MOST_COLUMNS:,} columns, found {len(names):,}"
+        )
     missing = [name for name in needed if name not in names]
     if missing:
         expected = ",".join((*needed, *(f"[{name}]" for name in optional)))
@@ -227,7 +261,7 @@ def _parse_slowly(
     table = np.empty((len(lines), len(wanted)))
     places = [names.index(name) for name in wanted]
     for row, (line, number) in enumerate(zip(lines, numbers, strict=True)):
-        cells = next(csv.reader([line]))
+        cells = _cells(line, where, number)
         if len(cells) != len(names):
             raise SequenceError(
                 f"{where}, line {number}: expected {len(names)} columns as in the header, "

@@ -21,6 +21,15 @@ LARGEST_IN_MATRIX = 1e12
 SMALLEST = 1e-4
 """Metres or pixels: what must be positive is not smaller, so that its square can be divided by."""
 
+SLOWEST, FASTEST = 1e-3, 1000.0
+"""Frames a second: from a picture in a quarter of an hour to a high-speed camera."""
+
+LARGEST_COUNT = 10_000_000
+"""Of steps, or of frames of a file: four days at 25 a second."""
+
+LONGEST_TEXT = 1000
+"""Characters of a name, a path or a description."""
+
 MISSING: Any = object()
 """The default of a field that must be there."""
 
@@ -42,7 +51,10 @@ def listed(words: Iterable[str]) -> str:
 
 def shown(value: Any) -> str:
     """A value as a message shows it: short, in TOML's notation."""
-    text = "true" if value is True else "false" if value is False else repr(value)
+    try:
+        text = "true" if value is True else "false" if value is False else repr(value)
+    except ValueError:  # Python writes no whole number of thousands of digits
+        return "a number with thousands of digits"
     if isinstance(value, str):
         text = f'"{value}"'
     return text if len(text) <= 60 else f"{text[:57]}…"
@@ -72,7 +84,7 @@ class Fields:
             if name not in self._known:
                 hint = did_you_mean(name, set(self._known) - set(values))
                 hint = hint or f"; the fields here are {listed(self._known)}"
-                raise SequenceError(f'{where}: unknown field "{name}"{hint}')
+                raise SequenceError(f"{where}: unknown field {shown(name)}{hint}")
 
     def __contains__(self, name: str) -> bool:
         return name in self._values
@@ -95,7 +107,23 @@ class Fields:
             raise self.error(name, f"expected text in quotes, found {shown(value)}")
         if not value.strip() and value != default:
             raise self.error(name, "expected some text, found none")
-        return " ".join(value.split())
+        if len(value) > LONGEST_TEXT:
+            raise self.error(
+                name, f"expected at most {LONGEST_TEXT} characters, found {len(value):,}"
+            )
+        words = " ".join(value.split())
+        if not words.isprintable():
+            odd = next(c for c in words if not c.isprintable())
+            raise self.error(
+                name,
+                f"expected text that can be printed, found the character U+{ord(odd):04X}; "
+                "write it without",
+            )
+        return words
+
+    def rate(self, name: str) -> float:
+        """Frames or steps a second."""
+        return self.number(name, above=SLOWEST, at_most=FASTEST)
 
     def number(self, name: str, *, above: float, at_most: float) -> float:
         """A finite number in (above, at_most]."""
@@ -108,7 +136,7 @@ class Fields:
     def integer(
         self, name: str, default: Any = MISSING, *, minimum: int = 0, maximum: int | None = None
     ) -> int:
-        """A whole number in [minimum, maximum]."""
+        """A whole number in [minimum, maximum]; up to :data:`LARGEST_COUNT` where none is given."""
         expected = f"a whole number of at least {minimum}"
         if maximum is not None:
             expected = f"a whole number from {minimum} to {maximum}"
@@ -116,6 +144,9 @@ class Fields:
             expected = f"{minimum}"
         value = self._get(name, default, expected)
         good = isinstance(value, int) and not isinstance(value, bool) and value >= minimum
+        if good and maximum is None and value > LARGEST_COUNT:
+            maximum = LARGEST_COUNT
+            expected = f"a whole number from {minimum} to {maximum}"
         if not good or (maximum is not None and value > maximum):
             raise self.error(name, f"expected {expected}, found {shown(value)}")
         return int(value)
@@ -197,7 +228,7 @@ def _called(word: str, number: int, item: Any) -> str:
     """A table by its name where it has one: ``camera "cam2"``, else ``camera 2``."""
     name = item.get("name") if isinstance(item, dict) else None
     plain = word.strip("[]")
-    return f'{plain} "{name}"' if isinstance(name, str) and name else f"{plain} {number}"
+    return f"{plain} {shown(name)}" if isinstance(name, str) and name else f"{plain} {number}"
 
 
 def is_number(value: Any, largest: float) -> bool:

@@ -16,6 +16,7 @@ from tracker.sequences.views import Source, Time
 
 _SAME_RATE = 0.01  # share by which videos of one rate may differ
 _SCORE_THRESHOLD = 0.3
+_MOST_BOXES = 50_000  # of one camera, from which room and size are found out: more tell no more
 
 
 def check_missing(fields: Fields, cameras: Many[Fields]) -> None:
@@ -61,7 +62,7 @@ def find_time(sources: Many[Source], fps: float | None, steps: int | None, field
         rates = [s.timing.fps or (s.pictures.fps if s.pictures else None) for s in sources]
         known = [rate for rate in rates if rate]
         if not known:
-            fields.number("fps", above=0.0, at_most=1000.0)  # says what is missing
+            fields.rate("fps")  # says what is missing
         fps = max(known)
         own_rates = min(known) < (1.0 - _SAME_RATE) * fps
         told.append(f"fps is not stated: {fps:g} as the {'fastest ' if own_rates else ''}video has")
@@ -105,11 +106,13 @@ def find_room(
     agreed = None
     if sum(view.detections is not None for view in views) > 1:
         rays = []
+        most = max(len(view.detections.frames) for view in views if view.detections is not None)
+        every = 1 + most // _MOST_BOXES  # the same steps of all cameras
         for view in views:
             own = view.detections
-            kept = (
-                np.zeros(0, int) if own is None else np.flatnonzero(own.scores >= _SCORE_THRESHOLD)
-            )
+            kept = np.zeros(0, int)
+            if own is not None:
+                kept = np.flatnonzero((own.scores >= _SCORE_THRESHOLD) & (own.frames % every == 0))
             frames = np.zeros(0, int) if own is None else own.frames[kept]
             boxes = np.zeros((0, 4)) if own is None else own.boxes[kept]
             rays.append(rays_of(frames, boxes, view.camera))

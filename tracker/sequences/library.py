@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import os
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -11,7 +13,7 @@ from typing import Literal
 
 from tracker.folders import cache_folder
 from tracker.sequences.fields import did_you_mean, listed
-from tracker.sequences.reader import FILE, read_sequence, read_summary
+from tracker.sequences.reader import FILE, given_folder, read_sequence, read_summary
 from tracker.sequences.sequence import DetectorFile, Sequence, SequenceError
 
 DEFAULT_CAMERAS = 2
@@ -60,8 +62,18 @@ def available(data: Path | None = None) -> list[SequenceEntry]:
         for name, room in ROOMS.items()
     ]
     if data is not None and data.is_dir():
-        entries += [_entry(path.parent) for path in sorted(data.glob(f"*/{FILE}"))]
+        entries += [_entry(folder) for folder in _folders(data)]
     return entries
+
+
+def _folders(data: Path) -> list[Path]:
+    """Folders with a sequence's file, also where some of them may not be looked into."""
+    try:
+        with os.scandir(data) as inside:
+            names = sorted(entry.name for entry in inside if not entry.name.startswith("."))
+    except OSError:
+        return []
+    return [data / name for name in names if os.path.lexists(data / name / FILE)]
 
 
 def _entry(folder: Path) -> SequenceEntry:
@@ -70,8 +82,9 @@ def _entry(folder: Path) -> SequenceEntry:
         summary = read_summary(folder)
         description, cameras = summary.description, summary.cameras
         frames = summary.frames or 0
-    except SequenceError as problem:
-        error = str(problem)
+    except (ValueError, OSError, RecursionError, MemoryError) as problem:
+        # whatever is wrong with one folder is a line of the list, and the others stay in it
+        error = " ".join(str(problem).split()) or type(problem).__name__
     return SequenceEntry(
         name=folder.name,
         description=description,
@@ -118,7 +131,7 @@ def open_sequence(
     name = str(name_or_folder)
     if name in ROOMS:
         return _open_room(name, progress, cancelled, cameras)
-    folder = Path(name_or_folder).expanduser()
+    folder = given_folder(name_or_folder)
     if not folder.exists() and len(folder.parts) <= 1:
         hint = did_you_mean(name, ROOMS)
         raise SequenceError(
@@ -154,13 +167,14 @@ def _open_room(
     name: str, progress: Told | None, cancelled: Callable[[], bool] | None, cameras: int
 ) -> Sequence:
     from tracker.sequences.rendering import render
+    from tracker.sequences.rendering.writing import is_whole
 
     folder = rendered_folder(name, cameras)
-    if folder.exists():
-        try:
+    if is_whole(folder):
+        with contextlib.suppress(SequenceError):
             return read_sequence(folder)
-        except SequenceError:
-            shutil.rmtree(folder)  # somebody spoilt it; it can always be rendered again
+    if folder.exists():  # somebody spoilt it; it can always be rendered again
+        shutil.rmtree(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
     render(name, folder, cameras=cameras, progress=progress, cancelled=cancelled)
     return read_sequence(folder)

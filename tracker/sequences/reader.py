@@ -8,12 +8,13 @@ what was expected and what was found. What is odd but can be lived with becomes 
 from __future__ import annotations
 
 import hashlib
+import os
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
 from tracker.sequences.calibration import check_sight
-from tracker.sequences.fields import Fields, did_you_mean, shown
+from tracker.sequences.fields import LARGEST_COUNT, Fields, did_you_mean, shown
 from tracker.sequences.filling import check_missing, find_room, find_time
 from tracker.sequences.sequence import FileState, Sequence, SequenceError
 from tracker.sequences.tables import Reading, read_ground_truth
@@ -22,7 +23,13 @@ from tracker.sequences.writing.taught_fields import read_room, read_target, read
 
 FILE = "sequence.toml"
 FORMAT = 1
-MOST_FRAMES = 10_000_000
+MOST_FRAMES = LARGEST_COUNT
+MOST_BYTES = 4 * 2**20
+"""Of a sequence.toml: thousands of templates and entrances."""
+LONGEST_NAME, LONGEST_PATH = 255, 4000
+"""Bytes of the name of a file or folder, and of a whole path, as file systems have them."""
+MOST_DEPTH = 12
+"""Tables and lists within each other; the format itself needs five."""
 
 TOP = ("format", "name", "description", "fps", "frames", "room", "target", "camera", "template",
        "ground_truth")  # fmt: skip
@@ -59,7 +66,7 @@ def read_sequence(folder: Path | str) -> Sequence:
     stated_frames = (
         fields.integer("frames", minimum=1, maximum=MOST_FRAMES) if "frames" in fields else None
     )
-    stated_fps = fields.number("fps", above=0.0, at_most=1000.0) if "fps" in fields else None
+    stated_fps = fields.rate("fps") if "fps" in fields else None
     room = read_room(fields) if "room" in fields else None
     half_extents = read_target(fields)
     check_missing(fields, _tables(fields))
@@ -110,7 +117,7 @@ def read_summary(folder: Path | str) -> SequenceSummary:
     return SequenceSummary(
         name=fields.text("name"),
         description=fields.text("description", ""),
-        fps=fields.number("fps", above=0.0, at_most=1000.0) if "fps" in fields else None,
+        fps=fields.rate("fps") if "fps" in fields else None,
         frames=fields.integer("frames", minimum=1, maximum=MOST_FRAMES)
         if "frames" in fields
         else None,
@@ -130,8 +137,14 @@ def _find(folder: Path) -> tuple[Path, str]:
             raise SequenceError(f"{folder}: expected a folder with a {FILE} in it, found a file")
         folder = folder.resolve()
         if not (folder / FILE).is_file():
+            if os.path.lexists(folder / FILE):
+                raise SequenceError(
+                    f"{folder.name}/{FILE}: expected a file, found a folder, a pipe or a link that "
+                    "leads nowhere; put the file there"
+                )
             near = did_you_mean(FILE, _names(folder)) or f"; every sequence folder needs a {FILE}"
             raise SequenceError(f"{folder}: there is no {FILE} in this folder{near}")
+        check_own_file(folder)
         return folder, (folder / FILE).read_text(encoding="utf-8-sig")
     except OSError as error:
         raise SequenceError(
@@ -143,6 +156,63 @@ def _find(folder: Path) -> tuple[Path, str]:
             f"{folder.name}/{FILE}, line {line}: expected text in UTF-8, found byte "
             f"0x{error.object[error.start]:02x}; save the file as UTF-8"
         ) from None
+
+
+def given_folder(text: str | Path) -> Path:
+    """A path as somebody wrote it, with ``~`` for a person's home.
+
+    Raises:
+        SequenceError: If no file system has such a name, or there is no such person.
+    """
+    written = str(text)
+    if not written.isprintable():
+        odd = next(c for c in written if not c.isprintable())
+        raise SequenceError(
+            f"{shown(written)!s}: expected a path that can be printed, found the character "
+            f"U+{ord(odd):04X} in it; name another"
+        )
+    try:
+        path = Path(text).expanduser()
+    except RuntimeError as error:
+        raise SequenceError(f"{shown(written)}: is no path ({error}); write it in full") from None
+    longest = max((len(os.fsencode(part)) for part in path.parts), default=0)
+    if longest > LONGEST_NAME or len(os.fsencode(path)) > LONGEST_PATH:
+        raise SequenceError(
+            f"{shown(written)}: expected a path of at most {LONGEST_PATH} bytes, each name in it "
+            f"of at most {LONGEST_NAME}, found {len(written)} characters; shorten it"
+        )
+    return path
+
+
+def check_own_file(folder: Path) -> None:
+    """Whether a folder's own file may be read, and saved over.
+
+    Raises:
+        SequenceError: If it is too large, or a link that leads out of the folder.
+        OSError: If it is not there.
+    """
+    file = folder / FILE
+    if not file.resolve().is_relative_to(folder.resolve()):
+        raise SequenceError(
+            f"{folder.name}/{FILE}: expected a file in the folder, found a link to {file.resolve()}"
+            "; copy that file into the folder"
+        )
+    size = file.stat().st_size
+    if size > MOST_BYTES:
+        raise SequenceError(
+            f"{folder.name}/{FILE}: expected at most {MOST_BYTES // 2**20} MB, found "
+            f"{size / 2**20:,.0f} MB; put tables of boxes into CSV files"
+        )
+
+
+def _depth(values: object) -> int:
+    """How many tables and lists are within each other; stops counting beyond what is allowed."""
+    level, depth = [values], 0
+    while level and depth <= MOST_DEPTH:
+        inner = [one for one in level if isinstance(one, dict | list)]
+        level = [v for one in inner for v in (one.values() if isinstance(one, dict) else one)]
+        depth += 1 if inner else 0
+    return depth
 
 
 def _names(folder: Path) -> list[str]:
@@ -160,12 +230,18 @@ def _parse(folder: Path, text: str) -> Fields:
         raise SequenceError(f"{where}, {place}: is not valid TOML: {problem.lower()}") from None
     except RecursionError:
         raise SequenceError(
-            f"{where}: expected tables and lists a few levels deep, found hundreds; remove them"
+            f"{where}: expected tables and lists at most {MOST_DEPTH} levels deep, found hundreds; "
+            "remove them"
         ) from None
     except ValueError:  # of a whole number with thousands of digits
         raise SequenceError(
             f"{where}: expected numbers of at most 18 digits, found one with thousands; shorten it"
         ) from None
+    if _depth(values) > MOST_DEPTH:
+        raise SequenceError(
+            f"{where}: expected tables and lists at most {MOST_DEPTH} levels deep, found more; "
+            "remove them"
+        )
     version = values.get("format", FORMAT)
     if version != FORMAT:
         raise SequenceError(

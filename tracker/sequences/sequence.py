@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.camera import Camera
+from tracker.visible import visible
 
 if TYPE_CHECKING:
     from tracker.sequences.clock import Clock
@@ -26,6 +27,9 @@ PRESETS: dict[str, tuple[float, float, float]] = {
 
 class SequenceError(ValueError):
     """A sequence cannot be read; the message names file and field, expected and found."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(visible(message))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

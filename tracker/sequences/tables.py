@@ -12,11 +12,15 @@ from numpy import ndarray
 
 from tracker.sequences.clock import Clock
 from tracker.sequences.csv_columns import Columns, read_columns
-from tracker.sequences.fields import Fields
+from tracker.sequences.fields import SMALLEST, Fields, shown
 from tracker.sequences.media import locate
 from tracker.sequences.sequence import Detections, GroundTruth, SequenceError
 
 BOX = ("left", "top", "width", "height")
+
+MOST_BOXES = 1000
+"""Of one camera at one step: a detector finds fewer, and the pairs of two cameras are their
+product."""
 
 KNOWN_STEPS = "steps"
 """The comment of a truth that says of which steps it knows: ``# steps = 0-99 150-300``."""
@@ -93,12 +97,27 @@ class BoxTable:
                 raise columns.error(line, name, "expected a number, found an empty cell")
         for name in ("width", "height"):
             columns.require(name, ~is_box | (columns.values[name] > 0.0), "a size above 0 pixels")
+            columns.require(
+                name,
+                ~is_box | (columns.values[name] >= SMALLEST),
+                f"a size of at least {SMALLEST:g} pixels",
+            )
         scores = columns.values["score"]
         within = (scores >= 0.0) & (scores <= 1.0)
         columns.require("score", ~is_box | within, "a score from 0 to 1")
         looked_at = self._looked_at(steps, clock, of_row)
         kept = np.flatnonzero(is_box & (of_row >= 0))
         kept = kept[np.argsort(of_row[kept], kind="stable")]
+        counts = np.bincount(of_row[kept], minlength=1)
+        if counts.max() > MOST_BOXES:
+            step = int(np.argmax(counts))
+            last = kept[np.searchsorted(of_row[kept], step) + MOST_BOXES]
+            raise columns.error(
+                int(columns.lines[last]),
+                "frame",
+                f"expected at most {MOST_BOXES:,} boxes at a step, found {int(counts[step]):,} at "
+                f"step {step}; leave out those with low scores",
+            )
         boxes: Float[ndarray, "D 4"] = columns.stacked(*BOX)[kept]
         return Detections(of_row[kept], boxes, scores[kept]), looked_at
 
@@ -200,10 +219,10 @@ def _known_steps(path: Path, where: str, frames: int) -> Bool[ndarray, " F"] | N
             known = np.zeros(frames, dtype=bool)
             for part in ranges.split():
                 first, _, last = part.partition("-")
-                if not (first.isdecimal() and (last or first).isdecimal()):
+                if not (first.isdecimal() and (last or first).isdecimal() and len(part) < 20):
                     raise SequenceError(
                         f"{where}, line {number}: {KNOWN_STEPS}: expected ranges like "
-                        f"0-99 150-300, found {part}"
+                        f"0-99 150-300, found {shown(part)}"
                     )
                 known[int(first) : int(last or first) + 1] = True
             return known

@@ -11,21 +11,20 @@ AVI and MPEG files) are never jumped in: they are decoded from their start.
 from __future__ import annotations
 
 import contextlib
-import os
+import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-
-# broken frames are reported by who reads them, in words; FFmpeg's own lines would litter stderr
-os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 import cv2
 import numpy as np
 from jaxtyping import Int, UInt8
 from numpy import ndarray
 
-cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)
+from tracker.sequences.containers import MOST_PIXELS, VideoError, opened
+
+__all__ = ["VideoDecoder", "VideoError", "VideoIndex", "index_video", "read_image"]
 
 DECODED_TO_VERIFY = 24
 """Frames decoded from the start to see whether the time stamps hold; more than any reordering."""
@@ -34,8 +33,11 @@ RUN_UP = 16
 """Frames that OpenCV lands before the one it is to jump to, to decode them all again."""
 
 
-class VideoError(ValueError):
-    """A file cannot be read as a video."""
+LARGEST_IMAGE = 2**28
+"""Bytes of one image file: more than any camera's picture has, whatever its compression."""
+
+MOST_FRAMES = 10_000_000
+"""Of one video: four days at 25 a second."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,14 +70,14 @@ def index_video(path: Path) -> VideoIndex:
 @lru_cache(maxsize=64)
 def _index_video(path: Path, bytes_: int, changed: int) -> VideoIndex:
     stamps, is_key = _scan(path)
-    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    capture = opened(path)
     try:
         decoded = list(_first_times(capture, DECODED_TO_VERIFY))
         if not decoded:
             raise VideoError("no picture in it can be decoded")
         size = (
-            int(capture.get(cv2.CAP_PROP_FRAME_WIDTH)),
-            int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT)),
+            int(capture.get(_SIDES[0])),
+            int(capture.get(_SIDES[1])),
         )
         claimed = float(capture.get(cv2.CAP_PROP_FPS))
         frames = len(stamps)
@@ -112,13 +114,24 @@ def _rate(times: Int[ndarray, " F"], claimed: float) -> float | None:
     return claimed if 0.0 < claimed < 1000.0 else None
 
 
+_SIDES = (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
+
+
 def _scan(path: Path) -> tuple[Int[ndarray, " F"], ndarray]:
     """Time stamp and key flag of every packet, in the file's order, without decoding."""
-    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_FORMAT, -1])
+    capture = opened(path, packets=True)
     stamps: list[int] = []
     keys: list[bool] = []
     try:
+        width, height = (int(capture.get(side)) for side in _SIDES)
+        if width * height > MOST_PIXELS:
+            raise VideoError(
+                f"expected pictures of at most {MOST_PIXELS:,} pixels, found {width}×{height}; "
+                "make them smaller"
+            )
         while capture.grab():
+            if len(stamps) >= MOST_FRAMES:
+                raise VideoError(f"expected at most {MOST_FRAMES:,} frames, found more; cut it")
             stamps.append(_time(capture))
             keys.append(capture.get(cv2.CAP_PROP_LRF_HAS_KEY_FRAME) > 0.0)
     finally:
@@ -185,7 +198,7 @@ class VideoDecoder:
             if self._at != frame or self._broken or self._capture is None:
                 return None
             good, picture = self._capture.retrieve()
-        except cv2.error:  # it refused a spoilt frame: begin afresh with the next one
+        except (cv2.error, VideoError, OSError):  # a spoilt frame, or another file in its place
             self.close()
             return None
         return np.asarray(picture, dtype=np.uint8) if good else None
@@ -224,7 +237,7 @@ class VideoDecoder:
 
     def _open(self) -> None:
         self.close()
-        self._capture = cv2.VideoCapture(str(self._index.path), cv2.CAP_FFMPEG)
+        self._capture = opened(self._index.path)
         self._at, self._broken = -1, False
 
     def _advance_to(self, frame: int) -> None:
@@ -259,6 +272,9 @@ class VideoDecoder:
 def read_image(path: Path) -> UInt8[ndarray, "h w 3"] | None:
     """One picture file, BGR; None where it is missing or not a picture."""
     with contextlib.suppress(OSError, cv2.error):
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode) or status.st_size > LARGEST_IMAGE:
+            return None
         data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
         picture = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
         return None if picture is None else np.asarray(picture, dtype=np.uint8)

@@ -12,6 +12,7 @@ from numpy import ndarray
 
 from tracker.sequences.calibration import POSE, read_camera
 from tracker.sequences.clock import FIELDS, Timing, read_timing
+from tracker.sequences.containers import MOST_PIXELS
 from tracker.sequences.fields import Fields, shown
 from tracker.sequences.media import Pictures, check_pictures, find_images, locate, probe
 from tracker.sequences.sequence import View
@@ -135,6 +136,11 @@ def _image_size(fields: Fields, pictures: Pictures | None) -> tuple[int, int]:
             found = f"{size[0]:g} and {size[1]:g}"
             raise fields.error(
                 "image_size", f"expected two whole numbers of pixels up to 65535, found {found}"
+            )
+        if size.prod() > MOST_PIXELS:
+            raise fields.error(
+                "image_size",
+                f"expected at most {MOST_PIXELS:,} pixels, found {size[0]:g} × {size[1]:g}",
             )
         return int(size[0]), int(size[1])
     if pictures is not None:

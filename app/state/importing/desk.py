@@ -10,10 +10,11 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from app.errors import sentence
 from app.state.importing.draft import Draft, folder_name
 from app.state.importing.uploads import Announced, UploadError
 from tracker.folders import settings_folder
-from tracker.sequences.reader import FILE
+from tracker.sequences.reader import FILE, given_folder
 
 MOST_DRAFTS = 4
 """Imports that are begun and neither written nor given up; the oldest makes room for another."""
@@ -67,10 +68,10 @@ class Desk:
             UploadError: If it is not there, or not below a folder that may be opened.
         """
         try:
-            given = Path(path).expanduser()
+            given = given_folder(path)
             place = (self._data / given).resolve()
         except (ValueError, RuntimeError) as error:  # a null byte, no such person, a circle
-            raise UploadError(f"{path!r}: is no path ({error}); check it") from None
+            raise UploadError(sentence(error)) from None
         if place.name == FILE:
             place = place.parent
         if (place / FILE).is_file():

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import logging
 from pathlib import Path
 
-from app.state.kept.json_files import write_json
+from app.state.kept.json_files import read_json, set_aside, write_json
 from tracker.sequences.writing.teaching import Values, changes
 
 logger = logging.getLogger("app")
@@ -41,14 +40,16 @@ class Drafts:
             return self._kept.get(sequence)
         path = self._file(sequence)
         try:
-            draft = json.loads(path.read_text(encoding="utf-8"))
+            draft = read_json(path)
             saved, taught = draft["saved"], draft["taught"]
             changes(saved, taught)  # raises where another version wrote them
+            self._kept[sequence] = saved, taught
             return saved, taught
         except FileNotFoundError:
             return None
         except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
-            logger.warning("%s cannot be read and is left as it is: %s", path, error)
+            aside = set_aside(path)
+            logger.warning("%s cannot be read and is now %s: %s", path, aside or path, error)
             return None
 
     def forget(self, sequence: Path) -> None:
@@ -56,6 +57,11 @@ class Drafts:
         self._kept.pop(sequence, None)
         if self._folder is not None:
             self._file(sequence).unlink(missing_ok=True)
+
+    def file_of(self, sequence: Path) -> Path | None:
+        """The file of a draft; None where there is none."""
+        kept = self._folder is not None and sequence in self._kept
+        return self._file(sequence) if kept else None
 
     def _file(self, sequence: Path) -> Path:
         assert self._folder is not None

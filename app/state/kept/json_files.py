@@ -1,12 +1,25 @@
-"""Small files that a person would miss, written atomically: to a temporary file, then renamed."""
+"""Small files that a person would miss: written wholly or not at all, and checked when read.
+
+A file holds ``{"sha256": …, "value": …}``: a byte that a disk changed is found out. Whoever edits
+one by hand leaves the line ``sha256`` out. Files of before, with the value alone, are read too.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
+import logging
 import os
-import tempfile
 from pathlib import Path
 from typing import Any
+
+from tracker.placing import write_whole
+
+logger = logging.getLogger("app")
+
+_KEYS = {"sha256", "value"}
+
+MOST_BYTES = 64 * 2**20
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -16,11 +29,49 @@ def write_json(path: Path, value: Any) -> None:
         OSError: If the place cannot be written to; what was there still is.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, begun = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
+    document = {"sha256": _sum(value), "value": value}
+    write_whole(path, json.dumps(document, indent=2, ensure_ascii=False).encode("utf-8"))
+
+
+def read_json(path: Path) -> Any:
+    """The value of a file.
+
+    Raises:
+        OSError: If it cannot be read.
+        ValueError: If it is spoilt, in words.
+    """
+    if path.stat().st_size > MOST_BYTES:
+        raise ValueError(f"expected at most {MOST_BYTES >> 20} MB, found a larger file")
     try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            json.dump(value, file, indent=2, ensure_ascii=False)
-        os.replace(begun, path)
-    except BaseException:
-        Path(begun).unlink(missing_ok=True)
-        raise
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (UnicodeDecodeError, RecursionError):
+        raise ValueError("it is no JSON any more") from None
+    if not isinstance(found, dict) or not _KEYS >= set(found) or "value" not in found:
+        return found
+    value = found["value"]
+    if "sha256" in found and found["sha256"] != _sum(value):
+        raise ValueError(
+            "it was changed since it was written; where that was you, take the line sha256 out"
+        )
+    return value
+
+
+def set_aside(path: Path) -> Path | None:
+    """Give a spoilt file another name, so that nothing of it is lost; None where that fails."""
+    number = 0
+    while True:
+        aside = path.with_suffix(f".unreadable{number or ''}.json")
+        number += 1
+        if not os.path.lexists(aside):
+            break
+    try:
+        path.rename(aside)
+    except OSError as error:
+        logger.warning("%s cannot be read and not be set aside: %s", path, error)
+        return None
+    return aside
+
+
+def _sum(value: Any) -> str:
+    text = json.dumps(value, sort_keys=True, ensure_ascii=False, separators=(",", ":"))
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()

@@ -1,21 +1,23 @@
 """A person's own presets: named sets of values, kept in a file for every later start.
 
 The file holds one object by name; each has the values, by key, that were not at their
-defaults. It is written atomically.
+defaults. Several workbenches may have it open: each changes what is in the file then, one at a
+time, so that none undoes what another saved.
 """
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from app.state.kept.json_files import write_json
+from app.errors import sentence
+from app.state.kept.json_files import read_json, set_aside, write_json
 from app.state.snapshot import Presets
 from app.state.workbench import Workbench
 from tracker import parameters as table
 from tracker.parameters import ParameterError
+from tracker.placing import locked
 
 YOURS = "GET /api/state lists your presets."
 
@@ -35,17 +37,8 @@ class OwnPresets:
         """
         self._workbench = workbench
         self._path = path
-        if path is not None and path.is_file():
-            try:
-                workbench.set_presets(_read(path))
-            except (OSError, ValueError) as error:
-                aside = path.with_suffix(".unreadable.json")
-                path.replace(aside)
-                workbench.notify(
-                    "warn",
-                    f"Your presets cannot be read: {error}.",
-                    f"The file was moved to {aside}; mend it there and move it back.",
-                )
+        if path is not None:
+            workbench.set_presets(self._read(path))
 
     def save(self, name: str) -> None:
         """Keep what differs from the defaults now under a name, instead of what had it before.
@@ -62,7 +55,8 @@ class OwnPresets:
         Raises:
             ParameterError: If the name is empty, too long or a built-in preset's.
         """
-        self._put({**self._workbench.snapshot().presets, _checked(name): values})
+        name = _checked(name)
+        self._change(lambda presets: {**presets, name: values})
 
     def rename(self, name: str, new: str) -> None:
         """Give a preset another name, which no other one may have.
@@ -70,11 +64,15 @@ class OwnPresets:
         Raises:
             ParameterError: If there is no such preset, or the new name does not do.
         """
-        presets = self._known(name)
         new = _checked(new)
-        if new != name and new in presets:
-            raise ParameterError("name", f"expected a name that is free, got {new!r}", YOURS)
-        self._put({new if key == name else key: values for key, values in presets.items()})
+
+        def renamed(presets: Presets) -> Presets:
+            _check_known(presets, name)
+            if new != name and new in presets:
+                raise ParameterError("name", f"expected a name that is free, got {new!r}", YOURS)
+            return {new if key == name else key: values for key, values in presets.items()}
+
+        self._change(renamed)
 
     def remove(self, name: str) -> None:
         """Forget a preset.
@@ -82,21 +80,48 @@ class OwnPresets:
         Raises:
             ParameterError: If there is no such preset.
         """
-        self._put({key: values for key, values in self._known(name).items() if key != name})
 
-    def _known(self, name: str) -> Presets:
-        presets = self._workbench.snapshot().presets
-        if name not in presets:
-            known = ", ".join(presets) or "none is saved"
+        def removed(presets: Presets) -> Presets:
+            _check_known(presets, name)
+            return {key: values for key, values in presets.items() if key != name}
+
+        self._change(removed)
+
+    def _change(self, change: Callable[[Presets], Presets]) -> None:
+        """Change what is saved: in the file as it is now, whoever wrote it last.
+
+        Raises:
+            ParameterError: If the file cannot be written; the presets are as they were.
+        """
+        if self._path is None:
+            self._workbench.set_presets(change(self._workbench.snapshot().presets))
+            return
+        try:
+            with locked(self._path):
+                presets = change(self._read(self._path))
+                write_json(self._path, dict(presets))
+        except OSError as error:
             raise ParameterError(
-                "name", f"expected one of your presets ({known}), got {name!r}", YOURS
-            )
-        return presets
-
-    def _put(self, presets: Presets) -> None:
-        if self._path is not None:
-            write_json(self._path, dict(presets))
+                "name", f"your presets cannot be saved: {sentence(error)}", "Make room there."
+            ) from None
         self._workbench.set_presets(presets)
+
+    def _read(self, path: Path) -> Presets:
+        """What the file has; a spoilt one is set aside, and what is known stays."""
+        try:
+            return _valid(read_json(path))
+        except FileNotFoundError:
+            return self._workbench.snapshot().presets
+        except (OSError, ValueError) as error:
+            aside = set_aside(path)
+            self._workbench.notify(
+                "warn",
+                f"Your presets cannot be read: {sentence(error)}.",
+                f"The file was moved to {aside}; mend it there and move it back."
+                if aside
+                else f"{path} was left as it is.",
+            )
+            return self._workbench.snapshot().presets
 
 
 def keep_preset(path: Path, name: str, values: Mapping[str, Any]) -> None:
@@ -107,8 +132,17 @@ def keep_preset(path: Path, name: str, values: Mapping[str, Any]) -> None:
         ValueError: If the file is not as it was written.
         OSError: If it cannot be written.
     """
-    presets = _read(path) if path.is_file() else {}
-    write_json(path, {**presets, _checked(name): dict(values)})
+    name = _checked(name)
+    with locked(path):
+        presets = _valid(read_json(path)) if path.is_file() else {}
+        write_json(path, {**presets, name: dict(values)})
+
+
+def _valid(found: Any) -> Presets:
+    """What a file held, if it is an object of values for each name."""
+    if not isinstance(found, dict) or not all(isinstance(v, dict) for v in found.values()):
+        raise ValueError("expected an object of values for each name")
+    return found
 
 
 def _checked(name: str) -> str:
@@ -126,8 +160,7 @@ def _checked(name: str) -> str:
     return name
 
 
-def _read(path: Path) -> dict[str, Mapping[str, Any]]:
-    found = json.loads(path.read_text(encoding="utf-8"))
-    if not isinstance(found, dict) or not all(isinstance(v, dict) for v in found.values()):
-        raise ValueError(f"{path.name}: expected an object of values for each name")
-    return found
+def _check_known(presets: Presets, name: str) -> None:
+    if name not in presets:
+        known = ", ".join(presets) or "none is saved"
+        raise ParameterError("name", f"expected one of your presets ({known}), got {name!r}", YOURS)

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
-import secrets
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from app.state.importing.draft import small_jpeg
-from app.state.kept.json_files import write_json
+from app.state.kept.json_files import read_json, write_json
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
 from tracker.folders import cache_folder
+from tracker.placing import locked, write_whole
 from tracker.sequences import library
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.reader import FILE
@@ -80,17 +79,25 @@ class Recents:
             time.time(),
         )
         with self._lock:
-            self._list = [one, *(o for o in self._list if o.folder != one.folder)][:KEPT]
-            if self._file is not None:
-                try:
+            if self._file is None:
+                self._list = _first(one, self._list)
+                return
+            try:
+                with locked(self._file):  # of several workbenches none undoes what another noted
+                    self._list = _first(one, _read(self._file) or self._list)
                     write_json(self._file, [asdict(own) for own in self._list])
-                except OSError:
-                    self._file = None  # it cannot be kept: nobody needs to hear of that twice
+            except OSError:
+                self._list = _first(one, self._list)
+                self._file = None  # it cannot be kept: nobody needs to hear of that twice
+
+
+def _first(one: Recent, others: Iterable[Recent]) -> list[Recent]:
+    return [one, *(other for other in others if other.folder != one.folder)][:KEPT]
 
 
 def _read(file: Path | None) -> list[Recent]:
     try:
-        values = json.loads(file.read_text(encoding="utf-8")) if file is not None else []
+        values = read_json(file) if file is not None else []
         return [Recent(**value) for value in values]
     except (OSError, ValueError, TypeError):  # none yet, or of another version
         return []
@@ -115,10 +122,7 @@ def thumbnail(folder: Path, cancelled: Callable[[], bool] = lambda: False) -> by
             picture = next((one for one in found if one is not None), None)
         jpeg = None if picture is None else small_jpeg(picture)
         place.parent.mkdir(parents=True, exist_ok=True)
-        # a name of its own: two tabs may ask at once
-        partial = place.with_suffix(f".{secrets.token_hex(4)}.part")
-        partial.write_bytes(jpeg or b"")
-        partial.replace(place)
+        write_whole(place, jpeg or b"")  # two tabs may ask at once
         return jpeg
     except (SequenceError, OSError):
         return None

@@ -19,9 +19,11 @@ from functools import partial
 from pathlib import Path
 
 from app.errors import sentence
+from app.state.kept.crashes import Crashes
 from app.state.snapshot import Change, Opening, Snapshot
 from app.state.workbench import Workbench
 from app.state.workers.compiling import WORDS, Compiling
+from app.state.workers.watchdog import Watchdog
 from tracker import pipeline
 from tracker.corrections.log import open_log
 from tracker.library.keeping import run_from
@@ -31,7 +33,7 @@ from tracker.pipeline import Cancelled, Progress, Run
 from tracker.runs import gaps
 from tracker.runs.stage_cache import StageCache
 from tracker.sequences import library
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.frames import CACHE_BYTES, FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.trajectories import Trajectories, corrected
 
@@ -83,6 +85,9 @@ class Jobs:
         cache: StageCache | None = None,
         compiling: Compiling | None = None,
         computes: bool = True,
+        picture_bytes: int = CACHE_BYTES,
+        crashes: Crashes | None = None,
+        draft_of: Callable[[Path], Path | None] = lambda folder: None,
     ) -> None:
         """Begin to follow the workbench.
 
@@ -95,6 +100,9 @@ class Jobs:
             compiling: Whom to wait for before the first run;
                 closed with this.
             computes: Whether runs are computed at all, rather than only shown.
+            picture_bytes: Bound on the memory of decoded pictures.
+            crashes: Told what is computed with, for the start after a crash.
+            draft_of: The file of what was taught of a folder and not saved.
         """
         self._workbench = workbench
         self._data = data
@@ -106,6 +114,9 @@ class Jobs:
         self._cache = cache or StageCache()
         self._compiling = compiling
         self._computes = computes
+        self._picture_bytes = picture_bytes
+        self._crashes = crashes or Crashes(None)
+        self._draft_of = draft_of
         self._opening: threading.Event | None = None
         self._openings: list[threading.Thread] = []
         self._closed = False
@@ -164,7 +175,7 @@ class Jobs:
             parameters = RunParameters()
             if self._computes:  # else neither pictures nor boxes are needed
                 parameters = pipeline.default_parameters(sequence)
-            reader = FrameReader(sequence)
+            reader = FrameReader(sequence, cache_bytes=self._picture_bytes)
             with self._condition:
                 if cancelled.is_set():
                     reader.close()
@@ -303,8 +314,13 @@ class Jobs:
         assert sequence is not None
 
         def on_progress(run: Run, progress: Progress) -> None:
+            watchdog.heard()
             if not wanted.cancelled.is_set():
                 workbench.run_progresses(run, progress)
+
+        def on_silence(seconds: float) -> None:
+            if not wanted.cancelled.is_set():
+                workbench.run_waits(wanted.key, f"no new step for {seconds:.0f} s")
 
         def on_compiling(done: int, total: int) -> None:
             if total and not wanted.cancelled.is_set():
@@ -313,22 +329,30 @@ class Jobs:
         try:
             if self._compiling is not None:
                 self._compiling.wait(on_compiling, wanted.cancelled.is_set)
-            run = pipeline.compute(
-                sequence,
-                snapshot.parameters,
-                seed=self._seed,
-                corrections=snapshot.corrections,
-                meanwhile=_meanwhile(snapshot, self._seed),
-                reader=snapshot.reader,
-                cache=self._cache,
-                wanted=lambda: workbench.snapshot().playhead,
-                on_progress=on_progress,
-                cancelled=wanted.cancelled.is_set,
-                thread_begins=be_nice,
-            )
+            draft = self._draft_of(sequence.folder)
+            with Watchdog(on_silence) as watchdog, self._crashes.computing(draft):
+                run = pipeline.compute(
+                    sequence,
+                    snapshot.parameters,
+                    seed=self._seed,
+                    corrections=snapshot.corrections,
+                    meanwhile=_meanwhile(snapshot, self._seed),
+                    reader=snapshot.reader,
+                    cache=self._cache,
+                    wanted=lambda: workbench.snapshot().playhead,
+                    on_progress=on_progress,
+                    cancelled=wanted.cancelled.is_set,
+                    thread_begins=be_nice,
+                )
         except Cancelled:
             if wanted.stopped_by_person:
                 workbench.run_ends(wanted.key, "cancelled")
+        except MemoryError:
+            self._cache.clear()
+            workbench.run_ends(
+                wanted.key, "failed", "there is not enough memory for this run; what was kept of "
+                "others has been let go"
+            )  # fmt: skip
         except Exception as error:
             if not isinstance(error, ValueError | OSError):
                 logger.exception("a run failed")

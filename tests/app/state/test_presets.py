@@ -42,7 +42,7 @@ def test_what_was_saved_is_there_again(tmp_path: Path) -> None:
     assert shown(later) == (["büro am Morgen"], "büro am Morgen")
     parameters = later.snapshot().parameters
     assert (value(parameters, P_D), parameters.fusion_method) == (0.7, "sequential_phd")
-    assert [file.name for file in path.parent.iterdir()] == ["presets.json"]
+    assert [p.name for p in path.parent.iterdir() if p.suffix == ".json"] == [path.name]
 
 
 def test_renaming_and_removing(tmp_path: Path) -> None:

@@ -328,7 +328,7 @@ def test_a_draft_that_cannot_be_read_is_left_alone(
     values = {"room": {}, "template": []}
     drafts.keep(tmp_path, values, {**values, "template": [1]})
     assert Drafts(tmp_path).read(tmp_path) is None
-    assert "cannot be read and is left as it is" in caplog.text
+    assert "cannot be read and is now" in caplog.text
     assert len(list(tmp_path.iterdir())) == 1
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from tracker.formats.pieces import ImagesPiece, Piece
 from tracker.formats.protocol import Certainty, Kind
 from tracker.formats.source import SourceFile
+from tracker.sequences.numbering import whole_row
 from tracker.sequences.video import read_image
 
 NAME = "numbered pictures"
@@ -30,7 +31,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
     picture = read_image(file.series[0])
     if picture is None:
         raise file.member(file.series[0]).error("cannot be read as a picture; it is spoilt")
-    files = tuple(sorted(file.series, key=_by_number))
+    files, _ = whole_row(sorted(file.series, key=_by_number))
     yield ImagesPiece(file.path.parent, files, (picture.shape[1], picture.shape[0]))
 
 

@@ -10,29 +10,18 @@ import numpy as np
 from tracker.formats.pieces import Piece, VideoPiece
 from tracker.formats.protocol import Certainty, Kind
 from tracker.formats.source import SourceFile
+from tracker.sequences.containers import is_video, opened
 from tracker.sequences.video import VideoError, VideoIndex, index_video
 
 NAME = "video"
 KIND: Kind = "pictures"
 SERIES = False
 
-_STARTS = (
-    b"\x1aE\xdf\xa3",  # Matroska, WebM
-    b"\x00\x00\x01\xba", b"\x00\x00\x01\xb3",  # MPEG
-    b"FLV\x01", b"OggS", b"\x30\x26\xb2\x75",
-)  # fmt: skip
-_BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip")
-"""Of MP4 and QuickTime, from the fifth byte."""
-_PACKET = 188
-"""Bytes of a packet of an MPEG transport stream, which begins with 0x47."""
-
 
 def recognise(file: SourceFile) -> Certainty:
     """The signature of a container."""
-    head = file.head
-    is_avi = head[:4] == b"RIFF" and head[8:12] == b"AVI "
-    is_stream = len(head) > 2 * _PACKET and head[0] == head[_PACKET] == head[2 * _PACKET] == 0x47
-    is_it = head.startswith(_STARTS) or head[4:8] in _BOXES or is_avi or is_stream
+    is_picture = file.head.startswith(b"\xff\xd8\xff")  # also the beginning of a row of JPEGs
+    is_it = is_video(file.head) and not is_picture
     return Certainty.SURE if is_it else Certainty.NO
 
 
@@ -45,7 +34,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
             f"({file.size:,} bytes) cannot be read as a video ({error}); expected MP4, AVI or "
             "another format that FFmpeg decodes; it may be cut short"
         ) from None
-    capture = cv2.VideoCapture(str(file.path), cv2.CAP_FFMPEG)
+    capture = opened(file.path)
     try:
         rate = float(capture.get(cv2.CAP_PROP_FPS))
         turned = round(capture.get(cv2.CAP_PROP_ORIENTATION_META)) % 360 != 0

@@ -91,7 +91,7 @@ class FusionParams(Params):
     """Constant velocity: time after which a person who is not seen has slowed to a third."""
 
     start_velocity: Annotated[
-        float, Field(ge=0.0, le=5.0), ui("σ_v0", unit="m/s", step=0.1, when=_VELOCITY)
+        float, Field(ge=0.01, le=5.0), ui("σ_v0", unit="m/s", step=0.1, when=_VELOCITY)
     ] = 0.7
     """Constant velocity: spread of a newcomer's speed along each axis."""
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import os
+import hashlib
 import shutil
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,6 +14,12 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.camera import Camera
+from tracker.placing import beside, sweep, sync_file, sync_folder
+
+SUMS = "SHA256SUMS"
+"""The SHA-256 of every file of a rendered folder, in the form of ``sha256sum``."""
+
+FILE = "sequence.toml"
 
 
 class RenderCancelled(Exception):
@@ -64,21 +69,53 @@ def whole_folder(folder: Path) -> Iterator[Path]:
     folder = Path(folder)
     _check_replaceable(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
-    work = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    sweep(folder.parent, folder.name)
+    work = beside(folder)
     try:
+        work.mkdir()
         yield work
-        os.chmod(work, 0o755)
+        seal(work)
         _check_replaceable(folder)
         if folder.exists():
-            old = Path(tempfile.mkdtemp(prefix=f".{folder.name}-old-", dir=folder.parent))
-            folder.rename(old / "old")
+            old = beside(folder)
+            folder.rename(old)
             work.rename(folder)
             shutil.rmtree(old, ignore_errors=True)
         else:
             work.rename(folder)
+        sync_folder(folder.parent)
     except BaseException:
         shutil.rmtree(work, ignore_errors=True)
         raise
+
+
+def seal(folder: Path) -> None:
+    """Write down what every file holds, and have the disk hold all of it."""
+    lines = []
+    for file in sorted(path for path in folder.rglob("*") if path.is_file()):
+        lines.append(f"{_sum(file)}  {file.relative_to(folder).as_posix()}\n")
+        sync_file(file)
+    (folder / SUMS).write_text("".join(lines), encoding="utf-8")
+    sync_file(folder / SUMS)
+    sync_folder(folder)
+
+
+def is_whole(folder: Path) -> bool:
+    """Whether a rendered folder holds what was written: not cut off, not changed."""
+    try:
+        lines = (folder / SUMS).read_text(encoding="utf-8").splitlines()
+        wanted = [line.partition("  ") for line in lines]
+        names = {FILE, *(name for _, _, name in wanted)}
+        return len(names) == len(wanted) and all(
+            _sum(folder / name) == told for told, _, name in wanted
+        )
+    except (OSError, ValueError):
+        return False
+
+
+def _sum(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _check_replaceable(folder: Path) -> None:

@@ -9,14 +9,14 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
-import tempfile
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from tracker.folders import cache_folder
-from tracker.sequences.reader import FILE, read_sequence
+from tracker.placing import beside, replacing, sweep, sync_file, sync_folder
+from tracker.sequences.reader import FILE, check_own_file, given_folder, read_sequence
 from tracker.sequences.sequence import Sequence, SequenceError
 from tracker.sequences.writing.rewriting import rewritten
 
@@ -51,13 +51,20 @@ def save(sequence: Sequence, saved: Sequence) -> Path:
     reason = why_not_in_place(folder)
     if reason is not None:
         raise SequenceError(f"{where}: cannot be saved, since {reason}; save a copy")
-    path = (folder / FILE).resolve()
-    with _complaining(path):
+    with _complaining(folder / FILE):
+        check_own_file(folder)  # it may have become a link since it was read
+        path = (folder / FILE).resolve()
         before = path.read_bytes()
         text = rewritten(before.decode("utf-8-sig"), saved, sequence, where)
         backup = _keep(folder, before)
         mark = b"\xef\xbb\xbf" if before.startswith(b"\xef\xbb\xbf") else b""
-        _replace(path, mark + text.encode("utf-8"))
+        try:
+            with replacing(path) as temporary:
+                temporary.write_bytes(mark + text.encode("utf-8"))
+                shutil.copymode(path, temporary)
+        except BaseException:
+            backup.unlink(missing_ok=True)  # of a file that is as it was
+            raise
     return backup
 
 
@@ -79,13 +86,14 @@ def save_copy(sequence: Sequence, saved: Sequence, folder: Path) -> Sequence:
         SequenceError: If it cannot be written there; nothing is left then.
     """
     source = sequence.folder
-    folder = folder.expanduser().absolute()
+    folder = given_folder(folder).absolute()
     _check_place(folder, source)
     with _complaining(folder):
         folder.parent.mkdir(parents=True, exist_ok=True)
-        building = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+        sweep(folder.parent, folder.name)
+        building = beside(folder)
         try:
-            building.chmod(0o777 & ~_mask())
+            building.mkdir()
             text = (source / FILE).read_bytes().decode("utf-8-sig")
             text = rewritten(text, saved, sequence, f"{source.name}/{FILE}", name=folder.name)
             for path in _files(sequence, tomllib.loads(text)):
@@ -94,7 +102,11 @@ def save_copy(sequence: Sequence, saved: Sequence, folder: Path) -> Sequence:
                 _copy(path, place, link=path.suffix.lower() != ".csv")
             (building / FILE).write_bytes(text.encode("utf-8"))
             read_sequence(building)
+            for written in (building / FILE, *building.rglob("*.csv")):
+                sync_file(written)
+            sync_folder(building)
             os.replace(building, folder)
+            sync_folder(folder.parent)
         except BaseException:
             shutil.rmtree(building, ignore_errors=True)
             raise
@@ -144,33 +156,19 @@ def _keep(folder: Path, data: bytes) -> Path:
     while True:
         path = folder / (BACKUP if number == 1 else f"{BACKUP}{number}")
         try:
-            with path.open("xb") as file:
-                file.write(data)
-            return path
+            file = path.open("xb")
         except FileExistsError:
             number += 1
-
-
-def _replace(path: Path, data: bytes) -> None:
-    """Have a file hold this, all of it or nothing."""
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        shutil.copymode(path, name)
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-
-
-def _mask() -> int:
-    """Which rights new files of this process do not get."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+            continue
+        try:
+            with file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+        except BaseException:
+            path.unlink(missing_ok=True)  # an empty backup would be taken for one
+            raise
+        return path
 
 
 @contextlib.contextmanager
@@ -179,8 +177,7 @@ def _complaining(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        reason = error.strerror or str(error)
+        told = f"{error.filename or path}: cannot be written ({error.strerror})"
         raise SequenceError(
-            f"{error.filename or path}: cannot be written ({reason}); choose another folder, "
-            "or make room there"
+            f"{told if error.strerror else error}; choose another folder, or make room there"
         ) from None

@@ -12,6 +12,9 @@ from numpy import ndarray
 from tracker.sequences.fields import Fields, did_you_mean, listed, shown
 from tracker.sequences.sequence import Entrance, Room, Template, View
 
+LEAST_TEMPLATE = 2.0
+"""Pixels a side of a template's box."""
+
 
 def read_room(fields: Fields) -> Room:
     """The table ``[room]``.
@@ -82,6 +85,12 @@ def _template(fields: Fields, views: tuple[View, ...], frames: int) -> Template:
     if width <= 0.0 or height <= 0.0:
         raise fields.error(
             "box", f"expected width and height above 0, found {width:g} × {height:g}"
+        )
+    if min(width, height) < LEAST_TEMPLATE:
+        raise fields.error(
+            "box",
+            f"expected at least {LEAST_TEMPLATE:g} pixels a side, found {width:g} × {height:g}; a "
+            "smaller one has no colours to tell apart",
         )
     full_width, full_height = by_name[camera].camera.image_size
     slack = 1.0  # a box drawn by hand may end on the border's outer edge

@@ -8,7 +8,7 @@ from tracker import colour
 from tracker.boxes import Boxes
 from tracker.colour import ColourModel, ColourSpaceName, KernelName
 from tracker.sequences.frames import Pictures
-from tracker.sequences.sequence import Sequence
+from tracker.sequences.sequence import Sequence, SequenceError
 
 
 def read_templates(
@@ -42,16 +42,19 @@ def _read(
     names = [camera.name for camera in sequence.cameras]
     histograms = []
     for template in sequence.templates:
-        place = f'template "{template.name}" ({template.camera}, frame {template.frame})'
+        place = (
+            f'{sequence.folder.name}/sequence.toml, template "{template.name}" '
+            f"({template.camera}, frame {template.frame})"
+        )
         if template.camera not in names:
-            raise ValueError(f"{place}: there is no such camera; expected {', '.join(names)}")
+            raise SequenceError(f"{place}: there is no such camera; expected {', '.join(names)}")
         picture = reader.picture(names.index(template.camera), template.frame)
         if picture is None:
-            raise ValueError(f"{place}: its picture cannot be read; choose another frame")
+            raise SequenceError(f"{place}: its picture cannot be read; choose another frame")
         box = Boxes.from_left_top(template.box[None]).centred
         histogram = colour.histograms(colour.bin_map(picture, space), box, space, kernel)[0]
         if not histogram.any():
-            raise ValueError(
+            raise SequenceError(
                 f"{place}: the box {template.box.tolist()} lies outside the picture of "
                 f"{picture.shape[1]}x{picture.shape[0]}; move it inside"
             )
