@@ -18,7 +18,7 @@ class TrackLife(Model):
 
     id: int
     name: str | None = None
-    """Whose colours it has, among people with templates."""
+    """What somebody said, or whose colours it has, among people with templates."""
     first: int
     last: int
     """Of its whole life."""

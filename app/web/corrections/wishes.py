@@ -15,6 +15,9 @@ from tracker.sequences.sequence import Sequence
 _MOST_PLACES = 12
 """Along the course of who was nobody."""
 
+_OFF_FLOOR = 0.3
+"""Metres by which a point that was clicked may lie under or over somebody who stands."""
+
 
 def corrections_of(wish: CorrectionWish, snapshot: Snapshot, note: str) -> tuple[Correction, ...]:
     """What a wish says.
@@ -126,10 +129,13 @@ def _place(wish: CorrectionWish, sequence: Sequence, step: int) -> Place:
         if click.camera not in cameras:
             raise CorrectionError(f"clicks: there is no camera {click.camera}")
     points = [(cameras[click.camera], (click.x, click.y)) for click in wish.clicks]
+    half_height = float(sequence.target_half_extents[2])
+    floor = float(sequence.room.minimum[2])
     if len(points) == 1:
-        half_height = float(sequence.target_half_extents[2])
-        floor = float(sequence.room.minimum[2])
         found = foot_on_floor(*points[0], floor=floor, half_height=half_height)
     else:
         found = triangulated(points)
+        # any point of somebody who stands says where: the middle is half a person over the floor
+        if floor - _OFF_FLOOR <= found[2] <= floor + 2.0 * half_height + _OFF_FLOOR:
+            found[2] = floor + half_height
     return Place(step, *found.tolist())

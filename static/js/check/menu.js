@@ -33,7 +33,7 @@ export function mountMenu(context, timeline, does) {
 	const { store, actions } = context;
 	const { state } = checkOf(context);
 	const menu = h("div", { class: "menu corrects", popover: "auto" });
-	document.body.append(menu);
+	one("main").append(menu);
 	/** Whoever is chosen elsewhere while others are offered is taken. @type {((id: number) => void) | null} */
 	let takes = null;
 	/** Where it was opened. */

@@ -182,7 +182,9 @@ export function mountQueue(root, { store, actions }, check, crops) {
 		const at = doubts.find(({ id }) => id === chosen?.id);
 		places.setAttribute("aria-activedescendant", at ? `place-${at.id}` : "");
 		places.ariaLabel = byTime ? "Places, as they come" : "Places, most doubtful first";
-		fill(order, icon("i-swap", "s"), byTime ? "as they come" : "most doubtful");
+		const words = byTime ? "as they come" : "most doubtful";
+		order.ariaLabel = `Order: ${words}`;
+		fill(order, icon("i-swap", "s"), h("span", { class: "opt-1" }, words));
 		head();
 	}
 

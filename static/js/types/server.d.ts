@@ -779,7 +779,7 @@ declare namespace Server {
 	/** A track of the pinned run. */
 	interface PinnedLife {
 		id: number;
-		/** Whose colours it has, among people with templates. */
+		/** What somebody said, or whose colours it has, among people with templates. */
 		name: string | null;
 		first: number;
 		/** Of its whole life. */
@@ -1226,7 +1226,7 @@ declare namespace Server {
 	/** A track's life. */
 	interface TrackLife {
 		id: number;
-		/** Whose colours it has, among people with templates. */
+		/** What somebody said, or whose colours it has, among people with templates. */
 		name: string | null;
 		first: number;
 		/** Of its whole life. */

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
@@ -218,9 +219,27 @@ def test_a_name_that_is_dropped_is_gone_before_the_run_is_another(desk: TestClie
     wish = {"kind": "name", "tracks": [tracks(desk)[0]["id"]], "name": "Anna", "step": 30}
     desk.post(PLACE, json={"corrections": [wish]})
     (one,) = settled(desk)["corrections"]
+    assert tracks(desk)[0]["name"] == "Anna"
     answer = desk.delete(f"{PLACE}/{one['id']}")
     assert answer.status_code == 200, answer.text
     assert answer.json()["names"] == {}
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.95])
+def test_one_point_of_a_person_in_two_pictures_says_where_the_middle_is(
+    desk: TestClient, share: float
+) -> None:
+    sequence = desk.app.state.workbench.snapshot().sequence  # type: ignore[attr-defined]
+    middle = sequence.room.minimum[2] + sequence.target_half_extents[2]
+    height = 2.0 * float(sequence.target_half_extents[2])
+    point = np.array([0.1, -0.2, sequence.room.minimum[2] + share * height])
+    clicks = []
+    for camera in sequence.cameras[:2]:
+        ((x, y),), _ = camera.project(point[None])
+        clicks.append({"camera": camera.name, "x": float(x), "y": float(y)})
+    wish = {"kind": "here", "step": 30, "clicks": clicks}
+    (told,) = desk.post(PLACE, json={"corrections": [wish]}).json()["corrections"]
+    assert told["places"][0] == pytest.approx([30, 0.1, -0.2, middle], abs=2e-3)
 
 
 def test_only_what_was_checked_counts_as_truth(desk: TestClient, own: Path, run: Runs) -> None:
