@@ -41,6 +41,7 @@ def compute(
     reader: FrameReader | None = None,
     previous: Run | None = None,
     cache: StageCache | None = None,
+    meanwhile: Trajectories | None = None,
     wanted: Callable[[], int] = lambda: 0,
     on_progress: Callable[[Run, Progress], None] | None = None,
     cancelled: Cancel = lambda: False,
@@ -65,6 +66,8 @@ def compute(
             keys agree. It is left as it is.
         cache: Columns of earlier runs, re-used in the same way; those of this run are
             kept there at its end, or as far as they came where it is cancelled.
+        meanwhile: What ``on_progress`` is shown of the people, where all steps are fused already,
+            until the smoothing has looked at them: nothing, if none are given, but the filter's.
         wanted: The step that somebody looks at; it is told of the moment it is there.
         on_progress: Called from this thread every so often, and at the end, with the
             run so far: its steps below ``done`` may be read.
@@ -85,7 +88,7 @@ def compute(
     if cache is not None:
         _take(run, cache)
     taken = len(run.views)
-    telling = _Telling(run, total, wanted, on_progress)
+    telling = _Telling(run, total, wanted, on_progress, meanwhile)
     sound = False
     try:
         _fuse(run, total, reader, telling, cancelled, thread_begins)
@@ -110,8 +113,10 @@ class _Telling:
         total: int,
         wanted: Callable[[], int],
         on_progress: Callable[[Run, Progress], None] | None,
+        meanwhile: Trajectories | None,
     ) -> None:
         self._run = run
+        self._meanwhile = meanwhile if len(run.fused) >= total else None
         self._total = total
         self._wanted = wanted
         self._on_progress = on_progress
@@ -139,11 +144,19 @@ class _Telling:
                 [run.filtered, self._extract()], len(run.sequence.views)
             )
             run.done = len(run.fused)
+        if self._meanwhile is not None and run.tracks is run.filtered:
+            run.tracks = self._meanwhile
         if self._on_progress is not None:
             seconds = time.perf_counter() - self._begin
             fresh = run.done - self._first
             progress = Progress(self._stage, run.done, self._total, seconds, fresh, self._preparing)
             self._on_progress(run, progress)
+
+    def forget_meanwhile(self) -> None:
+        """Have the filter's people again instead of what was shown meanwhile."""
+        if self._meanwhile is not None and self._run.tracks is self._meanwhile:
+            self._run.tracks = self._run.filtered
+        self._meanwhile = None
 
     def _extract(self) -> Trajectories:
         run = self._run
@@ -204,6 +217,7 @@ def _last_stage(run: Run) -> Stage:
 
 def _smooth(run: Run, total: int, telling: _Telling, cancelled: Cancel) -> None:
     """Put the smoothed people in the place of the filter's."""
+    telling.forget_meanwhile()
     if run.parameters.smoothing_method == "none" or run.tracks is not run.filtered:
         return
 

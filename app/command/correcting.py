@@ -6,21 +6,27 @@ import json
 import sys
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from app.command.correction_flags import (
+from app.command.arguments.corrections import (
     CheckCorrections,
     Corrections,
     DiffCorrections,
     ListCorrections,
     MergeCorrections,
+    TruthOfCorrections,
 )
 from app.command.terminal import Bar, CommandError, print_table, say
 from tracker.corrections import Correction, CorrectionError
 from tracker.corrections.log import FILE, place_of, read_log, write_log
 from tracker.corrections.merging import difference, merge
+from tracker.corrections.truth import checked_ranges, write_truth
+from tracker.placing import replacing
 from tracker.sequences import library
 from tracker.sequences.sequence import Sequence
+
+if TYPE_CHECKING:
+    from tracker.pipeline import Run
 
 DIFFERENT = 1
 
@@ -42,6 +48,8 @@ def corrections(command: Corrections) -> int:
             merged = merge(read_log(_log(action.first)), read_log(_log(action.second)))
             write_log(action.output, merged)
             say(f"{len(merged)} corrections, written to {action.output}")
+        case TruthOfCorrections() as action:
+            _truth(action)
     return 0
 
 
@@ -105,23 +113,40 @@ def _row(one: Correction) -> tuple[str, ...]:
     return one.id, f"{one.time:%Y-%m-%d %H:%M}", one.words, where, one.note
 
 
-def _check(action: CheckCorrections) -> int:
+def _tracked(name: str, file: Path | None) -> Run:
+    """A sequence tracked with its corrections."""
     from app.state.workers.compiling import Compiling
     from tracker import pipeline
     from tracker.runs.stage_cache import StageCache
 
     with Bar("rendering", "frame") as rendering:
-        sequence = library.open_sequence(action.sequence, progress=rendering.at)
-    told = of_run(sequence, action.corrections)
+        sequence = library.open_sequence(name, progress=rendering.at)
+    told = of_run(sequence, file)
     with Bar("tracking", "step") as tracking, closing(Compiling(say)) as compiling:
         compiling.wait(lambda done, total: None, lambda: False)
-        run = pipeline.compute(
+        return pipeline.compute(
             sequence,
             pipeline.default_parameters(sequence),
             corrections=told,
             cache=StageCache.on_disk(),
             on_progress=lambda _, progress: tracking.at(progress.done, progress.total),
         )
+
+
+def _truth(action: TruthOfCorrections) -> None:
+    run = _tracked(action.sequence, action.corrections)
+    with (
+        replacing(action.output) as temporary,
+        temporary.open("x", encoding="utf-8", newline="") as stream,
+    ):
+        write_truth(stream, run.tracks, run.corrections)
+    ranges = ", ".join(f"{first} – {last}" for first, last in checked_ranges(run.corrections))
+    say(f"steps {ranges}, written to {action.output}")
+
+
+def _check(action: CheckCorrections) -> int:
+    run = _tracked(action.sequence, action.corrections)
+    told = run.corrections
     became = {outcome.id: outcome for outcome in run.outcomes}
     unmet = [one for one in run.outcomes if not one.met]
     if action.json:

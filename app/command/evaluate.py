@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from contextlib import closing
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
@@ -20,6 +20,7 @@ from tracker.export import TrackFile
 from tracker.parameters import ParameterError
 from tracker.sequences import library
 from tracker.sequences.sequence import Sequence
+from tracker.sequences.tables import truth_of
 
 if TYPE_CHECKING:
     from tracker.without_truth import Estimate
@@ -49,6 +50,9 @@ def evaluate(command: Evaluate) -> None:
             )
     with Bar("rendering", "frame") as rendering:
         sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    if command.truth is not None:
+        truth = truth_of(command.truth, str(command.truth), sequence.frames)
+        sequence = replace(sequence, ground_truth=truth)
     tracks = export.read_tracks_csv(command.tracks)
     check_fit(sequence, tracks, str(command.tracks))
     for sentence in (*sequence.warnings, *tracks.remarks):
@@ -85,7 +89,9 @@ def estimate_without_truth(command: Evaluate) -> None:
     Raises:
         CommandError: If something is asked for that needs a track file.
     """
-    given = [name for name in ("html", *command.changes()) if getattr(command, name) is not None]
+    given = [
+        name for name in ("html", "truth", *command.changes()) if getattr(command, name) is not None
+    ]
     if given:
         flags = ", ".join(f"--{name.replace('_', '-')}" for name in given)
         raise CommandError(f"{flags}: expected a track file as well; name it after the sequence")

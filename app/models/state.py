@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Literal
 
 from app.models.base import Model, Vector
+from app.models.correcting import CorrectionsState
 from app.state.snapshot import RunPhase
 
 
@@ -177,6 +178,7 @@ class State(Model):
     run: RunInfo
     pinned: PinnedInfo | None
     teaching: TeachingInfo
+    corrections: CorrectionsState
     viser: ViserInfo
 
 

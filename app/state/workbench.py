@@ -23,6 +23,7 @@ from app.state.snapshot import (
     Change,
     Command,
     Event,
+    Ghosts,
     Level,
     Notice,
     Opening,
@@ -35,6 +36,7 @@ from app.state.snapshot import (
     clamp,
 )
 from tracker import parameters as table
+from tracker.corrections import Correction
 from tracker.parameters import ParameterError, RunParameters
 from tracker.pipeline import Progress, Run
 from tracker.sequences.frames import FrameReader
@@ -276,11 +278,30 @@ class Workbench:
             if now.sequence is not None and shown.views is now.sequence.views:
                 self._put("taught", sequence=shown, saved=saved)
 
+    def correct(self, sequence: Sequence, corrections: tuple[Correction, ...]) -> None:
+        """Have the open recording with these corrections; the run that obeys them follows.
+
+        Args:
+            sequence: Of the recording that they are of; any other is refused silently.
+            corrections: All of them, in their order.
+        """
+        with self._edit() as now:
+            if now.sequence is None or sequence.views is not now.sequence.views:
+                return
+            if corrections != now.corrections:
+                self._put("corrections", corrections=corrections)
+
     def edit_room(self, on: bool) -> None:
         """Have the 3D view with handles on the room, or without."""
         with self._edit() as now:
             if on != now.editing_room:
                 self._put("editing", editing_room=on)
+
+    def show_ghosts(self, ghosts: Ghosts | None) -> None:
+        """Have the 3D view show how tracks would be, or no more."""
+        with self._edit() as now:
+            if ghosts is not None or now.ghosts is not None:
+                self._put("ghosts", ghosts=ghosts)
 
     def set_theme(self, theme: Theme) -> None:
         """Have the 3D view dark or light."""
@@ -315,6 +336,7 @@ class Workbench:
         reader: FrameReader,
         parameters: RunParameters,
         opened_as: str = "",
+        corrections: tuple[Correction, ...] = (),
     ) -> FrameReader | None:
         """Show another sequence, from its first step; the reader of the one before, to be closed.
 
@@ -324,6 +346,7 @@ class Workbench:
             reader: Its pictures.
             parameters: Its default parameters.
             opened_as: The name or folder that opens it again; its own name where none is given.
+            corrections: Those of its log.
         """
         with self._edit() as now:
             before = now.reader
@@ -339,6 +362,7 @@ class Workbench:
                 opening=None,
                 parameters=parameters,
                 defaults=parameters,
+                corrections=corrections,
                 parameters_origin="",
                 playhead=0,
                 playhead_origin="",

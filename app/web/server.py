@@ -8,6 +8,7 @@ import socket as sockets
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,8 @@ from app import errors
 from app.errors import sentence
 from app.paths import static_folder
 from app.state import opening_step
+from app.state.correcting import Correcting
+from app.state.doubting import Doubting
 from app.state.importing.desk import Desk
 from app.state.kept.history import History
 from app.state.kept.presets import OwnPresets
@@ -39,6 +42,7 @@ from app.state.workers.sensitivity import Sensitivity
 from app.web import api, description, gateway, stream, teaching_routes
 from app.web.access import Access, Keys
 from app.web.connections import Requests, Sockets
+from app.web.corrections import routes as corrections
 from app.web.entrance import LARGEST_MESSAGE, Entrance, start_viser
 from app.web.evaluation import course_routes, identity_routes
 from app.web.evaluation import routes as evaluation
@@ -81,6 +85,7 @@ ROUTERS = (
     event_tables.router,
     teaching_routes.router,
     teaching_tables.router,
+    corrections.router,
     evaluation.router,
     identity_routes.router,
     course_routes.router,
@@ -158,8 +163,17 @@ def create_app(settings: Settings) -> FastAPI:
         return response
 
     app.mount("/static", files, name="static")
+    app.mount("/plotly", StaticFiles(directory=_plotly()), name="plotly")
     app.mount("/manual", Manual(), name="manual")
     return app
+
+
+def _plotly() -> Path:
+    """The folder of the script that draws figures; it is found without reading the package."""
+    found = find_spec("plotly")
+    assert found is not None
+    assert found.origin is not None
+    return Path(found.origin).parent / "package_data"
 
 
 class _PageFiles(StaticFiles):
@@ -195,6 +209,10 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     teaching = app.state.teaching = Teaching(
         workbench, settings.data, settings_folder() / "unsaved" if kept else None
     )
+    correcting = app.state.correcting = Correcting(
+        workbench, settings_folder() / "corrections" if kept else None
+    )
+    app.state.doubting = Doubting()
     given = Path(settings.sequence or "").expanduser()
     roots = [given] if settings.sequence and given.is_dir() else []
     desk = app.state.desk = Desk(settings.data, roots)
@@ -235,6 +253,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
             await asyncio.gather(starting, return_exceptions=True)
         told.stop()
         teaching.close()
+        correcting.close()
         recents.close()
         desk.close()
         pictures.close()

@@ -214,6 +214,11 @@ def _notes(comparison: Comparison) -> tuple[str, ...]:
             f"and {_many(len(comparison.ignored), 'estimate')} that matched one count on neither "
             "side."
         )
+    if comparison.unknown:
+        notes.append(
+            f"Of {_many(comparison.unknown, 'step')} the truth says nothing: they count on neither "
+            "side."
+        )
     if comparison.left_out:
         notes.append(
             f"{_many(comparison.left_out, 'estimate')} left out: outside the steps compared, at a "

@@ -95,6 +95,8 @@ class GroundTruth:
     """World metres."""
     valid: Bool[ndarray, " G"]
     """False where the person is there but the position is not certain."""
+    known: Bool[ndarray, " F"] | None = None
+    """Of which steps anything is known; None for all. Of others nothing counts."""
 
     def at(self, frame: int) -> slice:
         """The rows of one step."""

@@ -14,9 +14,12 @@ from tracker.sequences.clock import Clock
 from tracker.sequences.csv_columns import Columns, read_columns
 from tracker.sequences.fields import Fields
 from tracker.sequences.media import locate
-from tracker.sequences.sequence import Detections, GroundTruth
+from tracker.sequences.sequence import Detections, GroundTruth, SequenceError
 
 BOX = ("left", "top", "width", "height")
+
+KNOWN_STEPS = "steps"
+"""The comment of a truth that says of which steps it knows: ``# steps = 0-99 150-300``."""
 
 
 @dataclass(slots=True)
@@ -155,14 +158,53 @@ def read_ground_truth(fields: Fields, reading: Reading, frames: int) -> GroundTr
     table = fields.table("ground_truth", ("file",), needed=False)
     if table is None:
         return None
-    columns = reading.columns(
-        locate(reading.folder, table, "file"),
-        needed=("frame", "id", "x", "y", "z"),
-        optional={"valid": 1.0},
+    path = locate(reading.folder, table, "file")
+    reading.files.append(path)
+    return truth_of(
+        path, f"{reading.folder.name}/{path.relative_to(reading.folder).as_posix()}", frames
+    )
+
+
+def truth_of(path: Path, where: str, frames: int) -> GroundTruth:
+    """A file of truth.
+
+    Args:
+        path: A table ``frame, id, x, y, z`` with ``valid`` where there is one. A comment before
+            its head may say of which steps it knows; see :data:`KNOWN_STEPS`.
+        where: The file, as the messages begin.
+        frames: Steps of the sequence.
+
+    Raises:
+        SequenceError: If it cannot be read.
+    """
+    columns = read_columns(
+        path, where, needed=("frame", "id", "x", "y", "z"), optional={"valid": 1.0}
     )
     steps = columns.whole("frame", 0, frames - 1, "the step")
     ids = columns.whole("id", 0, None, "the person")
     valid = columns.whole("valid", 0, 1, "1 certain, 0 not")
     order = columns.one_row_each(steps, ids, "person")
     positions = columns.stacked("x", "y", "z")
-    return GroundTruth(steps[order], ids[order], positions[order], valid[order] == 1)
+    known = _known_steps(path, where, frames)
+    return GroundTruth(steps[order], ids[order], positions[order], valid[order] == 1, known)
+
+
+def _known_steps(path: Path, where: str, frames: int) -> Bool[ndarray, " F"] | None:
+    with path.open(encoding="utf-8-sig", errors="replace") as stream:
+        for number, line in enumerate(stream, 1):
+            if line.strip() and not line.startswith("#"):
+                return None
+            name, equals, ranges = line.lstrip("# ").partition("=")
+            if not equals or name.strip() != KNOWN_STEPS:
+                continue
+            known = np.zeros(frames, dtype=bool)
+            for part in ranges.split():
+                first, _, last = part.partition("-")
+                if not (first.isdecimal() and (last or first).isdecimal()):
+                    raise SequenceError(
+                        f"{where}, line {number}: {KNOWN_STEPS}: expected ranges like "
+                        f"0-99 150-300, found {part}"
+                    )
+                known[int(first) : int(last or first) + 1] = True
+            return known
+    return None

@@ -26,7 +26,7 @@ from tracker.smoothing.appearance import Appearance
 from tracker.smoothing.lifetimes import independence, lifetimes, misses
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.pieces import Pairs
-from tracker.smoothing.result import Decision
+from tracker.smoothing.result import Decision, Joined
 from tracker.smoothing.smoother import Fitted, Shared, Smoother
 from tracker.smoothing.ties import Seeker, Ties
 
@@ -57,6 +57,9 @@ class Settled:
     had: Bool[ndarray, " N"]
     """The rows of pieces: the others are of the gaps between them."""
     decisions: list[Decision]
+    joined: Joined
+    limits: dict[int, tuple[int, int]]
+    """Of some labels the first and the last step at which corrections let them be."""
 
 
 def settle(
@@ -124,7 +127,17 @@ def settle(
     links = pieces.moved_to(links, rows)
     of_piece = np.zeros(len(paths.states), dtype=bool)
     of_piece[rows[rows >= 0]] = True
-    return Settled(paths, links, np.array(origins, dtype=np.int64), of_piece, decisions)
+    of_pieces = np.full(len(cut.labels), -1, dtype=np.int64)
+    for chain, label in zip(chains, labels, strict=True):
+        of_pieces[chain] = label
+    places = refitted.paths.states[:, :3]
+    joined = Joined(
+        of_pieces, cut.firsts, cut.lasts, places[cut.starts[:-1]], places[cut.starts[1:] - 1],
+        worths, births, deaths, pairs.earlier, pairs.later, pairs.gains,
+    )  # fmt: skip
+    limits = {labels[k]: span for k, span in ties.limits(chains, cut).items()}
+    origins_of = np.array(origins, dtype=np.int64)
+    return Settled(paths, links, origins_of, of_piece, decisions, joined, limits)
 
 
 def _cut(

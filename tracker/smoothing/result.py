@@ -34,6 +34,29 @@ class Decision:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Joined:
+    """The pieces that tracks were joined of, and the odds of joining them otherwise."""
+
+    labels: Int[ndarray, " n"]
+    """Of the track that each piece is in, -1 for nobody's."""
+    firsts: Int[ndarray, " n"]
+    lasts: Int[ndarray, " n"]
+    begins: Float[ndarray, "n 3"]
+    """World metres."""
+    ends: Float[ndarray, "n 3"]
+    worths: Float[ndarray, " n"]
+    """Log odds of each piece's boxes against clutter."""
+    births: Float[ndarray, " n"]
+    """Log probability of beginning there."""
+    deaths: Float[ndarray, " n"]
+    earlier: Int[ndarray, " P"]
+    """Of each possible pair."""
+    later: Int[ndarray, " P"]
+    gains: Float[ndarray, " P"]
+    """Log odds of being one person's."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Smoothed:
     """Tracks of the whole recording, one row a person a step, by step and then label."""
 
@@ -50,6 +73,8 @@ class Smoothed:
     decisions: tuple[Decision, ...] = ()
     learnt: Calibration = field(default_factory=lambda: Calibration.none(0, 0, 3))
     """What the recording said of its boxes; the sizes are of the final tracks."""
+    joined: Joined | None = None
+    """Of what tracks were joined, where that was settled."""
 
     @staticmethod
     def empty(dimension: int, cameras: int) -> Smoothed:

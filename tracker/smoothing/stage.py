@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from collections.abc import Sequence as Many
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from tracker import trajectories
@@ -19,11 +21,20 @@ from tracker.single_view.protocol import ViewResult
 from tracker.smoothing import identities, lifetimes, pieces, reading
 from tracker.smoothing.calibration import Calibration
 from tracker.smoothing.paths import Links, Paths
-from tracker.smoothing.result import Decision, Smoothed
+from tracker.smoothing.result import Decision, Joined, Smoothed
 from tracker.smoothing.smoother import Fitted, Shared, Smoother
 
 _SEEN = 0.5
 """Association probability from which a camera counts as seeing a person."""
+
+
+class _Decided(NamedTuple):
+    """What was decided of who is who, and between what."""
+
+    decisions: list[Decision]
+    joined: Joined | None = None
+    limits: Mapping[int, tuple[int, int]] = MappingProxyType({})
+    """Of some labels the first and the last step at which corrections let them be."""
 
 
 class Positions:
@@ -62,11 +73,11 @@ class Positions:
         existences = np.where(had, 1.0, lifetimes.UNSURE)
         links = reading.read_links(fused, paths, smoother.cameras)
         check()
-        paths, existences, links, learnt, decisions = self._named(
+        paths, existences, links, learnt, decided = self._named(
             smoother, paths, existences, links, views, check, corrections
         )
         fitted, shared, learnt = _settled(smoother, paths, existences, links, p, learnt, check)
-        return _finished(smoother, fitted, shared, learnt, p, decisions)
+        return _finished(smoother, fitted, shared, learnt, p, decided)
 
     def _named(
         self,
@@ -77,10 +88,10 @@ class Positions:
         views: Many[tuple[ViewResult, ...]],
         check: Callable[[], None],
         corrections: Many[Correction],
-    ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, list[Decision]]:
+    ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, _Decided]:
         """The tracks of people, with which existence each row asks for boxes, and what was learnt
         on the way: here the filter's own."""
-        return paths, existences, links, None, []
+        return paths, existences, links, None, _Decided([])
 
 
 class Identities(Positions):
@@ -95,7 +106,7 @@ class Identities(Positions):
         views: Many[tuple[ViewResult, ...]],
         check: Callable[[], None],
         corrections: Many[Correction],
-    ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, list[Decision]]:
+    ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, _Decided]:
         p = self._parameters.smoothing
         contested = pieces.contested(paths, links)
         fitted, shared, learnt = _settled(smoother, paths, existences, links, p, None, check)
@@ -106,7 +117,13 @@ class Identities(Positions):
         check()
         learnt = learnt.of_people(found.origins)
         existences = np.where(found.had, 1.0, lifetimes.UNSURE)
-        return found.paths, existences, found.links, learnt, found.decisions
+        return (
+            found.paths,
+            existences,
+            found.links,
+            learnt,
+            _Decided(found.decisions, found.joined, found.limits),
+        )
 
 
 def _settled(
@@ -138,16 +155,19 @@ def _finished(
     shared: Shared,
     learnt: Calibration,
     p: SmoothingParams,
-    decisions: list[Decision],
+    decided: _Decided,
 ) -> Smoothed:
     """The tracks with their ends settled, and what is nobody left out."""
     longer, existences = lifetimes.extended(
         smoother, fitted.paths, round(p.reach / smoother.model.step_time)
     )
+    away = _outside(longer, decided.limits)
+    existences = np.where(away, 0.0, existences)
     shared = smoother.share(longer, existences, learnt)
     fitted = smoother.fit(longer, shared.links, 1, learnt)
     shared = smoother.share(fitted.paths, existences, learnt)
     there, odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
+    there[away] = 0.0
     paths, owners = fitted.paths, fitted.paths.owners
     somebody = odds > 0.0
     removed = [
@@ -175,9 +195,22 @@ def _finished(
         paths.covariances[rows],
         there[rows],
         seen[rows],
-        tuple(sorted([*decisions, *removed], key=lambda one: (one.step, one.label))),
+        tuple(sorted([*decided.decisions, *removed], key=lambda one: (one.step, one.label))),
         learnt,
+        decided.joined,
     )
+
+
+def _outside(paths: Paths, limits: Mapping[int, tuple[int, int]]) -> Bool[ndarray, " N"]:
+    """The rows at which corrections do not let a person be."""
+    away = np.zeros(len(paths.states), dtype=bool)
+    for path, label in enumerate(paths.labels.tolist()):
+        if label in limits:
+            first, last = limits[label]
+            own = slice(int(paths.starts[path]), int(paths.starts[path + 1]))
+            steps = int(paths.firsts[path]) + np.arange(own.stop - own.start)
+            away[own] = (steps < first) | (steps > last)
+    return away
 
 
 def _looks(views: Many[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B A"]] | None:

@@ -23,6 +23,7 @@ from app.state.snapshot import Change, Opening, Snapshot
 from app.state.workbench import Workbench
 from app.state.workers.compiling import WORDS, Compiling
 from tracker import pipeline
+from tracker.corrections.log import open_log
 from tracker.library.keeping import run_from
 from tracker.library.records import Result
 from tracker.parameters import RunParameters
@@ -32,6 +33,7 @@ from tracker.runs.stage_cache import StageCache
 from tracker.sequences import library
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
+from tracker.trajectories import Trajectories, corrected
 
 logger = logging.getLogger("app")
 
@@ -169,7 +171,8 @@ class Jobs:
                     raise Cancelled
                 self._opening = None
             key = sequence.digest[:16]
-            before = self._workbench.open(sequence, key, reader, parameters, name)
+            log = open_log(sequence.folder)
+            before = self._workbench.open(sequence, key, reader, parameters, name, log.corrections)
         except Exception as error:
             if cancelled.is_set():
                 future.set_exception(Cancelled("another sequence was asked for"))
@@ -255,7 +258,7 @@ class Jobs:
                     wanted.cancelled.set()
 
     def _on_change(self, change: Change) -> None:
-        if change in ("sequence", "parameters", "taught"):
+        if change in ("sequence", "parameters", "taught", "corrections"):
             self._ask()
 
     def _ask(self, *, again: bool = False) -> None:
@@ -263,7 +266,9 @@ class Jobs:
             snapshot = self._workbench.snapshot()
             if snapshot.sequence is None or self._closed or not self._computes:
                 return
-            key = pipeline.stage_keys(snapshot.sequence, snapshot.parameters, self._seed)["tracks"]
+            key = pipeline.stage_keys(
+                snapshot.sequence, snapshot.parameters, self._seed, snapshot.corrections
+            )["tracks"]
             newest = self._wanted or self._under_way
             if newest is not None and newest.key == key and not newest.cancelled.is_set():
                 return  # it is under way already
@@ -312,6 +317,8 @@ class Jobs:
                 sequence,
                 snapshot.parameters,
                 seed=self._seed,
+                corrections=snapshot.corrections,
+                meanwhile=_meanwhile(snapshot, self._seed),
                 reader=snapshot.reader,
                 cache=self._cache,
                 wanted=lambda: workbench.snapshot().playhead,
@@ -351,6 +358,20 @@ class Jobs:
         reader = self._workbench.snapshot().reader
         if reader is not None:
             reader.close()
+
+
+def _meanwhile(snapshot: Snapshot, seed: int) -> Trajectories | None:
+    """What shows at once, where only corrections changed: the shown tracks with what is new."""
+    shown, sequence = snapshot.run, snapshot.sequence
+    if shown is None or sequence is None or not shown.complete or shown.sequence is not sequence:
+        return None
+    if shown.seed != seed or shown.parameters != snapshot.parameters:
+        return None
+    known = set(shown.corrections)
+    if not known <= set(snapshot.corrections):
+        return None  # something was taken back: that run is kept, and there at once
+    new = [one for one in snapshot.corrections if one not in known]
+    return corrected(shown.tracks, new, sequence.step_time)
 
 
 def in_background(work: Callable[[], object]) -> None:

@@ -9,6 +9,7 @@ from numpy import ndarray
 from app import models
 from app.state.snapshot import Snapshot
 from app.web.command_line import command_line
+from app.web.corrections import views as corrections
 from tracker import parameters as table
 from tracker.sequences.writing.teaching import changes, taught_values
 
@@ -44,6 +45,7 @@ def state_of(snapshot: Snapshot) -> models.State:
         run=run_of(snapshot),
         pinned=_pinned_of(snapshot),
         teaching=_teaching_of(snapshot),
+        corrections=corrections.state_of(snapshot),
         viser=models.ViserInfo(),
     )
 

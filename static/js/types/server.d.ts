@@ -3,6 +3,20 @@
  * Steps are 0-based; boxes are `[left, top, width, height]` in pixels; positions are metres.
  */
 declare namespace Server {
+	/** What may be true at a doubtful place. */
+	interface AlternativeInfo {
+		words: string;
+		probability: number;
+		as_it_is: boolean;
+	}
+
+	/** What the tracks would be around a doubtful place, if an alternative were true. */
+	interface AlternativePreview {
+		tracks: GhostTrack[];
+		/** Over the whole recording. */
+		spans: ChangedSpan[];
+	}
+
 	/** An import that was begun, or a recording that needs none. */
 	interface Begun {
 		draft: ImportInfo | null;
@@ -98,6 +112,15 @@ declare namespace Server {
 		value: string;
 	}
 
+	/** A part of a track that would be another's. */
+	interface ChangedSpan {
+		/** Whose it would be; 0 for nobody's. */
+		id: number;
+		was: number;
+		first: number;
+		last: number;
+	}
+
 	/** One side of a comparison. */
 	interface ComparedRun {
 		run: string;
@@ -116,6 +139,55 @@ declare namespace Server {
 		b: ComparedRun;
 		parameters: ParameterDifference[];
 		rows: DifferenceInfo[];
+	}
+
+	/** One correction. */
+	interface CorrectionInfo {
+		id: string;
+		kind: "same" | "different" | "exchanged" | "here" | "nobody" | "came" | "left" | "name" | "checked";
+		words: string;
+		note: string;
+		time: string;
+		/** Steps that it speaks of, both included. */
+		first: number;
+		last: number;
+		/** Step and world metres. */
+		places: [number, number, number, number][];
+		accuracy: number | null;
+		name: string | null;
+		/** By the shown run; null while that is computed. */
+		met: boolean | null;
+		/** Where it is not met. */
+		why: string;
+		/** Ids of whom it means in the shown run. */
+		tracks: number[];
+	}
+
+	/** All of the open recording, in their order. */
+	interface Corrections {
+		/** Key of the run that they were held against. */
+		run: string | null;
+		/** Where they are kept. */
+		file: string;
+		/** Why the file cannot be used: nothing is obeyed then. */
+		problem: string | null;
+		corrections: CorrectionInfo[];
+		/** Ranges of steps that somebody has looked at, without overlap, in order. */
+		checked: [number, number][];
+		/** Of tracks of the shown run. */
+		names: Record<string, string>;
+		/** What would be taken back. */
+		undo: string | null;
+		/** What would be said again. */
+		redo: string | null;
+	}
+
+	/** How corrections stand. */
+	interface CorrectionsState {
+		/** Another for every change of them, or of what became of them: read them again. */
+		key: string;
+		count: number;
+		unmet: number;
 	}
 
 	/** Whole numbers over time: of each bucket the lowest, the highest and the mean. */
@@ -188,11 +260,16 @@ declare namespace Server {
 		settings: string;
 	}
 
-	/** A moment at which other ways to look disagree. */
-	interface DoubtInfo {
-		step: number;
-		ids: number[];
-		why: string;
+	/** The doubtful places of the shown run, the most at stake first. */
+	interface DoubtQueue {
+		run: string | null;
+		/** Whether the run is. */
+		complete: boolean;
+		/** By what they were judged. */
+		how: string;
+		/** Places that corrections settle. */
+		answered: number;
+		doubts: app__models__correcting__DoubtInfo[];
 	}
 
 	/** Where people appear: mean and standard deviation. */
@@ -327,6 +404,14 @@ declare namespace Server {
 		formats: FormatInfo[];
 	}
 
+	/** A track as it would be. */
+	interface GhostTrack {
+		id: number;
+		first: number;
+		/** World metres, one a step from ``first`` on; null where it is not there. */
+		positions: ([number, number, number] | null)[];
+	}
+
 	/** A group of parameters. */
 	interface GroupInfo {
 		name: string;
@@ -352,7 +437,7 @@ declare namespace Server {
 		/** Empty where there is one camera only. */
 		witnesses: Witness[];
 		/** The most doubtful first. */
-		doubts: DoubtInfo[];
+		doubts: app__web__evaluation__identity_routes__DoubtInfo[];
 		warning: string;
 	}
 
@@ -948,6 +1033,7 @@ declare namespace Server {
 		run: RunInfo;
 		pinned: PinnedInfo | null;
 		teaching: TeachingInfo;
+		corrections: CorrectionsState;
 		viser: ViserInfo;
 	}
 
@@ -1221,6 +1307,41 @@ declare namespace Server {
 		error: number | null;
 	}
 
+	/** What a study proposes at its end. */
+	interface Tuned {
+		/** Whether the best were measured again; all else is empty before. */
+		done: boolean;
+		/** Whether anything better was found than where somebody was. */
+		better: boolean;
+		words: string;
+		/** Of the same values; null where changes that bring nothing were put back. */
+		trial: number | null;
+		seeds: number[];
+		rows: TunedRow[];
+		figures: TunedFigure[];
+	}
+
+	/** A figure of the proposal, on the seeds that no trial had. */
+	interface TunedFigure {
+		key: string;
+		name: string;
+		default: number | null;
+		before: number | null;
+		after: number | null;
+	}
+
+	/** A parameter that the proposal changes. */
+	interface TunedRow {
+		key: string;
+		symbol: string;
+		unit: string;
+		default: any;
+		before: any;
+		after: any;
+		/** Of the leading figure, against the proposal without it; null where the time was over. */
+		brought: number | null;
+	}
+
 	/** Where the 3D view is. */
 	interface ViserInfo {
 		path: string;
@@ -1246,5 +1367,30 @@ declare namespace Server {
 		seed: number | null;
 		/** Seconds since 1970. */
 		since: number;
+	}
+
+	/** A doubtful place. */
+	interface app__models__correcting__DoubtInfo {
+		id: string;
+		kind: "exchange" | "join" | "cut" | "crossing" | "gap" | "short" | "begins" | "ends" | "missing" | "fast";
+		title: string;
+		why: string;
+		first: number;
+		last: number;
+		tracks: number[];
+		places: [number, number, number, number][];
+		/** Probability that the run is wrong there. */
+		doubt: number;
+		/** Steps that depend on it. */
+		stake: number;
+		/** As it is, then the most probable first. */
+		alternatives: AlternativeInfo[];
+	}
+
+	/** A moment at which other ways to look disagree. */
+	interface app__web__evaluation__identity_routes__DoubtInfo {
+		step: number;
+		ids: number[];
+		why: string;
 	}
 }

@@ -222,6 +222,8 @@ class Comparison:
     """The estimates that matched a don't-care row."""
     dont_care: Rows
     """The true positions that are not certain."""
+    unknown: int
+    """Steps of which the truth knows nothing."""
     left_out: int
     """Estimates that could not be scored (see :func:`to_rows`)."""
 
@@ -244,7 +246,8 @@ def prepare(
         truth: None is a truth without rows.
         tracks: Estimates, in any order.
         measure: Distance and gate.
-        steps: Steps 0 … ``steps`` − 1 are compared.
+        steps: Steps 0 … ``steps`` − 1 are compared; of those of which the truth knows nothing
+            neither side counts.
     """
     everyone, sources = to_rows(
         truth.frames if truth else np.zeros(0),
@@ -255,6 +258,17 @@ def prepare(
     valid = np.asarray(truth.valid, dtype=bool)[sources] if truth else np.zeros(0, dtype=bool)
     people, dont_care = everyone.select(valid), everyone.select(~valid)
     estimates, _ = to_rows(tracks.frames, tracks.ids, tracks.positions, steps)
+    left_out = len(np.asarray(tracks.frames)) - len(estimates)
+    unknown = 0
+    if truth is not None and truth.known is not None:
+        known = np.zeros(steps, dtype=bool)
+        known[: len(truth.known)] = truth.known[:steps]
+        people, dont_care = (
+            people.select(known[people.frames]),
+            dont_care.select(known[dont_care.frames]),
+        )
+        estimates = estimates.select(known[estimates.frames])
+        unknown = int((~known).sum())
     distances = distances_by_step(people, estimates, measure)
     keep = np.ones(len(estimates), dtype=bool)
     if len(dont_care):
@@ -272,7 +286,8 @@ def prepare(
         measure=measure,
         ignored=estimates.select(~keep),
         dont_care=dont_care,
-        left_out=len(np.asarray(tracks.frames)) - len(estimates),
+        unknown=unknown,
+        left_out=left_out,
     )
 
 

@@ -59,16 +59,28 @@ class MergeCorrections:
     """The log to write."""
 
 
+@dataclass
+class TruthOfCorrections:
+    """Write the corrected tracks of the steps that were checked as a truth for `evaluate`."""
+
+    sequence: Annotated[Positional[str], _SEQUENCE]
+    output: Annotated[Path, arg(aliases=["-o"])]
+    """The file to write, for [ground_truth] or `evaluate --truth`."""
+    corrections: LogFile = None
+    """Another log than the sequence's own."""
+
+
 CorrectionsAction = (
     Annotated[ListCorrections, subcommand("list")]
     | Annotated[CheckCorrections, subcommand("check")]
     | Annotated[DiffCorrections, subcommand("diff")]
     | Annotated[MergeCorrections, subcommand("merge")]
+    | Annotated[TruthOfCorrections, subcommand("truth")]
 )
 
 
 @dataclass
 class Corrections:
-    """Read, check, compare and merge what was put right by hand."""
+    """Read, check, compare and merge what was put right by hand, and make truth of it."""
 
     action: OmitSubcommandPrefixes[CorrectionsAction]

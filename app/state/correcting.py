@@ -1,0 +1,226 @@
+"""What was put right by hand in the open recording: kept as a log, taken back, said again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from app.state.kept.json_files import write_json
+from app.state.snapshot import Change
+from app.state.workbench import Workbench
+from tracker.corrections import Correction, CorrectionError
+from tracker.corrections.contradictions import refuse_contradiction
+from tracker.corrections.log import Log, open_log, own_place, write_log, writing_place
+from tracker.sequences.sequence import Sequence as Recording
+
+logger = logging.getLogger("app")
+
+MOST = 500
+"""Actions that can be taken back."""
+
+Told = tuple[Correction, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """One thing that a person did, from one list of corrections to another."""
+
+    words: str
+    before: Told
+    after: Told
+
+
+class Correcting:
+    """Follows a workbench; the log is written before anybody hears of a change."""
+
+    def __init__(self, workbench: Workbench, folder: Path | None) -> None:
+        """Read the log of what is open, now and whenever something else is.
+
+        Args:
+            workbench: Whose recordings.
+            folder: Where what can be taken back is kept over a start; None: not beyond this one.
+        """
+        self._workbench, self._folder = workbench, folder
+        self._lock = threading.RLock()
+        self._recording: Recording | None = None
+        self._log = Log(Path())
+        self._done: list[Action] = []
+        self._undone: list[Action] = []
+        self.skipped: set[str] = set()
+        """Doubtful places that somebody passed over, until the program ends."""
+        self._unsubscribe = workbench.subscribe(self._on_change)
+
+    def close(self) -> None:
+        """Stop following."""
+        self._unsubscribe()
+
+    @property
+    def log(self) -> Log:
+        """Where the log lies, and why it cannot be used, where it cannot."""
+        return self._log
+
+    @property
+    def undo_words(self) -> str | None:
+        """What would be taken back; None for nothing."""
+        return self._done[-1].words if self._done else None
+
+    @property
+    def redo_words(self) -> str | None:
+        """What would be said again; None for nothing."""
+        return self._undone[-1].words if self._undone else None
+
+    def add(self, new: Sequence[Correction]) -> None:
+        """Say some things at once: one action.
+
+        Raises:
+            CorrectionError: If one contradicts what was said, or the log cannot be written;
+                nothing changes then.
+        """
+        with self._lock:
+            before = self._workbench.snapshot().corrections
+            after = list(before)
+            for one in new:
+                refuse_contradiction(after, one)
+                after.append(one)
+            words = new[0].words if len(new) == 1 else f"{len(new)} corrections"
+            self._do(Action(words, before, tuple(after)))
+
+    def remove(self, identity: str) -> None:
+        """Take one correction out, wherever it stands.
+
+        Raises:
+            CorrectionError: If there is none with this id, or the log cannot be written.
+        """
+        with self._lock:
+            before = self._workbench.snapshot().corrections
+            gone = next((one for one in before if one.id == identity), None)
+            if gone is None:
+                raise CorrectionError(f"there is no correction {identity}; read the list again")
+            after = tuple(one for one in before if one is not gone)
+            self._do(Action(f"{gone.words} dropped", before, after))
+
+    def undo(self) -> None:
+        """Take the last action back.
+
+        Raises:
+            CorrectionError: If there is nothing to take back, or the log cannot be written.
+        """
+        with self._lock:
+            if not self._done:
+                raise CorrectionError("there is nothing to take back")
+            action = self._done[-1]
+            self._put(action.before)
+            self._undone.append(self._done.pop())
+            self._keep_history()
+
+    def redo(self) -> None:
+        """Do again what was taken back last.
+
+        Raises:
+            CorrectionError: If nothing was, or the log cannot be written.
+        """
+        with self._lock:
+            if not self._undone:
+                raise CorrectionError("nothing was taken back that could be said again")
+            action = self._undone[-1]
+            self._put(action.after)
+            self._done.append(self._undone.pop())
+            self._keep_history()
+
+    def _do(self, action: Action) -> None:
+        self._put(action.after)
+        self._done = [*self._done, action][-MOST:]
+        self._undone = []
+        self._keep_history()
+
+    def _put(self, corrections: Told) -> None:
+        if self._recording is None:
+            raise CorrectionError("no recording is open")
+        if self._log.problem is not None:
+            raise CorrectionError(
+                f"{self._log.problem}; mend the file, or move it away, and open the recording again"
+            )
+        path = writing_place(self._recording.folder)
+        try:
+            write_log(path, corrections)
+        except OSError as error:
+            if path == own_place(self._recording.folder):
+                raise CorrectionError(str(error)) from None
+            path = own_place(self._recording.folder)
+            write_log(path, corrections)
+        self._log = Log(path, corrections)
+        self._workbench.correct(self._recording, corrections)
+
+    # over a start
+
+    def _on_change(self, change: Change) -> None:
+        recording = self._workbench.snapshot().sequence
+        if recording is None or change not in ("sequence", "taught"):
+            return
+        with self._lock:
+            same = self._recording is not None and self._recording.views is recording.views
+            self._recording = recording
+            if change == "taught" and same:
+                return
+            self._log = open_log(recording.folder)
+            self._done, self._undone, self.skipped = [], [], set()
+            self._read_history()
+
+    def _history_file(self) -> Path | None:
+        if self._folder is None or self._recording is None:
+            return None
+        name = hashlib.sha256(str(self._recording.folder.absolute()).encode()).hexdigest()[:16]
+        return self._folder / f"{name}.history.json"
+
+    def _keep_history(self) -> None:
+        path = self._history_file()
+        if path is None:
+            return
+        known: dict[str, Any] = {}
+
+        def plain(action: Action) -> dict[str, Any]:
+            for one in (*action.before, *action.after):
+                known[one.id] = one.model_dump(mode="json", exclude_none=True)
+            return {
+                "words": action.words,
+                "before": [one.id for one in action.before],
+                "after": [one.id for one in action.after],
+            }
+
+        value = {"done": [plain(a) for a in self._done], "undone": [plain(a) for a in self._undone]}
+        try:
+            write_json(path, {**value, "corrections": known})
+        except OSError as error:
+            logger.warning("what was done cannot be taken back after an end: %s", error)
+
+    def _read_history(self) -> None:
+        """What can be taken back, unless somebody else has changed the log meanwhile."""
+        path = self._history_file()
+        try:
+            value = json.loads(path.read_text(encoding="utf-8")) if path is not None else None
+            if value is None:
+                return
+            known = {k: Correction.model_validate(v) for k, v in value["corrections"].items()}
+            action: Callable[[Any], Action] = lambda plain: Action(  # noqa: E731
+                plain["words"],
+                tuple(known[k] for k in plain["before"]),
+                tuple(known[k] for k in plain["after"]),
+            )
+            done = [action(plain) for plain in value["done"]]
+            undone = [action(plain) for plain in value["undone"]]
+        except FileNotFoundError:
+            return
+        except (OSError, ValueError, LookupError, TypeError, ValidationError) as error:
+            logger.warning("%s cannot be read; earlier corrections stay: %s", path, error)
+            return
+        now = done[-1].after if done else undone[-1].before if undone else ()
+        if now == self._log.corrections:
+            self._done, self._undone = done, undone

@@ -1,0 +1,1 @@
+"""Corrections and the queue of doubtful places over HTTP."""

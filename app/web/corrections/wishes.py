@@ -1,0 +1,135 @@
+"""What a page says of tracks of the shown run, as corrections of steps and places."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.models.correcting import CorrectionWish
+from app.state.snapshot import Snapshot
+from tracker.corrections import Correction, CorrectionError, Place
+from tracker.corrections.kinds import make
+from tracker.corrections.pointing import foot_on_floor, triangulated
+from tracker.doubts.doubt import Lanes
+from tracker.sequences.sequence import Sequence
+
+_MOST_PLACES = 12
+"""Along the course of who was nobody."""
+
+
+def corrections_of(wish: CorrectionWish, snapshot: Snapshot, note: str) -> tuple[Correction, ...]:
+    """What a wish says.
+
+    Args:
+        wish: Of tracks of the shown run.
+        snapshot: With that run.
+        note: Written beside each.
+
+    Raises:
+        CorrectionError: If it means nobody, or is not what its kind needs.
+    """
+    sequence = snapshot.sequence
+    if sequence is None:
+        raise CorrectionError("no recording is open")
+    if wish.kind == "checked":
+        return (make(kind="checked", first=wish.first, last=wish.last, note=note),)
+    step = snapshot.playhead if wish.step is None else wish.step
+    for one in (step, wish.to, wish.first, wish.last):
+        if one is not None and one >= sequence.frames:
+            raise CorrectionError(f"step: expected 0 … {sequence.frames - 1}, found {one}")
+    if wish.kind == "here" and (wish.clicks or wish.place is not None):
+        return (
+            make(kind="here", places=[_place(wish, sequence, step)], accuracy=wish.accuracy,
+                 note=note),
+        )  # fmt: skip
+    return _of_tracks(wish, snapshot, step, note)
+
+
+def _of_tracks(
+    wish: CorrectionWish, snapshot: Snapshot, step: int, note: str
+) -> tuple[Correction, ...]:
+    if snapshot.run is None:
+        raise CorrectionError("there is no run yet whose tracks could be meant")
+    lanes = Lanes(snapshot.run.tracks)
+    needed = 2 if wish.kind in ("exchanged", "same") else 1
+    if len(wish.tracks) != needed or len(set(wish.tracks)) != needed:
+        raise CorrectionError(
+            f"tracks: {wish.kind} is of {needed} of them, found {len(wish.tracks)}"
+        )
+    for track in wish.tracks:
+        if track not in lanes.rows:
+            raise CorrectionError(f"tracks: the shown run has no track {track}")
+    one = wish.tracks[0]
+    if wish.kind == "exchanged":
+        back = () if wish.to is None else (_exchanged(lanes, wish.tracks, wish.to, note),)
+        return (_exchanged(lanes, wish.tracks, step, note), *back)
+    if wish.kind == "same":
+        first, second = sorted(wish.tracks, key=lambda track: lanes.span(track)[1])
+        if wish.step is None or lanes.span(first)[1] < lanes.span(second)[0]:
+            begin = lanes.span(second)[0]
+            end = min(lanes.span(first)[1], max(begin - 1, lanes.span(first)[0]))
+        else:
+            begin, end = step, step - 1
+        places = [lanes.place(first, end), lanes.place(second, begin, after=True)]
+        return (make(kind="same", places=places, note=note),)
+    if wish.kind == "different":
+        before, after = lanes.place(one, step - 1), lanes.place(one, step, after=True)
+        if before.step >= after.step:
+            raise CorrectionError(f"step: track {one} begins or ends there, and cannot be cut")
+        return (make(kind="different", places=[before, after], note=note),)
+    if wish.kind == "nobody":
+        return (_nobody(lanes, one, wish, note),)
+    if wish.kind in ("came", "left"):
+        at = wish.step
+        if at is None:
+            at = lanes.span(one)[wish.kind == "left"]
+        place = lanes.place(one, at, after=wish.kind == "came")
+        return (make(kind=wish.kind, places=[place], note=note),)
+    place = lanes.place(one, step)
+    if wish.kind == "name":
+        return (make(kind="name", places=[place], name=wish.name, note=note),)
+    return (make(kind="here", places=[place], accuracy=wish.accuracy, note=note),)
+
+
+def _exchanged(lanes: Lanes, tracks: list[int], step: int, note: str) -> Correction:
+    one, other = tracks
+    before = [lanes.place(track, step - 1) for track in (one, other)]
+    after = [lanes.place(track, step, after=True) for track in (other, one)]
+    for track, place in zip((one, other, other, one), (*before, *after), strict=True):
+        at_all = lanes.span(track)
+        if (place in before) != (place.step < step):
+            raise CorrectionError(
+                f"step: track {track} is there from step {at_all[0]} to {at_all[1]} only, so it "
+                f"cannot be exchanged at step {step}"
+            )
+    return make(kind="exchanged", places=[*before, *after], note=note)
+
+
+def _nobody(lanes: Lanes, track: int, wish: CorrectionWish, note: str) -> Correction:
+    begin, end = lanes.span(track)
+    first = begin if wish.first is None else wish.first
+    last = end if wish.last is None else wish.last
+    frames = lanes.tracks.frames[lanes.rows[track]]
+    own = lanes.rows[track][(frames >= first) & (frames <= last)]
+    if not len(own):
+        raise CorrectionError(f"first, last: track {track} is not there between them")
+    spread = np.linspace(0, len(own) - 1, min(len(own), _MOST_PLACES))
+    chosen = np.unique(spread.round().astype(int))
+    places = [lanes.of_row(int(own[k])) for k in chosen]
+    return make(kind="nobody", places=places, accuracy=wish.accuracy, note=note)
+
+
+def _place(wish: CorrectionWish, sequence: Sequence, step: int) -> Place:
+    if wish.place is not None:
+        return Place(step, *wish.place)
+    cameras = {camera.name: camera for camera in sequence.cameras}
+    for click in wish.clicks:
+        if click.camera not in cameras:
+            raise CorrectionError(f"clicks: there is no camera {click.camera}")
+    points = [(cameras[click.camera], (click.x, click.y)) for click in wish.clicks]
+    if len(points) == 1:
+        half_height = float(sequence.target_half_extents[2])
+        floor = float(sequence.room.minimum[2])
+        found = foot_on_floor(*points[0], floor=floor, half_height=half_height)
+    else:
+        found = triangulated(points)
+    return Place(step, *found.tolist())

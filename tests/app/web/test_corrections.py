@@ -1,0 +1,247 @@
+"""The routes of corrections: said, obeyed, taken back, kept over a start."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.state.doubting import Doubting
+from app.web.server import Settings, create_app
+from tests.app.conftest import ADDRESS, Runs, run_is, wait_until
+from tracker.corrections.log import read_log
+from tracker.doubts import Alternative, Doubt, Queue
+from tracker.doubts.doubt import Lanes, unsaid
+
+PLACE = "/api/corrections"
+
+
+@pytest.fixture
+def own(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the recording with boxes, which may be written to, and settings of its own."""
+    monkeypatch.setenv("MULTIVIEW_PHD_SETTINGS", str(tmp_path / "settings"))
+    folder = tmp_path / "crossing"
+    shutil.copytree(data / "crossing", folder)
+    return folder
+
+
+@pytest.fixture
+def desk(own: Path) -> Iterator[TestClient]:
+    """The application with it open and computed."""
+    with started(own) as client:
+        yield client
+
+
+def started(folder: Path) -> Any:
+    """A start of the application, which keeps what can be taken back."""
+    app = create_app(Settings(sequence=str(folder), with_viser=False, keep_on_disk=True))
+
+    class Start:
+        def __enter__(self) -> TestClient:
+            self.client = TestClient(app, base_url=ADDRESS)
+            self.client.__enter__()
+            wait_until(run_is(self.client, "done"))
+            return self.client
+
+        def __exit__(self, *error: object) -> None:
+            self.client.__exit__(None, None, None)
+
+    return Start()
+
+
+def tracks(client: TestClient) -> list[dict[str, Any]]:
+    """The lives of the shown run."""
+    lives: list[dict[str, Any]] = client.get("/api/timeline").json()["tracks"]
+    return lives
+
+
+def settled(client: TestClient) -> dict[str, Any]:
+    """The corrections, once the run has met them or not."""
+    answer: dict[str, Any] = {}
+
+    def holds() -> bool:
+        answer.update(client.get(PLACE).json())
+        return run_is(client, "done")() and all(
+            one["met"] is not None for one in answer["corrections"]
+        )
+
+    wait_until(holds)
+    return answer
+
+
+def test_a_cut_is_obeyed_kept_taken_back_and_said_again(desk: TestClient, own: Path) -> None:
+    before = tracks(desk)
+    one = max(before, key=lambda life: life["last"] - life["first"])
+    step = (one["first"] + one["last"]) // 2
+    wish = {"kind": "different", "step": step, "tracks": [one["id"]]}
+    answer = desk.post(PLACE, json={"corrections": [wish], "note": "two people"})
+    assert answer.status_code == 200, answer.text
+    found = settled(desk)
+    assert [c["met"] for c in found["corrections"]] == [True]
+    assert found["corrections"][0]["note"] == "two people"
+    assert found["undo"] == found["corrections"][0]["words"]
+    assert len(tracks(desk)) == len(before) + 1
+    assert [c.kind for c in read_log(own / "corrections.toml")] == ["different"]
+    desk.post(f"{PLACE}/undo")
+    assert settled(desk)["corrections"] == []
+    assert len(tracks(desk)) == len(before)
+    assert read_log(own / "corrections.toml") == ()
+    again = desk.post(f"{PLACE}/redo").json()
+    assert again["corrections"][0]["id"] == found["corrections"][0]["id"]
+    settled(desk)
+    assert len(tracks(desk)) == len(before) + 1
+    assert desk.post(f"{PLACE}/redo").status_code == 409
+    key = desk.get("/api/state").json()["corrections"]
+    assert (key["count"], key["unmet"]) == (1, 0)
+
+
+def test_what_can_be_taken_back_survives_a_start(own: Path) -> None:
+    with started(own) as client:
+        lives = tracks(client)
+        wish = {"kind": "name", "tracks": [lives[0]["id"]], "name": "Anna", "step": 30}
+        client.post(PLACE, json={"corrections": [wish]})
+        client.post(PLACE, json={"corrections": [{"kind": "checked", "first": 0, "last": 9}]})
+        client.post(f"{PLACE}/undo")
+    with started(own) as client:
+        found = settled(client)
+        assert found["names"] == {str(lives[0]["id"]): "Anna"}
+        assert found["redo"] == "steps 0 – 9 checked"
+        assert client.post(f"{PLACE}/redo").json()["checked"] == [[0, 9]]
+        client.post(f"{PLACE}/undo")
+        client.post(f"{PLACE}/undo")
+        assert client.get(PLACE).json()["corrections"] == []
+        assert client.post(f"{PLACE}/undo").status_code == 409
+
+
+def test_after_another_slider_a_correction_still_holds(desk: TestClient) -> None:
+    one = max(tracks(desk), key=lambda life: life["last"] - life["first"])
+    step = (one["first"] + one["last"]) // 2
+    wish = {"kind": "different", "step": step, "tracks": [one["id"]]}
+    desk.post(PLACE, json={"corrections": [wish]})
+    settled(desk)
+    desk.patch("/api/parameters", json={"changes": {"fusion.survival_probability": 0.97}})
+    assert [c["met"] for c in settled(desk)["corrections"]] == [True]
+
+
+def test_what_cannot_be_is_refused_with_a_sentence(desk: TestClient, own: Path) -> None:
+    lives = tracks(desk)
+    two = [life["id"] for life in lives[:2]]
+    for wish, words in (
+        ({"kind": "different", "step": 40, "tracks": [999]}, "no track 999"),
+        ({"kind": "exchanged", "step": 40, "tracks": two[:1]}, "found 1"),
+        ({"kind": "here", "step": 40, "clicks": [{"camera": "x", "x": 1, "y": 1}]}, "no camera x"),
+        ({"kind": "checked", "first": 9, "last": 3}, "expected a step from 9 on"),
+        ({"kind": "different", "step": 10**6, "tracks": two[:1]}, "expected 0 …"),
+    ):
+        answer = desk.post(PLACE, json={"corrections": [wish]})
+        assert answer.status_code == 422, wish
+        assert words in answer.json()["detail"], answer.text
+    assert not (own / "corrections.toml").exists()
+    assert desk.delete(f"{PLACE}/nothing").status_code == 404
+
+
+def test_a_malformed_log_is_told_and_the_recording_stays_usable(own: Path) -> None:
+    (own / "corrections.toml").write_text('format = 1\n\n[[correction]]\nkind = "hier"\n')
+    with started(own) as client:
+        found = client.get(PLACE).json()
+        assert "line 4" in found["problem"]
+        assert tracks(client)
+        answer = client.post(
+            PLACE, json={"corrections": [{"kind": "checked", "first": 0, "last": 9}]}
+        )
+        assert answer.status_code == 422
+        assert "line 4" in answer.json()["detail"]
+    assert "hier" in (own / "corrections.toml").read_text()
+
+
+def test_the_queue_is_answered_previewed_and_skipped(
+    desk: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert desk.get(f"{PLACE}/queue").json()["doubts"] == [], "all is clear here"
+    # so that what is hardly doubtful is told, too: who passes metres apart
+    monkeypatch.setattr("tracker.doubts.ranking._LEAST", 0.0)
+    monkeypatch.setattr("tracker.doubts.alone._CLOSE", 8.0)
+    desk.patch("/api/parameters", json={"changes": {"fusion.survival_probability": 0.97}})
+    settled(desk)
+    queue = desk.get(f"{PLACE}/queue").json()
+    assert queue["complete"]
+    assert queue["doubts"], queue
+    weights = [one["doubt"] * one["stake"] for one in queue["doubts"]]
+    assert weights == sorted(weights, reverse=True)
+    first = queue["doubts"][0]
+    assert [a["as_it_is"] for a in first["alternatives"]][:2] == [True, False]
+    shown = desk.get(f"{PLACE}/queue/{first['id']}/1").json()
+    assert shown["tracks"]
+    assert desk.get(f"{PLACE}/queue/{first['id']}/0").json()["spans"] == []
+    assert desk.get(f"{PLACE}/queue/{first['id']}/99").status_code == 404
+    assert desk.get(f"{PLACE}/queue/nothing/0").status_code == 404
+    left = desk.post(f"{PLACE}/skips", json={"doubt": first["id"]}).json()["doubts"]
+    assert first["id"] not in [one["id"] for one in left]
+    if len(left):
+        answer = desk.post(f"{PLACE}/answers", json={"doubt": left[0]["id"], "alternative": 0})
+        assert answer.status_code == 200, answer.text
+        settled(desk)
+        rest = desk.get(f"{PLACE}/queue").json()["doubts"]
+        assert left[0]["id"] not in [one["id"] for one in rest]
+
+
+def test_how_it_would_be_is_shown_until_it_is_no_more(
+    desk: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lanes = Lanes(desk.app.state.workbench.snapshot().run.tracks)  # type: ignore[attr-defined]
+    track = tracks(desk)[0]["id"]
+    places = (lanes.place(track, 59), lanes.place(track, 60, after=True))
+    two = Alternative("two people", 0.5, unsaid("different", places))
+    made = Doubt(
+        "cut", "two people?", "told", 59, 60, (track,), places, 0.5, 60,
+        (Alternative("as it is", 0.5, ()), two),
+    )  # fmt: skip
+    monkeypatch.setattr(Doubting, "of", lambda self, snapshot: Queue((made,), 0, "a test"))
+    first = desk.get(f"{PLACE}/queue").json()["doubts"][0]
+    told = desk.post(f"{PLACE}/ghosts", json={"doubt": first["id"], "alternative": 1}).json()
+    assert told == desk.get(f"{PLACE}/queue/{first['id']}/1").json()
+    assert [one["was"] for one in told["spans"]] == [track]
+    ghosts = desk.app.state.workbench.snapshot().ghosts  # type: ignore[attr-defined]
+    assert set(ghosts.tracks.ids.tolist()) == {one["id"] for one in told["tracks"]}
+    assert ghosts.run == desk.get("/api/state").json()["run"]["key"]
+    assert desk.post(f"{PLACE}/ghosts", json={"doubt": "nothing"}).status_code == 404
+    assert desk.post(f"{PLACE}/ghosts", json={"doubt": None}).json()["tracks"] == []
+    assert desk.app.state.workbench.snapshot().ghosts is None  # type: ignore[attr-defined]
+
+
+def test_a_name_that_is_dropped_is_gone_before_the_run_is_another(desk: TestClient) -> None:
+    wish = {"kind": "name", "tracks": [tracks(desk)[0]["id"]], "name": "Anna", "step": 30}
+    desk.post(PLACE, json={"corrections": [wish]})
+    (one,) = settled(desk)["corrections"]
+    answer = desk.delete(f"{PLACE}/{one['id']}")
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["names"] == {}
+
+
+def test_only_what_was_checked_counts_as_truth(desk: TestClient, own: Path, run: Runs) -> None:
+    assert desk.get(f"{PLACE}/truth.csv").status_code == 409
+    wish = [
+        {"kind": "checked", "first": 10, "last": 19},
+        {"kind": "checked", "first": 20, "last": 29},
+    ]
+    found = desk.post(PLACE, json={"corrections": wish}).json()
+    assert found["checked"] == [[10, 29]]
+    text = desk.get(f"{PLACE}/truth.csv").text
+    assert text.startswith("# steps = 10-29\nframe,id,x,y,z\n")
+    truth = own / "truth.csv"
+    truth.write_text(text)
+    out = own / "tracks.csv"
+    assert run("track", str(own), "-o", str(out), "--keep", "0")[0] == 0
+    status, told, _ = run("evaluate", str(own), str(out), "--truth", str(truth), "--json")
+    assert status == 0
+    answer = json.loads(told)
+    figures = {one["key"]: one["value"] for one in answer["figures"]}
+    assert figures["idf1"] == pytest.approx(1.0)
+    assert sum(answer["series"]["truth"][:10]) == 0
+    assert sum(answer["series"]["estimates"][30:]) == 0
+    assert any("truth says nothing" in note for note in answer["notes"])

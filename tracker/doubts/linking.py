@@ -1,0 +1,74 @@
+"""Doubts about who goes on as whom: moves from one way to link pieces to another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tracker.corrections import Place
+from tracker.doubts.doubt import Alternative, DoubtKind, unsaid
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A part of a track that is one person's."""
+
+    track: int
+    begin: Place
+    end: Place
+    before: int
+    """Steps of the track up to its end."""
+    after: int
+    """Steps of the track from its begin on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """Other links than the run's, at one place: i → j' and i' → j, or no link at all."""
+
+    earlier: tuple[Piece, ...]
+    """i, then i' where there is one."""
+    later: tuple[Piece, ...]
+    """What they go on as now: j, then j'; for a join those that begin anew."""
+    kind: DoubtKind
+    """exchange: both cross over; cut: i → j no more; join: i → j where both were free."""
+    odds: float
+    """log of how much likelier than what the run has."""
+
+    @property
+    def stake(self) -> int:
+        """Steps that another person's track would get."""
+        if self.kind == "join":
+            return min(self.earlier[0].before, self.later[0].after)
+        if self.kind == "cut":
+            return min(self.earlier[0].before, self.later[0].after)
+        heads = sum(piece.before for piece in self.earlier)
+        tails = sum(piece.after for piece in self.later)
+        return min(heads, tails)
+
+    @property
+    def alternative(self) -> Alternative:
+        """What somebody says who makes it; its probability is still to be found."""
+        if self.kind == "cut":
+            (i,), (j,) = self.earlier, self.later
+            return Alternative("two people", 0.0, unsaid("different", (i.end, j.begin)))
+        if self.kind == "join":
+            i, j = self.earlier[0], self.later[0]
+            return Alternative(_joined(i, j), 0.0, unsaid("same", (i.end, j.begin)))
+        if len(self.earlier) == 2 and len(self.later) == 2:
+            (i, other), (j, after) = self.earlier, self.later
+            told = unsaid("exchanged", (i.end, other.end, after.begin, j.begin))
+            if not told:
+                told = (
+                    *unsaid("same", (i.end, after.begin)), *unsaid("same", (other.end, j.begin)),
+                )  # fmt: skip
+            words = f"exchanged with {other.track if other.track != i.track else after.track}"
+            return Alternative(words, 0.0, told)
+        if len(self.earlier) == 2:  # j goes on from i', and i ends
+            (_, other), (j,) = self.earlier, self.later
+            return Alternative(_joined(other, j), 0.0, unsaid("same", (other.end, j.begin)))
+        (i,), (_, after) = self.earlier, self.later
+        return Alternative(_joined(i, after), 0.0, unsaid("same", (i.end, after.begin)))
+
+
+def _joined(i: Piece, j: Piece) -> str:
+    return f"{i.track} goes on as {j.track}" if i.track != j.track else f"{i.track} goes on"
