@@ -17,7 +17,7 @@ from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subc
 from app.command.arguments.corrections import Corrections, LogFile
 from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
 from app.command.arguments.library import Bundle, FormatName, LibraryCommand, LibraryFile, Runs
-from app.command.arguments.studies import Batch, Study
+from app.command.arguments.studies import Batch, Study, Tune
 from tracker import parameters as table
 from tracker.library import KEEP
 from tracker.parameters import FOLLOWS, METHODS, PRESETS, Parameter, ParameterError
@@ -375,6 +375,7 @@ Arguments = (
     | LibraryCommand
     | Study
     | Batch
+    | Tune
     | Corrections
 )
 
@@ -406,6 +407,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         | Annotated[LibraryCommand, subcommand("library")]
         | Annotated[Study, subcommand("study")]
         | Annotated[Batch, subcommand("batch")]
+        | Annotated[Tune, subcommand("tune")]
         | Annotated[Corrections, subcommand("corrections")]
     )
     parsed: Arguments = tyro.cli(

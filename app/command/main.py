@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 from app.command.arguments.corrections import Corrections
 from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
 from app.command.arguments.library import Bundle, LibraryCommand, OpenRun, Runs
-from app.command.arguments.studies import Batch, Study
+from app.command.arguments.studies import Batch, Study, Tune
 from app.command.flags import (
     Arguments,
     Benchmark,
@@ -126,6 +126,10 @@ def _run(command: Arguments) -> int:
             from app.command.batch import batch
 
             return batch(command)
+        case Tune():
+            from app.command.tune import tune
+
+            return tune(command)
         case Corrections():
             from app.command.correcting import corrections
 
@@ -294,6 +298,7 @@ def _track(command: Track) -> int:
     from tracker.runs import gaps
     from tracker.runs.gates import notices
     from tracker.runs.outcome import why_no_tracks
+    from tracker.runs.run import resting_of
     from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
 
@@ -334,7 +339,14 @@ def _track(command: Track) -> int:
     seconds = time.perf_counter() - begin
     with Bar("writing", "step") as writing:
         missing = gaps.sentences(run)
-        written = Written(sequence, run.tracks, parameters, command.seed, remarks=tuple(missing))
+        written = Written(
+            sequence,
+            run.tracks,
+            parameters,
+            command.seed,
+            remarks=tuple(missing),
+            resting=resting_of(run),
+        )
         save(output, form, written, Options(progress=writing.at))
     targets = len(set(run.tracks.ids.tolist()))
     kept = "" if "single_view" in stages else "; stage 1 was kept from an earlier run"

@@ -129,8 +129,15 @@ def crew_of(where: Where) -> Iterator[Any]:
             crew.close()
 
 
-def run(store: Store, where: Where, *, as_json: bool = False) -> int:
-    """Run a study, or go on with it; returns the exit status."""
+def run(store: Store, where: Where, *, as_json: bool = False, quiet: bool = False) -> int:
+    """Run a study, or go on with it; returns the exit status.
+
+    Args:
+        store: Its folder.
+        where: Who computes.
+        as_json: Tell the end as JSON.
+        quiet: Tell nothing at the end.
+    """
     from tracker.studies.running import run_study
 
     before: list[str] = []
@@ -151,7 +158,7 @@ def run(store: Store, where: Where, *, as_json: bool = False) -> int:
         status = run_study(store, writer, crew, told=told, stopped=stopped.is_set)
     if as_json:
         _print({"study": store.name, "state": status.state, "trials": len(store.trials())})
-    else:
+    elif not quiet:
         _tell_end(store, status)
     return INTERRUPTED if status.state == "stopped" and stopped.is_set() else 0
 
@@ -252,7 +259,7 @@ def _show_trials(store: Store) -> None:
                 summary.objectives, trial.objectives, trial.spreads, strict=True
             )
         ]
-        values = [_value(trial.values.get(key)) for key in keys]
+        values = [shown_value(trial.values.get(key)) for key in keys]
         rows.append((str(trial.number), *measured, *values, summary.remark(trial)))
     print_table((">trial", *(f">{one.name}" for one in summary.objectives), *named, ""), rows)
     for sentence in summary.sentences():
@@ -263,8 +270,8 @@ def _show_trial(store: Store, trial: Trial) -> None:
     facts = {
         "trial": f"{trial.number} of {store.name}, {trial.state}",
         **({"": trial.words} if trial.words else {}),
-        **{f"value {key}": _value(value) for key, value in trial.values.items()},
-        **{key: _value(value) for key, value in trial.figures.items()},
+        **{f"value {key}": shown_value(value) for key, value in trial.values.items()},
+        **{key: shown_value(value) for key, value in trial.figures.items()},
         "vetoed": "yes" if trial.vetoed else "no",
         "seconds": f"{trial.seconds:.1f}",
         **{f"run {row.key}": f"{row.recording}, seed {row.seed}" for row in trial.jobs},
@@ -289,7 +296,10 @@ def _best(store: Store, command: BestOfStudy) -> None:
         say(sentence)
     print_table(
         ("parameter", "default", "best"),
-        [(key, _value(summary.defaults.get(key)), _value(v)) for key, v in changes.items()],
+        [
+            (key, shown_value(summary.defaults.get(key)), shown_value(v))
+            for key, v in changes.items()
+        ],
     )
 
 
@@ -323,7 +333,8 @@ def _everything(store: Store) -> dict[str, Any]:
     return everything(store)
 
 
-def _value(value: Any) -> str:
+def shown_value(value: Any) -> str:
+    """A value in a few digits; a dash for none."""
     if value is None:
         return "–"
     if isinstance(value, bool):

@@ -24,6 +24,7 @@ from tests.benchmarks import (
     record,
     server,
     stage_one,
+    studies,
 )
 from tests.benchmarks.measure import Measurement, machine
 from tests.benchmarks.plane import targets
@@ -42,6 +43,7 @@ SUITES = {
     "server": server.run,
     "page": page.run,
     "library": library.run,
+    "studies": studies.run,
 }
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from tests.studies.small import Serial, definition, made_up, recording, run
 from tracker.studies.errors import StudyError
+from tracker.studies.sampling import Sampler
 from tracker.studies.store import JOURNAL, Store, create
 from tracker.studies.summary import summary_of
 from tracker.studies.work.jobs import Job, Outcome
@@ -215,3 +216,25 @@ def test_the_time_ends_it(tmp_path: Path) -> None:
     assert status.state == "done"
     assert "minutes are over" in status.words
     assert 0 < len(store.trials()) < 10_000
+
+
+def test_a_trial_that_ended_before_the_sampler_heard_of_it_stays_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = study(tmp_path, trials=6, seeds=2)
+    tell = Sampler.tell
+
+    def killed(self: Sampler, number: int, values: Any, *, pruned: bool = False) -> None:
+        if number == 2:
+            raise KeyboardInterrupt
+        tell(self, number, values, pruned=pruned)
+
+    monkeypatch.setattr(Sampler, "tell", killed)
+    with pytest.raises(KeyboardInterrupt):
+        run(store, Serial(made_up(near)))
+    monkeypatch.setattr(Sampler, "tell", tell)
+    before = store.trials()
+    assert [one.number for one in before] == [0, 1, 2]
+    run(store, Serial(made_up(near)))
+    assert store.trials()[:3] == before
+    assert len(store.trials()) == 6

@@ -26,7 +26,7 @@ GRID_STEPS = 5
 _NAME = re.compile(r"[^\W_][\w .+-]{0,59}")
 _TOP = frozenset(
     {"name", "recordings", "trials", "minutes", "seeds", "search", "objectives", "prune", "preset",
-     "seed", "values", "start", "parameters"}
+     "propose", "seed", "values", "start", "parameters"}
 )  # fmt: skip
 _RANGE = frozenset({"low", "high", "log", "steps", "choices"})
 
@@ -85,6 +85,9 @@ class Definition:
     prune: bool = True
     """Whether hopeless trials are given up after the first recordings."""
     preset: str | None = None
+    propose: int = 0
+    """On how many seeds that no trial had the best are measured again at the end, and the best
+    of them proposed; 0 leaves it out."""
     seed: int = 0
     """Of the sampler."""
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -106,6 +109,7 @@ class Definition:
             "search": self.search,
             "objectives": list(self.objectives),
             "prune": self.prune,
+            "propose": self.propose,
             "seed": self.seed,
         }
         if self.minutes is not None:
@@ -198,6 +202,7 @@ def definition_of(found: Mapping[str, Any], *, where: str, folder: Path) -> Defi
         objectives=objectives,
         prune=fields.yes("prune", True),
         preset=preset,
+        propose=fields.whole("propose", 0, 0, 100),
         seed=fields.whole("seed", 0, 0, 2**32 - 1),
         values=values,
         start=start,

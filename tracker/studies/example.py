@@ -54,6 +54,9 @@ objectives = ["score"]
 # Whether hopeless trials are given up after a third of their runs.
 prune = true
 
+# On how many other seeds the best are measured again at the end, before one is proposed.
+propose = 2
+
 # Values to start from, and the sampler's seed.
 preset = "robust"
 seed = 0

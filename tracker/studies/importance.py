@@ -16,10 +16,10 @@ from tracker.studies.definition import Varied
 FEWEST = 12
 """Complete trials below which nothing is told."""
 
-REPEATS = 6
+REPEATS = 5
 """Times that it is found out from trials drawn with replacement: their spread is told."""
 
-TREES = 24
+TREES = 16
 
 MOST_TRIALS = 400
 """More are drawn from at random: the forest takes time with their number."""

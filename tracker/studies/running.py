@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -18,6 +18,7 @@ from tracker.studies.definition import Definition
 from tracker.studies.errors import StudyError
 from tracker.studies.judging import Judge
 from tracker.studies.opened import Recordings, open_recordings
+from tracker.studies.proposing import SEARCH_SHARE, Proposer
 from tracker.studies.sampling import Sampler
 from tracker.studies.space import defaults_of
 from tracker.studies.store import JOURNAL, JobRow, Status, Store, Trial, Writer
@@ -30,7 +31,7 @@ SECONDS_BETWEEN = 0.5
 AHEAD = 1
 """Runs that wait beside each one under way, so that no worker waits for the sampler."""
 
-IMPORTANCE_GROWTH = 1.25
+IMPORTANCE_GROWTH = 1.5
 """What matters is found out anew when there are so many times more trials."""
 
 LAST_SECONDS = 60.0
@@ -201,11 +202,14 @@ class _Running:
         self._begin = time.monotonic()
         for active in list(self._active.values()):
             self._send(active)
-        while not self._stopped() and not self._store.asked_to_stop():
+        while not self._is_stopped():
             self._fill()
             if not self._active:
-                self.state, self.words = "done", self._why_done()
+                words = self._why_done()
                 self._weigh(last=True)
+                if self._definition.propose and not self._propose():
+                    break
+                self.state, self.words = "done", words
                 return
             for outcome in self.crew.finished(SECONDS_BETWEEN):
                 self._came(outcome)
@@ -230,10 +234,12 @@ class _Running:
             return False
         return self._asked < 1 or self._minutes_left() > 0.0
 
-    def _minutes_left(self) -> float:
+    def _minutes_left(self, share: float | None = None) -> float:
         if self._definition.minutes is None:
             return float("inf")
-        return self._definition.minutes - (self._spent + self._seconds()) / 60.0
+        if share is None:
+            share = SEARCH_SHARE if self._definition.propose else 1.0
+        return share * self._definition.minutes - (self._spent + self._seconds()) / 60.0
 
     def _seconds(self) -> float:
         return time.monotonic() - self._begin
@@ -260,6 +266,48 @@ class _Running:
                 self._waiting[job.key] = [active]
                 self.crew.submit(job, -active.number)
         active.sent = upto
+
+    def _propose(self) -> bool:
+        """Measure the best again on other seeds; False where somebody stopped it."""
+        if self._store.told("tuned") is not None:
+            return True
+        definition = self._definition
+        first = max(definition.seeds) + 1
+        proposer = Proposer(
+            self._recordings,
+            self._store.trials(),
+            defaults_of(definition.varied, self._recordings.bases[0]),
+            definition.start if self._fixed > 1 else {},
+            range(first, first + definition.propose),
+            self._measure,
+        )
+        self.words = "measuring the best again on other seeds"
+        found = proposer.propose()
+        if self._is_stopped():
+            return False
+        self._writer.tell("tuned", found)
+        return True
+
+    def _measure(self, jobs: Sequence[Job]) -> dict[str, Outcome]:
+        """Have jobs done that are no trial's, as far as the time goes."""
+        found: dict[str, Outcome] = {}
+        wanted = {job.key: job for job in jobs}
+        for key, job in wanted.items():
+            if (kept := self._writer.outcome(key)) is not None:
+                found[key] = kept
+            elif self._minutes_left(1.0) > 0.0:
+                self._waiting[key] = []
+                self.crew.submit(job)
+        while self._waiting and not self._is_stopped():
+            for outcome in self.crew.finished(SECONDS_BETWEEN):
+                self._came(outcome)
+                found[outcome.key] = outcome
+            if time.monotonic() - self._said >= SECONDS_BETWEEN:
+                self.say()
+        return found
+
+    def _is_stopped(self) -> bool:
+        return self._stopped() or self._store.asked_to_stop()
 
     def _came(self, outcome: Outcome) -> None:
         if outcome.became == "done":

@@ -266,3 +266,51 @@ class PresetWish(Model):
     """A name to keep a trial's values under."""
 
     name: str
+
+
+class TuneWish(Model):
+    """The open recording is to be tuned, from today's values."""
+
+    minutes: float = Field(default=5.0, gt=0, le=10_000)
+    without_truth: bool = False
+    """Whether truth is not looked at though it is there."""
+    workers: int | None = Field(default=None, ge=1, le=1024)
+    scheduler: str | None = None
+
+
+class TunedRow(Model):
+    """A parameter that the proposal changes."""
+
+    key: str
+    symbol: str
+    unit: str
+    default: Any
+    before: Any
+    after: Any
+    brought: float | None
+    """Of the leading figure, against the proposal without it; null where the time was over."""
+
+
+class TunedFigure(Model):
+    """A figure of the proposal, on the seeds that no trial had."""
+
+    key: str
+    name: str
+    default: float | None
+    before: float | None
+    after: float | None
+
+
+class Tuned(Model):
+    """What a study proposes at its end."""
+
+    done: bool
+    """Whether the best were measured again; all else is empty before."""
+    better: bool
+    """Whether anything better was found than where somebody was."""
+    words: str
+    trial: int | None
+    """Of the same values; null where changes that bring nothing were put back."""
+    seeds: list[int]
+    rows: list[TunedRow]
+    figures: list[TunedFigure]

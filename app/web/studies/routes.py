@@ -23,6 +23,7 @@ from tracker.studies.definition import Definition, definition_of
 from tracker.studies.errors import StudyError
 from tracker.studies.objectives import OBJECTIVES, WITH_TRUTH, WITHOUT_TRUTH, chosen
 from tracker.studies.store import Store
+from tracker.studies.tuning import tuning
 
 router = APIRouter(prefix="/api/studies", responses=ERRORS)
 
@@ -211,7 +212,27 @@ def scheduler(wish: models.SchedulerWish) -> models.SchedulerInfo:
     return models.SchedulerInfo(address=wish.address, **found, error=None)
 
 
-@router.get("/{name}")
+@router.post("/tune")
+def tune(wish: models.TuneWish, desk: Desk, bench: Bench) -> models.Study:
+    """Define and start the study that tunes the open recording from today's values."""
+    snapshot = bench.snapshot()
+    if snapshot.sequence is None:
+        raise nothing_open()
+    try:
+        definition = tuning(
+            _free_name(desk, f"tune {snapshot.sequence.name}"),
+            [views.place_of(snapshot)],
+            minutes=wish.minutes,
+            changes=table.changed(snapshot.parameters, snapshot.defaults),
+            without_truth=wish.without_truth,
+        )
+        desk.define(definition)
+        return _told(desk, desk.start(definition.name, wish.workers, wish.scheduler))
+    except StudyError as error:
+        raise no_study(error) from None
+
+
+@router.get("/{name}", operation_id="get_study")
 def study(store: Named, desk: Desk) -> models.Study:
     """Everything of a study but its trials."""
     return _told(desk, store)
@@ -258,7 +279,7 @@ def trials(
     )
 
 
-@router.get("/{name}/trials/{number}")
+@router.get("/{name}/trials/{number}", operation_id="get_studies_trial")
 def trial(store: Named, number: int) -> models.TrialDetail:
     """A trial with its runs, and the commands that repeat them."""
     try:
@@ -290,25 +311,65 @@ def use(store: Named, number: int, bench: Bench) -> State:
 @router.post("/{name}/trials/{number}/preset")
 def preset(store: Named, number: int, wish: models.PresetWish, bench: Bench, own: Own) -> State:
     """Keep the values of a trial as a preset."""
-    snapshot = bench.snapshot()
-    values = _values(store, number, bench)
-    parameters = table.with_values(snapshot.defaults, values)
-    own.keep(wish.name, table.changed(parameters, snapshot.defaults))
+    _keep(wish.name, _values(store, number, bench), bench, own)
     return results.state_of(bench.snapshot())
+
+
+def _keep(name: str, values: dict[str, object], bench: Bench, own: Own) -> None:
+    defaults = bench.snapshot().defaults
+    own.keep(name, table.changed(table.with_values(defaults, values), defaults))
 
 
 def _values(store: Store, number: int, bench: Bench) -> dict[str, object]:
     """Of all parameters: a trial's own, what its study holds, and the defaults."""
-    snapshot = bench.snapshot()
-    if snapshot.sequence is None:
-        raise nothing_open()
     try:
         found, definition = store.trial(number), store.definition()
     except StudyError as error:
         raise ApiError(404, "no_trial", f"{sentence(error)}.", field="number") from None
-    values = {**definition.held(), **(found.values if number else {})}
+    return _all({**definition.held(), **(found.values if number else {})}, bench)
+
+
+def _all(values: dict[str, object], bench: Bench) -> dict[str, object]:
+    """Of all parameters, these and the defaults."""
+    snapshot = bench.snapshot()
+    if snapshot.sequence is None:
+        raise nothing_open()
     parameters = table.with_values(snapshot.defaults, values)
     return {key: table.value(parameters, key) for key in (*table.METHODS, *table.PARAMETERS)}
+
+
+@router.get("/{name}/tuned")
+def tuned(store: Named) -> models.Tuned:
+    """What a study proposes at its end."""
+    try:
+        found = store.told("tuned")
+    except StudyError as error:
+        raise no_study(error) from None
+    return views.tuned_of(found)
+
+
+@router.post("/{name}/tuned/use")
+def use_tuned(store: Named, bench: Bench) -> State:
+    """Set all parameters to what a study proposes, as one step."""
+    bench.set_parameters(_proposed(store, bench), "api")
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/{name}/tuned/preset")
+def keep_tuned(store: Named, wish: models.PresetWish, bench: Bench, own: Own) -> State:
+    """Keep what a study proposes as a preset."""
+    _keep(wish.name, _proposed(store, bench), bench, own)
+    return results.state_of(bench.snapshot())
+
+
+def _proposed(store: Store, bench: Bench) -> dict[str, object]:
+    try:
+        found, definition = store.told("tuned"), store.definition()
+    except StudyError as error:
+        raise no_study(error) from None
+    if found is None or not found["better"]:
+        raise ApiError(409, "nothing_better", f"The study {store.name} proposes nothing.")
+    return _all({**definition.held(), **found["values"]}, bench)
 
 
 @router.get(

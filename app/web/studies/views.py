@@ -96,6 +96,29 @@ def trial_of(trial: Trial) -> models.TrialInfo:
     return models.TrialInfo(**told)
 
 
+def tuned_of(found: dict[str, Any] | None) -> models.Tuned:
+    """What a study proposes; None where it has not come to its end."""
+    if found is None:
+        return models.Tuned(
+            done=False, better=False, words="", trial=None, seeds=[], rows=[], figures=[]
+        )
+    rows = []
+    for row in found["rows"]:
+        parameter = PARAMETERS.get(row["key"])
+        symbol = "" if parameter is None else parameter.symbol
+        unit = "" if parameter is None else parameter.unit
+        rows.append(models.TunedRow(symbol=symbol, unit=unit, **row))
+    return models.Tuned(
+        done=True,
+        better=found["better"],
+        words=found["words"],
+        trial=found["trial"],
+        seeds=found["seeds"],
+        rows=rows,
+        figures=[models.TunedFigure(**one) for one in found["figures"]],
+    )
+
+
 def place_of(snapshot: Snapshot) -> str:
     """What opens the recording again, wherever the program is started."""
     sequence = snapshot.sequence

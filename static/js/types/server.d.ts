@@ -1307,6 +1307,41 @@ declare namespace Server {
 		error: number | null;
 	}
 
+	/** What a study proposes at its end. */
+	interface Tuned {
+		/** Whether the best were measured again; all else is empty before. */
+		done: boolean;
+		/** Whether anything better was found than where somebody was. */
+		better: boolean;
+		words: string;
+		/** Of the same values; null where changes that bring nothing were put back. */
+		trial: number | null;
+		seeds: number[];
+		rows: TunedRow[];
+		figures: TunedFigure[];
+	}
+
+	/** A figure of the proposal, on the seeds that no trial had. */
+	interface TunedFigure {
+		key: string;
+		name: string;
+		default: number | null;
+		before: number | null;
+		after: number | null;
+	}
+
+	/** A parameter that the proposal changes. */
+	interface TunedRow {
+		key: string;
+		symbol: string;
+		unit: string;
+		default: any;
+		before: any;
+		after: any;
+		/** Of the leading figure, against the proposal without it; null where the time was over. */
+		brought: number | null;
+	}
+
 	/** Where the 3D view is. */
 	interface ViserInfo {
 		path: string;

@@ -13,7 +13,9 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import CancelledError
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -29,6 +31,7 @@ ADDRESS = "DASK_SCHEDULER_ADDRESS"
 TOPIC = "multiview-phd"
 
 CONNECT_SECONDS = 10.0
+SENDING_SECONDS = 600.0
 
 Told = Callable[[str], None]
 
@@ -152,8 +155,8 @@ class DaskCrew:
         for name in ("distributed", "distributed.worker", "distributed.nanny"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
         self._do, self._address, self._sent_bytes = do, scheduler, sent_bytes
-        self._ended: queue.SimpleQueue[tuple[Any, Job]] = queue.SimpleQueue()
-        self._futures: dict[str, Any] = {}
+        self._jobs: dict[Any, Job] = {}
+        """Each job under way by its future."""
         self._states: dict[str, WorkerState] = {}
         self._lock = threading.Lock()
         self._sent: set[tuple[str, str]] = set()
@@ -169,27 +172,32 @@ class DaskCrew:
         except (OSError, TimeoutError, ValueError) as error:
             self.close()
             raise _no_scheduler(scheduler, error) from None
+        # results come over beside us, so that nobody waits for one after the other
+        self._ended: Any = distributed.as_completed(
+            loop=self._client.loop, with_results=True, raise_errors=False
+        )
         self._client.subscribe_topic(TOPIC, self._heard)
 
     def _start(self, count: int, processes: bool, tell: Told) -> Any:
         distributed: Any = importlib.import_module("distributed")  # slow, and without types
-
+        dask: Any = importlib.import_module("dask")
         if processes:
             compile_first(tell)
         tell(f"starting {count} worker{'s' if count > 1 else ''}")
         own = {"preload": ["tracker.studies.work.local"]} if processes else {}
         environment = {"NUMBA_NUM_THREADS": "1"}
-        return distributed.LocalCluster(
-            n_workers=count,
-            threads_per_worker=1,
-            processes=processes,
-            dashboard_address=None,
-            worker_dashboard_address=None,
-            memory_limit=0,  # what a run takes is bounded by its recording
-            silence_logs=logging.CRITICAL,
-            **({"env": environment} if processes else {}),
-            **own,
-        )
+        # its profiler looks at every worker a hundred times a second
+        with dask.config.set({"distributed.worker.profile.enabled": False}):
+            return distributed.LocalCluster(
+                n_workers=count,
+                threads_per_worker=1,
+                processes=processes,
+                dashboard_address="127.0.0.1:0",  # Dask has one in any case
+                memory_limit=0,  # what a run takes is bounded by its recording
+                silence_logs=logging.CRITICAL,
+                **({"env": environment} if processes else {}),
+                **own,
+            )
 
     def __enter__(self) -> DaskCrew:
         return self
@@ -212,17 +220,19 @@ class DaskCrew:
         return max(1, sum(self._threads().values()))
 
     def _threads(self) -> Mapping[str, int]:
-        workers = self._client.scheduler_info(n_workers=-1).get("workers", {})
+        with self._asking():
+            workers = self._client.scheduler_info(n_workers=-1).get("workers", {})
         return {address: int(about.get("nthreads", 1)) for address, about in workers.items()}
 
     def submit(self, job: Job, priority: int = 0) -> None:
         """Have a job done; of several those of higher priority come first."""
-        future = self._client.submit(
-            self._do, job, key=f"{TOPIC}-{job.key}-{time.monotonic_ns()}",
-            pure=False, priority=priority, retries=0,
-        )  # fmt: skip
-        self._futures[job.key] = future
-        future.add_done_callback(lambda done: self._ended.put((done, job)))
+        with self._asking():
+            future = self._client.submit(
+                self._do, job, key=f"{TOPIC}-{job.key}-{time.monotonic_ns()}",
+                pure=False, priority=priority, retries=0,
+            )  # fmt: skip
+        self._jobs[future] = job
+        self._ended.add(future)
 
     def finished(self, seconds: float) -> list[Outcome]:
         """What has ended, waiting for the first so long.
@@ -235,22 +245,31 @@ class DaskCrew:
         while True:
             left = 0.0 if found else max(0.0, until - time.monotonic())
             try:
-                future, job = self._ended.get(timeout=left) if left else self._ended.get_nowait()
+                future, result = self._ended.queue.get(block=left > 0.0, timeout=left or None)
             except queue.Empty:
                 return found
-            outcome = self._outcome(future, job)
+            outcome = self._outcome(self._jobs.pop(future), future.status, result)
             if outcome is not None:
                 found.append(outcome)
 
-    def _outcome(self, future: Any, job: Job) -> Outcome | None:
-        self._futures.pop(job.key, None)
-        if future.status in ("cancelled", "lost"):
-            raise StudyError(
-                f"the scheduler at {self._address or 'this machine'} is gone; every run that ended "
-                "is kept: start it again and go on by `multiview-phd study resume`"
-            )
-        if future.status == "error":
-            error = future.exception()
+    def _gone(self) -> StudyError:
+        return StudyError(
+            f"the scheduler at {self._address or 'this machine'} is gone; every run that ended is "
+            "kept: start it again and go on by `multiview-phd study resume`"
+        )
+
+    @contextmanager
+    def _asking(self) -> Iterator[None]:
+        """Whatever Dask raises where its scheduler does not answer is told as one sentence."""
+        try:
+            yield
+        except (OSError, TimeoutError, RuntimeError, CancelledError) as error:
+            raise self._gone() from error
+
+    def _outcome(self, job: Job, status: str, result: Any) -> Outcome | None:
+        """What became of a job; None where it is sent once more."""
+        if status == "error":
+            error = result[1]
             words = _words(error)
             if type(error).__name__ == "KilledWorker":
                 words = "every worker that tried it died: it takes too much memory, or crashes"
@@ -260,7 +279,9 @@ class DaskCrew:
                     "multiview-phd of the same version there"
                 )
             return Outcome(job.key, "failed", words)
-        outcome: Outcome = future.result()
+        if status != "finished":  # cancelled or lost, as all are when the connection breaks
+            raise self._gone()
+        outcome: Outcome = result
         if outcome.became == "version":
             raise StudyError(
                 f"worker {outcome.worker} on {outcome.machine} has another version of the program "
@@ -290,14 +311,16 @@ class DaskCrew:
                 f"worker {outcome.worker} on {outcome.machine} cannot read {job.place} "
                 f"({outcome.words}), and {_words(error)}"
             ) from None
-        sent = self._client.submit(
-            recordings.unpack, job.content, data, workers=[outcome.worker], pure=False
-        )
-        sent.result(timeout=600.0)
+        with self._asking():
+            sent = self._client.submit(
+                recordings.unpack, job.content, data, workers=[outcome.worker], pure=False
+            )
+            sent.result(timeout=SENDING_SECONDS)
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any | None]:
         """Have something else computed; what is given back has it once it is there."""
-        future = self._client.submit(function, *arguments, pure=False, priority=10)
+        with self._asking():
+            future = self._client.submit(function, *arguments, pure=False, priority=10)
         return lambda: future.result() if future.status == "finished" else None
 
     def _heard(self, event: tuple[float, Any]) -> None:

@@ -1,0 +1,184 @@
+"""Studies: how busy the workers are, what a trial costs beside its runs, and how that grows."""
+
+from __future__ import annotations
+
+import logging
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+
+from tests.benchmarks.measure import Measurement
+from tests.conftest import DATA
+from tests.synthetic import write_sequence
+from tracker.studies.definition import Definition, definition_of
+from tracker.studies.opened import open_recordings
+from tracker.studies.running import run_study
+from tracker.studies.store import Store, create
+from tracker.studies.work import working
+from tracker.studies.work.cluster import DaskCrew
+from tracker.studies.work.jobs import Job, Outcome
+
+RECORDINGS = ("cmc1", "cmc2", "av163-seq45-3p-1111-points")
+WORKERS = 2
+THREADS = 64
+SLEEP = 1.0
+"""Seconds of a run that is a sleep."""
+
+PARAMETERS: dict[str, Any] = {
+    "fusion.detection_probability": {"low": 0.85, "high": 0.99},
+    "fusion.clutter_rate": {"low": 0.5, "high": 8.0, "log": True},
+    "fusion.acceleration_sigma": {"low": 0.3, "high": 2.0},
+}
+
+
+def run(short: bool) -> Iterator[Measurement]:
+    """Trials that sleep on many threads, then real ones against a loop written by hand."""
+    for trials in (300,) if short else (1000, 3000, 10_000):
+        busy, beside = _asleep(trials)
+        words = f"{trials} trials that sleep {SLEEP:g} s, {THREADS} threads"
+        yield Measurement(f"studies: busy, {words}", busy, "share", "≥ 0.9", better="higher")
+        yield Measurement(f"studies: the asker's time a trial, {words}", beside * 1e3, "ms")
+    if all((DATA / name).is_dir() for name in RECORDINGS):
+        yield from _real(12 if short else 300)
+
+
+def _definition(folder: Path, recordings: list[str], trials: int, search: str) -> Definition:
+    fields = {
+        "name": f"{trials} {search}",
+        "recordings": recordings,
+        "trials": trials,
+        "objectives": ["score"],
+        "search": search,
+        "prune": False,
+        "parameters": PARAMETERS,
+    }
+    return definition_of(fields, where="benchmark", folder=folder)
+
+
+def _sleep(job: Job) -> Outcome:
+    time.sleep(SLEEP)
+    rate = float(dict(job.values).get("fusion.clutter_rate", 3.0))
+    return Outcome(job.key, "done", figures={"score": 1.0 / rate}, seconds=SLEEP)
+
+
+def _asleep(trials: int) -> tuple[float, float]:
+    """Share of the threads' time that is slept, and the asker's processor time a trial."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_sequence(folder / "r", frames=8, container=None, detections=True, templates=False)
+        store = create(_definition(folder, ["r"], trials, "random"), folder / "studies")
+        with DaskCrew(workers=THREADS, processes=False, do=_sleep) as crew:
+            begin, own = 0.0, 0.0
+
+            def ready(tell: object) -> DaskCrew:
+                nonlocal begin, own
+                begin, own = time.time(), time.process_time()
+                return crew
+
+            with store.running() as writer:
+                run_study(store, writer, ready)
+            own = time.process_time() - own
+            seconds = max(one.ended for one in store.trials()) - begin
+    return trials * SLEEP / (seconds * THREADS), own / trials
+
+
+def _warm(crew: DaskCrew, store: Store) -> None:
+    """Every worker has opened every recording and loaded its kernels."""
+    recordings = open_recordings(store.definition())
+    jobs = [
+        recordings.job(one, {}, 1000 + number)
+        for number in range(2 * WORKERS)
+        for one in recordings.every
+    ]
+    for job in jobs:
+        crew.submit(job)
+    left = {job.key for job in jobs}
+    while left:
+        left -= {outcome.key for outcome in crew.finished(1.0)}
+
+
+def _real(trials: int) -> Iterator[Measurement]:
+    """A study of three recordings, and the same runs by joblib."""
+    words = f"{trials} trials on 3 recordings, {WORKERS} workers"
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        places = [str(DATA / one) for one in RECORDINGS]
+        store = create(_definition(folder, places, trials, "tpe"), folder / "studies")
+        with DaskCrew(workers=WORKERS) as crew, _Memory() as memory:
+            _warm(crew, store)
+            begin = time.perf_counter()
+            with store.running() as writer:
+                run_study(store, writer, lambda tell: crew)
+            seconds = time.perf_counter() - begin
+        found = store.trials()
+        worked = sum(one.seconds for one in found)
+        yield Measurement(
+            f"studies: busy, {words}", worked / (WORKERS * seconds), "share", "≥ 0.85",
+            better="higher",
+        )  # fmt: skip
+        beside = (WORKERS * seconds - worked) / trials
+        yield Measurement(f"studies: beside the runs, {words}", beside * 1e3, "ms/trial", "≤ 30 ms")
+        yield Measurement(f"studies: memory's growth, {words}", memory.growth / 1e6, "MB")
+        recordings = open_recordings(store.definition())
+        jobs = [
+            job for one in found for _, job in recordings.jobs(one.values if one.number else {})
+        ]
+        by_hand = _by_hand(jobs)
+        yield Measurement(
+            f"studies: against joblib by hand, {words}", by_hand / seconds, "×", "≥ 1/1.1"
+        )
+
+
+def _by_hand(jobs: list[Job]) -> float:
+    """Seconds of the same runs in a loop of joblib, its processes warm."""
+    from joblib import Parallel, delayed
+
+    with Parallel(n_jobs=WORKERS, backend="loky", batch_size=1) as parallel:
+        parallel(delayed(working.work)(job) for job in jobs[: 2 * WORKERS * len(RECORDINGS)])
+        begin = time.perf_counter()
+        parallel(delayed(working.work)(job) for job in jobs)
+        return time.perf_counter() - begin
+
+
+class _Memory:
+    """Memory of this process and of those below it, from its middle third to its last."""
+
+    def __enter__(self) -> _Memory:
+        self._samples: list[float] = []
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._look, daemon=True)
+        self._thread.start()
+        return self
+
+    def _look(self) -> None:
+        here = psutil.Process()
+        while not self._ended.wait(0.5):
+            total = 0.0
+            for process in (here, *here.children(recursive=True)):
+                try:
+                    total += process.memory_info().rss
+                except psutil.NoSuchProcess:
+                    continue
+            self._samples.append(total)
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self._thread.join()
+
+    @property
+    def growth(self) -> float:
+        """Bytes."""
+        third = max(1, len(self._samples) // 3)
+        middle, last = self._samples[third : 2 * third], self._samples[2 * third :]
+        if not middle or not last:
+            return 0.0
+        return float(np.mean(last) - np.mean(middle))
+
+
+logging.getLogger("distributed").setLevel(logging.CRITICAL)

@@ -1,0 +1,153 @@
+"""What holds when processes are killed, and when a cluster does the work."""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.studies.processes import cluster, finish, kill, outcomes, start, wait, workers_of
+from tests.studies.small import definition, recording
+from tracker import pipeline
+from tracker.kernels import compilation
+from tracker.parameters import with_values
+from tracker.sequences.library import open_sequence
+from tracker.studies.commands import changes_of, track_commands
+from tracker.studies.opened import open_recordings
+from tracker.studies.store import Store, create
+from tracker.studies.work import recordings, working
+from tracker.studies.work.working import tracks_hash
+from tracker.writing.registry import format_of, save
+from tracker.writing.written import Options, Written
+
+pytestmark = [
+    pytest.mark.full,
+    pytest.mark.skipif(sys.platform != "linux", reason="finds processes by /proc"),
+]
+
+
+def study(folder: Path, name: str = "small", **fields: Any) -> Store:
+    fields = {"trials": 12, "seeds": 2, "search": "random", "prune": False, **fields}
+    return create(definition(folder, name, **fields), folder / "studies")
+
+
+def done(store: Store) -> int:
+    return len(store.trials())
+
+
+def check_whole(store: Store, trials: int = 12) -> None:
+    """Every trial once, every run kept."""
+    assert [one.number for one in store.trials()] == list(range(trials))
+    keys = {row.key for one in store.trials() for row in one.jobs}
+    assert keys == set(outcomes(store))
+
+
+def test_the_program_is_killed_and_nothing_is_lost_or_run_twice(tmp_path: Path) -> None:
+    store = study(tmp_path, trials=40)
+    program = start(store, "--workers", "2")
+    wait(lambda: done(store) >= 3)
+    kill(program.pid)
+    program.wait()
+    assert store.status().state == "stopped"
+    before, runs = store.trials(), outcomes(store)
+    assert 3 <= len(before) < 40
+    wait(lambda: not workers_of(program.pid))
+    said = finish(store, "--workers", "2")
+    check_whole(store, 40)
+    assert [store.trial(one.number) for one in before] == before
+    assert {key: outcomes(store)[key] for key in runs} == runs
+    left = len(outcomes(store)) - len(runs)
+    assert f" {left} runs in " in said  # what had ended was not run again
+
+
+def test_a_worker_is_killed_and_its_run_is_run_again(tmp_path: Path) -> None:
+    store = study(tmp_path, trials=30)
+    program = start(store, "--workers", "2")
+    wait(lambda: done(store) >= 2)
+    kill(workers_of(program.pid)[0])
+    assert program.wait(timeout=200) == 0
+    check_whole(store, 30)
+
+
+def test_a_cluster_started_by_hand_gives_the_same_bit_for_bit(tmp_path: Path) -> None:
+    fields = {"trials": 8, "objectives": ["score"]}
+    here = study(tmp_path, "here", **fields)
+    finish(here, "--workers", "2")
+    there = study(tmp_path, "there", **fields)
+    with cluster(where=tmp_path) as (address, _):
+        finish(there, "--scheduler", address)
+    check_whole(there, 8)
+    assert outcomes(there) == outcomes(here)
+    assert [one.values for one in there.trials()] == [one.values for one in here.trials()]
+    assert [one.objectives for one in there.trials()] == [one.objectives for one in here.trials()]
+
+
+def test_the_scheduler_is_killed_and_another_goes_on(tmp_path: Path) -> None:
+    store = study(tmp_path, trials=60)
+    with cluster(where=tmp_path) as (address, processes):
+        program = start(store, "--scheduler", address)
+        wait(lambda: done(store) >= 2)
+        kill(processes[0].pid)
+        assert program.wait(timeout=120) == 1
+    assert store.status().state == "failed"
+    assert f"the scheduler at {address} is gone" in store.status().words
+    before, runs = store.trials(), outcomes(store)
+    assert len(before) < 60
+    with cluster(where=tmp_path) as (address, _):
+        finish(store, "--scheduler", address)
+    check_whole(store, 60)
+    assert [store.trial(one.number) for one in before] == before
+    assert {key: outcomes(store)[key] for key in runs} == runs
+
+
+def test_a_recording_goes_where_it_cannot_be_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a worker whose cache is another one, and where the recording is not."""
+    place = recording(tmp_path / "recording")
+    (_, job), *_ = open_recordings(definition(tmp_path)).jobs({})
+    data = recordings.packed(place)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(compilation.kernel_folder()))
+    monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(tmp_path / "cache"))
+    place.rename(tmp_path / "elsewhere")
+    assert working.work(job).became == "unreadable"
+    recordings.unpack(job.content, data)
+    assert working.work(job).became == "done"
+
+
+def test_the_command_of_a_trial_gives_the_same_tracks(tmp_path: Path) -> None:
+    store = study(tmp_path, trials=4, seeds=1, parameters={
+        "fusion.detection_probability": {"low": 0.6, "high": 0.98},
+        "fusion.clutter_rate": {"low": 0.1, "high": 10.0, "log": True},
+        "fusion.recognition": {},
+        "smoothing_method": {},
+    })  # fmt: skip
+    finish(store, "--workers", "1")
+    for trial in store.trials():
+        (row,) = trial.jobs
+        (line,) = track_commands(store.definition(), trial)
+        words = shlex.split(line)
+        assert words[0] == "multiview-phd"
+        run = subprocess.run(
+            [sys.executable, "-m", "app", *words[1:], "--keep", "0"],
+            cwd=tmp_path, capture_output=True, text=True,
+        )  # fmt: skip
+        assert run.returncode == 0, run.stderr
+        # the run of the study, made again here: its tracks are those that were kept, and their
+        # CSV is the one that the command wrote
+        sequence = open_sequence(row.recording)
+        changes = changes_of(store.definition(), trial, row.recording)
+        parameters = with_values(pipeline.default_parameters(sequence), changes)
+        again = pipeline.compute(sequence, parameters, seed=row.seed)
+        kept = store.outcome(row.key)
+        assert kept is not None
+        assert tracks_hash(again) == kept.tracks
+        file = tmp_path / words[words.index("--output") + 1]
+        expected = tmp_path / "expected.csv"
+        written = Written(sequence, again.tracks, parameters, row.seed)
+        save(expected, format_of(expected, None), written, Options())
+        assert file.read_bytes() == expected.read_bytes()

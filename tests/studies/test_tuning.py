@@ -1,0 +1,118 @@
+"""What is proposed was measured again, is never worse than the defaults, and changes no more than
+it must."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.studies.small import Serial, definition, recording, run
+from tracker.parameters import PARAMETERS, table
+from tracker.studies.errors import StudyError
+from tracker.studies.store import Store, create
+from tracker.studies.tuning import tuning
+from tracker.studies.work.jobs import Job, Outcome
+
+
+def study(folder: Path, **fields: Any) -> Store:
+    made = definition(folder, propose=3, trials=40, prune=False, **fields)
+    return create(made, folder / "studies")
+
+
+def outcome(job: Job, score: float) -> Outcome:
+    figures = {"score": score, "hota": score, "idf1": score, "speed": 9.0}
+    return Outcome(job.key, "done", figures=figures, overlap=0.5, tracks=job.key, seconds=0.01)
+
+
+def of(job: Job, key: str) -> float:
+    return float(dict(job.values).get(key, PARAMETERS[key].default))
+
+
+def test_what_was_luck_is_not_proposed(tmp_path: Path) -> None:
+    """The seed of the trials likes another rate, no other seed does."""
+
+    def do(job: Job) -> Outcome:
+        lucky = job.seed == 0 and of(job, "fusion.clutter_rate") != 3.0
+        return outcome(job, 0.9 if lucky else 0.8 - abs(of(job, "fusion.clutter_rate") - 3.0))
+
+    store = study(tmp_path)
+    run(store, Serial(do))
+    found = store.told("tuned")
+    assert not found["better"]
+    assert found["words"] == "nothing better was found"
+    assert found["seeds"] == [1, 2, 3]
+
+
+def test_what_brings_something_is_proposed_without_what_does_not(tmp_path: Path) -> None:
+    def do(job: Job) -> Outcome:
+        return outcome(job, 0.9 - 0.1 * abs(of(job, "fusion.detection_probability") - 0.7))
+
+    store = study(tmp_path)
+    run(store, Serial(do))
+    found = store.told("tuned")
+    assert found["better"]
+    (row,) = found["rows"]
+    assert row["key"] == "fusion.detection_probability"
+    assert row["after"] == pytest.approx(0.7, abs=0.1)
+    assert row["brought"] > 0.01
+    assert found["values"]["fusion.clutter_rate"] == 3.0
+    score = next(one for one in found["figures"] if one["key"] == "score")
+    assert score["after"] > score["default"]
+
+
+def test_from_a_bad_start_it_comes_back_to_the_defaults(tmp_path: Path) -> None:
+    def do(job: Job) -> Outcome:
+        return outcome(job, 0.9 - 0.01 * abs(of(job, "fusion.clutter_rate") - 3.0))
+
+    store = study(tmp_path, start={"fusion.clutter_rate": 10.0})
+    run(store, Serial(do))
+    assert store.trial(1).values["fusion.clutter_rate"] == 10.0
+    assert store.trial(1).words == "where you were"
+    found = store.told("tuned")
+    assert found["better"]
+    assert found["values"]["fusion.clutter_rate"] == 3.0
+    (row,) = found["rows"]
+    assert (row["before"], row["after"]) == (10.0, 3.0)
+
+
+def test_a_method_that_draws_nothing_is_told(tmp_path: Path) -> None:
+    store = study(tmp_path)
+    run(store, Serial())  # boxes: the tracks are the same for every seed
+    found = store.told("tuned")
+    assert "nothing is drawn at random here" in found["words"]
+    assert found["seeds"] == [0]
+
+
+def test_ended_while_it_measures_again_it_goes_on(tmp_path: Path) -> None:
+    def do(job: Job) -> Outcome:
+        return outcome(job, 0.9 - 0.1 * abs(of(job, "fusion.detection_probability") - 0.7))
+
+    store = study(tmp_path)
+    first = Serial(do, stop_after=44)
+    with pytest.raises(KeyboardInterrupt):
+        run(store, first)
+    assert len(store.trials()) == 40
+    assert store.told("tuned") is None
+    second = Serial(do)
+    run(store, second)
+    assert store.told("tuned")["better"]
+    assert not set(first.done) & set(second.done)
+
+
+def test_the_dozen_are_varied_around_where_somebody_is(tmp_path: Path) -> None:
+    place = recording(tmp_path / "recording")
+    changes = {"fusion.detection_probability": 0.6, "fusion.vertical_share": 0.5}
+    made = tuning("t", [str(place)], minutes=5.0, changes=changes)
+    assert 8 <= len(made.varied) <= 12
+    assert made.objectives == ("score",)
+    assert dict(made.start) == {"fusion.detection_probability": 0.6}
+    assert dict(made.values) == {"fusion.vertical_share": 0.5}
+    for one in made.varied:
+        now = made.start.get(one.key, table.PARAMETERS[one.key].default)
+        assert one.contains(now)
+    blind = tuning("t", [str(place)], minutes=5.0, changes={}, without_truth=True)
+    assert blind.objectives == ("identity",)
+    with pytest.raises(StudyError, match="cannot be read"):
+        tuning("t", [str(tmp_path / "nothing")], minutes=5.0, changes={})

@@ -1,0 +1,236 @@
+"""What a study proposes at its end: the best values, measured again on other seeds.
+
+The best of many trials is partly the luckiest. So the best few, the defaults and the values where
+somebody was are run again on seeds that no trial had, and what leads there is proposed, without
+the changes that bring nothing. Never anything worse than the defaults.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from tracker.studies.judging import Judge, usable
+from tracker.studies.objectives import OBJECTIVES
+from tracker.studies.opened import Opened, Recordings
+from tracker.studies.store import JobRow, Trial
+from tracker.studies.work.jobs import Job, Outcome
+
+CANDIDATES = 4
+"""Best trials that are measured again."""
+
+LEAST = 5e-4
+"""Of the leading figure: what is less than this better is as good."""
+
+SEARCH_SHARE = 0.6
+"""Of the time of a study that proposes something, the search's; the rest is for measuring again."""
+
+SHOWN = ("score", "hota", "idf1", "mota", "identity", "speed")
+
+Measure = Callable[[Sequence[Job]], Mapping[str, Outcome]]
+"""Has jobs done, as far as the time goes."""
+
+
+class Proposer:
+    """Measures candidates on other seeds."""
+
+    def __init__(
+        self,
+        recordings: Recordings,
+        trials: Sequence[Trial],
+        defaults: Mapping[str, Any],
+        start: Mapping[str, Any],
+        seeds: Sequence[int],
+        measure: Measure,
+    ) -> None:
+        """Nothing is measured yet.
+
+        Args:
+            recordings: Of the study.
+            trials: That ended.
+            defaults: What is varied, by default.
+            start: Where somebody was, of what is varied; empty at the defaults.
+            seeds: That no trial had.
+            measure: Has jobs done.
+        """
+        self._recordings, self._trials = recordings, trials
+        self._defaults, self._start = dict(defaults), dict(start)
+        self._measure = measure
+        self._seeds = list(seeds)
+        self._trial_seed = recordings.seeds[0]
+        self._lead = recordings.objectives[0]
+        self._judge = Judge(recordings.objectives, (), lambda key: None)
+
+    def propose(self) -> dict[str, Any]:
+        """What is proposed, as it is written down: values, what they change and bring, words."""
+        drawn = self._seeds_matter()
+        if not drawn:
+            self._seeds = [self._trial_seed]
+        current = {**self._defaults, **self._start}
+        lists: list[dict[str, Any]] = [{}] + ([current] if self._start else [])
+        lists += [trial.values for trial in self._best_trials()]
+        measured = self._measured(lists)
+        default = measured[0]
+        if default is None:
+            return self._nothing("the time was over before anything was measured again", drawn)
+        now = measured[1] if self._start else default
+        if now is None:
+            return self._nothing("the time was over before anything was measured again", drawn)
+        good = [
+            (values, trial)
+            for values, trial in zip(lists, measured, strict=True)
+            if trial is not None and trial.state == "complete" and not trial.vetoed
+        ]
+        values, best = max(good, key=lambda pair: self._value(pair[1]), default=({}, default))
+        if not self._gain(best, now) >= LEAST:
+            return self._nothing("nothing better was found", drawn, default, now)
+        if best is not default and self._gain(best, default) < LEAST:
+            values, best = {}, default  # as good, and the simplest
+        values = {k: v for k, v in values.items() if v != self._defaults.get(k)}
+        values, best, brought = self._without_idle(values, best)
+        number = next((t.number for t in self._trials if t.values == values), None)
+        return {
+            "better": True,
+            "words": self._words(best, now, default, drawn),
+            "trial": number,
+            "values": {**self._defaults, **values},
+            "rows": [
+                {
+                    "key": key,
+                    "default": self._defaults[key],
+                    "before": current[key],
+                    "after": values.get(key, self._defaults[key]),
+                    "brought": brought.get(key),
+                }
+                for key in self._defaults
+                if values.get(key, self._defaults[key]) != current[key] or key in values
+            ],
+            **self._facts(default, now, best),
+        }
+
+    def _nothing(
+        self, words: str, drawn: bool, default: Trial | None = None, now: Trial | None = None
+    ) -> dict[str, Any]:
+        told = words if drawn else f"{words} ({_NOT_DRAWN})"
+        return {
+            "better": False,
+            "words": told,
+            "trial": None,
+            "values": {**self._defaults, **self._start},
+            "rows": [],
+            **self._facts(default, now, now),
+        }
+
+    def _facts(
+        self, default: Trial | None, now: Trial | None, after: Trial | None
+    ) -> dict[str, Any]:
+        def of(trial: Trial | None, key: str) -> float | None:
+            return None if trial is None else trial.figures.get(key)
+
+        return {
+            "seeds": self._seeds,
+            "figures": [
+                {
+                    "key": key,
+                    "name": OBJECTIVES[key].name,
+                    "default": of(default, key),
+                    "before": of(now, key),
+                    "after": of(after, key),
+                }
+                for key in SHOWN
+                if any(of(one, key) is not None for one in (default, now, after))
+            ],
+        }
+
+    def _words(self, best: Trial, now: Trial, default: Trial, drawn: bool) -> str:
+        lead = self._lead
+        here, there = self._value(best), self._value(now)
+        sign = 1.0 if lead.higher else -1.0
+        base = "the default" if not self._start else "where you were"
+        words = (
+            f"{lead.name} {lead.words(sign * here, None)}, {base} {lead.words(sign * there, None)}"
+        )
+        if self._start:
+            words += f", the default {lead.words(sign * self._value(default), None)}"
+        seeds = ", ".join(map(str, self._seeds))
+        return f"{words}; " + (f"measured on the seeds {seeds}" if drawn else _NOT_DRAWN)
+
+    def _seeds_matter(self) -> bool:
+        """Whether another seed gives other tracks at all."""
+        one, other = self._jobs({}, [self._trial_seed]), self._jobs({}, self._seeds[:1])
+        found = self._measure([job for _, job in (*one, *other)])
+        pairs = zip(one, other, strict=True)
+        return any(
+            a.key not in found or b.key not in found or found[a.key].tracks != found[b.key].tracks
+            for (_, a), (_, b) in pairs
+        )
+
+    def _best_trials(self) -> list[Trial]:
+        left = [one for one in usable(self._trials) if one.number != 0]
+        return sorted(left, key=self._value, reverse=True)[:CANDIDATES]
+
+    def _without_idle(
+        self, values: dict[str, Any], best: Trial
+    ) -> tuple[dict[str, Any], Trial, dict[str, float | None]]:
+        """Put back what brings nothing; what each of the others brings."""
+        keys = list(values)
+        lists = [{k: v for k, v in values.items() if k != key} for key in keys]
+        measured = self._measured(lists)
+        brought = {
+            key: None if one is None else self._gain(best, one)
+            for key, one in zip(keys, measured, strict=True)
+        }
+        idle = [key for key, gain in brought.items() if gain is not None and gain < LEAST / 4.0]
+        if idle:
+            fewer = {k: v for k, v in values.items() if k not in idle}
+            (again,) = self._measured([fewer])
+            if (
+                again is not None
+                and again.state == "complete"
+                and not again.vetoed
+                and self._gain(again, best) > -LEAST / 4.0
+            ):
+                return fewer, again, {k: v for k, v in brought.items() if k in fewer}
+        return values, best, brought
+
+    def _measured(self, lists: Sequence[Mapping[str, Any]]) -> list[Trial | None]:
+        """Each set of values on the other seeds; None where the time was over before.
+
+        The first time the defaults are the first of the list: the vetoes go by them.
+        """
+        rows = [self._jobs(values, self._seeds) for values in lists]
+        found = self._measure([job for some in rows for _, job in some])
+        result: list[Trial | None] = []
+        for values, some in zip(lists, rows, strict=True):
+            if not all(row.key in found for row, _ in some):
+                result.append(None)
+                continue
+            failed = next((found[r.key] for r, _ in some if found[r.key].became != "done"), None)
+            result.append(
+                self._judge.trial(
+                    0 if not values else 1,
+                    dict(values),
+                    tuple(row for row, _ in some),
+                    found,
+                    pruned=False,
+                    words="" if failed is None else failed.words,
+                    failed=failed is not None,
+                )
+            )
+        return result
+
+    def _jobs(self, values: Mapping[str, Any], seeds: Sequence[int]) -> list[tuple[JobRow, Job]]:
+        every: Sequence[Opened] = self._recordings.every
+        jobs = [(one, self._recordings.job(one, values, seed)) for seed in seeds for one in every]
+        return [(JobRow(job.key, one.place, job.seed), job) for one, job in jobs]
+
+    def _value(self, trial: Trial) -> float:
+        if trial.objectives is None:
+            return float("-inf")
+        return trial.objectives[0] if self._lead.higher else -trial.objectives[0]
+
+    def _gain(self, one: Trial, other: Trial) -> float:
+        return self._value(one) - self._value(other)
+
+
+_NOT_DRAWN = "nothing is drawn at random here, so that another seed measures the same again"
