@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from tracker.library import KEEP, columns
-from tracker.library.errors import LibraryError, told
+from tracker.library.errors import LibraryError, NoSuchRun, told
 from tracker.library.file import WAIT_SECONDS, LibraryFile
 from tracker.library.records import (
     HEADLINES,
@@ -86,7 +86,7 @@ class Library(LibraryFile):
                 f"{_RUNS} WHERE runs.id = ? AND deleted IS NULL", (number,)
             ).fetchone()
             if row is None:
-                raise LibraryError(
+                raise NoSuchRun(
                     f"{self.path}: there is no run {number}; `multiview-phd runs` lists them"
                 )
             return KeptRun._make(row)
