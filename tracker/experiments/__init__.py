@@ -1,23 +1,13 @@
 """The claims of the papers, run again: ``multiview-phd experiment NAME``.
 
-One module a claim; its ``EXPERIMENT`` is entered here under its name.
+One module a claim; its ``EXPERIMENT`` is entered in :mod:`tracker.experiments.registry`.
 """
 
 from __future__ import annotations
 
-from tracker.experiments import (
-    association,
-    cameras,
-    cmc,
-    corrections,
-    fig1,
-    fig2,
-    fig3,
-    jpda,
-    methods,
-    ppf,
-)
-from tracker.experiments.laboratory import sequences
+import importlib
+from typing import TYPE_CHECKING, Any
+
 from tracker.experiments.laboratory.experiment import (
     Context,
     Experiment,
@@ -27,26 +17,9 @@ from tracker.experiments.laboratory.experiment import (
     Unavailable,
     Verdict,
 )
-from tracker.experiments.rooms import experiment as rooms
 
-EXPERIMENTS: dict[str, Experiment] = {
-    experiment.name: experiment
-    for experiment in (
-        fig1.EXPERIMENT,
-        fig2.EXPERIMENT,
-        fig3.EXPERIMENT,
-        cameras.EXPERIMENT,
-        sequences.EXPERIMENT,
-        cmc.EXPERIMENT,
-        corrections.EXPERIMENT,
-        jpda.EXPERIMENT,
-        ppf.EXPERIMENT,
-        association.EXPERIMENT,
-        methods.EXPERIMENT,
-        rooms.EXPERIMENT,
-    )
-}
-"""By name, in the order in which ``--all`` runs them."""
+if TYPE_CHECKING:
+    from tracker.experiments.registry import EXPERIMENTS
 
 __all__ = [
     "EXPERIMENTS",
@@ -58,3 +31,11 @@ __all__ = [
     "Unavailable",
     "Verdict",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """The list of all is made when it is asked for: whoever needs the laboratory alone waits
+    for no experiment."""
+    if name != "EXPERIMENTS":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return importlib.import_module(f"{__name__}.registry").EXPERIMENTS

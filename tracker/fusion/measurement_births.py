@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
-from scipy.special import expit
 
 from tracker.camera import Camera, stacked
 from tracker.fusion.target_model import TargetModel
@@ -176,6 +175,8 @@ class MeasurementBirths:
             np.zeros(len(kept)),
             fitted.sources[:, kept],
         )
+        from scipy.special import expit  # a server starts without it
+
         existences = expit(self._log_odds(found, fitted.fits[:, kept], evidence.seeing))
         return Newborns(found.positions, found.covariances, existences, found.sources)
 
