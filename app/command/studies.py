@@ -29,7 +29,8 @@ from app.command.study_flags import (
 )
 from app.command.terminal import Bar, CommandError, print_table, say
 from tracker.studies.errors import StudyError
-from tracker.studies.store import Status, Store, Trial, create, find, stores, studies_folder
+from tracker.studies.records import Status, Trial
+from tracker.studies.store import Store, create, find, stores, studies_folder
 
 if TYPE_CHECKING:
     from tracker.studies.work.cluster import DaskCrew
@@ -53,7 +54,7 @@ def study(command: Study) -> int:
     folder = action.studies or studies_folder()
     match action:
         case RunStudy():
-            from tracker.studies.definition import read_definition
+            from tracker.studies.defining import read_definition
 
             return run(create(read_definition(action.file), folder), action, as_json=action.json)
         case ResumeStudy():

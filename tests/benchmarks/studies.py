@@ -16,7 +16,8 @@ import psutil
 from tests.benchmarks.measure import Measurement
 from tests.conftest import DATA
 from tests.synthetic import write_sequence
-from tracker.studies.definition import Definition, definition_of
+from tracker.studies.defining import definition_of
+from tracker.studies.definition import Definition
 from tracker.studies.opened import open_recordings
 from tracker.studies.running import run_study
 from tracker.studies.store import Store, create

@@ -6,7 +6,7 @@ from typing import Any
 
 from tracker.parameters import PARAMETERS
 from tracker.studies.judging import usable
-from tracker.studies.store import Trial
+from tracker.studies.records import Trial
 from tracker.studies.summary import Summary
 
 _HEIGHT = 340

@@ -15,7 +15,7 @@ from tracker.studies import objectives
 from tracker.studies.definition import Definition
 from tracker.studies.errors import StudyError
 from tracker.studies.objectives import Objective
-from tracker.studies.store import JobRow
+from tracker.studies.records import JobRow
 from tracker.studies.work.jobs import Job, job_of
 from tracker.studies.work.recordings import content_of
 

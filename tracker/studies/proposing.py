@@ -13,7 +13,7 @@ from typing import Any
 from tracker.studies.judging import Judge, usable
 from tracker.studies.objectives import OBJECTIVES
 from tracker.studies.opened import Opened, Recordings
-from tracker.studies.store import JobRow, Trial
+from tracker.studies.records import JobRow, Trial
 from tracker.studies.work.jobs import Job, Outcome
 
 CANDIDATES = 4

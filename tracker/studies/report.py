@@ -15,7 +15,8 @@ from tracker.placing import replacing
 from tracker.sequences.sequence import SequenceError
 from tracker.studies.commands import track_commands
 from tracker.studies.figures import importance_figure, objective_figure, parameter_figures
-from tracker.studies.store import Store, Trial
+from tracker.studies.records import Trial
+from tracker.studies.store import Store
 from tracker.studies.summary import Summary, summary_of
 
 _STYLE = """

@@ -19,11 +19,13 @@ from tracker.studies.errors import StudyError
 from tracker.studies.judging import Judge
 from tracker.studies.opened import Recordings, open_recordings
 from tracker.studies.proposing import SEARCH_SHARE, Proposer
+from tracker.studies.records import JobRow, Status, Trial
 from tracker.studies.sampling import Sampler
 from tracker.studies.space import defaults_of
-from tracker.studies.store import JOURNAL, JobRow, Status, Store, Trial, Writer
+from tracker.studies.store import JOURNAL, Store
 from tracker.studies.work.cluster import Crew
 from tracker.studies.work.jobs import Job, Outcome, code_version
+from tracker.studies.writer import Writer
 
 SECONDS_BETWEEN = 0.5
 """How often the status is written and the wish to stop is heard."""

@@ -18,7 +18,8 @@ from typing import Any
 from app.state.workbench import Workbench
 from tracker.studies.definition import Definition
 from tracker.studies.errors import StudyError
-from tracker.studies.store import FILE, Store, Trial, create, find, stores
+from tracker.studies.records import Trial
+from tracker.studies.store import FILE, Store, create, find, stores
 from tracker.studies.summary import Summary, summary_of
 
 logger = logging.getLogger("app")

@@ -19,7 +19,8 @@ from tracker import parameters as table
 from tracker.experiments.laboratory.pool import cores
 from tracker.sequences.sequence import SequenceError
 from tracker.studies.commands import track_commands
-from tracker.studies.definition import Definition, definition_of
+from tracker.studies.defining import definition_of
+from tracker.studies.definition import Definition
 from tracker.studies.errors import StudyError
 from tracker.studies.objectives import OBJECTIVES, WITH_TRUTH, WITHOUT_TRUTH, chosen
 from tracker.studies.store import Store

@@ -13,8 +13,9 @@ from tracker.folders import cache_folder
 from tracker.parameters import METHODS, PARAMETERS
 from tracker.studies.definition import Varied
 from tracker.studies.objectives import Objective
+from tracker.studies.records import Trial
 from tracker.studies.space import around
-from tracker.studies.store import Store, Trial
+from tracker.studies.store import Store
 
 _METHOD_HELP = {
     "single_view": "Method of stage 1.",

@@ -1,0 +1,299 @@
+"""A study's file, or what the page says, as a :class:`Definition`: checked field by field."""
+
+from __future__ import annotations
+
+import glob
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, get_args
+
+from tracker.parameters import METHODS, PARAMETERS, PRESETS, RunParameters, value, with_values
+from tracker.sequences.fields import did_you_mean
+from tracker.studies.definition import GRID_STEPS, MOST_TRIALS, Definition, Search, Varied
+from tracker.studies.errors import StudyError
+from tracker.studies.objectives import OBJECTIVES
+
+_NAME = re.compile(r"[^\W_][\w .+-]{0,59}")
+_TOP = frozenset(
+    {"name", "recordings", "trials", "minutes", "seeds", "search", "objectives", "prune", "preset",
+     "propose", "seed", "values", "start", "parameters"}
+)  # fmt: skip
+_RANGE = frozenset({"low", "high", "log", "steps", "choices"})
+
+
+def read_definition(path: Path) -> Definition:
+    """Read a study's file.
+
+    Raises:
+        StudyError: If it cannot be read or something in it is not as it must be, with the field.
+    """
+    try:
+        found = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise StudyError(
+            f"{path}: cannot be read ({error.strerror}); name a study's file"
+        ) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise StudyError(f"{path}: expected TOML, found something else ({error})") from None
+    return definition_of(found, where=str(path), folder=path.absolute().parent)
+
+
+def definition_of(found: Mapping[str, Any], *, where: str, folder: Path) -> Definition:
+    """Check what a study's file, or the page, says.
+
+    Args:
+        found: By field.
+        where: Named in what is raised.
+        folder: From which relative paths go out.
+
+    Raises:
+        StudyError: With the field, what was expected and what was found.
+    """
+    fields = _Fields(found, where)
+    fields.only(_TOP)
+    name = fields.text("name")
+    if not _NAME.fullmatch(name):
+        raise fields.error(
+            "name", f"expected 1 to 60 letters, digits, spaces and . + -, found {name!r}"
+        )
+    preset = fields.text("preset", "") or None
+    if preset is not None and preset not in PRESETS:
+        raise fields.error("preset", f"expected one of {', '.join(PRESETS)}, found {preset!r}")
+    search = fields.text("search", "auto")
+    if search not in get_args(Search):
+        known = ", ".join(get_args(Search))
+        raise fields.error("search", f"expected one of {known}, found {search!r}")
+    objectives = tuple(fields.texts("objectives", []))
+    for one in objectives:
+        if one not in OBJECTIVES:
+            hint = did_you_mean(one, OBJECTIVES)
+            raise fields.error(
+                "objectives", f"expected some of {', '.join(OBJECTIVES)}, found {one!r}{hint}"
+            )
+    varied = tuple(_varied(fields, key, table) for key, table in fields.table("parameters").items())
+    if not varied:
+        raise fields.error("parameters", "expected at least one parameter to vary, found none")
+    values = _values(fields, "values")
+    start = _values(fields, "start")
+    keys = {one.key for one in varied}
+    for key in values:
+        if key in keys:
+            raise fields.error(
+                f"values.{key}", "it is varied under [parameters]; name it in one of the two"
+            )
+    for key in start:
+        if key not in keys:
+            raise fields.error(f"start.{key}", "it is not varied; name it under [values] instead")
+    return Definition(
+        name=name,
+        recordings=_recordings(fields, folder),
+        varied=varied,
+        trials=fields.whole("trials", 100, 1, MOST_TRIALS),
+        minutes=fields.minutes(),
+        seeds=_seeds(fields),
+        search=search,  # type: ignore[arg-type]  # checked above
+        objectives=objectives,
+        prune=fields.yes("prune", True),
+        preset=preset,
+        propose=fields.whole("propose", 0, 0, 100),
+        seed=fields.whole("seed", 0, 0, 2**32 - 1),
+        values=values,
+        start=start,
+    )
+
+
+def _recordings(fields: _Fields, folder: Path) -> tuple[str, ...]:
+    from tracker.sequences.rendering import ROOMS
+
+    found: list[str] = []
+    for name in fields.texts("recordings", None):
+        if name in ROOMS:
+            found.append(name)
+            continue
+        pattern = str(folder / Path(name).expanduser())
+        if Path(pattern).exists():
+            found.append(pattern)
+            continue
+        some = sorted(
+            path for path in glob.glob(pattern) if (Path(path) / "sequence.toml").is_file()
+        )
+        if not some:
+            raise fields.error(
+                "recordings",
+                f"expected the name of a rendered room, a folder or a pattern of folders with a "
+                f"sequence.toml, found nothing at {name!r}{did_you_mean(name, ROOMS)}",
+            )
+        found += some
+    if not found:
+        raise fields.error("recordings", "expected at least one, found none")
+    return tuple(dict.fromkeys(found))
+
+
+def _seeds(fields: _Fields) -> tuple[int, ...]:
+    seeds = fields.found.get("seeds", 1)
+    if isinstance(seeds, int) and not isinstance(seeds, bool) and 1 <= seeds <= 1000:
+        return tuple(range(seeds))
+    if isinstance(seeds, list) and seeds and all(type(s) is int and s >= 0 for s in seeds):
+        return tuple(dict.fromkeys(seeds))
+    raise fields.error(
+        "seeds",
+        f"expected how many (1 to 1000), or a list of whole numbers from 0, found {seeds!r}",
+    )
+
+
+def _values(fields: _Fields, name: str) -> dict[str, Any]:
+    values = dict(fields.table(name))
+    for key in values:
+        try:
+            values[key] = value(with_values(RunParameters(), {key: values[key]}), key)
+        except ValueError as error:
+            raise StudyError(f"{fields.where}, {name}: {error}") from None
+    return values
+
+
+def _varied(fields: _Fields, key: str, table: Any) -> Varied:
+    where = f"parameters.{key}"
+    if not isinstance(table, Mapping):
+        raise fields.error(
+            where, f"expected a table such as {{ low = 1, high = 5 }}, found {table!r}"
+        )
+    for name in table:
+        if name not in _RANGE:
+            raise fields.error(
+                where, f"expected some of low, high, log, steps and choices, found {name!r}"
+            )
+    if key not in PARAMETERS and key not in METHODS:
+        hint = did_you_mean(key, (*PARAMETERS, *METHODS))
+        raise fields.error(
+            where, f"there is no such parameter{hint}; `multiview-phd parameters` lists them all"
+        )
+    if key in METHODS or PARAMETERS[key].kind in ("bool", "choice"):
+        allowed: tuple[Any, ...] = (
+            METHODS[key]
+            if key in METHODS
+            else (False, True)
+            if PARAMETERS[key].kind == "bool"
+            else PARAMETERS[key].choices
+        )
+        choices = tuple(table.get("choices", allowed))
+        for one in choices:
+            if one not in allowed:
+                raise fields.error(
+                    where, f"expected choices among {', '.join(map(str, allowed))}, found {one!r}"
+                )
+        if len(choices) < 2:
+            raise fields.error(where, "expected at least two choices; name one under [values]")
+        return Varied(key, choices=choices)
+    parameter = PARAMETERS[key]
+    if "choices" in table:
+        choices = tuple(table["choices"]) if isinstance(table["choices"], list) else ()
+        if len(choices) < 2:
+            raise fields.error(where, f"expected at least two choices, found {table['choices']!r}")
+        for one in choices:
+            _number(fields, where, key, one)
+        return Varied(key, choices=choices)
+    low = _number(fields, where, key, table.get("low", parameter.minimum))
+    high = _number(fields, where, key, table.get("high", parameter.maximum))
+    if not low < high:
+        raise fields.error(where, f"expected low below high, found {low:g} and {high:g}")
+    log = table.get("log", parameter.log)
+    if not isinstance(log, bool) or (log and low <= 0.0):
+        raise fields.error(where, f"log: expected true with low above 0, or false, found {log!r}")
+    steps = table.get("steps", GRID_STEPS)
+    if type(steps) is not int or not 2 <= steps <= 1000:
+        raise fields.error(where, f"steps: expected a whole number from 2 to 1000, found {steps!r}")
+    return Varied(key, low, high, log, steps)
+
+
+def _number(fields: _Fields, where: str, key: str, found: Any) -> float:
+    try:
+        return float(value(with_values(RunParameters(), {key: found}), key))
+    except ValueError as error:
+        words = str(error).removeprefix(f"{key}: ")
+        raise fields.error(where, f"{words} (its definition says how far it goes)") from None
+
+
+class _Fields:
+    """What was found, with sentences for what does not fit."""
+
+    def __init__(self, found: Mapping[str, Any], where: str) -> None:
+        self.found = found
+        self.where = where
+
+    def error(self, name: str, words: str) -> StudyError:
+        return StudyError(f"{self.where}, {name}: {words}")
+
+    def only(self, known: frozenset[str]) -> None:
+        for name in self.found:
+            if name not in known:
+                raise self.error(name, f"there is no such field{did_you_mean(name, known)}")
+
+    def text(self, name: str, default: str | None = None) -> str:
+        found = self.found.get(name, default)
+        if not isinstance(found, str):
+            raise self.error(name, f"expected text, found {_shown(found)}")
+        return found
+
+    def texts(self, name: str, default: list[str] | None) -> list[str]:
+        found = self.found.get(name, default)
+        if isinstance(found, str):
+            found = [found]
+        if not isinstance(found, list) or not all(isinstance(one, str) for one in found):
+            raise self.error(name, f"expected a list of texts, found {_shown(found)}")
+        return found
+
+    def whole(self, name: str, default: int, low: int, high: int) -> int:
+        found = self.found.get(name, default)
+        if type(found) is not int or not low <= found <= high:
+            raise self.error(
+                name, f"expected a whole number from {low} to {high}, found {_shown(found)}"
+            )
+        return found
+
+    def minutes(self) -> float | None:
+        found = self.found.get("minutes")
+        if found is None:
+            return None
+        if type(found) not in (int, float) or not 0.0 < found <= 1e6:
+            raise self.error("minutes", f"expected a number above 0, found {_shown(found)}")
+        return float(found)
+
+    def yes(self, name: str, default: bool) -> bool:
+        found = self.found.get(name, default)
+        if not isinstance(found, bool):
+            raise self.error(name, f"expected true or false, found {_shown(found)}")
+        return found
+
+    def table(self, name: str) -> Mapping[str, Any]:
+        found = self.found.get(name, {})
+        if not isinstance(found, Mapping):
+            raise self.error(name, f"expected a table [{name}], found {_shown(found)}")
+        return _flat(found) if name != "parameters" else _flat_ranges(found)
+
+
+def _flat(table: Mapping[str, Any]) -> dict[str, Any]:
+    """``fusion.clutter_rate = 2`` without quotes is a table in a table."""
+    flat: dict[str, Any] = {}
+    for key, found in table.items():
+        if isinstance(found, Mapping):
+            flat |= {f"{key}.{name}": one for name, one in found.items()}
+        else:
+            flat[key] = found
+    return flat
+
+
+def _flat_ranges(table: Mapping[str, Any]) -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for key, found in table.items():
+        groups = isinstance(found, Mapping) and key not in METHODS and "." not in key
+        if groups and all(isinstance(one, Mapping) for one in found.values()) and found:
+            flat |= {f"{key}.{name}": one for name, one in found.items()}
+        else:
+            flat[key] = found
+    return flat
+
+
+def _shown(found: Any) -> str:
+    return "nothing" if found is None else repr(found)
