@@ -33,7 +33,7 @@ from tracker.runs.stage_cache import StageCache
 from tracker.runs.stage_files import StageFiles
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence, SequenceError
-from tracker.studies.objectives import OBJECTIVES
+from tracker.studies.defined.objectives import OBJECTIVES
 from tracker.studies.work import recordings
 from tracker.studies.work.jobs import Job, Outcome, code_version
 from tracker.without_truth import estimate

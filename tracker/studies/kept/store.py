@@ -18,12 +18,12 @@ from typing import Any
 import platformdirs
 
 from tracker.placing import filling
-from tracker.studies.defining import read_definition
-from tracker.studies.definition import Definition
+from tracker.studies.defined.defining import read_definition
+from tracker.studies.defined.definition import Definition
 from tracker.studies.errors import StudyError
-from tracker.studies.records import Status, Trial, trial_of
+from tracker.studies.kept.records import Status, Trial, trial_of
+from tracker.studies.kept.writer import RESULTS, STATUS, Writer
 from tracker.studies.work.jobs import Outcome
-from tracker.studies.writer import RESULTS, STATUS, Writer
 
 FILE = "study.toml"
 JOURNAL = "journal.log"

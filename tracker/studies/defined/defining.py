@@ -11,9 +11,9 @@ from typing import Any, get_args
 
 from tracker.parameters import METHODS, PARAMETERS, PRESETS, RunParameters, value, with_values
 from tracker.sequences.fields import did_you_mean
-from tracker.studies.definition import GRID_STEPS, MOST_TRIALS, Definition, Search, Varied
+from tracker.studies.defined.definition import GRID_STEPS, MOST_TRIALS, Definition, Search, Varied
+from tracker.studies.defined.objectives import OBJECTIVES
 from tracker.studies.errors import StudyError
-from tracker.studies.objectives import OBJECTIVES
 
 _NAME = re.compile(r"[^\W_][\w .+-]{0,59}")
 _TOP = frozenset(

@@ -66,8 +66,8 @@ class Definition:
     seeds: tuple[int, ...] = (0,)
     search: Search = "auto"
     objectives: tuple[str, ...] = ()
-    """Keys of :data:`~tracker.studies.objectives.OBJECTIVES`, the leading one first; where there
-    are none they follow the recordings."""
+    """Keys of :data:`~tracker.studies.defined.objectives.OBJECTIVES`, the leading one first; where
+    there are none they follow the recordings."""
     prune: bool = True
     """Whether hopeless trials are given up after the first recordings."""
     preset: str | None = None

@@ -13,7 +13,7 @@ from typing import Any
 
 from tracker.placing import replacing
 from tracker.studies.errors import StudyError
-from tracker.studies.records import Status, Trial
+from tracker.studies.kept.records import Status, Trial
 from tracker.studies.work.jobs import Outcome
 
 RESULTS = "results.sqlite3"
