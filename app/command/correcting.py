@@ -8,7 +8,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.command.correction_flags import (
+from app.command.arguments.corrections import (
     CheckCorrections,
     Corrections,
     DiffCorrections,

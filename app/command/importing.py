@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from app.command.flags import Check, ExportCalibration, Formats, Import
+from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
 from app.command.terminal import Bar, CommandError, print_table, say
 from tracker.parameters import ParameterError
 

@@ -19,17 +19,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.command.correction_flags import Corrections
+from app.command.arguments.corrections import Corrections
+from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
+from app.command.arguments.library import Bundle, LibraryCommand, OpenRun, Runs
+from app.command.arguments.studies import Batch, Study, Tune
 from app.command.flags import (
     Arguments,
     Benchmark,
-    Check,
     Detect,
     Evaluate,
     Experiment,
-    ExportCalibration,
-    Formats,
-    Import,
     Parameters,
     Render,
     Sequences,
@@ -40,8 +39,6 @@ from app.command.flags import (
     show,
 )
 from app.command.interruption import between_steps
-from app.command.library_flags import Bundle, LibraryCommand, OpenRun, Runs
-from app.command.study_flags import Batch, Study, Tune
 from app.command.terminal import Bar, CommandError, check_data, print_table, say
 from tracker import parameters as table
 from tracker.folders import library_file
@@ -301,6 +298,7 @@ def _track(command: Track) -> int:
     from tracker.runs import gaps
     from tracker.runs.gates import notices
     from tracker.runs.outcome import why_no_tracks
+    from tracker.runs.run import resting_of
     from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
 
@@ -341,7 +339,14 @@ def _track(command: Track) -> int:
     seconds = time.perf_counter() - begin
     with Bar("writing", "step") as writing:
         missing = gaps.sentences(run)
-        written = Written(sequence, run.tracks, parameters, command.seed, remarks=tuple(missing))
+        written = Written(
+            sequence,
+            run.tracks,
+            parameters,
+            command.seed,
+            remarks=tuple(missing),
+            resting=resting_of(run),
+        )
         save(output, form, written, Options(progress=writing.at))
     targets = len(set(run.tracks.ids.tolist()))
     kept = "" if "single_view" in stages else "; stage 1 was kept from an earlier run"

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from app.command.library_flags import (
+from app.command.arguments.library import (
     Bundle,
     CollectRuns,
     DeleteRuns,

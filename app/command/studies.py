@@ -15,7 +15,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from app.command.study_flags import (
+from app.command.arguments.studies import (
     BestOfStudy,
     ExportStudy,
     ListStudies,

@@ -18,10 +18,10 @@ METHODS = ("get", "put", "post", "delete", "patch")
 
 
 def operation_id(route: APIRoute) -> str:
-    """A route's name for programs: its method and the fixed parts of its address."""
-    (method,) = route.methods
-    parts = [part for part in route.path_format.split("/") if part and not part.startswith("{")]
-    return re.sub(r"\W", "_", "_".join([method.lower(), *parts[1:]]))
+    """A route's name for programs: its method and the parts of its address."""
+    (method,) = route.methods or ("get",)
+    parts = [part for part in re.split(r"\W+", route.path_format) if part]
+    return "_".join([method.lower(), *parts[1:]])
 
 
 def install(app: FastAPI) -> None:

@@ -8,6 +8,7 @@ import socket as sockets
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -158,8 +159,17 @@ def create_app(settings: Settings) -> FastAPI:
         return response
 
     app.mount("/static", files, name="static")
+    app.mount("/plotly", StaticFiles(directory=_plotly()), name="plotly")
     app.mount("/manual", Manual(), name="manual")
     return app
+
+
+def _plotly() -> Path:
+    """The folder of the script that draws figures; it is found without reading the package."""
+    found = find_spec("plotly")
+    assert found is not None
+    assert found.origin is not None
+    return Path(found.origin).parent / "package_data"
 
 
 class _PageFiles(StaticFiles):

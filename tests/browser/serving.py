@@ -41,6 +41,7 @@ class Server:
             self._environment["MULTIVIEW_PHD_CACHE"] = str(cache)
             self._environment["MULTIVIEW_PHD_SETTINGS"] = str(cache / "settings")
             self._environment["MULTIVIEW_PHD_LIBRARY"] = str(cache / "library.sqlite3")
+            self._environment["MULTIVIEW_PHD_STUDIES"] = str(cache / "studies")
         self.port = 0
         self.start()
         if wait:

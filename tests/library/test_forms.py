@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 import pytest
 import trimesh
 
-from app.command.library_flags import FormatName
+from app.command.arguments.library import FormatName
 from tests.library.written import STEPS, written
 from tracker import export
 from tracker.evaluation import EvaluationSettings, evaluate

@@ -17,6 +17,7 @@ from app.web.library.routes import Kept, no_library
 from tracker.library.errors import LibraryError
 from tracker.library.keeping import remarks_of
 from tracker.runs import gaps
+from tracker.runs.run import resting_of
 from tracker.sequences import library as sequences
 from tracker.writing.registry import FORMATS
 from tracker.writing.written import Options, Written
@@ -124,6 +125,7 @@ def begin(wish: ExportRequest, exporter: Out, keeper: Kept, bench: Bench) -> Exp
             run.seed,
             done,
             tuple(gaps.sentences(run)),
+            resting_of(run)[rows],
         )
         try:
             form.check(sequence)

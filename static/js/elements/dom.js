@@ -65,7 +65,7 @@ export const parts = (root) =>
 	Object.fromEntries(all("[data-ref]", root).map((element) => [element.dataset.ref, element]));
 
 /**
- * @param {Part} select
+ * @param {Element & { value: string }} select
  * @param {[string | number, string][]} choices  values and words
  * @param {string | number} chosen
  */

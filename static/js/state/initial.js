@@ -34,6 +34,7 @@ export function initialState() {
 		retryAt: 0,
 		server: null,
 		run: null,
+		study: null,
 		schema: null,
 		sequence: null,
 		frames: 0,

@@ -12,6 +12,21 @@ export const PLACES = [
 		bench: true,
 	},
 	{
+		name: "check",
+		word: "Check",
+		tip: "Doubtful moments, put right",
+		bench: true,
+		read: () => import("../check/check.js").then(({ mountCheck }) => mountCheck),
+		exists: ({ sequence }) => sequence !== null,
+	},
+	{
+		name: "study",
+		word: "Study",
+		tip: "Many runs at once: which values are better, and which matter",
+		read: () => import("../study/study.js").then(({ mountStudy }) => mountStudy),
+		sign: ({ study }) => (study?.state === "running" ? `${study.done}/${study.trials}` : ""),
+	},
+	{
 		name: "library",
 		word: "Library",
 		tip: "Recordings and runs that are kept",

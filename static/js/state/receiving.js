@@ -174,6 +174,16 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 			void fetchTimeline();
 		},
 		evaluation: () => void fetchScores(),
+		study({ study }) {
+			const before = store.get().study;
+			store.set({ study });
+			if (study.state !== "done" || before?.name !== study.name || before?.state === "done") return;
+			if (store.get().place !== "study")
+				actions.note("info", `The study ${study.name} is done`, "", {
+					word: "Show",
+					act: () => (location.hash = "#study"),
+				});
+		},
 		notice: ({ level, message, hint }) => actions.note(level, message, hint ?? ""),
 		command({ name }) {
 			// Of a 3D view in a window of its own: keys of our frame come by themselves.

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from tyro.conf import FlagCreatePairsOff, OmitSubcommandPrefixes, Positional, arg, subcommand
 
-from app.command.library_flags import LibraryFile
+from app.command.arguments.library import LibraryFile
 from tracker.library import KEEP
 
 _STUDY = arg(

@@ -1,0 +1,48 @@
+/** Small pieces of what is written down of a study. */
+import { h, icon } from "../elements/dom.js";
+
+/** @type {[string, string][]} */
+export const SEARCHES = [
+	["auto", "narrowing"],
+	["tpe", "narrowing, one figure"],
+	["nsga2", "evolution"],
+	["random", "at random"],
+	["grid", "grid"],
+];
+
+/**
+ * @param {() => void} changed
+ * @param {string} label
+ * @param {number | null} value
+ * @param {(value: number | null) => void} set
+ * @param {object} [more]
+ */
+export function numberField(changed, label, value, set, more = {}) {
+	const field = h("input", {
+		type: "number",
+		step: "any",
+		class: "field",
+		value: value ?? "",
+		"aria-label": label,
+		...more,
+		oninput: () => {
+			set(field.value === "" ? null : Number(field.value));
+			changed();
+		},
+	});
+	return field;
+}
+
+/** @param {string} word @param {false | (() => void)} out @param {string} [title] */
+export const tag = (word, out, title) =>
+	h(
+		"span",
+		{ class: "pc", title: title ?? word },
+		word,
+		out &&
+			h(
+				"button",
+				{ class: "btn icon", "aria-label": `Leave out ${word}`, onclick: out },
+				icon("i-close", "s"),
+			),
+	);

@@ -1,0 +1,83 @@
+/** What a study that is there tries: it cannot change. */
+import { h } from "../elements/dom.js";
+import { SEARCHES, tag } from "./fields.js";
+import { nameOf, symbolOf, valueOf } from "./words.js";
+
+/** @param {Server.Study} study */
+export function lockedParts(study) {
+	const { definition: told } = study;
+	/** @param {string} word @param {Child} value */
+	const line = (word, value) =>
+		h("div", { class: "pairline" }, h("span", {}, word), h("span", {}, value));
+	const seeds = Array.isArray(told.seeds) ? told.seeds.length : told.seeds;
+	return [
+		h(
+			"div",
+			{ class: "blk" },
+			h("h3", { class: "h" }, "Recordings"),
+			h(
+				"div",
+				{ class: "tags" },
+				told.recordings.map((/** @type {string} */ place) => tag(nameOf(place), false, place)),
+			),
+		),
+		h(
+			"div",
+			{ class: "blk" },
+			h(
+				"h3",
+				{ class: "h" },
+				"Parameters",
+				h("span", { class: "grow" }),
+				h("span", { class: "small" }, study.varied.length),
+			),
+			h(
+				"table",
+				{ class: "pt" },
+				h(
+					"thead",
+					{},
+					h(
+						"tr",
+						{},
+						h("th", {}, "name"),
+						h("th", { class: "num" }, "from"),
+						h("th", { class: "num" }, "to"),
+						h("th", {}, "scale"),
+					),
+				),
+				h(
+					"tbody",
+					{},
+					study.varied.map(({ label, symbol, help, low, high, log, choices: all }) =>
+						h(
+							"tr",
+							{},
+							h("td", { title: help }, h("span", { class: "lab" }, label), " ", symbolOf(symbol)),
+							all.length
+								? h("td", { class: "num", colspan: 3 }, all.map(valueOf).join(", "))
+								: [
+										h("td", { class: "num" }, valueOf(low)),
+										h("td", { class: "num" }, valueOf(high)),
+										h("td", {}, log ? "log" : "linear"),
+									],
+						),
+					),
+				),
+			),
+		),
+		h(
+			"div",
+			{ class: "blk" },
+			h("h3", { class: "h" }, "Search"),
+			line("trials", told.trials),
+			line("seeds", seeds),
+			line("search", SEARCHES.find(([key]) => key === told.search)?.[1] ?? told.search),
+			told.minutes && line("at most", `${told.minutes} min`),
+			line(
+				"best is",
+				study.objectives.map(({ name, higher }) => `${name} ${higher ? "↑" : "↓"}`).join(", "),
+			),
+		),
+	];
+}

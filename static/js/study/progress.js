@@ -1,0 +1,79 @@
+/** How far a study is, and what each worker does. */
+import { fill, h, icon } from "../elements/dom.js";
+import { lasting, nameOf } from "./words.js";
+
+/** @param {{pause: () => void}} on */
+export function progressPane({ pause }) {
+	const element = h("section", { class: "pane prog", "aria-label": "Progress" });
+
+	/** @param {Server.Study} now */
+	function show({ info, status, sentences }) {
+		const running = info.state === "running";
+		const gone = [
+			`${status.runs} runs`,
+			lasting(status.seconds),
+			status.seconds_left !== null && running ? `${lasting(status.seconds_left)} left` : "",
+			status.busy === null ? "" : `workers ${Math.round(100 * status.busy)} % busy`,
+		];
+		fill(
+			element,
+			h(
+				"div",
+				{ class: "pgl" },
+				h(
+					"div",
+					{ class: "big" },
+					h("b", {}, info.done),
+					h("span", { class: "q" }, ` of ${info.trials} trials`),
+				),
+				h(
+					"span",
+					{
+						class: "bar wide",
+						"--part": info.done / Math.max(1, info.trials),
+						role: "progressbar",
+						"aria-label": "Trials",
+						"aria-valuenow": info.done,
+						"aria-valuemin": 0,
+						"aria-valuemax": info.trials,
+					},
+					h("i"),
+				),
+				h("div", { class: "q" }, gone.filter(Boolean).join(" · ")),
+			),
+			h(
+				"div",
+				{ class: "wk" },
+				running && status.workers.length
+					? status.workers.slice(0, 4).map((worker, k) => workerRow(worker, k))
+					: h("div", { class: "q" }, info.words || sentences[0] || ""),
+				status.workers.length > 4 &&
+					h("div", { class: "q" }, `and ${status.workers.length - 4} more workers`),
+			),
+			h(
+				"button",
+				{
+					class: "btn box tall2",
+					"data-key": "Space",
+					onclick: pause,
+					disabled: info.state === "done",
+				},
+				icon(running ? "i-pause" : "i-play", "s"),
+				running ? "Pause" : info.state === "done" ? "Done" : "Go on",
+			),
+		);
+	}
+
+	return { element, show };
+}
+
+/** @param {Server.WorkerInfo} worker @param {number} k */
+function workerRow({ words, trial, recording, seed, machine }, k) {
+	return h(
+		"div",
+		{ class: "wrow" },
+		h("span", { title: machine }, `worker ${k + 1}`),
+		h("span", {}, words || (trial === null ? "waits" : trial ? `trial ${trial}` : "the default")),
+		h("span", { class: "q" }, recording && !words ? `${nameOf(recording)}, seed ${seed}` : ""),
+	);
+}

@@ -1,0 +1,426 @@
+/** The place Study: what is tried, how far it is, what it has found. */
+import { choices, fill, h, icon } from "../elements/dom.js";
+import { getJson } from "../state/api.js";
+import { definition } from "./form.js";
+import { overview } from "./overview.js";
+import { progressPane } from "./progress.js";
+import { trialsTable } from "./trials.js";
+import { lasting, lineOf } from "./words.js";
+
+const EVERY_MS = 1000;
+
+/** The choice of a study that is not there yet. */
+const NEW = "";
+
+/** @type {Pane} */
+export function mountStudy(root, { store, actions }) {
+	/** @type {Server.StudyInfo[]} */
+	let studies = [];
+	let name = NEW;
+	/** @type {Server.Study | null} */
+	let study = null;
+	/** @type {Map<number, Server.TrialInfo>} */
+	let trials = new Map();
+	let last = 0;
+	/** @type {number | null} */
+	let chosen = null;
+	/** @type {Server.StudyCost | null} */
+	let cost = null;
+
+	const path = (/** @type {string} */ rest = "") => `studies/${encodeURIComponent(name)}${rest}`;
+
+	const list = h("select", {
+		class: "field which",
+		"aria-label": "Study",
+		onchange: () => void open(list.value),
+	});
+	/** @param {string} word @param {string} sign @param {() => void} act @param {string} tip */
+	const tool = (word, sign, act, tip) =>
+		h("button", { class: "btn", onclick: act, title: tip }, sign && icon(sign, "s"), word);
+	const report = h("a", { class: "btn", download: "" }, icon("i-export", "s"), "Report");
+	const table = h("a", { class: "btn", download: "" }, icon("i-export", "s"), "Table");
+	const remove = tool(
+		"Delete",
+		"i-trash",
+		() => void discard(),
+		"Delete this study with its trials",
+	);
+	const tune = tool(
+		"Tune in 5 minutes",
+		"i-play",
+		() => void tuneNow(),
+		"Seek better values for what is open, by what matters most, and check them on other seeds",
+	);
+	const bar = h(
+		"div",
+		{ class: "pane stu-bar", role: "toolbar", "aria-label": "Studies" },
+		list,
+		tool("New", "", () => void begin(), "Another study, from what is on the sliders"),
+		tune,
+		h("span", { class: "grow" }),
+		report,
+		table,
+		remove,
+	);
+
+	const form = definition(
+		{ store, actions },
+		{ start: (wish, where) => void start(wish, where), cost: showCost, copy: () => void copy() },
+	);
+	const progress = progressPane({ pause: () => void pauseOrGoOn() });
+	const figures = overview({ choose, narrow: (key, low, high) => void copy(key, low, high) });
+	const rows = trialsTable({ choose, use: (number) => void use(number) });
+	const which = h("span", { class: "sub" });
+	const put = h(
+		"button",
+		{ class: "btn main", onclick: () => chosen !== null && void use(chosen) },
+		"Use",
+	);
+	const beside = h(
+		"button",
+		{ class: "btn box", onclick: () => void compare() },
+		"Compare with current",
+	);
+	const keep = h("button", { class: "btn box", onclick: askName }, "Save as preset…");
+	const differs = h("span", { class: "sub" });
+	const command = h(
+		"button",
+		{
+			class: "btn",
+			onclick: () => void copyCommand(),
+			title: "The command that gives these tracks again",
+		},
+		icon("i-copy", "s"),
+		"Command",
+	);
+	const best = h(
+		"section",
+		{ class: "pane tab2", "aria-label": "Best trials" },
+		h(
+			"div",
+			{ class: "pane-head" },
+			h("h2", { class: "pane-title" }, "Best trials"),
+			differs,
+			h("span", { class: "grow" }),
+			which,
+			put,
+			beside,
+			keep,
+			command,
+		),
+		rows.element,
+	);
+	const blank = h("section", { class: "pane stu-blank" });
+	const main = h(
+		"div",
+		{ class: "stu" },
+		bar,
+		form.element,
+		progress.element,
+		figures.elements,
+		best,
+		blank,
+	);
+	fill(root, main);
+
+	async function refreshList() {
+		studies = (await getJson("/api/studies")).studies;
+		choices(
+			list,
+			[
+				[NEW, "a new study"],
+				...studies.map((one) => /** @type {[string, string]} */ ([one.name, lineOf(one)])),
+			],
+			name,
+		);
+	}
+
+	/** @param {string} wanted */
+	async function open(wanted) {
+		name = wanted;
+		list.value = wanted;
+		study = null;
+		trials = new Map();
+		last = 0;
+		chosen = null;
+		if (name === NEW) return begin();
+		await refresh();
+	}
+
+	/** @param {Partial<import("./form.js").Wish>} [from] @param {string[]} [keys] */
+	async function begin(from, keys) {
+		name = NEW;
+		list.value = NEW;
+		study = null;
+		const asked = keys ? `?keys=${keys.map(encodeURIComponent).join(",")}` : "";
+		const draft = await getJson(`/api/studies/draft${asked}`).catch((error) => error);
+		if (draft instanceof Error) {
+			main.dataset.shows = "nothing";
+			return fill(blank, h("h3", {}, "No study yet"), h("p", {}, draft.message));
+		}
+		main.dataset.shows = "draft";
+		form.edit(draft, from);
+		tools();
+	}
+
+	/** A study of the same, to be changed. @param {string} [narrowed] @param {number} [low] @param {number} [high] */
+	async function copy(narrowed, low, high) {
+		if (!study) return;
+		const { definition: told, varied } = study;
+		const parameters = Object.fromEntries(
+			varied.map((range) => [
+				range.key,
+				{
+					low: range.key === narrowed ? (low ?? range.low) : range.low,
+					high: range.key === narrowed ? (high ?? range.high) : range.high,
+					log: range.log,
+					choices: range.choices.length ? [...range.choices] : null,
+				},
+			]),
+		);
+		await begin(
+			{
+				recordings: told.recordings,
+				parameters,
+				trials: told.trials,
+				seeds: Array.isArray(told.seeds) ? told.seeds.length : told.seeds,
+				minutes: told.minutes ?? null,
+				search: told.search,
+				objectives: told.objectives,
+			},
+			varied.map(({ key }) => key),
+		);
+	}
+
+	/** @param {Server.StudyCost | null} told */
+	function showCost(told) {
+		cost = told;
+		if (name !== NEW) return;
+		fill(
+			blank,
+			h("h3", {}, "What it will take"),
+			cost
+				? h(
+						"dl",
+						{ class: "cost" },
+						h("div", {}, h("dt", {}, "runs"), h("dd", {}, cost.runs)),
+						h(
+							"div",
+							{},
+							h("dt", {}, "time"),
+							h(
+								"dd",
+								{},
+								cost.seconds === null
+									? "known after the first trial"
+									: `about ${lasting(cost.seconds)}`,
+							),
+						),
+						h("div", {}, h("dt", {}, "disk"), h("dd", {}, `${(cost.bytes / 1e6).toFixed(1)} MB`)),
+					)
+				: h("p", {}, "See what is said beside Start."),
+			h(
+				"p",
+				{ class: "q" },
+				"Trial 0 is always the default. Here its figures will stand against each other: every trial a dot, those that nothing beats joined by a line.",
+			),
+		);
+	}
+
+	/** @param {import("./form.js").Wish} wish @param {import("./form.js").Where} where */
+	async function start(wish, where) {
+		const made = await actions.ask("POST", "studies", wish);
+		if (!made) return;
+		name = made.info.name;
+		await actions.ask(
+			"POST",
+			path("/start"),
+			where.scheduler === null ? { workers: where.workers } : { scheduler: where.scheduler },
+		);
+		await refreshList();
+		await open(name);
+	}
+
+	async function tuneNow() {
+		const made = await actions.ask("POST", "studies/tune", {});
+		if (!made) return;
+		await refreshList();
+		await open(made.info.name);
+	}
+
+	async function discard() {
+		if (!(await actions.ask("DELETE", path()))) return;
+		await refreshList();
+		await open(studies[0]?.name ?? NEW);
+	}
+
+	async function pauseOrGoOn() {
+		if (!study) return;
+		await actions.ask("POST", path(study.info.state === "running" ? "/stop" : "/start"), {});
+		await refresh();
+	}
+
+	let busy = false;
+	async function refresh() {
+		if (name === NEW || busy) return;
+		busy = true;
+		const wanted = name;
+		try {
+			const told = await getJson(`/api/${path()}`);
+			const more = await getJson(`/api/${path(`/trials?after=${last}`)}`);
+			if (name !== wanted) return;
+			const begun = !study;
+			study = told;
+			for (const trial of more.trials) trials.set(trial.number, trial);
+			last = more.last;
+			if (chosen === null && study?.best !== null && study?.best !== undefined) chosen = study.best;
+			if (begun && study) form.locked(study);
+			show(begun || more.trials.length > 0);
+		} catch (error) {
+			// The socket tells whether the server is there.
+			if (name === wanted && !study) fill(blank, h("p", {}, /** @type {Error} */ (error).message));
+		} finally {
+			busy = false;
+		}
+	}
+
+	function tools() {
+		report.href = `/api/${path("/export/report.html")}`;
+		table.href = `/api/${path("/export/trials.csv")}`;
+		for (const part of [report, table, remove]) part.hidden = name === NEW;
+		remove.disabled = study?.info.state === "running";
+	}
+
+	/** @param {boolean} news whether trials ended */
+	function show(news) {
+		if (!study) return;
+		main.dataset.shows = "study";
+		tools();
+		progress.show(study);
+		if (!news) return;
+		const done = [...trials.values()].sort((a, b) => a.ended - b.ended);
+		rows.show(study, done, chosen);
+		fill(
+			differs,
+			`difference to the default${study.definition.seeds?.length > 1 ? `, mean of ${study.definition.seeds.length} seeds` : ""}`,
+		);
+		fill(which, chosen === null ? "" : chosen ? `trial ${chosen}` : "default");
+		for (const part of [put, beside, keep, command]) part.disabled = chosen === null;
+		void figures.show(study, done, chosen);
+	}
+
+	/** @param {number} number */
+	function choose(number) {
+		chosen = number;
+		show(true);
+		rows.reveal(number);
+	}
+
+	/** @param {number} number */
+	async function use(number) {
+		if (!(await actions.ask("POST", path(`/trials/${number}/use`)))) return;
+		actions.note(
+			"info",
+			`The values of ${number ? `trial ${number}` : "the default"} are on the sliders`,
+			"Ctrl Z takes them back.",
+			{
+				word: "To Tune",
+				act: () => (location.hash = "#tune"),
+			},
+		);
+	}
+
+	async function compare() {
+		if (chosen === null || !(await actions.ask("POST", "run/pin"))) return;
+		if (await actions.ask("POST", path(`/trials/${chosen}/use`))) location.hash = "#tune";
+		store.set({ tab: "compare" });
+	}
+
+	/** The name is asked for where the button stands. */
+	function askName() {
+		const field = h("input", {
+			class: "field",
+			value: `${name} ${chosen}`,
+			"aria-label": "Name of the preset",
+		});
+		let over = false;
+		const end = async (/** @type {boolean} */ kept) => {
+			if (over) return;
+			over = true;
+			field.replaceWith(keep);
+			if (!kept || !field.value.trim()) return;
+			if (await actions.ask("POST", path(`/trials/${chosen}/preset`), { name: field.value.trim() }))
+				actions.note(
+					"info",
+					`Kept as the preset ${field.value.trim()}`,
+					"It is among the presets in Tune.",
+				);
+		};
+		field.addEventListener("keydown", (event) => {
+			event.stopPropagation();
+			if (event.key === "Enter" || event.key === "Escape") void end(event.key === "Enter");
+		});
+		field.addEventListener("blur", () => void end(false));
+		keep.replaceWith(field);
+		field.select();
+	}
+
+	async function copyCommand() {
+		if (chosen === null) return;
+		const { commands } = await getJson(`/api/${path(`/trials/${chosen}`)}`);
+		await navigator.clipboard.writeText(commands.join("\n"));
+		actions.note("info", "The command was copied", commands[0] ?? "");
+	}
+
+	/** What a key does here. @type {Record<string, () => void>} */
+	const KEYS = {
+		" ": () => void pauseOrGoOn(),
+		ArrowDown: () => move(1),
+		ArrowUp: () => move(-1),
+		Enter: () => chosen !== null && void use(chosen),
+		c: () => void compare(),
+		Escape: () => (location.hash = "#tune"),
+	};
+	/** @param {number} by */
+	function move(by) {
+		const next = rows.beside(chosen, by);
+		if (next !== null) choose(next);
+	}
+	document.addEventListener(
+		"keydown",
+		(event) => {
+			if (store.get().place !== "study" || document.querySelector("dialog[open]")) return;
+			const target = /** @type {HTMLElement} */ (event.target);
+			if (event.ctrlKey || event.metaKey || event.altKey) return;
+			if (target.matches("input, select")) {
+				if (event.key === "Escape") (target.blur(), event.stopPropagation());
+				return;
+			}
+			const act = KEYS[event.key];
+			if (!act || (target.closest("button, a") && ["Enter", " "].includes(event.key))) return;
+			act();
+			event.preventDefault();
+			event.stopPropagation();
+		},
+		true,
+	);
+
+	/** @type {Timer} */
+	let clock;
+	store.watch(["place", "study"], ({ place, study: told }) => {
+		clearInterval(clock);
+		if (place !== "study") return;
+		if (told && told.name === name) void refresh();
+		clock = setInterval(() => {
+			if (study?.info.state === "running" || (study && trials.size < study.info.done))
+				void refresh();
+		}, EVERY_MS);
+	});
+	store.on(["place"], ({ place }) => {
+		if (place === "study") void refreshList();
+	});
+	store.on(["theme"], () => show(true));
+	void refreshList().then(() =>
+		open(studies.find(({ state }) => state === "running")?.name ?? studies[0]?.name ?? NEW),
+	);
+}

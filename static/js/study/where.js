@@ -1,0 +1,85 @@
+/** Where a study runs: on this machine, or on a cluster that exists. */
+import { fill, h } from "../elements/dom.js";
+import { sendJson } from "../state/api.js";
+import { numberField } from "./fields.js";
+
+/** @typedef {{scheduler: string | null, workers: number}} Where */
+
+/** @param {Where} where @param {{changed: () => void, show: () => void}} on */
+export function runsOn(where, { changed, show }) {
+	const address = h("input", {
+		class: "field addr",
+		value: where.scheduler ?? "",
+		placeholder: "tcp://scheduler:8786",
+		"aria-label": "Address of the Dask scheduler",
+		oninput: () => (where.scheduler = address.value.trim()),
+	});
+	const answer = h("span", { class: "small", role: "status" });
+	const test = h(
+		"button",
+		{
+			class: "btn box",
+			onclick: async () => {
+				fill(answer, "asking…");
+				const found = await sendJson("POST", "/api/studies/scheduler", {
+					address: address.value.trim(),
+				}).catch((error) => ({ error: error.message }));
+				fill(
+					answer,
+					found.error ??
+						`${found.workers} workers with ${found.threads} threads on ${found.machines.join(", ") || "no machine yet"}`,
+				);
+			},
+		},
+		"Test",
+	);
+	/** @param {boolean} here @param {string} title @param {...Child} rest */
+	const choice = (here, title, ...rest) => {
+		const on = here === (where.scheduler === null);
+		return h(
+			"div",
+			{ class: `choice${on ? " on" : ""}` },
+			h(
+				"button",
+				{
+					class: "as-text",
+					role: "radio",
+					"aria-checked": String(on),
+					onclick: () => {
+						where.scheduler = here ? null : (where.scheduler ?? "");
+						show();
+					},
+				},
+				h("b", {}, title),
+			),
+			on && rest,
+		);
+	};
+	const workers = numberField(
+		changed,
+		"Workers",
+		where.workers,
+		(value) => (where.workers = value ?? 1),
+		{
+			min: 1,
+			max: 1024,
+			step: 1,
+		},
+	);
+	return h(
+		"div",
+		{ class: "blk" },
+		h("h3", { class: "h" }, "Runs on"),
+		h(
+			"div",
+			{ role: "radiogroup", "aria-label": "Runs on", class: "stack" },
+			choice(
+				true,
+				"This machine",
+				workers,
+				h("span", { class: "small" }, "workers, behind the page"),
+			),
+			choice(false, "Dask scheduler", address, test, answer),
+		),
+	);
+}

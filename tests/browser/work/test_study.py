@@ -1,0 +1,94 @@
+"""The place Study: defined, run, looked at, used, by somebody at the page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Page, expect
+
+from tests.browser.looking import ask
+from tests.browser.serving import Server
+
+TRIALS = 4
+
+
+@pytest.fixture(scope="module", autouse=True)
+def ended(server: Server) -> str:
+    """A short study of what is open, that has ended."""
+    draft = server.get("/api/studies/draft").json()
+    ranges = {
+        one["key"]: {"low": one["low"], "high": one["high"], "log": one["log"]}
+        for one in draft["parameters"]
+        if one["key"] in ("fusion.detection_probability", "fusion.clutter_rate")
+    }
+    ask(
+        server,
+        "POST",
+        "studies",
+        {
+            "name": "short",
+            "parameters": ranges,
+            "trials": TRIALS,
+            "objectives": ["idf1", "position_error"],
+        },
+    )
+    ask(server, "POST", "studies/short/start", {"workers": 1})
+    return "short"
+
+
+@pytest.fixture
+def study(flat_page: Page) -> Page:
+    """The place with the study, done."""
+    flat_page.get_by_role("link", name="Study").click()
+    expect(flat_page.locator(".big")).to_contain_text(f"{TRIALS} of {TRIALS}", timeout=240_000)
+    expect(flat_page.locator("tr[data-trial]")).to_have_count(TRIALS)
+    return flat_page
+
+
+def test_trials_stand_against_each_other(study: Page, screenshots: Path | None) -> None:
+    expect(study.locator("main")).to_be_hidden()
+    expect(study.locator("tr[data-trial]").last).to_contain_text("default")
+    figure = study.locator(".scat .fill")
+    expect(figure.locator("path.point:not([display=none])").first).to_be_visible()
+    assert "IDF1 against Position error" in (figure.get_attribute("aria-label") or "")
+    expect(study.locator(".mp")).to_have_count(2)
+    study.get_by_role("button", name="IDF1 · time").click()
+    assert study.get_by_role("button", name="IDF1 · time").get_attribute("aria-pressed") == "true"
+    found = Axe().run(study, context=".place-study")
+    assert found.violations_count == 0, found.generate_report()
+    if screenshots:
+        for theme in ("dark", "light"):
+            study.emulate_media(color_scheme=theme)  # type: ignore[arg-type]
+            study.screenshot(path=screenshots / f"study-{theme}.png")
+
+
+def test_keys_walk_through_the_trials_and_use_one(study: Page, server: Server) -> None:
+    study.locator("tr[data-trial]").first.click()
+    first = study.locator("tr[aria-selected=true]").get_attribute("data-trial")
+    study.keyboard.press("ArrowDown")
+    row = study.locator("tr[aria-selected=true]")
+    expect(row).not_to_have_attribute("data-trial", first or "")
+    number = row.get_attribute("data-trial")
+    values = server.get(f"/api/studies/short/trials/{number}").json()["trial"]["values"]
+    row.get_by_role("button", name=f"Use trial {number}").click()
+    expect(study.get_by_text("are on the sliders")).to_be_visible()
+    now = server.get("/api/state").json()["parameters"]
+    assert {key: now[key] for key in values} == pytest.approx(values)
+    study.keyboard.press("Escape")
+    expect(study.locator("main")).to_be_visible()
+
+
+def test_a_copy_is_changed_and_what_is_wrong_is_said(study: Page) -> None:
+    study.get_by_role("button", name="Edit a copy").click()
+    expect(study.get_by_text("What it will take")).to_be_visible()
+    begin = study.get_by_role("button", name="Start", exact=True)
+    expect(begin).to_be_enabled()
+    study.get_by_label("Clutter rate to").fill("1000")
+    expect(begin).to_be_disabled()
+    expect(study.locator(".def-foot .why")).to_contain_text("clutter_rate")
+    study.get_by_label("Clutter rate to").fill("8")
+    expect(begin).to_be_enabled()
+    study.get_by_role("button", name="Leave out Clutter rate").click()
+    expect(study.locator(".pt tbody tr")).to_have_count(1)
