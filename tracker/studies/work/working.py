@@ -46,7 +46,7 @@ MOST_OPEN = 16
 
 KNOWN_TIMES = 4096
 
-NICENESS = 10
+NICENESS = 5
 """Of a worker on this machine: whoever uses it goes first."""
 
 COMPILING = "compiling the kernels, once per machine"
