@@ -82,14 +82,18 @@ def cut(sequence: Sequence, first: int, steps: int) -> Sequence:
         frames=last - first,
         views=tuple(view(one) for one in sequence.views),
         templates=tuple(replace(one, frame=one.frame - first) for one in templates),
-        ground_truth=None if truth is None else rows(truth),
+        ground_truth=None
+        if truth is None
+        else replace(rows(truth), known=None if truth.known is None else truth.known[first:last]),
         digest=f"{sequence.digest}-{first}-{last}",
     )
 
 
 def _taken(table: _Rows, inside: ndarray, first: int) -> _Rows:
     columns: dict[str, ndarray] = {
-        name: getattr(table, name)[inside] for name in type(table).__slots__
+        name: getattr(table, name)[inside]
+        for name in type(table).__slots__
+        if name != "known"  # of steps, not of rows
     }
     columns["frames"] = columns["frames"] - first
     make: Callable[..., _Rows] = type(table)

@@ -26,8 +26,8 @@ leads here.
 ## In which order
 
 1. **Choose what is measured.** With templates and pictures: `colour_phd`. With pictures alone:
-   `jpda` or `association_matrix`, which look at the foreground. With a detector's boxes: `none`
-   or `detection_phd`.
+   `shapes`, or `jpda` and `association_matrix`, which look at the foreground. With a detector's
+   boxes: `none` or `detection_phd`.
 2. **Look at stage 1 first**: the boxes in the pictures. Somebody without a box in any camera
    cannot be found; boxes on furniture that stay at one place can become ghosts.
    `acceptance_distance`, `acceptance_foreground` and the foreground's `threshold` decide most.

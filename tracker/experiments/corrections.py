@@ -39,8 +39,8 @@ TASKS = (
     Task(
         "cmc2",
         1.0,
-        {"fusion.detection_probability": 0.2, "fusion.clutter_rate": 0.01},
-        "p_D 0.2 and λ_c 0.01, both far off",
+        {"fusion.detection_probability": 0.3, "fusion.clutter_rate": 30.0},
+        "p_D 0.3 and λ_c 30, both far off",
     ),
     Task("wildtrack-points-300", 1.0, {}, "defaults"),
     Task("av163-seq30-2p-1101", 0.5, {"single_view": "jpda"}, "without templates"),

@@ -32,6 +32,7 @@ __all__ = [
     "first_background",
     "integral",
     "learn",
+    "learn_background",
     "pack",
     "shape_scores",
     "shape_shares",
@@ -63,23 +64,17 @@ def learn(
             who knows nothing else of people.
     """
 
-    def pictures() -> list[UInt8[ndarray, "h w 3"]]:
-        count = min(BACKGROUND_PICTURES, sequence.frames)
-        steps = np.linspace(0, sequence.frames - 1, count).astype(int)
-        found = (reader.picture(camera_index, int(step)) for step in steps)
-        return [picture for picture in found if picture is not None]
-
     # no slider has a say in a background, so that a moved one does not wait for it again
     if parameters.model == "adaptive":
         follow = parameters.follow_exposure
         first = reader.once(
             ("first background", camera_index, follow),
-            lambda: first_background(pictures(), follow_exposure=follow, check=reader.check),
+            lambda: first_background(
+                _spread(sequence, camera_index, reader), follow_exposure=follow, check=reader.check
+            ),
         )
         return None if first is None else AdaptiveForeground(first, parameters)
-    background = reader.once(
-        ("background", camera_index), lambda: BackgroundModel.learn(pictures(), reader.check)
-    )
+    background = learn_background(sequence, camera_index, reader)
     if background is None:
         return None
     if motion:
@@ -87,3 +82,29 @@ def learn(
         if moving.memory > 0:
             return moving
     return LearntForeground(background, parameters)
+
+
+def learn_background(
+    sequence: Sequence, camera_index: int, reader: Pictures
+) -> BackgroundModel | None:
+    """The empty scene as one camera sees it, learnt once; None where it has not a single picture.
+
+    Args:
+        sequence: Whose camera.
+        camera_index: Which one.
+        reader: Of its pictures.
+    """
+    return reader.once(
+        ("background", camera_index),
+        lambda: BackgroundModel.learn(_spread(sequence, camera_index, reader), reader.check),
+    )
+
+
+def _spread(
+    sequence: Sequence, camera_index: int, reader: Pictures
+) -> list[UInt8[ndarray, "h w 3"]]:
+    """Pictures spread over the clip."""
+    count = min(BACKGROUND_PICTURES, sequence.frames)
+    steps = np.linspace(0, sequence.frames - 1, count).astype(int)
+    found = (reader.picture(camera_index, int(step)) for step in steps)
+    return [picture for picture in found if picture is not None]

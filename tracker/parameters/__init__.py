@@ -22,6 +22,7 @@ from tracker.parameters.groups.fusion import FusionParams
 from tracker.parameters.groups.jpda import JpdaParams
 from tracker.parameters.groups.onnx_detector import OnnxDetectorParams
 from tracker.parameters.groups.pseudo_particle import PseudoParticleParams
+from tracker.parameters.groups.shapes import ShapesParams
 from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.parameters.methods import Method, MethodKey, Reads, Uses
 
@@ -68,6 +69,7 @@ __all__ = [
     "PseudoParticleParams",
     "Reads",
     "RunParameters",
+    "ShapesParams",
     "SmoothingParams",
     "Stage",
     "Uses",

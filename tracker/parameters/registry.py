@@ -30,6 +30,7 @@ ENTRY_POINTS: dict[MethodKey, str] = {
 BUILT_IN: dict[MethodKey, tuple[str, ...]] = {
     "single_view": (
         "tracker.parameters.groups.colour_phd:METHOD",
+        "tracker.parameters.groups.shapes:METHOD",
         "tracker.parameters.groups.jpda:METHOD",
         "tracker.parameters.groups.pseudo_particle:METHOD",
         "tracker.parameters.groups.association_matrix:METHOD",
@@ -52,13 +53,13 @@ BUILT_IN: dict[MethodKey, tuple[str, ...]] = {
 SHARED_GROUPS = ("pictures", "foreground", "fusion", "smoothing")
 """Groups of parameters that are no single method's."""
 
-FOLLOWING = ("colour_phd", "none", "jpda")
+FOLLOWING = ("colour_phd", "none", "shapes")
 """What ``single_view`` is by default follows the recording: the first of these that it has all
 for."""
 
 FOLLOWS = (
     "follows the recording: onnx_detector where a detector is named, else colour_phd with "
-    "pictures and templates, else none with detections, else jpda on what moves"
+    "pictures and templates, else none with detections, else shapes"
 )
 """The same in words."""
 

@@ -35,13 +35,13 @@ _LATER: dict[Stage, tuple[str, ...]] = {
 def numbers_version(stage: Stage) -> str:
     """Another text for every code that may give other numbers up to this stage.
 
-    Made of the source files themselves, so that nobody has to remember to count a number
-    up, and of the libraries that compute. Where the sources are not at hand, the version
-    of the program has to do.
+    Made of the source files themselves and of what was learnt for them, so that nobody has to
+    remember to count a number up, and of the libraries that compute. Where the sources are not
+    at hand, the version of the program has to do.
     """
     left_out = tuple(str(_ROOT / name) for name in (*_NO_PART, *_LATER[stage]))
     digest = hashlib.sha256()
-    for path in sorted(_ROOT.rglob("*.py")):
+    for path in sorted([*_ROOT.rglob("*.py"), *_ROOT.rglob("*.npz")]):
         if not str(path).startswith(left_out):
             digest.update(path.relative_to(_ROOT).as_posix().encode() + b"\0")
             digest.update(path.read_bytes() + b"\0")

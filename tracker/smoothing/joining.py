@@ -123,11 +123,11 @@ def _with_ties(
     earlier, later, gains = earlier[keep], later[keep], gains[keep]
     there = set(zip(earlier.tolist(), later.tolist(), strict=True))
     more = np.array([pair for pair in ties.together if pair not in there], dtype=np.int64)
-    i, j = more.reshape(-1, 2).T
+    ends, begins = more.reshape(-1, 2).T
     return (
-        np.concatenate([earlier, i]),
-        np.concatenate([later, j]),
-        np.concatenate([gains, deaths[i] + births[j]]),
+        np.concatenate([earlier, ends]),
+        np.concatenate([later, begins]),
+        np.concatenate([gains, deaths[ends] + births[begins]]),
     )
 
 

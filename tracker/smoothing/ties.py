@@ -105,6 +105,8 @@ class Said(NamedTuple):
     last: int = -1
     meant: AbstractSet[int] = frozenset()
     """All pieces that it speaks of."""
+    somebody: AbstractSet[int] = frozenset()
+    """Those of them that are somebody's for sure."""
 
 
 class Seeker:
@@ -122,7 +124,7 @@ class Seeker:
         self._steps, self._owners = paths.steps, paths.owners
         self._whereabouts = Whereabouts(self._steps, paths.states[:, :3])
         self._rows = {
-            place: self._whereabouts.nearest(place, leeway=leeway)
+            place: self._whereabouts.nearest(place, leeway=0 if one.kind == "here" else leeway)
             for one in corrections
             if one.kind not in ("nobody", "checked")
             for place in one.places
@@ -191,7 +193,10 @@ class Seeker:
                 inside = self._inside[one.id][kept]
                 gone = mostly_inside(cut.owners, cut.steps, inside, one)
                 yield Said(nobody=gone, meant=gone)
-            elif one.kind not in ("checked", "here"):
+            elif one.kind == "here":
+                piece = self._piece(one.places[0], cut, kept, before=True)
+                yield Said(meant={piece} - {-1}, somebody={piece} - {-1})
+            elif one.kind != "checked":
                 yield self._of_people(one, cut, kept)
 
     def _of_people(self, one: Correction, cut: Paths, kept: Int[ndarray, " M"]) -> Said:
@@ -259,6 +264,7 @@ def possible(
     nobody: set[int] = set()
     came: set[int] = set()
     left: set[int] = set()
+    somebody: set[int] = set()
 
     def joined(pairs: list[tuple[int, int]]) -> dict[int, list[int]] | None:
         """The groups with more pairs, None where somebody would be in two places at once."""
@@ -291,13 +297,14 @@ def possible(
         nobody |= {piece for piece in one.nobody if piece not in groups}
         came |= {one.first} - {-1}
         left |= {one.last} - {-1}
+        somebody |= one.somebody
     members = {tuple(group) for group in groups.values()}
     together = [pair for group in sorted(members) for pair in itertools.pairwise(group)]
     between = {
         (i, j): tuple(np.flatnonzero((firsts > lasts[i]) & (lasts < firsts[j])).tolist())
         for i, j in together
     }
-    sure = {piece for group in members for piece in group} | came | left
+    sure = {piece for group in members for piece in group} | came | left | somebody
     return Ties(
         tuple(together),
         tuple(apart),

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from app.errors import ApiError, sentence
 from app.models import Model
+from app.models.base import RowNumber
 from app.state.workers.exporter import Exporter
 from app.web.dependencies import ERRORS, Bench
 from app.web.library.routes import Kept, no_library
@@ -45,7 +46,7 @@ class ExportRequest(Model):
     """What is wanted."""
 
     format: str
-    run: int | None = None
+    run: RowNumber | None = None
     """Its number in the library; null for the one that is shown."""
     first: int = Field(default=0, ge=0)
     """Of a video."""

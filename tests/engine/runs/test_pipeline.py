@@ -325,7 +325,7 @@ def test_the_methods_follow_from_what_the_sequence_has() -> None:
     )
     template = Template("person", "left", 0, np.array([1.0, 2.0, 3.0, 4.0]))
     assert default_parameters(WHOLE).single_view == "none"
-    assert default_parameters(filmed).single_view == "jpda"
+    assert default_parameters(filmed).single_view == "shapes"
     both = replace(
         WHOLE,
         views=tuple(replace(view, video=Path("v.avi")) for view in WHOLE.views),

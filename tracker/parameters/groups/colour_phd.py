@@ -57,6 +57,14 @@ class ColourPeakParams(Params):
     """Whether a camera without a template of a person gets one from where the others' templates
     and the calibration say that the person is."""
 
+    shapes: Annotated[bool, ui("S_h")] = False
+    """Whether people found by shape are peaks as well, whatever their colours."""
+
+    shape_odds: Annotated[
+        float, Field(ge=-6.0, le=10.0), ui("ln o", step=0.1, when={"shapes": (True,)})
+    ] = 2.0
+    """Logarithm of the odds from which somebody found by shape is taken."""
+
     samples: Annotated[int, Field(ge=20, le=5000), ui("S", unit="1/(camera·step)", log=True)] = 400
     """Boxes that are compared with the templates."""
 

@@ -21,6 +21,10 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.appearance import Appearance, Scene
 from tracker.single_view.protocol import CANDIDATES, DROPPED, TRUST
+from tracker.single_view.shape.finder import ShapeFinder
+
+SHAPE_OVERLAP = 0.3
+"""Windows of the shapes that share more than this of what both cover are of one person."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,6 +76,7 @@ class PeakFinder:
             foreground=foreground if p.asks_foreground else None,
             carry_templates=p.carry_templates,
         )
+        self._shapes = ShapeFinder(sequence, camera_index, reader) if p.shapes else None
 
     @property
     def sizes(self) -> BoxSizes:
@@ -79,8 +84,9 @@ class PeakFinder:
         return self._appearance.sizes
 
     def start(self) -> Any:
-        """The state of the foreground model before the first picture."""
-        return self._appearance.start()
+        """The state of the foreground model and of the shapes before the first picture."""
+        shapes = None if self._shapes is None else self._shapes.start()
+        return self._appearance.start(), shapes
 
     def find(
         self,
@@ -92,7 +98,7 @@ class PeakFinder:
         """The peaks of one picture.
 
         Args:
-            state: Of the foreground model.
+            state: As :meth:`start` gives it, or the picture before.
             picture: BGR.
             intensity: Where people are expected, over boxes.
             rng: Draws the samples.
@@ -100,12 +106,17 @@ class PeakFinder:
         Returns:
             The state for the next picture, and what was found.
         """
-        state, scene = self._appearance.look(state, picture)
+        background, shape_state = state
+        background, scene = self._appearance.look(background, picture)
         samples = self._sample(intensity, scene, rng)
         scores, _, _ = self._score(scene, samples)
         candidates = self._climb(samples, scores)
         boxes, distances, dropped = self._accept(scene, candidates)
-        return state, Peaks(
+        if self._shapes is not None:
+            shape_state, boxes, distances = self._with_shapes(
+                shape_state, picture, scene, boxes, distances
+            )
+        return (background, shape_state), Peaks(
             boxes=boxes,
             scores=np.exp(-0.5 * (distances / self._parameters.likelihood_sigma) ** 2),
             samples=samples,
@@ -121,6 +132,23 @@ class PeakFinder:
                 TRUST: float(self._appearance.trust.mean()),
             },
         )
+
+    def _with_shapes(
+        self,
+        state: Any,
+        picture: UInt8[ndarray, "h w 3"],
+        scene: Scene,
+        boxes: Float[ndarray, "N 4"],
+        distances: Float[ndarray, " N"],
+    ) -> tuple[Any, Float[ndarray, "M 4"], Float[ndarray, " M"]]:
+        """The peaks, and people found by shape where there is none, with their distances."""
+        assert self._shapes is not None
+        p = self._parameters
+        state, found = self._shapes.find(state, picture, p.shape_odds, SHAPE_OVERLAP)
+        apart = (found.boxes[:, None, :2] - boxes[None, :, :2]) / found.boxes[:, None, 2:]
+        new = found.boxes[((apart**2).sum(axis=2) >= p.merge_distance**2).all(axis=1)]
+        far = self._appearance.distances(scene, new).min(axis=1) if len(new) else np.zeros(0)
+        return state, np.concatenate([boxes, new]), np.concatenate([distances, far])
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
         """Standard deviations of peaks: proportional to the box, and no more of a large one."""

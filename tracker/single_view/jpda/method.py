@@ -21,7 +21,7 @@ from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.jpda.association import associate
 from tracker.single_view.jpda.cases import Cases, look_into_pieces, part_strangers, tell_apart
-from tracker.single_view.jpda.measurements import Measured, source_of
+from tracker.single_view.jpda.measurements import Measured, Source, source_of
 from tracker.single_view.jpda.moves import Moved, move
 from tracker.single_view.jpda.targets import Targets, innovations
 from tracker.single_view.jpda.track_management import Managed, manage
@@ -72,14 +72,22 @@ class Jpda:
         camera_index: int,
         parameters: RunParameters,
         reader: Pictures,
+        source: Source | None = None,
     ) -> None:
         """Prepare for one camera.
+
+        Args:
+            sequence: Whose camera.
+            camera_index: Which one.
+            parameters: Of the association, and of the measurements.
+            reader: Of the pictures.
+            source: Where the measurements come from; what the parameters say where None.
 
         Raises:
             ValueError: If the camera lacks what the measurements are made from.
         """
         self._parameters = p = parameters.of(JpdaParams)
-        self._source = source_of(sequence, camera_index, parameters, reader)
+        self._source = source or source_of(sequence, camera_index, parameters, reader)
         self._step_time = sequence.step_time
         self._longest_hidden = max(1, round(p.longest_hidden * sequence.fps))
         self._gate = gate_distance(p.gate_probability, 2)

@@ -1,0 +1,109 @@
+"""People by their shape: windows where people can be, the best of those that overlap, channels."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from tracker import pipeline
+from tracker.foreground import BackgroundModel
+from tracker.parameters import RunParameters, with_values
+from tracker.sequences.reader import read_sequence
+from tracker.sequences.rendering import render_random
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.box_sizes import upright_boxes
+from tracker.single_view.shape.channels import Channels
+from tracker.single_view.shape.finder import strongest
+from tracker.single_view.shape.windows import ABOVE, BELOW, WIDTH, Windows
+
+STEPS = 45
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory: pytest.TempPathFactory) -> Sequence:
+    """One person who walks, in a room that nothing was learnt from."""
+    folder = tmp_path_factory.mktemp("rooms") / "39"
+    render_random(39, folder, frames=STEPS)
+    return read_sequence(folder)
+
+
+def test_a_window_hangs_from_the_crown_and_has_the_targets_box_in_it(room: Sequence) -> None:
+    camera, half = room.cameras[1], room.target_half_extents
+    crowns = np.array([[*(room.room.minimum[:2] + room.room.maximum[:2]) / 2.0, 1.7]])
+    found, there = Windows.at(camera, crowns, half)
+    assert there[0]
+    expected, _ = upright_boxes(camera, crowns - [0.0, 0.0, half[2]], half)
+    np.testing.assert_allclose(found.boxes, expected)
+    across, down = found.sizes[0]
+    assert across == pytest.approx((found.edges[0, 2] - found.edges[0, 0]) / WIDTH)
+    assert down == pytest.approx((found.edges[0, 3] - found.edges[0, 1]) / (ABOVE + BELOW))
+    # the crown lies that far below the window's upper edge
+    (pixel,), _ = camera.project(crowns)
+    assert abs(found.edges[0, 1] + ABOVE * down - pixel[1]) < 0.12 * down
+
+
+def test_windows_cover_everybody_in_the_room_and_no_two_are_alike(room: Sequence) -> None:
+    camera = room.cameras[1]
+    windows = Windows.of(camera, room.room, room.target_half_extents)
+    assert 200 < len(windows.edges) < 20_000
+    rng = np.random.default_rng(0)
+    low = np.append(room.room.minimum[:2] + 0.3, 1.2)
+    high = np.append(room.room.maximum[:2] - 0.3, 1.8)
+    people, there = Windows.at(camera, rng.uniform(low, high, (200, 3)), room.target_half_extents)
+    for edges in people.edges[there]:
+        span = edges[2:] - edges[:2]
+        away = np.abs(windows.edges - edges) / np.tile(span, 2)
+        assert away.max(axis=1).min() < 0.25
+
+
+def test_the_best_of_windows_that_overlap_takes_the_others() -> None:
+    edges = np.array([[0, 0, 10, 10], [1, 0, 11, 10], [40, 0, 50, 10], [2, 1, 12, 11]], float)
+    owners, best = strongest(edges, np.array([1.0, 3.0, 2.0, 0.5]), 0.3)
+    assert best.tolist() == [1, 2]
+    assert owners.tolist() == [1, 1, 2, 1]
+    nobody = strongest(np.zeros((0, 4)), np.zeros(0), 0.3)
+    assert [len(one) for one in nobody] == [0, 0]
+
+
+def test_another_exposure_neither_moves_nor_differs_and_a_person_does_both() -> None:
+    rng = np.random.default_rng(1)
+    empty = cv2.GaussianBlur(rng.integers(40, 160, (80, 100, 3)).astype(np.uint8), (0, 0), 3.0)
+    background = BackgroundModel.learn([empty] * 3)
+    assert background is not None
+    channels = Channels(background, 1.0, 40.0, 0.1)
+    state, _ = channels.step(channels.start(), empty)
+    brighter = cv2.convertScaleAbs(empty, alpha=1.25)
+    state, sums = channels.step(state, brighter)
+    difference, motion, activity, spread = (sums[-1, -1, 7:] / empty[..., 0].size).tolist()
+    assert difference < 16.0
+    assert motion < 16.0
+    person = brighter.copy()
+    person[20:60, 40:60] = 250
+    _, sums = channels.step(state, person)
+
+    def mean(plane: int) -> float:
+        part = sums[55, 55] - sums[25, 55] - sums[55, 45] + sums[25, 45]
+        return float(part[plane] / 300.0)
+
+    assert mean(7) > difference + 60.0
+    assert mean(8) > motion + 60.0
+    assert mean(9) > activity
+    assert spread == 0.0
+
+
+def test_who_walks_is_found_by_shape_alone(room: Sequence) -> None:
+    nobody_marked = replace(room, templates=(), digest=f"{room.digest}-unmarked")
+    chosen = with_values(RunParameters(), {"single_view": "shapes"})
+    run = pipeline.compute(nobody_marked, chosen)
+    truth = Path(room.folder) / "ground_truth.csv"
+    rows = np.genfromtxt(truth, delimiter=",", skip_header=1)
+    near = 0
+    for step in range(20, STEPS):
+        there = run.tracks.positions[run.tracks.frames == step]
+        place = rows[rows[:, 0] == step][0, 2:5]
+        near += bool(len(there)) and np.linalg.norm(there - place, axis=1).min() < 0.5
+    assert near > 0.8 * (STEPS - 20)

@@ -1,0 +1,183 @@
+"""Sums over rectangles of a picture's channels, and boosted trees that ask for them.
+
+[DTPB09] Dollár, Tu, Perona, Belongie, "Integral channel features", BMVC 2009.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy import ndarray
+
+from tracker.kernels.compilation import pixel_kernel
+
+ORIENTATIONS = 6
+"""Directions of edges that are told apart, over half a turn."""
+
+COLUMNS, ROWS = 8, 10
+"""Cells of a window."""
+
+
+class Gradients(NamedTuple):
+    """The edges of a picture."""
+
+    bins: ndarray
+    """(h, w) uint8, the direction of each pixel's, 0 … ORIENTATIONS - 1."""
+    magnitudes: ndarray
+    """(h, w) float32, levels a pixel, of the channel that changes most."""
+
+
+@pixel_kernel
+def gradients(picture: ndarray) -> Gradients:
+    """Central differences of the channel that changes most, by size and direction.
+
+    Args:
+        picture: (h, w, 3) uint8.
+    """
+    height, width, _ = picture.shape
+    bins = np.zeros((height, width), dtype=np.uint8)
+    magnitudes = np.zeros((height, width), dtype=np.float32)
+    for y in range(1, height - 1):
+        for x in range(1, width - 1):
+            best, across, down = -1, 0, 0
+            for c in range(3):
+                # bytes are subtracted with a sign
+                right = int(np.int64(picture[y, x + 1, c]) - np.int64(picture[y, x - 1, c]))
+                below = int(np.int64(picture[y + 1, x, c]) - np.int64(picture[y - 1, x, c]))
+                size = right * right + below * below
+                if size > best:
+                    best, across, down = size, right, below
+            magnitudes[y, x] = 0.5 * math.sqrt(best)
+            if best > 0:
+                turn = math.atan2(down, across) / math.pi  # edges have no sign: half a turn
+                bins[y, x] = int((turn + 1.0) * ORIENTATIONS + 0.5) % ORIENTATIONS
+    return Gradients(bins, magnitudes)
+
+
+@pixel_kernel
+def channel_sums(bins: ndarray, magnitudes: ndarray, planes: ndarray) -> ndarray:
+    """The integral image of all channels: sums above and to the left of each pixel corner.
+
+    The first channels are the magnitudes by direction, the next one those of all, then the
+    planes.
+
+    Args:
+        bins: (h, w) uint8, as in :class:`Gradients`.
+        magnitudes: (h, w) uint8.
+        planes: (h, w, P) uint8.
+
+    Returns:
+        (h + 1, w + 1, ORIENTATIONS + 1 + P) int32.
+    """
+    height, width, others = planes.shape
+    first = ORIENTATIONS + 1
+    sums = np.zeros((height + 1, width + 1, first + others), dtype=np.int32)
+    row = np.zeros(first + others, dtype=np.int32)
+    for y in range(height):
+        row[:] = 0
+        for x in range(width):
+            size = magnitudes[y, x]
+            row[bins[y, x]] += size
+            row[ORIENTATIONS] += size
+            for p in range(others):
+                row[first + p] += planes[y, x, p]
+            for c in range(first + others):
+                sums[y + 1, x + 1, c] = sums[y, x + 1, c] + row[c]
+    return sums
+
+
+@pixel_kernel
+def _edges(low: float, high: float, limit: int, edges: ndarray) -> None:
+    """The borders of equal cells between two places, as whole pixels inside a picture."""
+    cells = len(edges) - 1
+    for k in range(cells + 1):
+        place = low + (high - low) * k / cells
+        edges[k] = min(max(math.floor(place + 1.0), 0), limit)
+
+
+@pixel_kernel
+def _mean(sums: ndarray, xs: ndarray, ys: ndarray, feature: int) -> int:
+    """The mean of one channel over one cell, rounded; 0 where no pixel is in it."""
+    channels = sums.shape[2]
+    cell, channel = feature // channels, feature % channels
+    row, column = cell // COLUMNS, cell % COLUMNS
+    left, right, top, bottom = xs[column], xs[column + 1], ys[row], ys[row + 1]
+    area = (right - left) * (bottom - top)
+    if area <= 0:
+        return 0
+    total = (
+        sums[bottom, right, channel]
+        - sums[top, right, channel]
+        - sums[bottom, left, channel]
+        + sums[top, left, channel]
+    )
+    return int((total + area // 2) // area)
+
+
+@pixel_kernel
+def cell_means(sums: ndarray, windows: ndarray) -> ndarray:
+    """The mean of every channel over every cell of windows.
+
+    Args:
+        sums: As :func:`channel_sums` makes them.
+        windows: (N, 4), left, top, right and bottom edge, pixels.
+
+    Returns:
+        (N, ROWS * COLUMNS * channels) uint8, the channels of a cell beside each other.
+    """
+    height, width, channels = sums.shape
+    count = ROWS * COLUMNS * channels
+    means = np.empty((len(windows), count), dtype=np.uint8)
+    xs, ys = np.empty(COLUMNS + 1, dtype=np.int64), np.empty(ROWS + 1, dtype=np.int64)
+    for n in range(len(windows)):
+        _edges(windows[n, 0], windows[n, 2], width - 1, xs)
+        _edges(windows[n, 1], windows[n, 3], height - 1, ys)
+        for feature in range(count):
+            means[n, feature] = _mean(sums, xs, ys, feature)
+    return means
+
+
+@pixel_kernel
+def tree_scores(
+    sums: ndarray,
+    windows: ndarray,
+    features: ndarray,
+    thresholds: ndarray,
+    leaves: ndarray,
+    least: ndarray,
+) -> ndarray:
+    """The sum of boosted trees of depth 3 over windows, given up where it falls too low.
+
+    Args:
+        sums: As :func:`channel_sums` makes them.
+        windows: (N, 4), left, top, right and bottom edge, pixels.
+        features: (T, 7) of :func:`cell_means` that the nodes ask for, breadth first.
+        thresholds: (T, 7); up to it the way goes left.
+        leaves: (T, 8), what each tree adds.
+        least: (T,), a sum below it after a tree ends the window.
+
+    Returns:
+        (N,) float32, minus infinity where a window was given up.
+    """
+    height, width, _ = sums.shape
+    scores = np.full(len(windows), -np.inf, dtype=np.float32)
+    xs, ys = np.empty(COLUMNS + 1, dtype=np.int64), np.empty(ROWS + 1, dtype=np.int64)
+    for n in range(len(windows)):
+        _edges(windows[n, 0], windows[n, 2], width - 1, xs)
+        _edges(windows[n, 1], windows[n, 3], height - 1, ys)
+        total = 0.0
+        lost = False
+        for t in range(len(features)):
+            node = 0
+            for _ in range(3):
+                mean = _mean(sums, xs, ys, features[t, node])
+                node = 2 * node + (1 if mean <= thresholds[t, node] else 2)
+            total += leaves[t, node - 7]
+            if total < least[t]:
+                lost = True
+                break
+        if not lost:
+            scores[n] = total
+    return scores

@@ -1,0 +1,71 @@
+"""Numbers of the single-view method that finds people by shape.
+
+[DTPB09] Dollár, Tu, Perona, Belongie, "Integral channel features", BMVC 2009.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from tracker.parameters.definition import Params, ui
+from tracker.parameters.groups.jpda import JpdaParams
+from tracker.parameters.methods import Method, Reads, Uses
+
+
+class ShapesParams(Params):
+    """People by the shape of head and trunk, without templates ([DTPB09])."""
+
+    least_odds: Annotated[float, Field(ge=-6.0, le=10.0), ui("ln o", step=0.1, essential=True)] = (
+        0.5
+    )
+    """Logarithm of the odds from which a window of the picture is taken for a person."""
+
+    overlap: Annotated[float, Field(ge=0.05, le=0.9), ui("o_s", step=0.05, advanced=True)] = 0.3
+    """Windows whose intersection over union is larger are of one person: the best one stays."""
+
+    place_sigma: Annotated[
+        float, Field(ge=0.01, le=1.0), ui("σ_s", unit="m", step=0.01, log=True)
+    ] = 0.08
+    """Standard deviation of the place of a person in the picture, at the person's distance."""
+
+    size_sigma: Annotated[
+        float, Field(ge=0.01, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
+    ] = 0.2
+    """Standard deviation of the half sizes of a person's box: how far they tell depth."""
+
+    pixel_sigma: Annotated[
+        float, Field(ge=0.0, le=50.0), ui("σ_px", unit="px", step=0.1, advanced=True)
+    ] = 1.5
+    """Noise of a place however small the person is; it adds to the other."""
+
+    cover: Annotated[
+        float, Field(ge=1.0, le=10.0), ui("k_c", unit="half sizes", step=0.1, advanced=True)
+    ] = 2.0
+    """Who is hidden by another lies within so many half sizes of that one's box."""
+
+
+_TRACKING = frozenset(
+    name
+    for name in JpdaParams.model_fields
+    if name
+    not in {
+        "association", "events", "five_cases", "gate_probability", "detection_probability",
+        "clutter", "clutter_rate", "gate_volume", "acceleration_sigma", "velocity_sigma",
+        "size_rate", "least_probability", "occlusion", "vanish_steps", "return_steps",
+        "confirmation_steps", "output", "longest_hidden", "same_size", "leap", "one_side",
+    }
+)  # fmt: skip
+"""Of the association's numbers those that are about where measurements come from."""
+
+METHOD = Method(
+    name="shapes",
+    help="People by the shape of head and trunk, tracked in the picture by data association.",
+    made_by="tracker.single_view.shape.method:shapes",
+    uses=Uses(
+        pictures=True,
+        reads=(Reads("shapes"), Reads("jpda", without=_TRACKING), Reads("pictures")),
+    ),
+    parameters=ShapesParams,
+)

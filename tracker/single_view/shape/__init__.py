@@ -1,0 +1,1 @@
+"""People by their shape: edges, what is not background and what moved, weighed by boosted trees."""

@@ -1,0 +1,130 @@
+"""People in one camera's pictures, by the shape of head and trunk, without anybody's colours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+from numpy import ndarray
+
+from tracker.foreground import learn_background
+from tracker.sequences.frames import Pictures
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.shape.channels import Channels, ChannelState
+from tracker.single_view.shape.trees import Trees
+from tracker.single_view.shape.windows import Windows
+
+PIXELS_PER_METRE = 48.0
+"""Pictures are reduced until people in the middle of the room are this large: what the trees
+learnt from. Smaller ones are left as they are."""
+
+_NEAR = 2.0
+"""Log odds below the best of a person's windows from which another says nothing of the place."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shapes:
+    """N people in one picture."""
+
+    boxes: Float[ndarray, "N 4"]
+    """Of the target: centre and half sizes, pixels."""
+    log_odds: Float[ndarray, " N"]
+    sizes: Float[ndarray, "N 2"]
+    """Pixels a metre there, across and down."""
+    looked_at: int
+    """How many windows were looked at to the end."""
+    unlikely: int
+    """How many people were not likely enough."""
+
+
+class ShapeFinder:
+    """Looks at every window where a person can be, and keeps the best of those that overlap."""
+
+    def __init__(self, sequence: Sequence, camera_index: int, reader: Pictures) -> None:
+        """Learn the background of one camera.
+
+        Args:
+            sequence: Whose camera, upright.
+            camera_index: Which one.
+            reader: Of its pictures.
+        """
+        camera = sequence.cameras[camera_index]
+        background = learn_background(sequence, camera_index, reader)
+        self._windows = Windows.of(camera, sequence.room, sequence.target_half_extents)
+        self._channels: Channels | None = None
+        if background is None or not len(self._windows.edges):
+            return
+        size = float(np.median(self._windows.sizes))
+        factor = min(1.0, PIXELS_PER_METRE / size)
+        self._channels = Channels(background, factor, size * factor, sequence.step_time)
+        across, down = self._channels.factors
+        self._edges = (self._windows.edges + 0.5) * [across, down, across, down] - 0.5
+        self._trees = Trees.read()
+
+    def start(self) -> ChannelState | None:
+        """The state before the first picture."""
+        return None if self._channels is None else self._channels.start()
+
+    def find(
+        self,
+        state: ChannelState | None,
+        picture: UInt8[ndarray, "h w 3"],
+        least: float,
+        overlap: float,
+    ) -> tuple[ChannelState | None, Shapes]:
+        """The people of one picture.
+
+        Args:
+            state: After the picture before.
+            picture: BGR.
+            least: Log odds from which somebody is there.
+            overlap: Windows that share more than this of what both cover are of one person.
+        """
+        if self._channels is None or state is None:
+            none = np.zeros((0, 4))
+            return state, Shapes(none, np.zeros(0), none[:, :2], 0, 0)
+        state, sums = self._channels.step(state, picture)
+        scores = self._trees.scores(sums, self._edges).astype(float)
+        ended = np.flatnonzero(np.isfinite(scores))
+        windows, scores = self._windows.take(ended), scores[ended]
+        owners, best = strongest(windows.edges, scores, overlap)
+        likely = best[scores[best] >= least]
+        boxes = windows.boxes[likely].copy()
+        for n, i in enumerate(likely):
+            own = np.flatnonzero((owners == i) & (scores > scores[i] - _NEAR))
+            weights = np.exp(scores[own] - scores[i])
+            boxes[n] = weights @ windows.boxes[own] / weights.sum()
+        found = Shapes(
+            boxes, scores[likely], windows.sizes[likely], len(ended), len(best) - len(likely)
+        )
+        return state, found
+
+
+def strongest(
+    edges: Float[ndarray, "N 4"], scores: Float[ndarray, " N"], overlap: float
+) -> tuple[Int[ndarray, " N"], Int[ndarray, " K"]]:
+    """Windows that are better than all that overlap them, greedily, the best first.
+
+    Args:
+        edges: Left, top, right and bottom, pixels.
+        scores: Of the windows.
+        overlap: Intersection over union.
+
+    Returns:
+        To which each window belongs, and those themselves.
+    """
+    areas = (edges[:, 2] - edges[:, 0]) * (edges[:, 3] - edges[:, 1])
+    owners = np.full(len(edges), -1)
+    best: list[int] = []
+    for i in np.argsort(-scores, kind="stable").tolist():
+        if owners[i] >= 0:
+            continue
+        free = np.flatnonzero(owners < 0)
+        low = np.maximum(edges[free, :2], edges[i, :2])
+        high = np.minimum(edges[free, 2:], edges[i, 2:])
+        shared = np.maximum(high - low, 0.0).prod(axis=1)
+        owners[free[shared >= overlap * (areas[free] + areas[i] - shared)]] = i
+        owners[i] = i
+        best.append(i)
+    return owners, np.array(best, dtype=np.int64)

@@ -1,0 +1,65 @@
+"""The boosted trees that tell a window on a person from one on anything else.
+
+[DTPB09] Dollár, Tu, Perona, Belongie, "Integral channel features", BMVC 2009.
+[BB05] Bourdev, Brandt, "Robust object detection via soft cascade", CVPR 2005.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Float32, Int32
+from numpy import ndarray
+
+from tracker.kernels.pictures.channels import tree_scores
+
+FILE = Path(__file__).parent / "trees.npz"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trees:
+    """T trees of depth 3 over the means of channels in the cells of a window ([DTPB09]_).
+
+    Their sum is the logarithm of the odds that there is a person, as often as in what they
+    learnt from. A window is given up as soon as the sum is lower than nearly any person's was
+    there ([BB05]_).
+    """
+
+    features: Int32[ndarray, "T 7"]
+    thresholds: Int32[ndarray, "T 7"]
+    leaves: Float32[ndarray, "T 8"]
+    least: Float32[ndarray, " T"]
+
+    @staticmethod
+    @cache
+    def read() -> Trees:
+        """Those that come with the program."""
+        with np.load(FILE) as file:
+            return Trees(file["features"], file["thresholds"], file["leaves"], file["least"])
+
+    def write(self, path: Path) -> None:
+        """Keep them."""
+        np.savez_compressed(
+            path,
+            features=self.features,
+            thresholds=self.thresholds,
+            leaves=self.leaves,
+            least=self.least,
+        )
+
+    def scores(
+        self, sums: Int32[ndarray, "h1 w1 C"], edges: Float[ndarray, "N 4"]
+    ) -> Float32[ndarray, " N"]:
+        """The log odds of windows; minus infinity where one was given up.
+
+        Args:
+            sums: Integral images of the channels.
+            edges: Left, top, right and bottom, pixels.
+        """
+        found: Float32[ndarray, " N"] = tree_scores(
+            sums, edges, self.features, self.thresholds, self.leaves, self.least
+        )
+        return found

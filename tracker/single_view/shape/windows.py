@@ -1,0 +1,94 @@
+"""Where people can be in a picture: windows on the heads and trunks of people in the room."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.camera import Camera
+from tracker.sequences.sequence import Room
+from tracker.single_view.box_sizes import upright_boxes
+
+SPACING = 0.15
+"""Metres between the places on the floor."""
+
+CROWNS = (1.05, 1.2, 1.35, 1.5, 1.62, 1.74, 1.86)
+"""Metres from the floor to the crown of people who sit, bend and stand."""
+
+WIDTH, ABOVE, BELOW = 1.0, 0.15, 1.1
+"""Of a window, metres: across, above the crown and below it."""
+
+_SAME_PLACE, _SAME_SIZE = 0.1, 0.16
+"""Windows are one that differ by less, in shares of their width, and in log of their sizes."""
+
+_INSIDE = 0.35
+"""A window of which a smaller share lies in the picture is left out."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Windows:
+    """N places at which a person may be seen in one camera."""
+
+    edges: Float[ndarray, "N 4"]
+    """Left, top, right and bottom, pixels."""
+    boxes: Float[ndarray, "N 4"]
+    """The target's box there: centre and half sizes, pixels."""
+
+    @property
+    def sizes(self) -> Float[ndarray, "N 2"]:
+        """Pixels a metre, across and down."""
+        spans = self.edges[:, 2:] - self.edges[:, :2]
+        return np.asarray(spans / [WIDTH, ABOVE + BELOW])
+
+    def take(self, indices: ndarray) -> Windows:
+        """Some of them."""
+        return Windows(self.edges[indices], self.boxes[indices])
+
+    @staticmethod
+    def at(
+        camera: Camera, crowns: Float[ndarray, "N 3"], half_extents: Float[ndarray, " 3"]
+    ) -> tuple[Windows, ndarray]:
+        """The windows of people whose crowns are there, and which of them can be seen.
+
+        Args:
+            camera: The calibrated camera, upright.
+            crowns: World metres.
+            half_extents: Of the target, metres, whose top is the crown.
+        """
+        middles = crowns - [0.0, 0.0, (BELOW - ABOVE) / 2.0]
+        around = np.array([WIDTH / 2.0, WIDTH / 2.0, (ABOVE + BELOW) / 2.0])
+        seen, inside = upright_boxes(camera, middles, around)
+        targets, whole = upright_boxes(
+            camera, crowns - [0.0, 0.0, float(half_extents[2])], half_extents
+        )
+        edges = np.concatenate([seen[:, :2] - seen[:, 2:], seen[:, :2] + seen[:, 2:]], axis=1)
+        width, height = camera.image_size
+        shown = np.clip(edges, -0.5, [width - 0.5, height - 0.5] * 2)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            spans = shown[:, 2:] - shown[:, :2]
+            share = spans.prod(axis=1) / (edges[:, 2:] - edges[:, :2]).prod(axis=1)
+        there = np.isfinite(edges).all(axis=1) & np.isfinite(targets).all(axis=1)
+        return Windows(edges, targets), there & (inside | whole) & (share > _INSIDE)
+
+    @staticmethod
+    def of(camera: Camera, room: Room, half_extents: Float[ndarray, " 3"]) -> Windows:
+        """People everywhere on the room's floor, of every height; one window of those alike."""
+        across = [
+            np.arange(low + SPACING / 2.0, high, SPACING)
+            for low, high in zip(room.minimum[:2], room.maximum[:2], strict=True)
+        ]
+        floor = room.minimum[2]
+        grid = np.meshgrid(*across, floor + np.array(CROWNS), indexing="ij")
+        crowns = np.stack([axis.ravel() for axis in grid], axis=1)
+        found, there = Windows.at(camera, crowns, half_extents)
+        found = found.take(np.flatnonzero(there))
+        places = (found.edges[:, :2] + found.edges[:, 2:]) / 2.0
+        spans = np.maximum(found.edges[:, 2:] - found.edges[:, :2], 1e-6)
+        level = np.round(np.log(spans) / _SAME_SIZE)
+        steps = _SAME_PLACE * np.exp(level * _SAME_SIZE)
+        alike = np.concatenate([np.round(places / steps), level], axis=1).astype(np.int64)
+        first = np.unique(alike, axis=0, return_index=True)[1]
+        return found.take(np.sort(first))
