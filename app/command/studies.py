@@ -29,7 +29,8 @@ from app.command.arguments.studies import (
 )
 from app.command.terminal import Bar, CommandError, print_table, say
 from tracker.studies.errors import StudyError
-from tracker.studies.store import Status, Store, Trial, create, find, stores, studies_folder
+from tracker.studies.kept.records import Status, Trial
+from tracker.studies.kept.store import Store, create, find, stores, studies_folder
 
 if TYPE_CHECKING:
     from tracker.studies.work.cluster import DaskCrew
@@ -53,7 +54,7 @@ def study(command: Study) -> int:
     folder = action.studies or studies_folder()
     match action:
         case RunStudy():
-            from tracker.studies.definition import read_definition
+            from tracker.studies.defined.defining import read_definition
 
             return run(create(read_definition(action.file), folder), action, as_json=action.json)
         case ResumeStudy():
@@ -75,7 +76,7 @@ def study(command: Study) -> int:
 
 def _new(command: NewStudy) -> None:
     from tracker.placing import replacing
-    from tracker.studies.example import example
+    from tracker.studies.defined.example import example
 
     file = command.file
     if file.exists():
@@ -219,7 +220,7 @@ def _show(command: ShowStudy, folder: Path) -> None:
         return
     trial = store.trial(number)
     if command.command:
-        from tracker.studies.commands import track_commands
+        from tracker.studies.told.commands import track_commands
 
         sys.stdout.writelines(f"{one}\n" for one in track_commands(store.definition(), trial))
     elif command.json:
@@ -242,7 +243,7 @@ def _named(what: tuple[str, ...], folder: Path) -> tuple[Store, int | None]:
 
 
 def _show_trials(store: Store) -> None:
-    from tracker.studies.summary import summary_of
+    from tracker.studies.told.summary import summary_of
 
     summary = summary_of(store)
     keys = [key for key, _ in summary.importance[:6]] or [
@@ -280,7 +281,7 @@ def _show_trial(store: Store, trial: Trial) -> None:
 
 
 def _best(store: Store, command: BestOfStudy) -> None:
-    from tracker.studies.summary import summary_of
+    from tracker.studies.told.summary import summary_of
 
     summary = summary_of(store)
     best = summary.best
@@ -317,7 +318,7 @@ def save_preset(name: str, values: dict[str, Any]) -> None:
 
 
 def _export(store: Store, command: ExportStudy) -> None:
-    from tracker.studies.report import write_csv, write_json, write_report
+    from tracker.studies.told.report import write_csv, write_json, write_report
 
     writers = {".csv": write_csv, ".json": write_json, ".html": write_report}
     output = command.output
@@ -328,7 +329,7 @@ def _export(store: Store, command: ExportStudy) -> None:
 
 
 def _everything(store: Store) -> dict[str, Any]:
-    from tracker.studies.report import everything
+    from tracker.studies.told.report import everything
 
     return everything(store)
 

@@ -14,7 +14,7 @@ from app.command.terminal import print_table, say
 from tracker import parameters as table
 from tracker.parameters import ParameterError
 from tracker.studies.errors import StudyError
-from tracker.studies.store import create, studies_folder
+from tracker.studies.kept.store import create, studies_folder
 from tracker.studies.tuning import tuning
 from tracker.without_truth.estimate import WARNING
 

@@ -68,7 +68,7 @@ from tracker.library import KEEP
 from tracker.library.records import Result
 from tracker.pipeline import Cancelled
 from tracker.runs.stage_cache import StageCache
-from tracker.studies.store import studies_folder
+from tracker.studies.kept.store import studies_folder
 
 if TYPE_CHECKING:
     from app.scene.scene import Scene

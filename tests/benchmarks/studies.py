@@ -16,10 +16,11 @@ import psutil
 from tests.benchmarks.measure import Measurement
 from tests.conftest import DATA
 from tests.synthetic import write_sequence
-from tracker.studies.definition import Definition, definition_of
+from tracker.studies.defined.defining import definition_of
+from tracker.studies.defined.definition import Definition
+from tracker.studies.kept.store import Store, create
 from tracker.studies.opened import open_recordings
 from tracker.studies.running import run_study
-from tracker.studies.store import Store, create
 from tracker.studies.work import working
 from tracker.studies.work.cluster import DaskCrew
 from tracker.studies.work.jobs import Job, Outcome

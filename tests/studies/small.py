@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from tests.synthetic import write_sequence
-from tracker.studies.definition import Definition, definition_of
-from tracker.studies.store import Store
+from tracker.studies.defined.defining import definition_of
+from tracker.studies.defined.definition import Definition
+from tracker.studies.kept.store import Store
 from tracker.studies.work import working
 from tracker.studies.work.cluster import WorkerState
 from tracker.studies.work.jobs import Job, Outcome

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from tests.studies.small import PARAMETERS, definition, recording
-from tracker.studies.definition import definition_of, read_definition
+from tracker.studies.defined.defining import definition_of, read_definition
+from tracker.studies.defined.example import example
 from tracker.studies.errors import StudyError
-from tracker.studies.example import example
 
 
 def test_what_is_written_is_read_back(tmp_path: Path) -> None:

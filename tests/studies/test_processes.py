@@ -16,9 +16,9 @@ from tracker import pipeline
 from tracker.kernels import compilation
 from tracker.parameters import with_values
 from tracker.sequences.library import open_sequence
-from tracker.studies.commands import changes_of, track_commands
+from tracker.studies.kept.store import Store, create
 from tracker.studies.opened import open_recordings
-from tracker.studies.store import Store, create
+from tracker.studies.told.commands import changes_of, track_commands
 from tracker.studies.work import recordings, working
 from tracker.studies.work.working import tracks_hash
 from tracker.writing.registry import format_of, save

@@ -12,7 +12,7 @@ from starlette.testclient import TestClient
 
 from app.web.server import Settings, create_app
 from tests.studies.small import Serial, made_up, recording, run
-from tracker.studies.store import find
+from tracker.studies.kept.store import find
 
 ADDRESS = "http://127.0.0.1:8000"
 RANGES = {"fusion.detection_probability": {"low": 0.6, "high": 0.98}, "fusion.clutter_rate": {}}

@@ -10,9 +10,9 @@ import pytest
 
 from tests.studies.small import Serial, definition, made_up, recording, run
 from tracker.studies.errors import StudyError
+from tracker.studies.kept.store import JOURNAL, Store, create
 from tracker.studies.sampling import Sampler
-from tracker.studies.store import JOURNAL, Store, create
-from tracker.studies.summary import summary_of
+from tracker.studies.told.summary import summary_of
 from tracker.studies.work.jobs import Job, Outcome
 
 

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tracker.parameters import METHODS, PARAMETERS, RunParameters, shown_keys, with_values
-from tracker.studies import space
-from tracker.studies.definition import Varied
+from tracker.studies.defined import space
+from tracker.studies.defined.definition import Varied
 
 NUMBERS = [key for key, p in PARAMETERS.items() if p.kind in ("float", "int")]
 BASE = RunParameters(single_view="none")

@@ -11,7 +11,7 @@ import pytest
 from tests.studies.small import Serial, definition, recording, run
 from tracker.parameters import PARAMETERS, table
 from tracker.studies.errors import StudyError
-from tracker.studies.store import Store, create
+from tracker.studies.kept.store import Store, create
 from tracker.studies.tuning import tuning
 from tracker.studies.work.jobs import Job, Outcome
 

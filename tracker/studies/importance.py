@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tracker.studies.definition import Varied
+from tracker.studies.defined.definition import Varied
 
 FEWEST = 12
 """Complete trials below which nothing is told."""

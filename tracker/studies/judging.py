@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from tracker.studies.objectives import VETO, Objective, front, mean_over
-from tracker.studies.store import JobRow, Trial
+from tracker.studies.defined.objectives import VETO, Objective, front, mean_over
+from tracker.studies.kept.records import JobRow, Trial
 from tracker.studies.work.jobs import Outcome
 
 FIRST_SHARE = 1.0 / 3.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from tracker import pipeline
@@ -11,12 +11,14 @@ from tracker.parameters import METHODS, RunParameters, changed, value, with_valu
 from tracker.runs.fitting import unfit_methods
 from tracker.sequences.library import Told, open_sequence
 from tracker.sequences.sequence import Sequence, SequenceError
-from tracker.studies import objectives
-from tracker.studies.definition import Definition
+from tracker.studies.defined import objectives
+from tracker.studies.defined.definition import Definition
+from tracker.studies.defined.objectives import Objective
 from tracker.studies.errors import StudyError
-from tracker.studies.objectives import Objective
-from tracker.studies.store import JobRow
-from tracker.studies.work.jobs import Job, job_of
+from tracker.studies.kept.records import JobRow
+from tracker.studies.kept.store import Store
+from tracker.studies.kept.writer import Writer
+from tracker.studies.work.jobs import Job, code_version, job_of
 from tracker.studies.work.recordings import content_of
 
 
@@ -138,3 +140,30 @@ def _check_methods(definition: Definition, sequence: Sequence, base: RunParamete
         for name in choices.get(key, (value(base, key),)):
             if why := unfit[key].get(name):
                 raise StudyError(f"{key} = {name}: {why}")
+
+
+def check_same(store: Store, writer: Writer, recordings: Recordings) -> None:
+    """Old trials stand beside new ones only where nothing but the values differs.
+
+    The first time it is written down what they are of.
+
+    Raises:
+        StudyError: If a recording or the code is another than when the study began.
+    """
+    now, before = [one.told() for one in recordings.every], store.told("recordings")
+    if before is None:
+        writer.tell("recordings", now)
+        writer.tell("code", code_version())
+        writer.tell("objectives", [asdict(one) for one in recordings.objectives])
+        return
+    for one, other in zip(before, now, strict=True):
+        if one["content"] != other["content"]:
+            raise StudyError(
+                f"{other['place']} has changed since the study {store.name} began; its trials "
+                "cannot be set beside new ones: give the study a new name"
+            )
+    if store.told("code") != code_version():
+        raise StudyError(
+            f"the study {store.name} was begun by another version of the program; its trials "
+            "cannot be set beside new ones: give the study a new name"
+        )

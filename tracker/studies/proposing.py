@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from tracker.studies.defined.objectives import OBJECTIVES
 from tracker.studies.judging import Judge, usable
-from tracker.studies.objectives import OBJECTIVES
+from tracker.studies.kept.records import JobRow, Trial
 from tracker.studies.opened import Opened, Recordings
-from tracker.studies.store import JobRow, Trial
 from tracker.studies.work.jobs import Job, Outcome
 
 CANDIDATES = 4

@@ -10,32 +10,29 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
-from tracker.studies import importance
-from tracker.studies.definition import Definition
+from tracker.studies.defined.definition import Definition
+from tracker.studies.defined.space import defaults_of
 from tracker.studies.errors import StudyError
 from tracker.studies.judging import Judge
-from tracker.studies.opened import Recordings, open_recordings
+from tracker.studies.kept.records import JobRow, Status, Trial
+from tracker.studies.kept.store import JOURNAL, Store
+from tracker.studies.kept.writer import Writer
+from tracker.studies.opened import Recordings, check_same, open_recordings
+from tracker.studies.pace import Pace
 from tracker.studies.proposing import SEARCH_SHARE, Proposer
 from tracker.studies.sampling import Sampler
-from tracker.studies.space import defaults_of
-from tracker.studies.store import JOURNAL, JobRow, Status, Store, Trial, Writer
+from tracker.studies.weighing import Weighing
 from tracker.studies.work.cluster import Crew
-from tracker.studies.work.jobs import Job, Outcome, code_version
+from tracker.studies.work.jobs import Job, Outcome
 
 SECONDS_BETWEEN = 0.5
 """How often the status is written and the wish to stop is heard."""
 
 AHEAD = 1
 """Runs that wait beside each one under way, so that no worker waits for the sampler."""
-
-IMPORTANCE_GROWTH = 1.5
-"""What matters is found out anew when there are so many times more trials."""
-
-LAST_SECONDS = 60.0
-"""At most so long the end of a study waits for it."""
 
 
 @dataclass(eq=False)
@@ -66,7 +63,7 @@ def run_study(
 
     Args:
         store: Its folder.
-        writer: From :meth:`~tracker.studies.store.Store.running`.
+        writer: From :meth:`~tracker.studies.kept.store.Store.running`.
         crew: Makes the workers; given whom to tell what is being waited for.
         told: Called with the status now and then.
         stopped: Asked as often.
@@ -115,13 +112,9 @@ class _Running:
         self._queue: list[dict[str, Any]] = []
         self._begin = time.monotonic()
         self._spent = float(store.told("spent") or 0.0)
-        self._warm: float | None = None
-        self._warm_seconds = 0.0
-        self._runs = 0
+        self._pace = Pace()
         self._said = 0.0
         self._slots = 1
-        self._importance: Callable[[], Any | None] | None = None
-        self._weighed = 0
         self.state: Any = "running"
         self.words = ""
         self.status = Status("running")
@@ -131,7 +124,7 @@ class _Running:
         self.wait_for("opening the recordings")
         definition = self._definition
         self._recordings: Recordings = open_recordings(definition, self.wait_for)
-        self._check_same()
+        check_same(self._store, self._writer, self._recordings)
         ended = self._store.trials()
         self._judge = Judge(self._recordings.objectives, ended, self._writer.outcome)
         self._ended = {trial.number for trial in ended}
@@ -150,32 +143,13 @@ class _Running:
             else:
                 self._take_up(number, values)
         self._first_values()
+        defaults = defaults_of(definition.varied, self._recordings.bases[0])
+        self._weighing = Weighing(definition.varied, defaults)
 
     def close(self) -> None:
         """Close what the sampler keeps."""
         if hasattr(self, "_sampler"):
             self._sampler.close()
-
-    def _check_same(self) -> None:
-        """Old trials stand beside new ones only where nothing but the values differs."""
-        recordings = [one.told() for one in self._recordings.every]
-        before = self._store.told("recordings")
-        if before is not None:
-            for one, other in zip(before, recordings, strict=True):
-                if one["content"] != other["content"]:
-                    raise StudyError(
-                        f"{other['place']} has changed since the study {self._store.name} began; "
-                        "its trials cannot be set beside new ones: give the study a new name"
-                    )
-            if self._store.told("code") != code_version():
-                raise StudyError(
-                    f"the study {self._store.name} was begun by another version of the program; "
-                    "its trials cannot be set beside new ones: give the study a new name"
-                )
-            return
-        self._writer.tell("recordings", recordings)
-        self._writer.tell("code", code_version())
-        self._writer.tell("objectives", [asdict(one) for one in self._recordings.objectives])
 
     def _first_values(self) -> None:
         """What is tried before the sampler chooses: the defaults, where somebody was, a grid."""
@@ -312,11 +286,7 @@ class _Running:
     def _came(self, outcome: Outcome) -> None:
         if outcome.became == "done":
             self._writer.keep(outcome)
-        self._runs += 1
-        if self._warm is None:
-            self._warm = time.monotonic()
-        else:
-            self._warm_seconds += outcome.seconds
+        self._pace.came(outcome.seconds)
         for active in self._waiting.pop(outcome.key, ()):
             active.outcomes[outcome.key] = outcome
 
@@ -387,10 +357,10 @@ class _Running:
             self.words,
             done=done,
             trials=getattr(self, "_trials", self._definition.trials),
-            runs=self._runs,
+            runs=self._pace.runs,
             seconds=seconds,
-            seconds_left=self._left(done, seconds),
-            busy=self._busy(),
+            seconds_left=self._seconds_left(done),
+            busy=self._pace.busy(self._slots),
             workers=self._working(),
             process=os.getpid(),
             written=time.time(),
@@ -418,20 +388,11 @@ class _Running:
             )
         return found
 
-    def _left(self, done: int, seconds: float) -> float | None:
-        before = getattr(self, "_before", None)
-        if before is None:
-            self._before = before = done
-        if done - before < 2 or self.state != "running":
+    def _seconds_left(self, done: int) -> float | None:
+        if self.state != "running" or not hasattr(self, "_trials"):
             return None
-        left = (self._trials - done) * seconds / (done - before)
-        return max(0.0, min(left, 60.0 * self._minutes_left()))
-
-    def _busy(self) -> float | None:
-        if self._warm is None or self._runs < 2 * self._slots:
-            return None
-        elapsed = time.monotonic() - self._warm
-        return min(1.0, self._warm_seconds / (elapsed * self._slots)) if elapsed > 0.0 else None
+        left = self._pace.seconds_left(done, self._trials)
+        return None if left is None else max(0.0, min(left, 60.0 * self._minutes_left()))
 
     def _why_done(self) -> str:
         if len(self._ended) >= self._trials:
@@ -439,22 +400,7 @@ class _Running:
         return f"the {self._definition.minutes:g} minutes are over"
 
     def _weigh(self, *, last: bool = False) -> None:
-        """Have a worker find out what matters, when there is much more to tell from."""
-        if self._importance is not None and (found := self._importance()) is not None:
+        """Write down what matters, where that was found out anew."""
+        found = self._weighing.news(self._judge.complete, self.crew, last=last)
+        if found is not None:
             self._writer.tell("importance", found)
-            self._importance = None
-        complete, before = self._judge.complete, self._weighed
-        needed = before + 1 if last else before * IMPORTANCE_GROWTH
-        if len(complete) >= max(importance.FEWEST, needed):
-            self._weighed = len(complete)
-            rows = [(trial.values, trial.objectives) for trial in complete if trial.objectives]
-            defaults = defaults_of(self._definition.varied, self._recordings.bases[0])
-            self._importance = self.crew.call(
-                importance.importance, self._definition.varied, rows, defaults
-            )
-        until = time.monotonic() + LAST_SECONDS
-        while last and self._importance is not None and time.monotonic() < until:
-            time.sleep(0.02)
-            if (found := self._importance()) is not None:
-                self._writer.tell("importance", found)
-                self._importance = None

@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from tracker.parameters import RunParameters
-from tracker.studies import space
-from tracker.studies.definition import Definition, Varied
+from tracker.studies.defined import space
+from tracker.studies.defined.definition import Definition, Varied
+from tracker.studies.defined.objectives import Objective
 from tracker.studies.errors import StudyError
-from tracker.studies.objectives import Objective
 
 STARTUP = 12
 """Trials drawn at random before TPE trusts what it has."""

@@ -11,9 +11,9 @@ from tracker.parameters import PARAMETERS, RunParameters, with_values
 from tracker.runs.fitting import default_parameters
 from tracker.sequences.library import open_sequence
 from tracker.sequences.sequence import SequenceError
-from tracker.studies.definition import MOST_TRIALS, Definition
+from tracker.studies.defined.definition import MOST_TRIALS, Definition
+from tracker.studies.defined.space import around
 from tracker.studies.errors import StudyError
-from tracker.studies.space import around
 
 MORE = (
     "fusion.measurement_sigma",

@@ -16,10 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from app.state.workbench import Workbench
-from tracker.studies.definition import Definition
+from tracker.studies.defined.definition import Definition
 from tracker.studies.errors import StudyError
-from tracker.studies.store import FILE, Store, Trial, create, find, stores
-from tracker.studies.summary import Summary, summary_of
+from tracker.studies.kept.records import Trial
+from tracker.studies.kept.store import FILE, Store, create, find, stores
+from tracker.studies.told.summary import Summary, summary_of
 
 logger = logging.getLogger("app")
 

@@ -18,11 +18,12 @@ from app.web.views import results
 from tracker import parameters as table
 from tracker.experiments.laboratory.pool import cores
 from tracker.sequences.sequence import SequenceError
-from tracker.studies.commands import track_commands
-from tracker.studies.definition import Definition, definition_of
+from tracker.studies.defined.defining import definition_of
+from tracker.studies.defined.definition import Definition
+from tracker.studies.defined.objectives import OBJECTIVES, WITH_TRUTH, WITHOUT_TRUTH, chosen
 from tracker.studies.errors import StudyError
-from tracker.studies.objectives import OBJECTIVES, WITH_TRUTH, WITHOUT_TRUTH, chosen
-from tracker.studies.store import Store
+from tracker.studies.kept.store import Store
+from tracker.studies.told.commands import track_commands
 from tracker.studies.tuning import tuning
 
 router = APIRouter(prefix="/api/studies", responses=ERRORS)
@@ -379,7 +380,7 @@ def _proposed(store: Store, bench: Bench) -> dict[str, object]:
 )
 def export(store: Named, file: Literal["report.html", "trials.csv", "study.json"]) -> Response:
     """A study as a report, a table, or everything."""
-    from tracker.studies import report  # and with it the library of plots
+    from tracker.studies.told import report  # and with it the library of plots
 
     writers = {
         "report.html": (report.write_report, "text/html; charset=utf-8"),

@@ -11,10 +11,11 @@ from app.web.studies import models
 from tracker import parameters as table
 from tracker.folders import cache_folder
 from tracker.parameters import METHODS, PARAMETERS
-from tracker.studies.definition import Varied
-from tracker.studies.objectives import Objective
-from tracker.studies.space import around
-from tracker.studies.store import Store, Trial
+from tracker.studies.defined.definition import Varied
+from tracker.studies.defined.objectives import Objective
+from tracker.studies.defined.space import around
+from tracker.studies.kept.records import Trial
+from tracker.studies.kept.store import Store
 
 _METHOD_HELP = {
     "single_view": "Method of stage 1.",

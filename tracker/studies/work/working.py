@@ -33,7 +33,7 @@ from tracker.runs.stage_cache import StageCache
 from tracker.runs.stage_files import StageFiles
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence, SequenceError
-from tracker.studies.objectives import OBJECTIVES
+from tracker.studies.defined.objectives import OBJECTIVES
 from tracker.studies.work import recordings
 from tracker.studies.work.jobs import Job, Outcome, code_version
 from tracker.without_truth import estimate
@@ -46,7 +46,7 @@ MOST_OPEN = 16
 
 KNOWN_TIMES = 4096
 
-NICENESS = 10
+NICENESS = 5
 """Of a worker on this machine: whoever uses it goes first."""
 
 COMPILING = "compiling the kernels, once per machine"

@@ -10,107 +10,25 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import platformdirs
 
-from tracker.placing import filling, replacing
-from tracker.studies.definition import Definition, read_definition
+from tracker.placing import filling
+from tracker.studies.defined.defining import read_definition
+from tracker.studies.defined.definition import Definition
 from tracker.studies.errors import StudyError
+from tracker.studies.kept.records import Status, Trial, trial_of
+from tracker.studies.kept.writer import RESULTS, STATUS, Writer
 from tracker.studies.work.jobs import Outcome
 
 FILE = "study.toml"
 JOURNAL = "journal.log"
-RESULTS = "results.sqlite3"
-STATUS = "status.json"
 _LOCK = "running.lock"
 STOP = "stop"
-
-_TABLES = (
-    """
-    CREATE TABLE IF NOT EXISTS jobs (
-        key TEXT PRIMARY KEY,     -- of recording, values, seed and code
-        outcome TEXT NOT NULL,    -- JSON
-        ended REAL NOT NULL       -- seconds since 1970
-    ) STRICT
-    """,
-    """
-    CREATE TABLE IF NOT EXISTS trials (
-        number INTEGER PRIMARY KEY,
-        state TEXT NOT NULL,
-        told TEXT NOT NULL,       -- JSON
-        ended REAL NOT NULL
-    ) STRICT
-    """,
-    "CREATE TABLE IF NOT EXISTS told (name TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT",
-)
-
-TrialState = Literal["complete", "pruned", "failed"]
-
-
-@dataclass(frozen=True, slots=True)
-class JobRow:
-    """One run of a trial."""
-
-    key: str
-    recording: str
-    seed: int
-
-
-@dataclass(frozen=True, slots=True)
-class Trial:
-    """A trial that ended."""
-
-    number: int
-    state: TrialState
-    values: dict[str, Any]
-    """What was tried, by key."""
-    objectives: tuple[float, ...] | None
-    """Over recordings and seeds; None where it failed. Of a pruned one over its first runs."""
-    spreads: tuple[float | None, ...]
-    """Of each objective over the seeds."""
-    figures: dict[str, float]
-    """All other figures, over recordings and seeds."""
-    vetoed: bool
-    """Whether its people overlap too little with the cameras that were left out."""
-    words: str
-    """Why it failed or was given up, or what it is."""
-    seconds: float
-    """Of its runs on the workers' clocks."""
-    jobs: tuple[JobRow, ...]
-    ended: float = 0.0
-
-    def to_json(self) -> dict[str, Any]:
-        """As plain values."""
-        return asdict(self)
-
-
-@dataclass(frozen=True, slots=True)
-class Status:
-    """What a study is doing, as whoever runs it has said last."""
-
-    state: Literal["new", "running", "stopped", "done", "failed"] = "new"
-    words: str = ""
-    """What it waits for, or why it ended."""
-    done: int = 0
-    """Trials that ended."""
-    trials: int = 0
-    runs: int = 0
-    """Runs that ended in this start, those that were not needed again left out."""
-    seconds: float = 0.0
-    """Since this start."""
-    seconds_left: float | None = None
-    busy: float | None = None
-    """Share of the workers' time, since all were there, in which they worked."""
-    workers: list[dict[str, Any]] = field(default_factory=list)
-    process: int = 0
-    written: float = 0.0
-    """Seconds since 1970."""
 
 
 def studies_folder() -> Path:
@@ -219,7 +137,7 @@ class Store:
             rows = connection.execute(
                 "SELECT told FROM trials WHERE ended > ? ORDER BY number", (after,)
             ).fetchall()
-        return [_trial(json.loads(text)) for (text,) in rows]
+        return [trial_of(json.loads(text)) for (text,) in rows]
 
     def trial(self, number: int) -> Trial:
         """One that ended.
@@ -332,102 +250,3 @@ class Store:
                 connection.close()
         except sqlite3.Error as error:
             raise StudyError(f"{path}: cannot be read ({error})") from None
-
-
-class Writer:
-    """Results as they come in: each wholly or not at all."""
-
-    def __init__(self, folder: Path) -> None:
-        """Open the results, or make them.
-
-        Raises:
-            StudyError: If they cannot be written to.
-        """
-        self._path = folder / RESULTS
-        self._status = folder / STATUS
-        with self._told():
-            self._connection = sqlite3.connect(self._path, timeout=10.0, isolation_level=None)
-            self._connection.execute("PRAGMA journal_mode = WAL")
-            self._connection.execute("PRAGMA synchronous = NORMAL")
-            for table in _TABLES:
-                self._connection.execute(table)
-            rows = self._connection.execute("SELECT key, outcome FROM jobs").fetchall()
-        self._outcomes = {key: text for key, text in rows}
-
-    def __enter__(self) -> Writer:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._connection.close()
-
-    @property
-    def runs(self) -> int:
-        """How many are kept."""
-        return len(self._outcomes)
-
-    def outcome(self, key: str) -> Outcome | None:
-        """A run that ended before."""
-        text = self._outcomes.get(key)
-        return None if text is None else Outcome(**json.loads(text))
-
-    def keep(self, outcome: Outcome) -> None:
-        """Write down a run that ended; one that is there stays as it is."""
-        text = json.dumps(outcome.to_json(), ensure_ascii=False)
-        with self._told():
-            self._connection.execute(
-                "INSERT OR IGNORE INTO jobs VALUES (?, ?, ?)", (outcome.key, text, time.time())
-            )
-        self._outcomes.setdefault(outcome.key, text)
-
-    def end(self, trial: Trial) -> None:
-        """Write down a trial that ended."""
-        told = {**trial.to_json(), "ended": time.time()}
-        with self._told():
-            self._connection.execute(
-                "INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?)",
-                (trial.number, trial.state, json.dumps(told, ensure_ascii=False), told["ended"]),
-            )
-
-    def tell(self, name: str, value: Any) -> None:
-        """Write down something beside the trials."""
-        with self._told():
-            self._connection.execute(
-                "INSERT OR REPLACE INTO told VALUES (?, ?)",
-                (name, json.dumps(value, ensure_ascii=False)),
-            )
-
-    def say(self, status: Status) -> None:
-        """Write down what is being done, for whoever looks; the results are elsewhere."""
-        try:
-            with replacing(self._status) as begun:
-                begun.write_text(json.dumps(asdict(status)), encoding="utf-8")
-        except OSError as error:
-            raise StudyError(
-                f"{error}; free some space and go on by `multiview-phd study resume`: every run "
-                "that ended is kept"
-            ) from None
-
-    @contextmanager
-    def _told(self) -> Iterator[None]:
-        try:
-            yield
-        except sqlite3.Error as error:
-            words = " ".join(str(error).split())
-            if "full" in words:
-                words = "there is no space left"
-            raise StudyError(
-                f"{self._path}: cannot be written ({words}); mend that and go on by "
-                "`multiview-phd study resume`: every run that ended is kept"
-            ) from None
-
-
-def _trial(told: dict[str, Any]) -> Trial:
-    objectives: Sequence[float] | None = told["objectives"]
-    return Trial(
-        **{
-            **told,
-            "objectives": None if objectives is None else tuple(objectives),
-            "spreads": tuple(told["spreads"]),
-            "jobs": tuple(JobRow(**one) for one in told["jobs"]),
-        }
-    )

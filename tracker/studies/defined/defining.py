@@ -1,4 +1,4 @@
-"""What a study is: recordings, what is varied and how far, seeds, trials, objectives."""
+"""A study's file, or what the page says, as a :class:`Definition`: checked field by field."""
 
 from __future__ import annotations
 
@@ -6,22 +6,14 @@ import glob
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 from tracker.parameters import METHODS, PARAMETERS, PRESETS, RunParameters, value, with_values
 from tracker.sequences.fields import did_you_mean
+from tracker.studies.defined.definition import GRID_STEPS, MOST_TRIALS, Definition, Search, Varied
+from tracker.studies.defined.objectives import OBJECTIVES
 from tracker.studies.errors import StudyError
-from tracker.studies.objectives import OBJECTIVES
-
-Search = Literal["auto", "tpe", "nsga2", "random", "grid"]
-"""How values are sought; ``auto`` is TPE for one objective and NSGA-II for several."""
-
-MOST_TRIALS = 1_000_000
-
-GRID_STEPS = 5
-"""Values of a number on a grid, unless its ``steps`` say otherwise."""
 
 _NAME = re.compile(r"[^\W_][\w .+-]{0,59}")
 _TOP = frozenset(
@@ -29,103 +21,6 @@ _TOP = frozenset(
      "propose", "seed", "values", "start", "parameters"}
 )  # fmt: skip
 _RANGE = frozenset({"low", "high", "log", "steps", "choices"})
-
-
-@dataclass(frozen=True, slots=True)
-class Varied:
-    """One parameter, or choice of a method, that a study varies."""
-
-    key: str
-    low: float | None = None
-    high: float | None = None
-    """Of a number, both included, in its unit."""
-    log: bool = False
-    """Whether a number is drawn evenly over its logarithm."""
-    steps: int = GRID_STEPS
-    """Of a number on a grid."""
-    choices: tuple[Any, ...] = ()
-    """Of anything else."""
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether it is a whole number."""
-        return self.key in PARAMETERS and PARAMETERS[self.key].kind == "int"
-
-    def contains(self, tried: Any) -> bool:
-        """Whether a value is among those that are tried."""
-        if self.choices:
-            return tried in self.choices
-        assert self.low is not None
-        assert self.high is not None
-        return bool(self.low <= tried <= self.high)
-
-    def table(self) -> dict[str, Any]:
-        """As a study's file has it."""
-        if self.choices:
-            return {"choices": list(self.choices)}
-        return {"low": self.low, "high": self.high, "log": self.log, "steps": self.steps}
-
-
-@dataclass(frozen=True, slots=True)
-class Definition:
-    """A study, checked."""
-
-    name: str
-    recordings: tuple[str, ...]
-    """Names of rendered rooms, or absolute folders."""
-    varied: tuple[Varied, ...]
-    trials: int = 100
-    minutes: float | None = None
-    """No trial begins after so long; None for no such bound."""
-    seeds: tuple[int, ...] = (0,)
-    search: Search = "auto"
-    objectives: tuple[str, ...] = ()
-    """Keys of :data:`~tracker.studies.objectives.OBJECTIVES`, the leading one first; where there
-    are none they follow the recordings."""
-    prune: bool = True
-    """Whether hopeless trials are given up after the first recordings."""
-    preset: str | None = None
-    propose: int = 0
-    """On how many seeds that no trial had the best are measured again at the end, and the best
-    of them proposed; 0 leaves it out."""
-    seed: int = 0
-    """Of the sampler."""
-    values: Mapping[str, Any] = field(default_factory=dict)
-    """What is held, against the recording's defaults and the preset."""
-    start: Mapping[str, Any] = field(default_factory=dict)
-    """Values of varied parameters that are tried right after the defaults."""
-
-    def held(self) -> dict[str, Any]:
-        """The values by key that every trial has: the preset's, then its own."""
-        return {**(PRESETS[self.preset] if self.preset else {}), **self.values}
-
-    def to_json(self) -> dict[str, Any]:
-        """As a study's file has it."""
-        told: dict[str, Any] = {
-            "name": self.name,
-            "recordings": list(self.recordings),
-            "trials": self.trials,
-            "seeds": list(self.seeds),
-            "search": self.search,
-            "objectives": list(self.objectives),
-            "prune": self.prune,
-            "propose": self.propose,
-            "seed": self.seed,
-        }
-        if self.minutes is not None:
-            told["minutes"] = self.minutes
-        if self.preset is not None:
-            told["preset"] = self.preset
-        for name in ("values", "start"):
-            if table := dict(getattr(self, name)):
-                told[name] = table
-        return told | {"parameters": {one.key: one.table() for one in self.varied}}
-
-    def to_toml(self) -> str:
-        """The text of its file."""
-        import tomlkit
-
-        return tomlkit.dumps(self.to_json())
 
 
 def read_definition(path: Path) -> Definition:

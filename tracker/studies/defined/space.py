@@ -16,7 +16,7 @@ from tracker.parameters import (
     value,
     with_values,
 )
-from tracker.studies.definition import Varied
+from tracker.studies.defined.definition import Varied
 
 Draw = Callable[[Varied], Any]
 """Gives a value of one varied parameter."""

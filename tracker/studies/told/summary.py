@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tracker.studies.definition import Definition
+from tracker.studies.defined.definition import Definition
+from tracker.studies.defined.objectives import IDENTITY, OBJECTIVES, WITH_TRUTH, Objective
 from tracker.studies.judging import best_of, front_of, usable
-from tracker.studies.objectives import IDENTITY, OBJECTIVES, WITH_TRUTH, Objective
-from tracker.studies.store import Status, Store, Trial
+from tracker.studies.kept.records import Status, Trial
+from tracker.studies.kept.store import Store
 from tracker.without_truth.estimate import WARNING
 
 BETTER_SIGMAS = 2.0

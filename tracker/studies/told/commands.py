@@ -10,8 +10,8 @@ from typing import Any
 from tracker import pipeline
 from tracker.parameters import changed, with_values
 from tracker.sequences.library import open_sequence
-from tracker.studies.definition import Definition
-from tracker.studies.store import JobRow, Trial
+from tracker.studies.defined.definition import Definition
+from tracker.studies.kept.records import JobRow, Trial
 
 
 def track_commands(definition: Definition, trial: Trial) -> list[str]:

@@ -13,10 +13,11 @@ from tracker import __version__
 from tracker.evaluation.report.tables import escaped
 from tracker.placing import replacing
 from tracker.sequences.sequence import SequenceError
-from tracker.studies.commands import track_commands
-from tracker.studies.figures import importance_figure, objective_figure, parameter_figures
-from tracker.studies.store import Store, Trial
-from tracker.studies.summary import Summary, summary_of
+from tracker.studies.kept.records import Trial
+from tracker.studies.kept.store import Store
+from tracker.studies.told.commands import track_commands
+from tracker.studies.told.figures import importance_figure, objective_figure, parameter_figures
+from tracker.studies.told.summary import Summary, summary_of
 
 _STYLE = """
 :root { color-scheme: light dark; --line: #8884; --faint: #777; }

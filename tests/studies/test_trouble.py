@@ -1,0 +1,110 @@
+"""What goes wrong is told in a sentence, and nothing that ended is lost."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.studies.small import Serial, definition, made_up, run
+from tracker.studies.errors import StudyError
+from tracker.studies.kept.store import JOURNAL, Store, create, find
+from tracker.studies.kept.writer import Writer
+from tracker.studies.work.jobs import Job, Outcome
+from tracker.studies.work.recordings import packed
+
+
+def study(folder: Path, **fields: object) -> Store:
+    return create(definition(folder, **fields), folder / "studies")
+
+
+def test_a_full_disk_is_told_and_gone_on_from(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = study(tmp_path, trials=400, search="random")
+    do, keep = made_up(lambda values: 0.5), Writer.keep
+
+    def full(self: Writer, outcome: Outcome) -> None:
+        if self.runs == 20:  # SQLite's own bound stands for the disk's
+            pages = self._connection.execute("PRAGMA page_count").fetchone()[0]
+            self._connection.execute(f"PRAGMA max_page_count = {pages}")
+        keep(self, outcome)
+
+    monkeypatch.setattr(Writer, "keep", full)
+    with pytest.raises(StudyError, match=r"there is no space left.*study resume"):
+        run(store, Serial(do))
+    monkeypatch.setattr(Writer, "keep", keep)
+    assert store.status().state == "failed"
+    before = store.trials()
+    assert before
+    run(store, Serial(do))
+    assert store.trials()[: len(before)] == before
+    assert len(store.trials()) == 400
+
+
+def test_a_damaged_record_of_the_sampler_is_told(tmp_path: Path) -> None:
+    store = study(tmp_path, trials=3)
+    run(store, Serial(made_up(lambda values: 0.5)))
+    journal = store.folder / JOURNAL
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join([lines[0], b"{no json\n", *lines[2:]]))
+    with pytest.raises(StudyError, match="the record of what was tried cannot be read"):
+        run(store, Serial(made_up(lambda values: 0.5)))
+
+
+def test_results_that_are_no_database_are_told(tmp_path: Path) -> None:
+    store = study(tmp_path, trials=3)
+    (store.folder / "results.sqlite3").write_text("nothing of the kind" * 100, encoding="utf-8")
+    with pytest.raises(StudyError, match=r"results.sqlite3: cannot be"):
+        run(store, Serial(made_up(lambda values: 0.5)))
+
+
+def test_a_study_that_is_not_there_is_told(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="expected a study, found none is there"):
+        find(None, tmp_path)
+    store = study(tmp_path)
+    with pytest.raises(StudyError, match='expected the study "smal", found small'):
+        find("smal", tmp_path / "studies")
+    assert find(str(store.folder), tmp_path).folder == store.folder
+
+
+def test_a_worker_with_other_code_does_nothing(tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    from tracker.studies.opened import open_recordings
+    from tracker.studies.work.working import work
+
+    (_, job), *_ = open_recordings(definition(tmp_path)).jobs({})
+    outcome = work(replace(job, code="another"))
+    assert outcome.became == "version"
+
+
+def test_the_same_run_has_the_same_key_wherever_it_lies(tmp_path: Path) -> None:
+    import shutil
+
+    from tracker.studies.opened import open_recordings
+
+    made = definition(tmp_path)
+    shutil.copytree(tmp_path / "recording", tmp_path / "copy")  # other times of the files
+    copy = definition(tmp_path, recordings=["copy"])
+
+    def keys(of: object, values: dict[str, float], seed: int) -> str:
+        recordings = open_recordings(of)  # type: ignore[arg-type]
+        job: Job = recordings.job(recordings.every[0], values, seed)
+        return job.key
+
+    one = keys(made, {}, 0)
+    assert keys(copy, {}, 0) == one
+    assert keys(made, {"fusion.clutter_rate": 3.0}, 0) == one  # the default
+    assert keys(made, {"fusion.clutter_rate": 3.5}, 0) != one
+    assert keys(made, {}, 1) != one
+    boxes = tmp_path / "copy" / "cam1.csv"
+    boxes.write_text(boxes.read_text(encoding="utf-8").replace("20.5", "21.5"), encoding="utf-8")
+    assert keys(copy, {}, 0) != one
+
+
+def test_a_recording_that_is_too_large_is_not_sent(tmp_path: Path) -> None:
+    made = definition(tmp_path)
+    with pytest.raises(StudyError, match="more than 0 MB are not sent; put it where every worker"):
+        packed(Path(made.recordings[0]), limit=100)
+    assert len(packed(Path(made.recordings[0]))) > 100

@@ -1,0 +1,126 @@
+"""Results of a study as they come in: written once, each wholly or not at all."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from tracker.placing import replacing
+from tracker.studies.errors import StudyError
+from tracker.studies.kept.records import Status, Trial
+from tracker.studies.work.jobs import Outcome
+
+RESULTS = "results.sqlite3"
+STATUS = "status.json"
+
+_TABLES = (
+    """
+    CREATE TABLE IF NOT EXISTS jobs (
+        key TEXT PRIMARY KEY,     -- of recording, values, seed and code
+        outcome TEXT NOT NULL,    -- JSON
+        ended REAL NOT NULL       -- seconds since 1970
+    ) STRICT
+    """,
+    """
+    CREATE TABLE IF NOT EXISTS trials (
+        number INTEGER PRIMARY KEY,
+        state TEXT NOT NULL,
+        told TEXT NOT NULL,       -- JSON
+        ended REAL NOT NULL
+    ) STRICT
+    """,
+    "CREATE TABLE IF NOT EXISTS told (name TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT",
+)
+
+
+class Writer:
+    """Results as they come in: each wholly or not at all."""
+
+    def __init__(self, folder: Path) -> None:
+        """Open the results, or make them.
+
+        Raises:
+            StudyError: If they cannot be written to.
+        """
+        self._path = folder / RESULTS
+        self._status = folder / STATUS
+        with self._told():
+            self._connection = sqlite3.connect(self._path, timeout=10.0, isolation_level=None)
+            self._connection.execute("PRAGMA journal_mode = WAL")
+            self._connection.execute("PRAGMA synchronous = NORMAL")
+            for table in _TABLES:
+                self._connection.execute(table)
+            rows = self._connection.execute("SELECT key, outcome FROM jobs").fetchall()
+        self._outcomes = {key: text for key, text in rows}
+
+    def __enter__(self) -> Writer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._connection.close()
+
+    @property
+    def runs(self) -> int:
+        """How many are kept."""
+        return len(self._outcomes)
+
+    def outcome(self, key: str) -> Outcome | None:
+        """A run that ended before."""
+        text = self._outcomes.get(key)
+        return None if text is None else Outcome(**json.loads(text))
+
+    def keep(self, outcome: Outcome) -> None:
+        """Write down a run that ended; one that is there stays as it is."""
+        text = json.dumps(outcome.to_json(), ensure_ascii=False)
+        with self._told():
+            self._connection.execute(
+                "INSERT OR IGNORE INTO jobs VALUES (?, ?, ?)", (outcome.key, text, time.time())
+            )
+        self._outcomes.setdefault(outcome.key, text)
+
+    def end(self, trial: Trial) -> None:
+        """Write down a trial that ended."""
+        told = {**trial.to_json(), "ended": time.time()}
+        with self._told():
+            self._connection.execute(
+                "INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?)",
+                (trial.number, trial.state, json.dumps(told, ensure_ascii=False), told["ended"]),
+            )
+
+    def tell(self, name: str, value: Any) -> None:
+        """Write down something beside the trials."""
+        with self._told():
+            self._connection.execute(
+                "INSERT OR REPLACE INTO told VALUES (?, ?)",
+                (name, json.dumps(value, ensure_ascii=False)),
+            )
+
+    def say(self, status: Status) -> None:
+        """Write down what is being done, for whoever looks; the results are elsewhere."""
+        try:
+            with replacing(self._status) as begun:
+                begun.write_text(json.dumps(asdict(status)), encoding="utf-8")
+        except OSError as error:
+            raise StudyError(
+                f"{error}; free some space and go on by `multiview-phd study resume`: every run "
+                "that ended is kept"
+            ) from None
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.Error as error:
+            words = " ".join(str(error).split())
+            if "full" in words:
+                words = "there is no space left"
+            raise StudyError(
+                f"{self._path}: cannot be written ({words}); mend that and go on by "
+                "`multiview-phd study resume`: every run that ended is kept"
+            ) from None

@@ -1,0 +1,1 @@
+"""A study as it is told: in words, as commands, as a report."""

@@ -1,0 +1,61 @@
+"""When it is found out what matters: by a worker, whenever there is much more to tell from."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from tracker.studies import importance
+from tracker.studies.defined.definition import Varied
+from tracker.studies.kept.records import Trial
+from tracker.studies.work.cluster import Crew
+
+GROWTH = 1.5
+"""It is found out anew when there are so many times more trials."""
+
+LAST_SECONDS = 60.0
+"""At most so long the end of a study waits for it."""
+
+
+class Weighing:
+    """Of one start of a study."""
+
+    def __init__(self, varied: Sequence[Varied], defaults: Mapping[str, Any]) -> None:
+        """Nothing is asked for yet.
+
+        Args:
+            varied: What is varied.
+            defaults: What it is by default.
+        """
+        self._varied, self._defaults = tuple(varied), dict(defaults)
+        self._asked: Callable[[], Any | None] | None = None
+        self._weighed = 0
+
+    def news(
+        self, complete: Sequence[Trial], crew: Crew, *, last: bool = False
+    ) -> dict[str, Any] | None:
+        """What was found out since, if anything was.
+
+        Args:
+            complete: Trials that ended with all their runs.
+            crew: Has it computed.
+            last: Whether no more trials come: then it is waited for.
+        """
+        found = self._found()
+        needed = self._weighed + 1 if last else self._weighed * GROWTH
+        if self._asked is None and len(complete) >= max(importance.FEWEST, needed):
+            self._weighed = len(complete)
+            rows = [(one.values, one.objectives) for one in complete if one.objectives]
+            self._asked = crew.call(importance.importance, self._varied, rows, self._defaults)
+        until = time.monotonic() + LAST_SECONDS
+        while last and self._asked is not None and time.monotonic() < until:
+            found = self._found() or found
+            time.sleep(0.0 if self._asked is None else 0.02)
+        return found
+
+    def _found(self) -> dict[str, Any] | None:
+        found = None if self._asked is None else self._asked()
+        if found is not None:
+            self._asked = None
+        return found
