@@ -23,6 +23,9 @@ from tracker.single_view.colour.appearance import Appearance, Scene
 from tracker.single_view.protocol import CANDIDATES, DROPPED, TRUST
 from tracker.single_view.shape.finder import ShapeFinder
 
+SAME_PERSON = (0.35, 0.5)
+"""Metres across and down within which a peak shows that somebody found by shape is there."""
+
 SHAPE_OVERLAP = 0.3
 """Windows of the shapes that share more than this of what both cover are of one person."""
 
@@ -145,8 +148,9 @@ class PeakFinder:
         assert self._shapes is not None
         p = self._parameters
         state, found = self._shapes.find(state, picture, p.shape_odds, SHAPE_OVERLAP)
-        apart = (found.boxes[:, None, :2] - boxes[None, :, :2]) / found.boxes[:, None, 2:]
-        new = found.boxes[((apart**2).sum(axis=2) >= p.merge_distance**2).all(axis=1)]
+        apart = (found.boxes[:, None, :2] - boxes[None, :, :2]) / found.sizes[:, None]
+        taken = (np.abs(apart) < SAME_PERSON).all(axis=2).any(axis=1)
+        new = found.boxes[~taken]
         far = self._appearance.distances(scene, new).min(axis=1) if len(new) else np.zeros(0)
         return state, np.concatenate([boxes, new]), np.concatenate([distances, far])
 
