@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import http
 import logging
 from collections.abc import Mapping
@@ -16,6 +17,9 @@ from starlette.exceptions import HTTPException
 from tracker.parameters import ParameterError
 
 logger = logging.getLogger("app")
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""What a system says that has no room for a file."""
 
 
 class ErrorDetail(BaseModel):
@@ -77,7 +81,7 @@ class ApiError(Exception):
 
 def body(status: int, detail: ErrorDetail) -> dict[str, Any]:
     """The JSON of an error."""
-    return Problem(
+    problem = Problem(
         type="about:blank",
         title=http.HTTPStatus(status).phrase,
         status=status,
@@ -86,6 +90,11 @@ def body(status: int, detail: ErrorDetail) -> dict[str, Any]:
         field=detail.field,
         hint=detail.hint,
     ).model_dump()
+    # somebody else's words may have what is no text
+    return {
+        name: value.encode(errors="replace").decode() if isinstance(value, str) else value
+        for name, value in problem.items()
+    }
 
 
 def _answer(
@@ -163,6 +172,17 @@ def install(app: FastAPI) -> None:
             code = "too_large" if error.status_code == 413 else "http_error"
             detail = ErrorDetail(code=code, message=str(error.detail))
         return _answer(error.status_code, detail, error.headers)
+
+    @app.exception_handler(OSError)
+    async def _system(request: Request, error: OSError) -> JSONResponse:
+        if error.errno not in FULL:
+            return await _unexpected(request, error)
+        detail = ErrorDetail(
+            code="disk_full",
+            message=f"There is no space left: {sentence(error)}.",
+            hint="Nothing was changed; free some space and do it again.",
+        )
+        return _answer(507, detail)
 
     @app.exception_handler(Exception)
     async def _unexpected(request: Request, error: Exception) -> JSONResponse:

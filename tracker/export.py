@@ -10,6 +10,7 @@ import csv
 import itertools
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Sequence as Many
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
@@ -28,6 +29,9 @@ from tracker.trajectories import Trajectories
 PROGRAM = "multiview-phd"
 BOX = ("left", "top", "width", "height")
 COLUMNS = ("frame", "time", "id", "x", "y", "z", "existence", "sigma_x", "sigma_y", "sigma_z")
+
+CORRECTION = "correction"
+"""The column of a corrected run: the id of the correction that a row rests on, empty for none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,6 +69,7 @@ def write_tracks_csv(
     *,
     done: int | None = None,
     remarks: Iterable[str] = (),
+    resting: Many[str] = (),
 ) -> None:
     """Write the track file.
 
@@ -78,12 +83,15 @@ def write_tracks_csv(
         seed: Of the run.
         done: The number of steps computed; fewer than the sequence has are said at the top.
         remarks: What else is said there of the result, for instance that pictures were missing.
+        resting: Of a run with corrections the id of the one that each row rests on; it becomes
+            the column :data:`CORRECTION`.
     """
     for line in _comments(sequence, parameters, seed, done, remarks):
         stream.write(f"# {line}\n")
     cameras = sequence.cameras
     boxes = [f"{camera.name}_{side}" for camera in cameras for side in BOX]
-    csv.writer(stream, lineterminator="\n").writerow([*COLUMNS, *map(guarded, boxes)])
+    head = [*COLUMNS, *([CORRECTION] if resting else []), *map(guarded, boxes)]
+    csv.writer(stream, lineterminator="\n").writerow(head)
     columns = [
         [f"{frame}" for frame in tracks.frames],
         [f"{frame * sequence.step_time:.6f}" for frame in tracks.frames],
@@ -91,6 +99,7 @@ def write_tracks_csv(
         *_fixed(tracks.positions, 4),
         *_fixed(tracks.existences[:, None], 4),
         *_fixed(tracks.sigmas, 4),
+        *([list(resting)] if resting else []),
     ]
     for camera in cameras:
         pixels, visible = camera.project_boxes(tracks.positions, sequence.target_half_extents)

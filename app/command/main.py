@@ -298,6 +298,7 @@ def _track(command: Track) -> int:
     from tracker.runs import gaps
     from tracker.runs.gates import notices
     from tracker.runs.outcome import why_no_tracks
+    from tracker.runs.run import resting_of
     from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
 
@@ -338,7 +339,14 @@ def _track(command: Track) -> int:
     seconds = time.perf_counter() - begin
     with Bar("writing", "step") as writing:
         missing = gaps.sentences(run)
-        written = Written(sequence, run.tracks, parameters, command.seed, remarks=tuple(missing))
+        written = Written(
+            sequence,
+            run.tracks,
+            parameters,
+            command.seed,
+            remarks=tuple(missing),
+            resting=resting_of(run),
+        )
         save(output, form, written, Options(progress=writing.at))
     targets = len(set(run.tracks.ids.tolist()))
     kept = "" if "single_view" in stages else "; stage 1 was kept from an earlier run"

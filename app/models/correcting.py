@@ -69,6 +69,15 @@ class SkipRequest(Model):
     doubt: str = Field(max_length=40)
 
 
+class GhostsRequest(Model):
+    """How it would be, to be shown in 3D; or that no more."""
+
+    doubt: str | None = Field(default=None, max_length=40)
+    """Of the queue; null: what is shown goes away."""
+    alternative: int = Field(default=0, ge=0, le=20)
+    """0: as it is."""
+
+
 class CorrectionInfo(Model):
     """One correction."""
 

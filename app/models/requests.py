@@ -6,13 +6,13 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from app.models.base import Model
+from app.models.base import GivenPath, Model
 
 
 class OpenRequest(Model):
     """Open another sequence."""
 
-    name: str = Field(min_length=1, max_length=4096)
+    name: GivenPath
     """A built-in name, a name of the list, or a folder."""
 
 
@@ -20,7 +20,7 @@ class ParameterChanges(Model):
     """Values by key; all are taken or none."""
 
     changes: dict[str, Any]
-    origin: str = ""
+    origin: str = Field("", max_length=100)
 
 
 class ResetRequest(Model):
@@ -86,7 +86,7 @@ class SeekChange(Model):
     """Move the playhead."""
 
     step: int
-    origin: str = ""
+    origin: str = Field("", max_length=100)
 
 
 class StreamSeek(SeekChange):

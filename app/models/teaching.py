@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import Field
 
-from app.models.base import Model, Vector
+from app.models.base import GivenPath, Model, Vector
 
 
 class NewTemplate(Model):
@@ -68,5 +68,5 @@ class RestoreRequest(Model):
 class CopyRequest(Model):
     """Where a copy goes."""
 
-    folder: str = Field(min_length=1, max_length=4096)
+    folder: GivenPath
     """A path, or a name beside the offered one; new or empty."""

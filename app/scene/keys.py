@@ -33,7 +33,11 @@ class Hotkey:
 
 
 def hotkeys() -> Iterator[Hotkey]:
-    """The commands of ``static/commands.json`` with a key that viser knows and does not use."""
+    """The commands of ``static/commands.json`` with a key that viser knows and does not use.
+
+    Of a key that means something else at another place of the page the first meaning counts.
+    """
+    taken: set[tuple[HotkeyKey, KeyModifier | None]] = set()
     text = (static_folder() / "commands.json").read_text(encoding="utf-8")
     for commands in json.loads(text).values():
         for command in commands:
@@ -42,7 +46,9 @@ def hotkeys() -> Iterator[Hotkey]:
                 key = _KNOWN.get(letter.lower())
                 if key is None or modifier not in _MODIFIERS:
                     continue
-                if key in VISERS_OWN and modifier == "":
+                chord = (key, _MODIFIERS[modifier])
+                if (key in VISERS_OWN and modifier == "") or chord in taken:
                     continue
-                yield Hotkey(command["name"], command["title"], key, _MODIFIERS[modifier])
+                taken.add(chord)
+                yield Hotkey(command["name"], command["title"], *chord)
                 break

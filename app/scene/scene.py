@@ -17,6 +17,7 @@ from jaxtyping import UInt8
 from app.colours import PALETTES, Theme
 from app.scene import geometry
 from app.scene.geometry import Pose
+from app.scene.ghosts import GhostNodes
 from app.scene.people import PeopleNodes
 from app.scene.reference import ReferenceNodes
 from app.scene.room import FrustumNodes, RoomNodes, grid_cell, pose_through
@@ -57,6 +58,7 @@ class Scene:
         self._frusta = FrustumNodes(server, self._look_through)
         self._reference = ReferenceNodes(server)
         self._people = PeopleNodes(server, self._pick)
+        self._ghosts = GhostNodes(server)
         self._views = Views(server, self._overview)
         self._worker = LatestWorker("scene", self._work)
         self._unsubscribe = workbench.subscribe(self._note)
@@ -162,6 +164,7 @@ class Scene:
         drawing = (
             sequence, run, step, snapshot.selection, dict(snapshot.layers), self._looking,
             snapshot.run_state.state, snapshot.theme, snapshot.scores.pinned, snapshot.trail,
+            snapshot.ghosts,
         )  # fmt: skip
         if drawing == self._drawn:
             return
@@ -177,6 +180,7 @@ class Scene:
             self._reference.show_pinned(
                 sequence, pinned_tracks(snapshot), step, palette, snapshot.trail
             )
+            self._ghosts.show(sequence, ghost_tracks(snapshot), step, palette)
             for camera, picture in enumerate(pictures):
                 self._frusta.show_picture(camera, picture)
             self._status.content = status_html(snapshot, run)
@@ -252,6 +256,14 @@ def pinned_tracks(snapshot: Snapshot) -> Trajectories | None:
     if snapshot.run is not None and pinned.key == snapshot.run.key:
         return None
     return pinned.tracks
+
+
+def ghost_tracks(snapshot: Snapshot) -> Trajectories | None:
+    """How tracks would be; nothing where the run is another by now."""
+    ghosts, run = snapshot.ghosts, snapshot.run
+    if ghosts is None or run is None or ghosts.run != run.key:
+        return None
+    return ghosts.tracks
 
 
 def shown_run(snapshot: Snapshot) -> Run | None:

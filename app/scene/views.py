@@ -134,6 +134,8 @@ class _Follower:
     def __init__(self, client: viser.ClientHandle, goal: Callable[[float], Pose | None]) -> None:
         self._client = client
         self._goal = goal
+        # viser tells of a browser from several threads at once
+        self._lock = threading.RLock()
         self._pose: Pose | None = None
         self._aspect = 0.0
         self._arrived = False
@@ -142,9 +144,10 @@ class _Follower:
 
     def place_again(self) -> None:
         """Place it whatever happened before."""
-        self._moved = self._had_moved = False
-        self._aspect = 0.0
-        self.follow(self._client.camera)
+        with self._lock:
+            self._moved = self._had_moved = False
+            self._aspect = 0.0
+            self.follow(self._client.camera)
 
     def sent(self, pose: Pose, *, back: bool) -> None:
         """Somebody else moves it to a pose: away from where it is, or back there.
@@ -152,26 +155,28 @@ class _Follower:
         Away, it keeps to that pose whatever its window's shape; back, a person who
         had moved before is left alone again.
         """
-        if back:
-            self._moved = self._had_moved
-        else:
-            self._had_moved, self._moved = self._moved, False
-        self._pose, self._aspect, self._arrived = pose, self._client.camera.aspect, False
+        with self._lock:
+            if back:
+                self._moved = self._had_moved
+            else:
+                self._had_moved, self._moved = self._moved, False
+            self._pose, self._aspect, self._arrived = pose, self._client.camera.aspect, False
 
     def follow(self, camera: viser.CameraHandle) -> None:
         """The browser said where it is and what shape its window has."""
-        if self._pose is not None:
-            here = bool(np.allclose(camera.position, self._pose.position, atol=1e-2))
-            if math.isclose(camera.aspect, self._aspect, rel_tol=0.01):
-                # an answer from before it was placed does not count as moving
-                self._moved |= self._arrived and not here
-                self._arrived |= here
+        with self._lock:
+            if self._pose is not None:
+                here = bool(np.allclose(camera.position, self._pose.position, atol=1e-2))
+                if math.isclose(camera.aspect, self._aspect, rel_tol=0.01):
+                    # an answer from before it was placed does not count as moving
+                    self._moved |= self._arrived and not here
+                    self._arrived |= here
+                    return
+            pose = self._goal(camera.aspect)
+            if pose is None or self._moved:
                 return
-        pose = self._goal(camera.aspect)
-        if pose is None or self._moved:
-            return
-        self._pose, self._aspect, self._arrived = pose, camera.aspect, False
-        _place(self._client, pose)
+            self._pose, self._aspect, self._arrived = pose, camera.aspect, False
+            _place(self._client, pose)
 
 
 def between(start: Pose, goal: Pose, share: float) -> Pose:

@@ -18,10 +18,12 @@ from tracker.pipeline import Run
 from tracker.runs.fitting import unfit_methods
 from tracker.sequences.frames import FrameReader
 from tracker.sequences.sequence import Sequence
+from tracker.trajectories import Trajectories
 
 Change = Literal[
     "sequence", "opening", "parameters", "playhead", "selection", "layers", "view", "theme",
     "run", "progress", "evaluation", "pinned", "presets", "taught", "editing", "corrections",
+    "ghosts",
 ]  # fmt: skip
 """What is another now: ``run`` is a run's beginning and its end, ``progress`` its new steps,
 ``taught`` another room or other templates of the same recording."""
@@ -52,6 +54,16 @@ class Trail:
     """How far back they go."""
     fades: bool = True
     """Whether they are fainter the older they are."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ghosts:
+    """How tracks would be if something were otherwise, shown beside how they are."""
+
+    run: str
+    """Key of the run that they are another form of."""
+    tracks: Trajectories
+    """Around the place that is looked at."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +162,7 @@ class Snapshot:
     run_state: RunState = RunState()
     scores: Scores = field(default_factory=Scores)
     """Runs against the truth, where there is one."""
+    ghosts: Ghosts | None = None
     layers: Mapping[str, bool] = field(
         # the truth is in the pictures at first: in 3D twice as many boxes hide the people
         default_factory=lambda: MappingProxyType({name: name != "truth" for name in LAYERS})

@@ -23,6 +23,7 @@ from app.state.snapshot import (
     Change,
     Command,
     Event,
+    Ghosts,
     Level,
     Notice,
     Opening,
@@ -295,6 +296,12 @@ class Workbench:
         with self._edit() as now:
             if on != now.editing_room:
                 self._put("editing", editing_room=on)
+
+    def show_ghosts(self, ghosts: Ghosts | None) -> None:
+        """Have the 3D view show how tracks would be, or no more."""
+        with self._edit() as now:
+            if ghosts is not None or now.ghosts is not None:
+                self._put("ghosts", ghosts=ghosts)
 
     def set_theme(self, theme: Theme) -> None:
         """Have the 3D view dark or light."""

@@ -29,6 +29,7 @@ from app.web.views import results, steps
 from app.web.views.timeline import Timelines
 from tracker import export
 from tracker.runs import gaps
+from tracker.runs.run import resting_of
 from tracker.sequences import library
 
 router = APIRouter(prefix="/api", responses=ERRORS)
@@ -272,7 +273,14 @@ def export_tracks(bench: Bench) -> Response:
     stream = io.StringIO(newline="")
     told = gaps.sentences(run)
     export.write_tracks_csv(
-        stream, sequence, tracks, run.parameters, run.seed, done=done, remarks=told
+        stream,
+        sequence,
+        tracks,
+        run.parameters,
+        run.seed,
+        done=done,
+        remarks=told,
+        resting=resting_of(run),
     )
     return Response(
         stream.getvalue(),

@@ -18,10 +18,9 @@ METHODS = ("get", "put", "post", "delete", "patch")
 
 
 def operation_id(route: APIRoute) -> str:
-    """A route's name for programs: its method and the parts of its address."""
+    """A route's name for programs: its method and its address, such as ``get_step_step``."""
     (method,) = route.methods or ("get",)
-    parts = [part for part in re.split(r"\W+", route.path_format) if part]
-    return "_".join([method.lower(), *parts[1:]])
+    return "_".join([method.lower(), *re.findall(r"\w+", route.path_format)[1:]])
 
 
 def install(app: FastAPI) -> None:

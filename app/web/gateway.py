@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import hashlib
+import secrets
 from pathlib import Path
 
 import websockets
@@ -19,6 +20,15 @@ from websockets.asyncio.client import ClientConnection
 
 from app.errors import ApiError
 from app.web.entrance import Entrance
+
+CONTENT_POLICY = (
+    "default-src 'none'; script-src 'nonce-{nonce}' 'unsafe-eval'; "
+    "style-src 'unsafe-inline'; img-src 'self' blob: data:; font-src data:; media-src blob: data:; "
+    "connect-src 'self' blob: data:; worker-src blob:; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+)
+"""Of viser's page: its own scripts, which have a number that is another at each start, and nothing
+from another host. It makes styles as it goes, and functions of its own from words."""
 
 HAS_FOCUS = b"<script>Document.prototype.hasFocus=()=>true</script>"
 """Makes ``document.hasFocus()`` true: viser's client reconnects only while its document has the
@@ -36,6 +46,9 @@ addEventListener("click", (event) => {
 """viser's labels are plain text with a hint; a click on one opens what the panel says of it,
 in :meth:`app.scene.panel.controls.Controls`, as ``<i id="help-UUID" data-manual="...">``."""
 
+INSIDE = b'e.type="module";'
+"""Where viser's client, which travels packed, puts itself into its page as a script."""
+
 START_SECONDS = 15.0
 """How long a request waits for viser while it starts."""
 
@@ -49,6 +62,7 @@ class Gateway:
         self.entrance = Entrance()
         self._ready: asyncio.Event | None = None
         self._page = b""
+        self._policy = ""
         self._etag = ""
 
     def prepare(self) -> None:
@@ -61,7 +75,13 @@ class Gateway:
 
         page = Path(viser.__file__).parent / "client" / "build" / "index.html"
         head, mark, rest = page.read_bytes().partition(b"<head>")
-        self._page = head + mark + HAS_FOCUS + LABELS_LEAD_TO_THE_MANUAL + rest
+        whole = head + mark + HAS_FOCUS + LABELS_LEAD_TO_THE_MANUAL + rest
+        nonce = secrets.token_urlsafe(16)
+        said = f'nonce="{nonce}"'.encode()
+        self._page = whole.replace(b"<script", b"<script " + said).replace(
+            INSIDE, INSIDE + b"e." + said + b";"
+        )
+        self._policy = CONTENT_POLICY.format(nonce=nonce)
         self._etag = f'"{hashlib.sha256(self._page).hexdigest()[:20]}"'
         if self._ready is not None:
             self._ready.set()
@@ -87,7 +107,11 @@ class Gateway:
     async def page(self, request: Request) -> Response:
         """viser's client, which is one file."""
         await self.there()
-        headers = {"cache-control": "no-cache", "etag": self._etag}
+        headers = {
+            "cache-control": "no-cache",
+            "etag": self._etag,
+            "content-security-policy": self._policy,
+        }
         if request.headers.get("if-none-match") == self._etag:
             return Response(status_code=304, headers=headers)
         return Response(self._page, media_type="text/html; charset=utf-8", headers=headers)

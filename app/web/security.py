@@ -8,6 +8,7 @@ what browsers say of who asks keeps them from having pictures, scripts or frames
 
 from __future__ import annotations
 
+import asyncio
 import ipaddress
 import json
 import socket
@@ -15,7 +16,7 @@ from collections.abc import Iterable
 from urllib.parse import urlsplit
 
 from fastapi import HTTPException
-from starlette.datastructures import Headers
+from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.errors import PROBLEM, ErrorDetail, body
@@ -23,14 +24,32 @@ from app.errors import PROBLEM, ErrorDetail, body
 LARGEST_BODY = 1 << 20
 """Bytes of a request's body; what people send are a few numbers."""
 
+SECONDS_TO_SEND = 60.0
+"""For a request's body."""
+
 READING = frozenset({"GET", "HEAD", "OPTIONS"})
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 
 CONTENT_POLICY = (
-    "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; "
-    "object-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'self'"
+    "default-src 'none'; script-src 'self'; style-src-elem 'self'; style-src-attr 'unsafe-inline'; "
+    "img-src 'self' blob: data:; connect-src 'self'; frame-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-"""Of the page itself: nothing from another host, and no other page may frame it."""
+"""Of the page itself: no script or style sheet in it, nothing from another host, and no other page
+may frame it. Tables that the server writes have colours and lengths in attributes."""
+
+NOTHING = (
+    "default-src 'none'; style-src 'unsafe-inline'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'; sandbox"
+)
+"""Of whatever is no page: where a browser opens it as one, nothing in it runs."""
+
+DOCS = (
+    "default-src 'none'; script-src 'self' 'unsafe-inline'; style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' data:; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+"""Of the page of the routes: its frame, which FastAPI writes, has a script in it."""
 
 
 def is_loopback(host: str) -> bool:
@@ -71,7 +90,7 @@ class Guard:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        headers = Headers(scope=scope)
+        headers, send = Headers(scope=scope), _framed(scope, send)
         refusal = self._refusal(scope, headers)
         if refusal is None and scope["type"] == "http" and scope["method"] not in READING:
             length = headers.get("content-length", "0")
@@ -81,7 +100,7 @@ class Guard:
         if refusal is not None:
             await refuse(scope, receive, send, *refusal)
             return
-        await self._app(scope, receive, _framed(send))
+        await self._app(scope, receive, send)
 
     def _refusal(self, scope: Scope, headers: Headers) -> tuple[int, ErrorDetail] | None:
         host = headers.get("host", "")
@@ -169,13 +188,28 @@ class BodyTooLarge(HTTPException):
         super().__init__(413, _too_large().message)
 
 
+class BodyTooSlow(HTTPException):
+    """A body that is not there in time."""
+
+    def __init__(self) -> None:
+        super().__init__(408, f"The request's body took longer than {SECONDS_TO_SEND:g} s.")
+
+
 def _limited(receive: Receive) -> Receive:
-    received = 0
+    received, there = 0, False
+    until = asyncio.get_running_loop().time() + SECONDS_TO_SEND
 
     async def counted() -> Message:
-        nonlocal received
-        message = await receive()
+        nonlocal received, there
+        if there:  # what is waited for now is that the other side goes
+            return await receive()
+        try:
+            async with asyncio.timeout_at(until):
+                message = await receive()
+        except TimeoutError:
+            raise BodyTooSlow from None
         received += len(message.get("body", b""))
+        there = not message.get("more_body", False)
         if received > LARGEST_BODY:
             raise BodyTooLarge
         return message
@@ -183,18 +217,27 @@ def _limited(receive: Receive) -> Receive:
     return counted
 
 
-def _framed(send: Send) -> Send:
-    """Tell the browser to take types as stated, and to let no other page frame ours."""
+FOR_ALL = {
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "SAMEORIGIN",
+    "referrer-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "cross-origin-opener-policy": "same-origin",
+    "permissions-policy": "camera=(), geolocation=(), microphone=(), payment=(), usb=()",
+}
+
+
+def _framed(scope: Scope, send: Send) -> Send:
+    """Tell the browser to take types as stated, to run nothing that is not meant to be run, and
+    to let no other page frame ours or reach into it."""
+    policy = DOCS if scope["path"] == "/docs" else NOTHING
 
     async def with_headers(message: Message) -> None:
         if message["type"] == "http.response.start":
-            message["headers"] = [
-                *message.get("headers", []),
-                (b"x-content-type-options", b"nosniff"),
-                (b"x-frame-options", b"SAMEORIGIN"),
-                (b"referrer-policy", b"same-origin"),
-                (b"cross-origin-resource-policy", b"same-origin"),
-            ]
+            headers = MutableHeaders(scope=message)
+            headers.update(FOR_ALL)
+            if message["status"] != 304:  # what the browser has keeps the policy that it came with
+                headers.setdefault("content-security-policy", policy)
         await send(message)
 
     return with_headers

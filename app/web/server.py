@@ -41,6 +41,7 @@ from app.state.workers.keeper import Keeper
 from app.state.workers.sensitivity import Sensitivity
 from app.web import api, description, gateway, stream, teaching_routes
 from app.web.access import Access, Keys
+from app.web.connections import Requests, Sockets
 from app.web.corrections import routes as corrections
 from app.web.entrance import LARGEST_MESSAGE, Entrance, start_viser
 from app.web.evaluation import course_routes, identity_routes
@@ -71,6 +72,9 @@ if TYPE_CHECKING:
     from app.scene.scene import Scene
 
 logger = logging.getLogger("app")
+
+UNREAD = 1 << 18
+"""Bytes."""
 
 ROUTERS = (
     api.router,
@@ -336,6 +340,8 @@ def bind(host: str, port: int) -> sockets.socket:
     listener = sockets.socket(family, sockets.SOCK_STREAM, sockets.IPPROTO_TCP)
     try:
         listener.setsockopt(sockets.SOL_SOCKET, sockets.SO_REUSEADDR, 1)
+        # what the system keeps for somebody who does not read; else it grows to megabytes
+        listener.setsockopt(sockets.SOL_SOCKET, sockets.SO_SNDBUF, UNREAD)
         listener.bind(address)
         listener.listen(128)
     except OSError:
@@ -355,10 +361,11 @@ def serve(app: FastAPI, listener: sockets.socket, on_ready: Callable[[], None]) 
     build_routes(app)
     config = uvicorn.Config(
         app,
-        log_level="warning",
+        log_level="error",
         access_log=False,
         lifespan="on",
-        ws="websockets-sansio",
+        http=Requests,
+        ws=Sockets,
         # viser's messages are packed already, ours are small: compressing only costs time
         ws_per_message_deflate=False,
         ws_max_size=LARGEST_MESSAGE,

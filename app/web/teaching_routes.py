@@ -46,7 +46,7 @@ def _complaining(code: str = "cannot_teach") -> Iterator[None]:
     """What does not fit, in the one shape of errors."""
     try:
         yield
-    except SequenceError as error:
+    except (SequenceError, OSError) as error:
         words = sentence(error)
         words = words[:1].upper() + words[1:] + "."
         raise ApiError(422, code, words, hint=NOTHING_LOST) from None

@@ -1,4 +1,5 @@
 /** What nobody needs before the first picture: read when the page is there. */
+import { mountCorrecting } from "./check/edits.js";
 import { mountMagnifier } from "./cameras/magnify.js";
 import { one, parts } from "./elements/dom.js";
 import { mountBookmarks } from "./inspector/bookmarks.js";
@@ -24,6 +25,7 @@ export function mountLater(context, timeline) {
 	mountKeep(context);
 	mountHint(timeline, store);
 	mountPlots(context, timeline);
+	mountCorrecting(context, timeline);
 	timeline.braid = drawBraid;
 	timeline.draw();
 }

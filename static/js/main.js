@@ -81,6 +81,7 @@ const brought = /** @type {const} */ ([
 	"drawTemplate",
 	"checkIdentities",
 	"plot",
+	"correct",
 	"keepLayout",
 ]);
 for (const name of brought) {
@@ -88,7 +89,7 @@ for (const name of brought) {
 		await readRest();
 		if (actions[name] === early)
 			return actions.note("error", "That is not read yet", "The server does not answer.");
-		await actions[name](what);
+		await /** @type {any} */ (actions)[name](what);
 	};
 	actions[name] = early;
 }

@@ -64,6 +64,10 @@ def opened(browser: Browser, server: Server, *, flat: bool = False) -> Iterator[
     page = context.new_page()
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on(
+        "console",
+        lambda told: errors.append(told.text) if "Content Security Policy" in told.text else None,
+    )
     page.goto(server.address)
     page.locator(".cam canvas").first.wait_for()  # whoever presses keys sees what he does
     yield page

@@ -27,15 +27,18 @@ class Server:
         kernels: Path | None = None,
         data: Path | None = None,
         wait: bool = True,
+        token: str | None = None,
     ) -> None:
         """Start it on a sequence, with a cache folder of its own or the person's.
 
         Kernels are those of the machine, whatever the cache folder, unless a folder is given.
         """
         self.folder = sequence
-        self._arguments = [str(sequence), "--no-open", "--no-token"]
+        self._arguments = [str(sequence), "--no-open"]
         self._arguments += [] if data is None else ["--data", str(data)]
+        self._arguments += ["--no-token"] if token is None else []
         self._environment = dict(os.environ)
+        self.use(token)
         self._environment["NUMBA_CACHE_DIR"] = str(kernels or kernel_folder())
         if cache is not None:
             self._environment["MULTIVIEW_PHD_CACHE"] = str(cache)
@@ -65,6 +68,11 @@ class Server:
             found = re.search(r"http://[\w.]+:(\d+)", line)
         self.port = int(found[1])
 
+    def use(self, token: str | None) -> None:
+        """Have a token from the next start on."""
+        self.token = token
+        self._environment["MULTIVIEW_PHD_TOKEN"] = token or "none-is-asked-for"
+
     @property
     def address(self) -> str:
         """Of the page."""
@@ -72,7 +80,8 @@ class Server:
 
     def get(self, path: str) -> httpx2.Response:
         """One answer."""
-        return httpx2.get(self.address.rstrip("/") + path, timeout=30.0)
+        headers = {"Authorization": f"Bearer {self.token}"}
+        return httpx2.get(self.address.rstrip("/") + path, headers=headers, timeout=30.0)
 
     def wait(self, condition: Callable[[dict], bool], seconds: float = 180.0) -> dict:
         """The state, once it is as wished."""

@@ -101,7 +101,10 @@ def test_it_is_served(client: TestClient) -> None:
     for place in ("/", "/tuning/", "/search/search_index.json"):
         answer = client.get(place)
         assert answer.status_code == 200
-        assert answer.headers["content-security-policy"] == CONTENT_POLICY
+        policy = answer.headers["content-security-policy"]
+        assert policy.startswith(CONTENT_POLICY.partition("{")[0])
+        assert ("'sha256-" in policy) == place.endswith("/")
+        assert "script-src 'self' 'unsafe-inline'" not in policy
 
 
 def test_the_page_leads_to_pages_that_there_are(site: Path) -> None:

@@ -32,7 +32,9 @@ function clashes(commands) {
 }
 
 test("no key belongs to two commands and no name to two", () => {
-  assert.deepEqual(clashes(COMMANDS), []);
+  // those of Check hold there alone, and there before the others
+  for (const own of [true, false])
+    assert.deepEqual(clashes(COMMANDS.filter(({ group }) => (group === "Check") === own)), []);
   assert.equal(new Set(COMMANDS.map((c) => c.name)).size, COMMANDS.length);
   assert.deepEqual(clashes([COMMANDS[0], COMMANDS[0]]), ["Space"]);
 });
@@ -80,6 +82,16 @@ test("a key event finds its command", () => {
   assert.equal(find("z", { metaKey: true }), "undo");
   assert.equal(find("ArrowLeft", { altKey: true }), undefined);
   assert.equal(find("y", { ctrlKey: true }), undefined);
+});
+
+test("a key of Check means what it says there, and what it meant before elsewhere", () => {
+  const find = (key, place) => commandFor(key, true, place)?.name;
+  assert.equal(find("y", "check"), "check-next");
+  assert.equal(find("y", "tune"), "hindsight");
+  assert.equal(find("Ctrl+z", "check"), "check-undo");
+  assert.equal(find("Ctrl+z", "tune"), "undo");
+  assert.equal(find("Delete", "tune"), undefined);
+  assert.equal(find("Space", "check"), "play");
 });
 
 test("single-key shortcuts can be switched off, arrows and help stay", () => {

@@ -120,10 +120,13 @@ def _here(tracks: _Tracks, one: Correction) -> tuple[tuple[int, ...], str]:
 
 
 def names_by_track(outcomes: Many[Outcome], corrections: Many[Correction]) -> dict[int, str]:
-    """The names that people were given, by track; of two for one track the later."""
-    by_id = {one.id: one for one in corrections}
+    """The names that people were given, by track; of two for one track the later.
+
+    Outcomes of corrections that are not among these, as of one that was just dropped, name nobody.
+    """
+    names = {one.id: one.name for one in corrections}
     return {
         outcome.tracks[0]: name
         for outcome in outcomes
-        if outcome.met and (name := by_id[outcome.id].name) is not None
+        if outcome.met and (name := names.get(outcome.id)) is not None
     }

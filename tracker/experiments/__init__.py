@@ -5,7 +5,18 @@ One module a claim; its ``EXPERIMENT`` is entered here under its name.
 
 from __future__ import annotations
 
-from tracker.experiments import association, cameras, cmc, fig1, fig2, fig3, jpda, methods, ppf
+from tracker.experiments import (
+    association,
+    cameras,
+    cmc,
+    corrections,
+    fig1,
+    fig2,
+    fig3,
+    jpda,
+    methods,
+    ppf,
+)
 from tracker.experiments.laboratory import sequences
 from tracker.experiments.laboratory.experiment import (
     Context,
@@ -27,6 +38,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         cameras.EXPERIMENT,
         sequences.EXPERIMENT,
         cmc.EXPERIMENT,
+        corrections.EXPERIMENT,
         jpda.EXPERIMENT,
         ppf.EXPERIMENT,
         association.EXPERIMENT,

@@ -12,6 +12,10 @@ class LibraryError(ValueError):
     """The library cannot be used; the message says why and what to do."""
 
 
+class NoSuchRun(LibraryError):
+    """A run that the library does not have, or no longer."""
+
+
 @contextmanager
 def told(path: Path) -> Iterator[None]:
     """Turn every failure of the database into a sentence about its file.

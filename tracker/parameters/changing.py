@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Mapping
 from operator import attrgetter
 from typing import Any
@@ -82,6 +83,8 @@ def _checked(parameter: Parameter, new: Any) -> Any:
         number = float(new)
     except (TypeError, ValueError):
         raise ParameterError(parameter.key, f"expected a number, got {new!r}") from None
+    except OverflowError:  # a whole number of more digits than any other number has
+        number = math.inf if new > 0 else -math.inf
     if parameter.kind == "int":
         if number != int(number) if abs(number) < 1e18 else True:
             raise ParameterError(parameter.key, f"expected a whole number, got {new!r}")

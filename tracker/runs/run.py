@@ -9,6 +9,7 @@ from typing import Any
 
 from tracker.corrections.kinds import IN_THE_FUSION, OF_PEOPLE, Correction, Kind, digest
 from tracker.corrections.outcomes import Outcome
+from tracker.corrections.resting import resting
 from tracker.fusion.protocol import FusionResult
 from tracker.parameters import RunParameters, Stage, stage_values
 from tracker.parameters.reading import CHOSEN_BY
@@ -109,6 +110,14 @@ _OBEYED_BY: dict[Stage, tuple[Kind, ...]] = {
     "fusion": IN_THE_FUSION, "smoothing": OF_PEOPLE,
 }  # fmt: skip
 """The corrections that a stage obeys."""
+
+
+def resting_of(run: Run) -> list[str]:
+    """The id of the correction that each row of a run's tracks rests on; empty without any."""
+    if not run.corrections:
+        return []
+    tracks = run.tracks
+    return resting(tracks.frames, tracks.ids, tracks.positions, run.corrections, run.outcomes)
 
 
 def stage_keys(

@@ -58,6 +58,8 @@ class Settled:
     """The rows of pieces: the others are of the gaps between them."""
     decisions: list[Decision]
     joined: Joined
+    limits: dict[int, tuple[int, int]]
+    """Of some labels the first and the last step at which corrections let them be."""
 
 
 def settle(
@@ -133,7 +135,9 @@ def settle(
         of_pieces, cut.firsts, cut.lasts, places[cut.starts[:-1]], places[cut.starts[1:] - 1],
         worths, births, deaths, pairs.earlier, pairs.later, pairs.gains,
     )  # fmt: skip
-    return Settled(paths, links, np.array(origins, dtype=np.int64), of_piece, decisions, joined)
+    limits = {labels[k]: span for k, span in ties.limits(chains, cut).items()}
+    origins_of = np.array(origins, dtype=np.int64)
+    return Settled(paths, links, origins_of, of_piece, decisions, joined, limits)
 
 
 def _cut(

@@ -108,19 +108,26 @@ def _with_ties(
     later: Int[ndarray, " P"],
     gains: Float[ndarray, " P"],
 ) -> tuple[Int[ndarray, " Q"], Int[ndarray, " Q"], Float[ndarray, " Q"]]:
-    """The pairs, with those that ties need and without those that they forbid."""
+    """The pairs, with those that ties need and without those that they forbid.
+
+    What goes on from i, tied to j, is j or lies between them; and so is what comes before j.
+    """
     keep = ~np.isin(later, list(ties.firsts)) & ~np.isin(earlier, list(ties.lasts))
     together = set(ties.together)
     for k in np.flatnonzero(~keep).tolist():
         keep[k] = (int(earlier[k]), int(later[k])) in together
+    for i, j in ties.together:
+        between = ties.between[i, j]
+        keep &= (earlier != i) | (later == j) | np.isin(later, between)
+        keep &= (later != j) | (earlier == i) | np.isin(earlier, between)
     earlier, later, gains = earlier[keep], later[keep], gains[keep]
     there = set(zip(earlier.tolist(), later.tolist(), strict=True))
     more = np.array([pair for pair in ties.together if pair not in there], dtype=np.int64)
-    i, j = more.reshape(-1, 2).T
+    ends, begins = more.reshape(-1, 2).T
     return (
-        np.concatenate([earlier, i]),
-        np.concatenate([later, j]),
-        np.concatenate([gains, deaths[i] + births[j]]),
+        np.concatenate([earlier, ends]),
+        np.concatenate([later, begins]),
+        np.concatenate([gains, deaths[ends] + births[begins]]),
     )
 
 
@@ -139,6 +146,13 @@ def _within(ties: Ties, own: Int[ndarray, " k"], place: Int[ndarray, " n"]) -> T
     return Ties(pairs(ties.together), pairs(ties.apart), pieces(ties.somebody), pieces(ties.nobody))
 
 
+def _goes_on(ties: Ties, table: Float[ndarray, "m m"], size: int) -> None:
+    """Who is tied to somebody later does not end, and who is to somebody earlier does not begin."""
+    for i, j in ties.together:
+        table[i, size + i] = -np.inf
+        table[size + j, j] = -np.inf
+
+
 def _solved(table: Float[ndarray, "m m"], ties: Ties, size: int) -> list[int]:
     """The column of each of the first ``size`` rows in the best assignment that obeys the ties."""
     for piece in ties.somebody:
@@ -147,11 +161,12 @@ def _solved(table: Float[ndarray, "m m"], ties: Ties, size: int) -> list[int]:
         nobody = table[piece, piece]
         table[piece, :] = table[:, piece] = -np.inf
         table[piece, piece] = nobody
+    _goes_on(ties, table, size)
     possible = np.isfinite(table)
     never = -1e3 - 4.0 * size * np.abs(table[possible]).max()
     _, columns = linear_sum_assignment(np.where(possible, table, never), True)
     goes_on: list[int] = columns[:size].tolist()
-    if not (ties.together or ties.apart):
+    if not _broken(goes_on, ties, size):
         return goes_on
     # how a piece goes on, and where it does not follow another its beginning
     possible[size:, size:] = False

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from collections.abc import Sequence as Many
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from tracker import trajectories
@@ -32,6 +33,8 @@ class _Decided(NamedTuple):
 
     decisions: list[Decision]
     joined: Joined | None = None
+    limits: Mapping[int, tuple[int, int]] = MappingProxyType({})
+    """Of some labels the first and the last step at which corrections let them be."""
 
 
 class Positions:
@@ -114,7 +117,13 @@ class Identities(Positions):
         check()
         learnt = learnt.of_people(found.origins)
         existences = np.where(found.had, 1.0, lifetimes.UNSURE)
-        return found.paths, existences, found.links, learnt, _Decided(found.decisions, found.joined)
+        return (
+            found.paths,
+            existences,
+            found.links,
+            learnt,
+            _Decided(found.decisions, found.joined, found.limits),
+        )
 
 
 def _settled(
@@ -152,10 +161,13 @@ def _finished(
     longer, existences = lifetimes.extended(
         smoother, fitted.paths, round(p.reach / smoother.model.step_time)
     )
+    away = _outside(longer, decided.limits)
+    existences = np.where(away, 0.0, existences)
     shared = smoother.share(longer, existences, learnt)
     fitted = smoother.fit(longer, shared.links, 1, learnt)
     shared = smoother.share(fitted.paths, existences, learnt)
     there, odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
+    there[away] = 0.0
     paths, owners = fitted.paths, fitted.paths.owners
     somebody = odds > 0.0
     removed = [
@@ -187,6 +199,18 @@ def _finished(
         learnt,
         decided.joined,
     )
+
+
+def _outside(paths: Paths, limits: Mapping[int, tuple[int, int]]) -> Bool[ndarray, " N"]:
+    """The rows at which corrections do not let a person be."""
+    away = np.zeros(len(paths.states), dtype=bool)
+    for path, label in enumerate(paths.labels.tolist()):
+        if label in limits:
+            first, last = limits[label]
+            own = slice(int(paths.starts[path]), int(paths.starts[path + 1]))
+            steps = int(paths.firsts[path]) + np.arange(own.stop - own.start)
+            away[own] = (steps < first) | (steps > last)
+    return away
 
 
 def _looks(views: Many[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B A"]] | None:

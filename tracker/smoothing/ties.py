@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from collections.abc import Sequence as Many
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,8 @@ from numpy import ndarray
 from tracker.corrections import Correction, Place
 from tracker.corrections.seeking import Whereabouts, mostly_inside
 from tracker.smoothing.paths import Paths
+
+_EVER = int(np.iinfo(np.int64).max)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +35,8 @@ class Ties:
     """Pieces before which their person was not there."""
     lasts: frozenset[int] = frozenset()
     """Pieces after which their person was not there."""
+    between: Mapping[tuple[int, int], tuple[int, ...]] = field(default_factory=dict)
+    """Of each pair of :attr:`together` the pieces that lie between them in time."""
 
     def __bool__(self) -> bool:
         return bool(self.together or self.apart or self.somebody or self.nobody
@@ -47,7 +51,36 @@ class Ties:
         """
         near = tuple((i, j) for i, j in self.together if cut.firsts[j] - cut.lasts[i] <= longest)
         far = tuple(pair for pair in self.together if pair not in near)
-        return replace(self, together=near), Ties(far, self.apart)
+        return replace(self, together=near), Ties(far, self.apart, between=self.between)
+
+    def limits(self, chains: Many[Many[int]], cut: Paths) -> dict[int, tuple[int, int]]:
+        """The first and the last step at which the people of some chains may be: who is not
+        somebody else does not go on where that one begins.
+
+        Args:
+            chains: The pieces of each person.
+            cut: The pieces.
+        """
+        number = {piece: k for k, chain in enumerate(chains) for piece in chain}
+        found: dict[int, tuple[int, int]] = {}
+
+        def limit(piece: int, first: int, last: int) -> None:
+            k = number.get(piece, -1)
+            if k >= 0:
+                low, high = found.get(k, (0, _EVER))
+                begins, ends = piece == chains[k][0], piece == chains[k][-1]
+                found[k] = max(low, first if begins else 0), min(high, last if ends else high)
+
+        for one, other in self.apart:
+            i, j = (one, other) if cut.firsts[one] <= cut.firsts[other] else (other, one)
+            if cut.lasts[i] < cut.firsts[j]:
+                limit(i, 0, int(cut.firsts[j]) - 1)
+                limit(j, int(cut.lasts[i]) + 1, _EVER)
+        for piece in self.firsts:
+            limit(piece, int(cut.firsts[piece]), _EVER)
+        for piece in self.lasts:
+            limit(piece, 0, int(cut.lasts[piece]))
+        return found
 
     def of_chains(self, chains: Many[Many[int]], cut: Paths) -> Ties | None:
         """The same of the chains of pieces; None where two of one person's overlap in time."""
@@ -72,6 +105,8 @@ class Said(NamedTuple):
     last: int = -1
     meant: AbstractSet[int] = frozenset()
     """All pieces that it speaks of."""
+    somebody: AbstractSet[int] = frozenset()
+    """Those of them that are somebody's for sure."""
 
 
 class Seeker:
@@ -89,7 +124,7 @@ class Seeker:
         self._steps, self._owners = paths.steps, paths.owners
         self._whereabouts = Whereabouts(self._steps, paths.states[:, :3])
         self._rows = {
-            place: self._whereabouts.nearest(place, leeway=leeway)
+            place: self._whereabouts.nearest(place, leeway=0 if one.kind == "here" else leeway)
             for one in corrections
             if one.kind not in ("nobody", "checked")
             for place in one.places
@@ -158,7 +193,10 @@ class Seeker:
                 inside = self._inside[one.id][kept]
                 gone = mostly_inside(cut.owners, cut.steps, inside, one)
                 yield Said(nobody=gone, meant=gone)
-            elif one.kind not in ("checked", "here"):
+            elif one.kind == "here":
+                piece = self._piece(one.places[0], cut, kept, before=True)
+                yield Said(meant={piece} - {-1}, somebody={piece} - {-1})
+            elif one.kind != "checked":
                 yield self._of_people(one, cut, kept)
 
     def _of_people(self, one: Correction, cut: Paths, kept: Int[ndarray, " M"]) -> Said:
@@ -226,6 +264,7 @@ def possible(
     nobody: set[int] = set()
     came: set[int] = set()
     left: set[int] = set()
+    somebody: set[int] = set()
 
     def joined(pairs: list[tuple[int, int]]) -> dict[int, list[int]] | None:
         """The groups with more pairs, None where somebody would be in two places at once."""
@@ -258,9 +297,14 @@ def possible(
         nobody |= {piece for piece in one.nobody if piece not in groups}
         came |= {one.first} - {-1}
         left |= {one.last} - {-1}
+        somebody |= one.somebody
     members = {tuple(group) for group in groups.values()}
     together = [pair for group in sorted(members) for pair in itertools.pairwise(group)]
-    sure = {piece for group in members for piece in group} | came | left
+    between = {
+        (i, j): tuple(np.flatnonzero((firsts > lasts[i]) & (lasts < firsts[j])).tolist())
+        for i, j in together
+    }
+    sure = {piece for group in members for piece in group} | came | left | somebody
     return Ties(
         tuple(together),
         tuple(apart),
@@ -268,4 +312,5 @@ def possible(
         frozenset(nobody),
         frozenset(came),
         frozenset(left),
+        between,
     )

@@ -19,5 +19,6 @@ def write(path: Path, written: Written, options: Options) -> None:
             written.seed,
             done=written.done,
             remarks=written.remarks,
+            resting=written.resting,
         )
     options.at(written.steps, written.steps)

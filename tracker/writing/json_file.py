@@ -68,6 +68,8 @@ class TrackOfFile(_Model):
     """Standard deviations of the position, metres."""
     seen: dict[str, list[bool]]
     """By camera: whether a box of it fed the track at this step."""
+    correction: list[str] | None = None
+    """Of a corrected run the id of the correction that each row rests on, empty for none."""
     boxes: dict[str, list[tuple[float, float, float, float] | None]]
     """By camera: left, top, width, height in pixels, origin at the centre of the top-left pixel;
     null where the picture has none."""
@@ -121,7 +123,11 @@ def write(path: Path, written: Written, options: Options) -> None:
         file.write(beginning)
         for done, number in enumerate(ids):
             options.at(done, len(ids))
-            file.write(("," if done else "") + "\n" + _track(written, number).model_dump_json())
+            file.write(
+                ("," if done else "")
+                + "\n"
+                + _track(written, number).model_dump_json(exclude_none=True)
+            )
         file.write(("\n" if ids else "") + end + "\n")
     options.at(len(ids), len(ids))
 
@@ -137,6 +143,7 @@ def _track(written: Written, number: int) -> TrackOfFile:
         existences=tracks.existences[rows].tolist(),
         sigmas=tracks.sigmas[rows].tolist(),
         seen={c.name: tracks.seen[rows, k].tolist() for k, c in enumerate(cameras)},
+        correction=[written.resting[k] for k in rows.tolist()] if written.resting else None,
         boxes={
             camera.name: [
                 box if there else None

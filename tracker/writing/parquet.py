@@ -34,6 +34,8 @@ def write(path: Path, written: Written, options: Options) -> None:
         "existence": tracks.existences,
         **{f"sigma_{axis}": tracks.sigmas[:, k] for k, axis in enumerate("xyz")},
     }
+    if written.resting:
+        columns["correction"] = np.array(written.resting, dtype=object)
     for index, camera in enumerate(sequence.cameras):
         boxes, visible = written.boxes[index]
         columns[f"{camera.name}_seen"] = tracks.seen[:, index]

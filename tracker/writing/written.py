@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Sequence as Many
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -59,6 +60,8 @@ class Written:
     """The number of steps computed; None for all."""
     remarks: tuple[str, ...] = ()
     """What must be said of it wherever it goes: that pictures were missing."""
+    resting: Many[str] = ()
+    """Of a corrected run the id of the correction that each row rests on, empty for none."""
     boxes: list[tuple[Float[ndarray, "N 4"], Bool[ndarray, " N"]]] = field(init=False)
     """For each camera left, top, width, height in pixels, and whether the picture has them."""
 

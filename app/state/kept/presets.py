@@ -117,6 +117,8 @@ def _checked(name: str) -> str:
         raise ParameterError(
             "name", f"expected 1 to {LONGEST_NAME} characters, got {len(name)}", YOURS
         )
+    if not name.isprintable():
+        raise ParameterError("name", f"expected letters that can be seen, got {name!r}", YOURS)
     if name in table.PRESETS:
         raise ParameterError(
             "name", f"expected a name of your own: {name} is a built-in preset", YOURS

@@ -16,6 +16,7 @@ from app.models.correcting import (
     Corrections,
     CorrectionsRequest,
     DoubtQueue,
+    GhostsRequest,
     SkipRequest,
 )
 from app.state.correcting import Correcting
@@ -114,6 +115,20 @@ def preview(doubt: str, alternative: int, bench: Bench, doubts: Doubts) -> Alter
     snapshot = _open(bench)
     found = _found(doubts, snapshot, doubt)
     return views.preview_of(snapshot, found, _alternative(found, alternative))
+
+
+@router.post("/ghosts")
+def ghosts(wish: GhostsRequest, bench: Bench, doubts: Doubts) -> AlternativePreview:
+    """Have the 3D view show what the tracks would be, or that no more; what they would be."""
+    snapshot = _open(bench)
+    if wish.doubt is None:
+        bench.show_ghosts(None)
+        return AlternativePreview(tracks=[], spans=[])
+    found = _found(doubts, snapshot, wish.doubt)
+    chosen = _alternative(found, wish.alternative)
+    told = views.preview_of(snapshot, found, chosen)
+    bench.show_ghosts(views.ghosts_of(snapshot, found, chosen))
+    return told
 
 
 @router.post("/answers")

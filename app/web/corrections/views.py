@@ -20,11 +20,12 @@ from app.models.correcting import (
     GhostTrack,
 )
 from app.state.correcting import Correcting
-from app.state.snapshot import Snapshot
+from app.state.snapshot import Ghosts, Snapshot
 from tracker.corrections.outcomes import Outcome, names_by_track
 from tracker.corrections.truth import checked_ranges
 from tracker.doubts import Doubt, Queue
 from tracker.doubts.doubt import Lanes
+from tracker.pipeline import Run
 from tracker.trajectories import Trajectories, corrected
 
 GHOST_SECONDS = 5.0
@@ -106,18 +107,40 @@ def preview_of(snapshot: Snapshot, doubt: Doubt, alternative: int) -> Alternativ
     """The tracks as they would be if an alternative were true: at once, by their rows alone."""
     run = snapshot.run
     assert run is not None
-    sequence = run.sequence
-    before = run.tracks
-    after = before
-    if alternative > 0:
-        after = corrected(before, doubt.alternatives[alternative].corrections, sequence.step_time)
-    margin = round(GHOST_SECONDS / sequence.step_time)
-    first, last = max(doubt.first - margin, 0), min(doubt.last + margin, sequence.frames - 1)
-    spans = _spans(before, after)
-    touched = {*doubt.tracks, *(one.id for one in spans if one.id)}
+    after = _after(run, doubt, alternative)
+    first, last = _around(run, doubt)
+    spans = _spans(run.tracks, after)
     lanes = Lanes(after)
-    ghosts = [_ghost(lanes, track, first, last) for track in sorted(touched & set(lanes.rows))]
+    touched = _touched(doubt, spans) & set(lanes.rows)
+    ghosts = [_ghost(lanes, track, first, last) for track in sorted(touched)]
     return AlternativePreview(tracks=ghosts, spans=spans)
+
+
+def ghosts_of(snapshot: Snapshot, doubt: Doubt, alternative: int) -> Ghosts:
+    """The same for the 3D view."""
+    run = snapshot.run
+    assert run is not None
+    after = _after(run, doubt, alternative)
+    first, last = _around(run, doubt)
+    touched = _touched(doubt, _spans(run.tracks, after))
+    near = (after.frames >= first) & (after.frames <= last)
+    return Ghosts(run.key, after.take(near & np.isin(after.ids, sorted(touched))))
+
+
+def _after(run: Run, doubt: Doubt, alternative: int) -> Trajectories:
+    if not alternative:
+        return run.tracks
+    said = doubt.alternatives[alternative].corrections
+    return corrected(run.tracks, said, run.sequence.step_time)
+
+
+def _around(run: Run, doubt: Doubt) -> tuple[int, int]:
+    margin = round(GHOST_SECONDS / run.sequence.step_time)
+    return max(doubt.first - margin, 0), min(doubt.last + margin, run.sequence.frames - 1)
+
+
+def _touched(doubt: Doubt, spans: list[ChangedSpan]) -> set[int]:
+    return {*doubt.tracks, *(one.id for one in spans if one.id)}
 
 
 def _ghost(lanes: Lanes, track: int, first: int, last: int) -> GhostTrack:

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from app.models.base import Model, Vector
+from app.models.base import GivenPath, Model, Vector
 from app.state.importing.draft import Phase
 from tracker.checks import Status
 from tracker.formats.pieces import Axes, Direction, Layout, Unit, Up
@@ -30,7 +30,7 @@ class AnnouncedFiles(Model):
 class PathRequest(Model):
     """A folder or file on the machine that runs the workbench."""
 
-    path: str = Field(min_length=1, max_length=4096)
+    path: GivenPath
 
 
 class WriteRequest(Model):

@@ -141,14 +141,14 @@ def _lanes(run: KeptRunInfo, frames: int, tracks: Sequence[TrackLife]) -> str:
 def _curve(word: str, unit: str, values: Sequence[float]) -> str:
     """A staircase over the steps; people are whole, everything else ends where it is largest."""
     most = max([0.1 if unit else 1.0, *values])
-    top = f"{most:.2f}{unit}" if unit else f"{most:.0f}"
+    top = f"{most:.2f}" if unit else f"{most:.0f}"
     points = " ".join(
         f"{at},{most - value:g}" for k, value in enumerate(values) for at in (k, k + 1)
     )
     return (
-        f'<div class="crowd"><span>{word}<br><span class="q">0–{top}</span></span>'
+        f'<div class="crowd"><span>{word}{unit}<br><span class="q">0–{top}</span></span>'
         f'<svg viewBox="0 0 {max(1, len(values))} {most:g}" preserveAspectRatio="none" role="img" '
-        f'aria-label="{word} over time, at most {top}"><polyline points="{points}"/></svg>'
+        f'aria-label="{word} over time, at most {top}{unit}"><polyline points="{points}"/></svg>'
         "</div>"
     )
 

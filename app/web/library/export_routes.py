@@ -11,12 +11,14 @@ from pydantic import Field
 
 from app.errors import ApiError, sentence
 from app.models import Model
+from app.models.base import RowNumber
 from app.state.workers.exporter import Exporter
 from app.web.dependencies import ERRORS, Bench
 from app.web.library.routes import Kept, no_library
 from tracker.library.errors import LibraryError
 from tracker.library.keeping import remarks_of
 from tracker.runs import gaps
+from tracker.runs.run import resting_of
 from tracker.sequences import library as sequences
 from tracker.writing.registry import FORMATS
 from tracker.writing.written import Options, Written
@@ -44,7 +46,7 @@ class ExportRequest(Model):
     """What is wanted."""
 
     format: str
-    run: int | None = None
+    run: RowNumber | None = None
     """Its number in the library; null for the one that is shown."""
     first: int = Field(default=0, ge=0)
     """Of a video."""
@@ -124,6 +126,7 @@ def begin(wish: ExportRequest, exporter: Out, keeper: Kept, bench: Bench) -> Exp
             run.seed,
             done,
             tuple(gaps.sentences(run)),
+            resting_of(run)[rows],
         )
         try:
             form.check(sequence)

@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from app.models import Model, TrackLife
+from app.models.base import RowNumber
 from tracker.library.records import KeptRun
 
 
@@ -133,7 +134,7 @@ class RunChanges(Model):
 class RunNumbers(Model):
     """Runs by their numbers."""
 
-    runs: list[int] = Field(min_length=1, max_length=10_000)
+    runs: list[RowNumber] = Field(min_length=1, max_length=10_000)
 
 
 class Deleted(Model):

@@ -13,13 +13,14 @@ from fastapi.responses import HTMLResponse
 
 from app.errors import ApiError, sentence
 from app.models import State
+from app.models.base import RowNumber
 from app.state.workers.keeper import Keeper
 from app.web.dependencies import ERRORS, Bench, Work, nothing_open
 from app.web.library import drawing, models, preview
 from app.web.opening import begun, told_in_the_answer
 from app.web.views import results
 from tracker import parameters as table
-from tracker.library.errors import LibraryError
+from tracker.library.errors import LibraryError, NoSuchRun
 from tracker.library.keeping import code_version, recording_of
 from tracker.library.records import KeptRun, Recording, Result
 from tracker.library.store import Library
@@ -39,6 +40,8 @@ Kept = Annotated[Keeper, Depends(_keeper)]
 
 def no_library(error: LibraryError) -> ApiError:
     """The answer where the library, or the run, is not as it must be."""
+    if isinstance(error, NoSuchRun):
+        return ApiError(404, "no_run", f"{sentence(error)}.")
     return ApiError(409, "no_library", f"{sentence(error)}.")
 
 
@@ -107,7 +110,7 @@ def _recording(recording: Recording) -> models.RecordingInfo:
     response_class=Response,
     responses={200: {"content": {"image/jpeg": {}}, "description": "The picture."}},
 )
-def thumbnail(recording: int, opened: Opened) -> Response:
+def thumbnail(recording: RowNumber, opened: Opened) -> Response:
     """A recording in one picture."""
     try:
         picture = opened.thumbnail(recording)
@@ -119,7 +122,7 @@ def thumbnail(recording: int, opened: Opened) -> Response:
 
 
 @router.get("/recordings/{recording}/runs")
-def runs(recording: int, opened: Opened) -> models.KeptRuns:
+def runs(recording: RowNumber, opened: Opened) -> models.KeptRuns:
     """The kept runs of a recording, the newest first."""
     try:
         return models.KeptRuns(runs=[_info(run) for run in opened.runs(recording)])
@@ -151,7 +154,7 @@ async def move(recording: int, wish: models.Place, opened: Opened) -> models.Rec
 
 
 @router.get("/runs/{number}")
-def run(number: int, opened: Opened) -> models.Preview:
+def run(number: RowNumber, opened: Opened) -> models.Preview:
     """One kept run in small: its facts, lanes, people and ways from above."""
     result = _result(opened, number)
     fps = next((r.fps for r in opened.recordings() if r.id == result.run.recording), 25.0)
@@ -167,7 +170,7 @@ def run(number: int, opened: Opened) -> models.Preview:
 
 
 @router.get("/runs/{number}/drawn", response_class=HTMLResponse)
-def drawn(number: int, opened: Opened) -> str:
+def drawn(number: RowNumber, opened: Opened) -> str:
     """One kept run in small, as a part of the page."""
     told = run(number, opened)
     return drawing.preview(told.run, told.frames, told.tracks, told.people, told.courses, told.ospa)
@@ -176,7 +179,7 @@ def drawn(number: int, opened: Opened) -> str:
 @router.get("/compared", response_class=HTMLResponse)
 def compared(
     opened: Opened,
-    runs: Annotated[list[int], Query(max_length=12, description="Their numbers.")],
+    runs: Annotated[list[RowNumber], Query(max_length=12, description="Their numbers.")],
 ) -> str:
     """Kept runs side by side, as a part of the page."""
     try:
@@ -186,7 +189,7 @@ def compared(
 
 
 @router.patch("/runs/{number}")
-def change(number: int, wish: models.RunChanges, opened: Opened) -> models.KeptRunInfo:
+def change(number: RowNumber, wish: models.RunChanges, opened: Opened) -> models.KeptRunInfo:
     """Name, star, note and tag a run."""
     try:
         if wish.name is not None:
@@ -222,7 +225,7 @@ def take_back(wish: models.RunNumbers, opened: Opened) -> models.Deleted:
 
 
 @router.post("/runs/{number}/open")
-async def open_run(number: int, opened: Opened, bench: Bench, jobs: Work) -> State:
+async def open_run(number: RowNumber, opened: Opened, bench: Bench, jobs: Work) -> State:
     """Show a run as it was: its tracks at once; its recording is opened first where it is not."""
     result = await asyncio.to_thread(_result, opened, number)
     now = bench.snapshot()
@@ -240,7 +243,7 @@ async def open_run(number: int, opened: Opened, bench: Bench, jobs: Work) -> Sta
 
 
 @router.post("/runs/{number}/pin")
-def pin(number: int, opened: Opened, bench: Bench, jobs: Work) -> State:
+def pin(number: RowNumber, opened: Opened, bench: Bench, jobs: Work) -> State:
     """Pin a kept run of the open recording: others are compared with it."""
     result = _result(opened, number)
     now = bench.snapshot()

@@ -10,29 +10,33 @@ export function mountSide(root, context) {
 	const tabs = all("[role=tab]", root);
 	const nameOf = (/** @type {Part} */ tab) =>
 		/** @type {PageState["tab"]} */ (tab.id.replace("tab-", ""));
-	tabs.forEach((tab, index) => {
+	for (const tab of tabs) {
 		tab.addEventListener("click", () => store.set({ tab: nameOf(tab) }));
 		tab.addEventListener("keydown", (event) => {
 			const turn = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
 			if (!turn) return;
 			event.preventDefault();
 			event.stopPropagation();
-			const next = tabs[(index + turn + tabs.length) % tabs.length];
+			const there = tabs.filter(({ hidden }) => !hidden);
+			const next = there[(there.indexOf(tab) + turn + there.length) % there.length];
 			store.set({ tab: nameOf(next) });
 			next.focus();
 		});
-	});
+	}
 	mountTracks(one("#panel-tracks"), context);
 
 	function choose() {
+		const { tab: wanted, place } = store.get();
 		for (const tab of tabs) {
-			const chosen = nameOf(tab) === store.get().tab;
+			// What belongs to a place is there alone.
+			if (nameOf(tab) === "place") tab.hidden = place !== "check";
+			const chosen = nameOf(tab) === (wanted === "place" && place !== "check" ? "tracks" : wanted);
 			tab.ariaSelected = String(chosen);
 			tab.tabIndex = chosen ? 0 : -1;
 			one(`#panel-${nameOf(tab)}`).hidden = !chosen;
 		}
 	}
-	store.watch(["tab"], choose);
+	store.watch(["tab", "place"], choose);
 	store.on(["layers3d", "selection"], (state) => {
 		only.ariaPressed = String(isAlone(state));
 		only.disabled = state.selection === null;

@@ -11,12 +11,8 @@ const ASKS_MS = 250;
  * @param {(words: string, cancel?: () => void) => void} how.say
  */
 export function exportMenu({ actions, chosen, say }) {
-	const menu = h("div", {
-		class: "menu",
-		role: "menu",
-		popover: "auto",
-		"aria-label": "Export as",
-	});
+	const forms = h("div", { role: "menu", "aria-label": "Export as" });
+	const menu = h("div", { class: "menu", popover: "auto" }, forms);
 	const button = h(
 		"button",
 		{ class: "btn box", "aria-haspopup": "menu" },
@@ -67,8 +63,9 @@ export function exportMenu({ actions, chosen, say }) {
 			return;
 		}
 		listed = true;
+		fill(menu, forms, part);
 		fill(
-			menu,
+			forms,
 			told.formats.map((/** @type {Server.FormatInfo} */ form) =>
 				h(
 					"button",
@@ -80,7 +77,6 @@ export function exportMenu({ actions, chosen, say }) {
 					h("span", { class: "small" }, form.help),
 				),
 			),
-			part,
 		);
 		menu.querySelector("button")?.focus();
 	}

@@ -86,9 +86,11 @@ export function pressed(event, store, actions) {
 	if (types && !ALWAYS.includes(key)) return false;
 	// In a list letters and arrows choose.
 	if (!key.startsWith("Ctrl+") && target.matches?.("select")) return false;
-	// Space on a focused control presses that control.
-	if (key === "Space" && target.closest?.("button, a, summary, input, [role=button]")) return false;
-	const command = commandFor(key, store.get().singleKeys);
+	// On a focused control they press that control.
+	if (key === "Enter" && target.closest?.("tr")) return false;
+	if (/^(Space|Enter)$/.test(key) && target.closest?.("button, a, summary, input, [role=button]"))
+		return false;
+	const command = commandFor(key, store.get().singleKeys, store.get().place);
 	if (!command) return false;
 	// What a key means of the clock and the panes holds where they are.
 	if (!isBench(store.get().place) && command.group !== "Page") return false;

@@ -334,6 +334,7 @@ export function createActions({ store, seek, send, receive }) {
 		openSheet() {},
 		palette() {},
 		bookmark() {},
+		correct() {},
 		keepLayout() {},
 		plot() {},
 		zoom() {},

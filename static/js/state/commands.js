@@ -71,11 +71,14 @@ export function commandOf(name) {
  * The command of a key.
  * @param {string} key  as `keyOf` names it
  * @param {boolean} singleKeys  whether letters, digits and signs alone are on
+ * @param {string} place  the keys of the group Check hold there alone, before those of others
  */
-export function commandFor(key, singleKeys = true) {
+export function commandFor(key, singleKeys = true, place = "") {
 	if (!key) return undefined;
 	if (!singleKeys && key !== "?" && key.replace("Shift+", "").length === 1) return undefined;
-	return COMMANDS.find((command) => command.keys.includes(key));
+	return COMMANDS.findLast(
+		({ keys, group }) => keys.includes(key) && (group !== "Check" || place === "check"),
+	);
 }
 
 /**

@@ -12,6 +12,14 @@ export const PLACES = [
 		bench: true,
 	},
 	{
+		name: "check",
+		word: "Check",
+		tip: "Doubtful moments, put right",
+		bench: true,
+		read: () => import("../check/check.js").then(({ mountCheck }) => mountCheck),
+		exists: ({ sequence }) => sequence !== null,
+	},
+	{
 		name: "study",
 		word: "Study",
 		tip: "Many runs at once: which values are better, and which matter",

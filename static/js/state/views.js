@@ -5,7 +5,7 @@
 import { SPEEDS } from "../play/clock.js";
 
 const EVENTS = ["birth", "death", "switch", "long miss", "joined", "cut", "removed", "doubt"];
-const TABS = ["tracks", "step", "events", "teach", "changes", "compare", "runs"];
+const TABS = ["tracks", "step", "events", "teach", "changes", "compare", "runs", "place"];
 
 /** Layers of the pictures, as they are at first. */
 export const LAYERS_2D = {

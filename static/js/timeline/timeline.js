@@ -67,7 +67,7 @@ export function mountTimeline(root, context) {
 		parseFloat(getComputedStyle(document.documentElement).getPropertyValue(`--${name}`));
 
 	/** Height of what stands over the lanes. */
-	const above = () => token("h-over") + token("h-ruler");
+	const above = () => token("h-over") + token("h-ruler") + token("h-check");
 
 	function resize() {
 		view = { ...view, width: Math.max(1, plot.clientWidth - token("pad-end")) };
@@ -143,6 +143,7 @@ export function mountTimeline(root, context) {
 		/** The next row down. @param {number} height @returns {Pen} */
 		const row = (height) => ({ g, view, ink, row: { y: (y += height) - height, height } });
 		const [over, ruler] = [row(token("h-over")), row(token("h-ruler"))];
+		const check = row(token("h-check"));
 		const lanesRow = row(lanes.offsetHeight);
 		const top = lanesRow.row.y;
 		if (loop && (range[0] !== null || range[1] !== null)) {
@@ -166,6 +167,7 @@ export function mountTimeline(root, context) {
 			switches: series?.switches ?? [],
 			decisions: timeline?.decisions ?? [],
 		});
+		seam.marks?.(check, lanesRow, { tracks: shownTracks(), scroll: lanes.scrollTop });
 		drawRange(over, playback.loadedSteps(), done, frames);
 		drawRuler(ruler, range, store.get().bookmarks);
 		// Each plot has its row, whether there is something to plot or not.

@@ -117,7 +117,7 @@ interface PageState {
 	bookmarks: Bookmark[];
 	/** The camera that is shown large; null: all alike. */
 	large: number | null;
-	tab: "tracks" | "step" | "events" | "teach" | "changes" | "compare" | "runs";
+	tab: "tracks" | "step" | "events" | "place" | "teach" | "changes" | "compare" | "runs";
 	/** The events that are listed and gone to; all where empty. */
 	eventKind: "" | LaneEvent["kind"];
 	/** Whether all figures are compared, or the headlines. */
@@ -169,7 +169,7 @@ type PaneName = "view" | "cams" | "side" | "time";
 interface Command {
 	name: string;
 	title: string;
-	group: "Play" | "Cameras and 3D" | "Teach" | "Tracks" | "Parameters" | "Page";
+	group: "Play" | "Cameras and 3D" | "Teach" | "Tracks" | "Parameters" | "Check" | "Page";
 	keys: string[];
 	/** A name of `Actions`. */
 	action: string;
@@ -268,6 +268,8 @@ interface Actions {
 	keepLayout: () => void;
 	/** Mark the shown step, or go to its note. */
 	bookmark: () => void;
+	/** Put something right, or go to what may be wrong. */
+	correct: (what: Correcting) => void | Promise<void>;
 	/** Of the timeline; above 1 shows more steps. */
 	zoom: (factor: number) => void;
 }
@@ -303,6 +305,8 @@ interface TimelineSeam {
 	rows: ((pen: Pen) => void)[];
 	/** What is under the pointer. */
 	at: (event: PointerEvent) => { step: number; track: Server.TrackLife | undefined };
+	/** Draws doubtful places under the ruler, and what was put right over the lanes. */
+	marks?: (check: Pen, lanes: Pen, how: { tracks: Server.TrackLife[]; scroll: number }) => void;
 	/** Draws the braid of identities; read when the page is there. */
 	braid?: typeof import("../timeline/braid.js").drawBraid;
 }

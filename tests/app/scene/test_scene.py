@@ -17,6 +17,7 @@ from app.scene.geometry import mass_radius
 from app.scene.nodes import linear
 from app.scene.scene import Scene
 from app.scene.worker import LatestWorker
+from app.state.snapshot import Ghosts
 from app.web.entrance import start_viser
 from tests.app.scene import scene_case
 from tracker.pipeline import Progress
@@ -271,6 +272,29 @@ def test_the_overview_crops_neither_the_room_nor_a_camera(
     wide = np.abs(points @ right) / depth / np.tan(pose.fov / 2.0) / aspect
     assert max(tall.max(), wide.max()) < 0.97
     assert max(tall.max(), wide.max()) > 0.6  # nor is it farther away than it must be
+    view.close()
+
+
+def test_how_it_would_be_is_drawn_until_the_run_is_another(server: viser.ViserServer) -> None:
+    of = scene_case.sequence()
+    run = scene_case.run(of)
+    workbench = scene_case.opened(of, run)
+    view = Scene(server, workbench)
+    workbench.seek(30)
+    near = run.tracks.take((run.tracks.frames > 20) & (run.tracks.frames < 40))
+    workbench.show_ghosts(Ghosts(run.key, near))
+    assert view.wait(SECONDS)
+    ways = nodes(server)["/people/ghost_ways"]
+    assert ways.visible
+    # a piece of way between each two steps of a track, and none from one track to another
+    assert len(ways.points) == len(near) - len(np.unique(near.ids))
+    assert len(nodes(server)["/people/ghost_boxes"].points) == 12 * len(np.unique(near.ids))
+    other = scene_case.run(of, walkers=3)
+    other.keys = {**other.keys, "tracks": "another"}
+    workbench.run_begins(other.key)
+    workbench.run_progresses(other, Progress("tracks", of.frames, of.frames, 1.0, of.frames))
+    assert view.wait(SECONDS)
+    assert not ways.visible
     view.close()
 
 

@@ -350,7 +350,7 @@ def test_the_page_and_its_files_are_checked_by_their_etag(client: TestClient) ->
         assert answer.headers["cache-control"] == "no-cache"
         again = client.get(path, headers={"if-none-match": answer.headers["etag"]})
         assert again.status_code == 304
-    assert "frame-ancestors 'self'" in client.get("/").headers["content-security-policy"]
+    assert "script-src 'self';" in client.get("/").headers["content-security-policy"]
 
 
 def test_every_route_is_documented(client: TestClient) -> None:

@@ -11,9 +11,12 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from app.state.doubting import Doubting
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, Runs, run_is, wait_until
 from tracker.corrections.log import read_log
+from tracker.doubts import Alternative, Doubt, Queue
+from tracker.doubts.doubt import Lanes, unsaid
 
 PLACE = "/api/corrections"
 
@@ -185,6 +188,39 @@ def test_the_queue_is_answered_previewed_and_skipped(
         settled(desk)
         rest = desk.get(f"{PLACE}/queue").json()["doubts"]
         assert left[0]["id"] not in [one["id"] for one in rest]
+
+
+def test_how_it_would_be_is_shown_until_it_is_no_more(
+    desk: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lanes = Lanes(desk.app.state.workbench.snapshot().run.tracks)  # type: ignore[attr-defined]
+    track = tracks(desk)[0]["id"]
+    places = (lanes.place(track, 59), lanes.place(track, 60, after=True))
+    two = Alternative("two people", 0.5, unsaid("different", places))
+    made = Doubt(
+        "cut", "two people?", "told", 59, 60, (track,), places, 0.5, 60,
+        (Alternative("as it is", 0.5, ()), two),
+    )  # fmt: skip
+    monkeypatch.setattr(Doubting, "of", lambda self, snapshot: Queue((made,), 0, "a test"))
+    first = desk.get(f"{PLACE}/queue").json()["doubts"][0]
+    told = desk.post(f"{PLACE}/ghosts", json={"doubt": first["id"], "alternative": 1}).json()
+    assert told == desk.get(f"{PLACE}/queue/{first['id']}/1").json()
+    assert [one["was"] for one in told["spans"]] == [track]
+    ghosts = desk.app.state.workbench.snapshot().ghosts  # type: ignore[attr-defined]
+    assert set(ghosts.tracks.ids.tolist()) == {one["id"] for one in told["tracks"]}
+    assert ghosts.run == desk.get("/api/state").json()["run"]["key"]
+    assert desk.post(f"{PLACE}/ghosts", json={"doubt": "nothing"}).status_code == 404
+    assert desk.post(f"{PLACE}/ghosts", json={"doubt": None}).json()["tracks"] == []
+    assert desk.app.state.workbench.snapshot().ghosts is None  # type: ignore[attr-defined]
+
+
+def test_a_name_that_is_dropped_is_gone_before_the_run_is_another(desk: TestClient) -> None:
+    wish = {"kind": "name", "tracks": [tracks(desk)[0]["id"]], "name": "Anna", "step": 30}
+    desk.post(PLACE, json={"corrections": [wish]})
+    (one,) = settled(desk)["corrections"]
+    answer = desk.delete(f"{PLACE}/{one['id']}")
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["names"] == {}
 
 
 def test_only_what_was_checked_counts_as_truth(desk: TestClient, own: Path, run: Runs) -> None:

@@ -204,7 +204,7 @@ def test_names_stars_notes_and_deletion(kept: TestClient) -> None:
     kept.post("/api/library/take-back", json={"runs": [number]})
     assert runs_of(kept)[0]["name"] == "baseline"
     answer = kept.post("/api/library/delete", json={"runs": [999]})
-    assert answer.status_code == 409
+    assert answer.status_code == 404
     assert "no run 999" in answer.json()["detail"]
 
 
@@ -232,7 +232,7 @@ def test_what_is_drawn_says_what_there_is_and_is_escaped(kept: TestClient) -> No
     told = kept.get("/api/library/compared", params={"runs": [number, other]}).text
     assert "&lt;b&gt;x" in told
     assert "MOTA" in told
-    assert kept.get("/api/library/compared", params={"runs": [999]}).status_code == 409
+    assert kept.get("/api/library/compared", params={"runs": [999]}).status_code == 404
 
 
 def test_runs_stay_when_the_recording_is_gone(kept: TestClient, data: Path, path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -93,6 +94,28 @@ def test_dropped_files_become_tracks(
     assert state["run"]["done"] == 60
     assert len(server.get("/api/timeline").json()["tracks"]) >= 3
     assert (folder / "data/living room/files/session/cam1.avi").is_file()
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("name", ["pose2sim-multi", "wildtrack-60"])
+def test_folders_of_others_are_tracked_within_minutes(
+    page: Page, server: Server, foreign: Path, name: str
+) -> None:
+    """From the drop to the last track, with what their makers give and nothing told."""
+    begin = time.monotonic()
+    drop(page, foreign / name)
+    settled(page)
+    page.keyboard.press("Control+Enter")
+    expect(page.locator("dialog.opener")).not_to_be_visible(timeout=120_000)
+    server.wait(
+        lambda now: (
+            now["sequence"]["name"] == name
+            and now["run"]["state"] == "done"
+            and now["run"]["done"] == now["sequence"]["frames"]
+        )
+    )
+    assert time.monotonic() - begin < 300.0
+    assert server.get("/api/timeline").json()["tracks"]
 
 
 def test_what_is_changed_is_looked_into_again(page: Page, files: Path) -> None:

@@ -1,0 +1,51 @@
+/** The place Check: the workbench, with the queue where the sliders stand and the tab Place. */
+import { one } from "../elements/dom.js";
+import { createCrops } from "./crops.js";
+import { mountFeet } from "./feet.js";
+import { checkOf } from "./model.js";
+import { mountPlace } from "./place.js";
+import { mountQueue } from "./queue.js";
+
+/** @type {Pane} */
+export function mountCheck(root, context) {
+	const { store, actions } = context;
+	const check = checkOf(context);
+	const crops = createCrops(store);
+	// Where the sliders stand.
+	one(".stage").append(root);
+	root.classList.add("queue");
+	mountQueue(root, context, check, crops);
+	mountPlace(one("#panel-place"), context, check, crops);
+	mountFeet(context, check);
+
+	// While it is held down V shows how it would be; tapped it stays.
+	let since = 0;
+	document.addEventListener("keydown", (event) => {
+		if (event.key === "v" && !event.repeat && store.get().place === "check")
+			since = event.timeStamp;
+	});
+	document.addEventListener("keyup", (event) => {
+		if (event.key !== "v" || !since) return;
+		if (event.timeStamp - since > 350) check.show(0);
+		since = 0;
+	});
+
+	const { state } = check;
+	const first = () => {
+		const { chosen, queue } = state.get();
+		// While a run goes on another may still come before it.
+		if (store.get().place === "check" && !chosen && queue?.complete && queue.doubts[0])
+			check.choose(queue.doubts[0]);
+	};
+	let before = "";
+	store.watch(["place"], ({ place }) => {
+		if (place === "check" && before !== "check") {
+			actions.showTab("place");
+			// Who came by its word goes on in the queue: there Enter means the place.
+			if (document.activeElement?.matches(".place")) one(".qlist").focus();
+			first();
+		} else if (before === "check" && state.get().other) check.show(0);
+		before = place;
+	});
+	state.on(["queue"], first);
+}

@@ -1,0 +1,242 @@
+/**
+ * Where somebody stands, said in the pictures: the feet of the selected track have a handle in each
+ * picture, to be dragged or moved by arrows; and while a person is placed, every picture takes a
+ * click.
+ */
+import { lensOf } from "../draw/picture.js";
+import { h, one } from "../elements/dom.js";
+import { getJson } from "../state/api.js";
+
+/** Of a press of an arrow, pixels of the picture. */
+const [SMALL, LARGE] = [1, 10];
+
+/** How a cell shows its picture. @param {Element} cell @param {number} camera @param {Readonly<PageState>} state */
+function scaleOf(cell, camera, { zooms, cameras }) {
+	const { clientWidth: width, clientHeight: height } = cell;
+	const lens = lensOf(zooms[camera], width, height);
+	return { ...lens, scale: (width * lens.k) / cameras[camera].width };
+}
+
+/**
+ * The pixel under the pointer, and of which camera.
+ * @param {MouseEvent} event @param {Readonly<PageState>} state
+ * @param {Element | null} cell  that is meant, where it is not under the pointer
+ * @returns {Spot | null}
+ */
+export function pixelOf(
+	{ target, clientX, clientY },
+	state,
+	cell = /** @type {Element} */ (target).closest(".cam"),
+) {
+	const index = cell ? [...one(".mosaic").children].indexOf(cell) : -1;
+	if (!cell || !state.cameras[index]) return null;
+	const edge = cell.getBoundingClientRect();
+	const { left, top, scale } = scaleOf(cell, index, state);
+	return {
+		index,
+		camera: state.cameras[index].name,
+		x: (clientX - edge.left + left) / scale,
+		y: (clientY - edge.top + top) / scale,
+	};
+}
+
+/** As it is said. @param {Spot} spot @returns {Click} */
+export const clickOf = ({ camera, x, y }) => ({ camera, x, y });
+
+/** @param {Context} context @param {Check} check */
+export function mountFeet({ store, playback }, check) {
+	const { state } = check;
+	const mosaic = one(".mosaic");
+	// Beside the pictures, which are buttons themselves.
+	const layer = h("div", { class: "feet" });
+	mosaic.after(layer);
+	/** By camera; a place in the picture, and whether somebody said it. @type {(Spot & {said: boolean})[]} */
+	let feet = [];
+	/** @type {HTMLElement[]} */
+	let handles = [];
+	let wanted = "";
+
+	/** The feet of the selected track at the shown step, as the server projects them. */
+	async function refresh() {
+		const { place, selection, shown, playing, cameras, basis, result } = store.get();
+		const { placing } = state.get();
+		const track = placing ? placing.track : selection;
+		const on = place === "check" && !playing && shown >= 0 && (placing || track !== null);
+		const key = on ? `${track} ${shown} ${basis} ${Boolean(placing)} ${result?.run}` : "";
+		if (key === wanted) return put();
+		wanted = key;
+		feet = [];
+		put();
+		if (!on) return;
+		const there = track === null ? null : await footprints(track, shown);
+		if (key !== wanted) return;
+		feet = cameras.flatMap(({ name, width, height }, index) => {
+			const at = there?.[index];
+			if (!at && !placing) return [];
+			const [x, y] = at ?? [width / 2, height * 0.75];
+			return [{ index, camera: name, x, y, said: false }];
+		});
+		build();
+	}
+
+	/** @param {number} track @param {number} step @returns {Promise<([number, number] | null)[]>} */
+	async function footprints(track, step) {
+		/** @type {Server.Step} */
+		const result = await getJson(`/api/step/${step}?samples=false&trails=true`);
+		return result.cameras.map(({ tracks }) => {
+			const found = tracks.find(({ id, visible }) => id === track && visible);
+			const now = found?.trail.find(([since]) => since === 0);
+			return now ? [now[1], now[2]] : null;
+		});
+	}
+
+	function build() {
+		const { placing } = state.get();
+		const { selection } = store.get();
+		for (const handle of handles) handle.remove();
+		handles = feet.map((foot) => {
+			const id = placing ? placing.track : selection;
+			const handle = h("button", {
+				class: "foothold",
+				"aria-label": `Feet of ${id === null ? "somebody" : `track ${id}`} in ${foot.camera}: drag, or arrows and Enter`,
+				onclick: (event) => event.stopPropagation(),
+				ondblclick: (event) => event.stopPropagation(),
+			});
+			handle.addEventListener("pointerdown", (event) => {
+				event.stopPropagation();
+				if (event.button === 0) handle.setPointerCapture(event.pointerId);
+			});
+			handle.addEventListener("pointermove", (event) => {
+				event.stopPropagation();
+				if (!handle.hasPointerCapture(event.pointerId)) return;
+				const at = pixelOf(event, store.get(), mosaic.children[foot.index]);
+				if (at) move(foot, at.x, at.y);
+			});
+			handle.addEventListener("pointerup", (event) => {
+				event.stopPropagation();
+				if (foot.said && !state.get().placing) void send();
+			});
+			handle.addEventListener("keydown", (event) => keyed(event, foot));
+			layer.append(handle);
+			return handle;
+		});
+		put();
+	}
+
+	/** @param {Spot & {said: boolean}} foot @param {number} x @param {number} y */
+	function move(foot, x, y) {
+		const { width, height } = store.get().cameras[foot.index];
+		Object.assign(foot, {
+			x: Math.max(0, Math.min(width - 1, x)),
+			y: Math.max(0, Math.min(height - 1, y)),
+			said: true,
+		});
+		put();
+		tell();
+	}
+
+	/** @param {KeyboardEvent} event @param {Spot & {said: boolean}} foot */
+	function keyed(event, foot) {
+		const far = event.shiftKey ? LARGE : SMALL;
+		const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[
+			event.key
+		];
+		if (way) move(foot, foot.x + far * way[0], foot.y + far * way[1]);
+		else if (event.key === "Enter") {
+			foot.said = true;
+			void send();
+		} else if (event.key === "Escape") cancel();
+		else return;
+		event.preventDefault();
+		event.stopPropagation();
+	}
+
+	/** What was said so far is told to who places. */
+	function tell() {
+		const { placing } = state.get();
+		if (placing) state.set({ placing: { ...placing, clicks: said() } });
+	}
+	const said = () => feet.filter(({ said }) => said).map(clickOf);
+
+	async function send() {
+		const { placing } = state.get();
+		const track = placing ? placing.track : store.get().selection;
+		const step = placing ? placing.step : store.get().shown;
+		const clicks = said();
+		if (!clicks.length) return;
+		await check.say([{ kind: "here", step, clicks, ...(track !== null && { tracks: [track] }) }]);
+		wanted = "";
+		void refresh();
+	}
+
+	function cancel() {
+		state.set({ placing: null });
+		wanted = "";
+		void refresh();
+	}
+
+	function put() {
+		const now = store.get();
+		handles.forEach((handle, k) => {
+			const foot = feet[k];
+			const cell = mosaic.children[foot?.index];
+			handle.hidden = !foot || !cell;
+			if (!foot || !(cell instanceof HTMLElement)) return;
+			const { left, top, scale } = scaleOf(cell, foot.index, now);
+			const [x, y] = [foot.x * scale - left, foot.y * scale - top];
+			// A part that is magnified may not show it.
+			handle.hidden = x < 0 || y < 0 || x > cell.clientWidth || y > cell.clientHeight;
+			handle.style.translate = `${Math.round(mosaic.offsetLeft + cell.offsetLeft + x)}px ${Math.round(mosaic.offsetTop + cell.offsetTop + y)}px`;
+			handle.classList.toggle("said", foot.said);
+			handle.classList.toggle("placing", Boolean(state.get().placing));
+		});
+		if (!feet.length) {
+			for (const handle of handles) handle.remove();
+			handles = [];
+		}
+	}
+
+	// While somebody is placed a click in a picture says where; nothing else happens there.
+	for (const name of ["pointerdown", "click", "dblclick"])
+		mosaic.addEventListener(
+			name,
+			(event) => {
+				const { placing } = state.get();
+				const target = /** @type {Element} */ (event.target);
+				if (!placing || target.closest(".foothold")) return;
+				const at = pixelOf(/** @type {MouseEvent} */ (event), store.get());
+				if (!at) return;
+				event.stopPropagation();
+				const foot = feet.find(({ index }) => index === at.index);
+				if (name !== "click" || !foot) return;
+				// Two pictures are enough; a third click begins with the newest two.
+				const others = feet.filter((one) => one.said && one !== foot);
+				if (others.length > 1) others[0].said = false;
+				move(foot, at.x, at.y);
+			},
+			true,
+		);
+	document.addEventListener(
+		"keydown",
+		(event) => {
+			if (!state.get().placing || store.get().place !== "check") return;
+			if (document.querySelector("dialog[open], :popover-open")) return;
+			const onControl = /** @type {Element} */ (event.target).closest("button, input, select");
+			if (event.key === "Escape") cancel();
+			else if (event.key === "Enter" && !onControl && said().length) void send();
+			else return;
+			event.preventDefault();
+			event.stopPropagation();
+		},
+		true,
+	);
+	store.watch(
+		["place", "selection", "shown", "playing", "basis", "result", "cameras"],
+		() => void refresh(),
+	);
+	state.on(["placing"], () => void refresh());
+	store.on(["zooms", "large", "layout"], put);
+	playback.onPaint(() => handles.length && put());
+	new ResizeObserver(put).observe(mosaic);
+	return { send, cancel };
+}

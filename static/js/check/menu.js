@@ -1,0 +1,222 @@
+/** The menu of corrections at a lane, a box or the selected person; with whom; and a name. */
+import { fill, h, icon, idTag, one } from "../elements/dom.js";
+import { resultOf } from "../state/events.js";
+import { commandOf, keyLabel, perform } from "../state/commands.js";
+import { clickOf, pixelOf } from "./feet.js";
+import { checkOf } from "./model.js";
+import { neighbours } from "./words.js";
+
+/** What the menu has for a track, in its order: a command, its sign, and what it says. */
+const ITEMS = /** @type {const} */ ([
+	["check-exchange", "i-exchange", "Exchange with…"],
+	["check-split", "i-split", "Split here"],
+	["check-join", "i-join", "Join with…"],
+	["check-here", "i-here", "Say where it is…"],
+	["check-came", "i-start", "Came in here"],
+	["check-left", "i-end", "Left here"],
+	["check-name", "i-name", "Name…"],
+	["check-nobody", "i-trash", "Was nobody"],
+]);
+
+/** Others that are listed. */
+const MOST = 12;
+
+/**
+ * @param {Context} context
+ * @param {TimelineSeam} timeline
+ * @param {object} does
+ * @param {(one: number, other: number) => any} does.exchange
+ * @param {(one: number, other: number) => any} does.join
+ * @param {(track: number, name: string) => any} does.name
+ */
+export function mountMenu(context, timeline, does) {
+	const { store, actions } = context;
+	const { state } = checkOf(context);
+	const menu = h("div", { class: "menu corrects", popover: "auto" });
+	document.body.append(menu);
+	/** Whoever is chosen elsewhere while others are offered is taken. @type {((id: number) => void) | null} */
+	let takes = null;
+	/** Where it was opened. */
+	let [left, top] = [0, 0];
+
+	/** @param {string} label @param {Child[]} head @param {"menu" | "group"} role @param {Child[]} children */
+	function show(label, head, role, ...children) {
+		fill(
+			menu,
+			h("p", { class: "menu-head" }, ...head),
+			h("div", { role, "aria-label": label }, ...children),
+		);
+		if (!menu.matches(":popover-open")) menu.showPopover();
+		const box = menu.getBoundingClientRect();
+		menu.style.left = `${Math.max(4, Math.min(left, innerWidth - box.width - 4))}px`;
+		menu.style.top = `${Math.max(4, Math.min(top, innerHeight - box.height - 4))}px`;
+		/** @type {HTMLElement | null} */ (menu.querySelector("button, input"))?.focus();
+	}
+	const close = () => menu.matches(":popover-open") && menu.hidePopover();
+	menu.addEventListener("toggle", (event) => {
+		if (/** @type {ToggleEvent} */ (event).newState !== "open") takes = null;
+	});
+	menu.addEventListener("keydown", (event) => {
+		const turn = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+		if (turn) {
+			const all = [...menu.querySelectorAll("button")];
+			const at = all.indexOf(/** @type {HTMLButtonElement} */ (document.activeElement));
+			all[(at + turn + all.length) % all.length]?.focus();
+			event.preventDefault();
+		}
+		// Its keys are its own: the page's mean something else.
+		if (event.key !== "Escape") event.stopPropagation();
+	});
+
+	/** @param {string} sign @param {Child[]} words @param {string} key @param {() => void} act */
+	const item = (sign, words, key, act) =>
+		h(
+			"button",
+			{ role: "menuitem", onclick: () => (close(), act()) },
+			icon(sign),
+			h("span", {}, ...words),
+			key && h("kbd", {}, key),
+		);
+
+	/** @param {{track: number | null, step: number, click?: Spot}} what */
+	function open({ track, step, click }) {
+		if (track !== null) actions.select(track);
+		if (click) store.set({ playing: 0 });
+		const { told } = state.get();
+		const at = (/** @type {string} */ name) =>
+			commandOf(name).keys.slice(0, 1).map(keyLabel).join();
+		show(
+			track === null
+				? `Corrections at step ${step}`
+				: `Corrections of track ${track} at step ${step}`,
+			[track === null ? "nobody" : idTag(track), h("span", { class: "sub" }, `step ${step}`)],
+			"menu",
+			...(track === null
+				? []
+				: ITEMS.map(([name, sign, words]) =>
+						item(sign, [words], at(name), () => perform(commandOf(name), actions)),
+					)),
+			click &&
+				item("i-here", [track === null ? "Somebody is here" : "Its feet are here"], "", () =>
+					checkOf(context).say([
+						{
+							kind: "here",
+							step,
+							clicks: [clickOf(click)],
+							...(track !== null && { tracks: [track] }),
+						},
+					]),
+				),
+			told?.undo && item("i-undo", [`Undo: ${told.undo}`], "", () => actions.correct("undo")),
+		);
+	}
+
+	/**
+	 * With whom: those alive there, the nearest first; a click on anybody else is an answer too.
+	 * @param {"exchange" | "join"} what @param {number} track
+	 */
+	function others(what, track) {
+		const { timeline: lanes, shown } = store.get();
+		const found = neighbours(track, resultOf(store.get()), lanes?.tracks ?? [], Math.max(0, shown));
+		if (!found.length)
+			return actions.note("info", "There is nobody else", "It takes a second track.");
+		if (!menu.matches(":popover-open")) middle();
+		const word = what === "join" ? "Join" : "Exchange";
+		const take = (/** @type {number} */ id) => (close(), void does[what](track, id));
+		show(
+			`${word} ${track} with`,
+			[`${word} `, idTag(track), " with"],
+			"menu",
+			...found
+				.slice(0, MOST)
+				.map(({ id, metres, steps, first, last }) =>
+					item(
+						what === "join" ? "i-join" : "i-exchange",
+						[
+							idTag(id),
+							h(
+								"span",
+								{ class: "sub" },
+								metres !== null
+									? ` ${metres.toFixed(1)} m away`
+									: steps
+										? ` ${steps} steps ${first > shown ? "later" : "before"}`
+										: ` steps ${first} – ${last}`,
+							),
+						],
+						"",
+						() => take(id),
+					),
+				),
+		);
+		takes = (id) => id !== track && take(id);
+	}
+
+	/** @param {number} track */
+	function name(track) {
+		middle();
+		const given = state.get().told?.names[track] ?? "";
+		const field = h("input", {
+			class: "field",
+			value: given,
+			maxlength: 80,
+			"aria-label": `Name of track ${track}`,
+			placeholder: "name, then Enter",
+		});
+		field.addEventListener("keydown", ({ key }) => {
+			if (key !== "Enter" || !field.value.trim()) return;
+			close();
+			void does.name(track, field.value.trim());
+		});
+		show(`Name of track ${track}`, [idTag(track), " is"], "group", field);
+		field.select();
+	}
+
+	/** Over the cameras, where no pointer says better. */
+	function middle() {
+		const box = one(".side").getBoundingClientRect();
+		[left, top] = [box.left + 12, box.top + 12];
+	}
+
+	store.on(["selection"], ({ selection }) => {
+		if (takes && selection !== null) takes(selection);
+	});
+	/** @param {MouseEvent} event @param {{track: number | null, step: number, click?: Spot}} what */
+	function at(event, what) {
+		if (!store.get().sequence) return;
+		event.preventDefault();
+		[left, top] = [event.clientX + 2, event.clientY + 2];
+		open(what);
+	}
+	const shown = () => Math.max(0, store.get().shown);
+	timeline.plot.addEventListener("contextmenu", (event) => {
+		const { step, track } = timeline.at(/** @type {PointerEvent} */ (event));
+		if (!track) return;
+		context.playback.seek(step);
+		at(event, { track: track.id, step });
+	});
+	one(".lanes").addEventListener("contextmenu", (event) => {
+		const label = /** @type {HTMLElement} */ (event.target).closest(".lane");
+		const id = Number(label?.querySelector(".id")?.textContent);
+		if (id) at(event, { track: id, step: shown() });
+	});
+	one(".mosaic").addEventListener("contextmenu", (event) => {
+		const click = pixelOf(event, store.get());
+		if (!click) return;
+		const { hover } = store.get();
+		at(event, {
+			track: hover?.camera === click.index ? hover.id : null,
+			step: shown(),
+			click,
+		});
+	});
+	return {
+		/** @param {{track: number, step: number}} what */
+		open(what) {
+			middle();
+			open(what);
+		},
+		others,
+		name,
+	};
+}

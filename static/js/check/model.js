@@ -1,0 +1,180 @@
+/** What is doubtful and what was put right, fetched and kept; every part of Check looks at this. */
+import { fetcher, getJson } from "../state/api.js";
+import { createStore } from "../state/store.js";
+import { middleOf } from "./words.js";
+
+/** One for a page. @type {WeakMap<Store<PageState>, Check>} */
+const made = new WeakMap();
+
+/** @param {Context} context @returns {Check} */
+export function checkOf(context) {
+	const { store } = context;
+	const check = made.get(store) ?? createCheck(context);
+	made.set(store, check);
+	return check;
+}
+
+/** While a run goes on its places are asked for at most so often, milliseconds. */
+const OFTEN = 1500;
+
+/** @param {Context} context @returns {Check} */
+function createCheck({ store, actions, playback }) {
+	/** @type {Store<CheckState>} */
+	const state = createStore(
+		/** @type {CheckState} */ ({
+			told: null,
+			queue: null,
+			chosen: null,
+			other: 0,
+			preview: null,
+			ends: null,
+			placing: null,
+		}),
+	);
+	/** Where the chosen place stood, so that the next one is there when it is done. */
+	let at = 0;
+	let answered = false;
+	/** Places that were answered, and the run whose they are: its queue still has them. */
+	/** @type {Map<string, string | null>} */
+	const gone = new Map();
+	let asked = 0;
+
+	const refresh = fetcher(async () => {
+		const { sequence, run } = store.get();
+		if (!sequence) return;
+		asked = performance.now();
+		const told = await getJson("/api/corrections");
+		state.set({ told });
+		// In Tune the run has the machine for itself; the queue is asked for when it is done.
+		if (!run?.done || (run.state === "computing" && store.get().place !== "check")) return;
+		receiveQueue(await getJson("/api/corrections/queue"));
+	});
+
+	/** @param {Server.DoubtQueue} told */
+	function receiveQueue(told) {
+		const { chosen } = state.get();
+		const doubts = told.doubts.filter(({ id }) => gone.get(id) !== told.run || !gone.has(id));
+		const queue = { ...told, doubts };
+		const same = doubts.find(({ id }) => id === chosen?.id);
+		state.set({ queue });
+		store.set({
+			signs: { ...store.get().signs, check: doubts.length ? String(doubts.length) : "" },
+		});
+		if (same) {
+			at = doubts.indexOf(same);
+			state.set({ chosen: same });
+		} else if (answered || (chosen && queue.complete && store.get().run?.state === "done")) {
+			// What is done makes room for the next; while a run goes on the shown one stays.
+			answered = false;
+			const next = doubts[Math.min(at, doubts.length - 1)] ?? null;
+			if (store.get().place === "check") choose(next);
+			else state.set({ ...hide(), chosen: null });
+		}
+	}
+
+	/** How it would be is drawn no more. */
+	function hide() {
+		if (state.get().other) void actions.ask("POST", "corrections/ghosts", { doubt: null });
+		return { other: 0, preview: null, ends: null, placing: null };
+	}
+
+	/** @param {Doubt | null} doubt */
+	function choose(doubt) {
+		at = Math.max(0, state.get().queue?.doubts.findIndex(({ id }) => id === doubt?.id) ?? 0);
+		state.set({ ...hide(), chosen: doubt });
+		if (!doubt) return;
+		store.set({ playing: 0 });
+		playback.seek(middleOf(doubt));
+		actions.select(doubt.tracks[0] ?? null);
+	}
+
+	/** @param {number} other */
+	async function show(other) {
+		const { chosen, ends } = state.get();
+		if (!chosen?.alternatives[other]) return;
+		if (!other) return state.set({ ...hide(), ends });
+		state.set({ other });
+		const wish = { doubt: chosen.id, alternative: other };
+		const preview = await actions.ask("POST", "corrections/ghosts", wish);
+		const now = state.get();
+		if (now.chosen?.id === chosen.id && now.other === other) state.set({ preview });
+	}
+
+	/** Ask, and take over what is told. @param {"POST" | "DELETE"} method @param {string} path @param {object} [body] */
+	async function ask(method, path, body) {
+		const told = await actions.ask(method, `corrections${path}`, body);
+		if (!told) return false;
+		state.set({ ...hide(), told });
+		void refresh();
+		return true;
+	}
+
+	store.watch(["sequence"], () => {
+		state.set({
+			told: null,
+			queue: null,
+			chosen: null,
+			other: 0,
+			preview: null,
+			ends: null,
+			placing: null,
+		});
+		store.set({ signs: { ...store.get().signs, check: "" } });
+		void refresh();
+	});
+	let heard = "";
+	store.on(["server", "basis"], ({ server, basis }) => {
+		const now = `${server?.corrections?.key} ${basis}`;
+		if (now === heard) return;
+		heard = now;
+		void refresh();
+	});
+	store.on(["place"], ({ place }) => place === "check" && void refresh());
+	/** @type {Timer} */
+	let waiting;
+	let ended = "";
+	store.watch(["run"], ({ run }) => {
+		const now = `${run?.key} ${run?.state}`;
+		if (!run || (now === ended && run.state !== "computing")) return;
+		ended = now;
+		clearTimeout(waiting);
+		const rest = run.state === "computing" ? OFTEN - (performance.now() - asked) : 100;
+		waiting = setTimeout(() => void refresh(), Math.max(0, rest));
+	});
+
+	return {
+		state,
+		choose,
+		show: (other) => void show(other),
+		say: (corrections) => ask("POST", "", { corrections }),
+		async answer(alternative) {
+			const { chosen } = state.get();
+			if (!chosen) return false;
+			answered = true;
+			const { queue } = state.get();
+			const taken = await ask("POST", "/answers", { doubt: chosen.id, alternative });
+			answered &&= taken;
+			if (taken && queue) {
+				gone.set(chosen.id, queue.run);
+				receiveQueue({ ...queue, answered: queue.answered + 1 });
+			}
+			return taken;
+		},
+		async skip() {
+			const { chosen } = state.get();
+			if (!chosen) return;
+			answered = true;
+			const queue = await actions.ask("POST", "corrections/skips", { doubt: chosen.id });
+			if (queue) receiveQueue(queue);
+			else answered = false;
+		},
+		drop(id) {
+			gone.clear();
+			return ask("DELETE", `/${id}`);
+		},
+		async undo(direction) {
+			gone.clear();
+			await ask("POST", `/${direction}`);
+		},
+	};
+}

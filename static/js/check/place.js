@@ -1,0 +1,346 @@
+/** The inspector's tab Place: one doubtful moment in pictures, what it could be, what to do. */
+import { palette } from "../draw/colours.js";
+import { all, fill, h, icon, idTag } from "../elements/dom.js";
+import { scoresOf } from "../state/events.js";
+import { commandOf, keyLabel, perform } from "../state/commands.js";
+import { drawCrop } from "./crops.js";
+import { camerasFor, filmSteps, isOfTwo, percent, proposed, standsFor } from "./words.js";
+
+/** People whose pictures are shown. */
+const ROWS = 2;
+/** What can be done: a command, its sign and its word. */
+const ACTS = /** @type {const} */ ([
+	["check-exchange", "i-exchange", "Exchange"],
+	["check-split", "i-split", "Split here"],
+	["check-join", "i-join", "Join with…"],
+	["check-nobody", "i-trash", "Delete"],
+	["check-here", "i-here", "Place…"],
+]);
+/** Where there is little room their words go first. */
+const SHORT = ["check-here", "check-nobody", "check-skip"];
+/** Which of them a kind of doubt proposes where it is wrong. @type {Record<string, string>} */
+const PROPOSES = {
+	exchange: "check-exchange",
+	crossing: "check-exchange",
+	join: "check-join",
+	cut: "check-split",
+	gap: "check-split",
+	fast: "check-split",
+	short: "check-nobody",
+	missing: "check-here",
+};
+
+/**
+ * @param {HTMLElement} root @param {Context} context @param {Check} check
+ * @param {ReturnType<typeof import("./crops.js").createCrops>} crops
+ */
+export function mountPlace(root, { store, actions, playback }, check, crops) {
+	const { state } = check;
+	const head = h("div", { class: "plhead" });
+	const film = h("div", { class: "film", role: "group" });
+	const why = h("p", { class: "why" });
+	const cameras = h("div", { class: "seg", role: "group", "aria-label": "Camera of the pictures" });
+	const acts = h("div", { class: "acts", role: "toolbar", "aria-label": "Actions" });
+	const blank = h("div", { class: "blank" });
+	fill(
+		root,
+		h("div", { class: "pl" }, head, film, h("div", { class: "whyline" }, why, cameras), acts),
+		blank,
+	);
+	/** By which camera; null: the one that sees them best. @type {number | null} */
+	let by = null;
+	let drawn = 0;
+	/** @type {number[]} */
+	let steps = [];
+
+	/** @param {string} name @param {string} sign @param {string} word @param {boolean} main */
+	const button = (name, sign, word, main) => {
+		const command = commandOf(name);
+		return h(
+			"button",
+			{
+				class: `btn up ${main ? "main" : "box"}${SHORT.includes(name) ? " short end" : ""}`,
+				"data-tip": command.title,
+				onclick: () => perform(command, actions),
+			},
+			icon(sign),
+			h("span", { class: "w" }, word),
+			h(
+				"kbd",
+				{},
+				command.keys
+					.slice(0, 1)
+					.map((key) =>
+						keyLabel(key).replace("Shift ", "⇧").replace("Enter", "↵").replace("Delete", "Del"),
+					)
+					.join(),
+			),
+		);
+	};
+
+	/** @param {string} label @param {number | null} value @param {(turn: -1 | 1) => void} act */
+	const stepper = (label, value, act) =>
+		h(
+			"span",
+			{ class: "stepper", role: "group", "aria-label": label },
+			h(
+				"button",
+				{ "aria-label": `${label}: earlier`, onclick: () => act(-1) },
+				icon("i-prev", "s"),
+			),
+			h("span", {}, value ?? "end"),
+			h("button", { "aria-label": `${label}: later`, onclick: () => act(1) }, icon("i-next", "s")),
+		);
+
+	/** An end of an exchange moves; behind the last step it is for good. @param {0 | 1} end @param {-1 | 1} turn */
+	function moveEnd(end, turn) {
+		const { chosen, ends } = state.get();
+		if (!chosen) return;
+		const { frames } = store.get();
+		/** @type {[number, number | null]} */
+		const next = ends ? [...ends] : [chosen.last, null];
+		if (end === 0) next[0] = Math.max(1, Math.min(frames - 1, next[0] + turn));
+		else if (next[1] === null) next[1] = turn < 0 ? Math.max(next[0], chosen.last) : null;
+		else next[1] = next[1] + turn > frames - 1 ? null : next[1] + turn;
+		if (next[1] !== null) next[1] = Math.max(next[0], next[1]);
+		state.set({ ends: next });
+		playback.seek(next[end] ?? next[0]);
+	}
+
+	function heads() {
+		const { chosen, other, queue, ends, placing } = state.get();
+		blank.hidden = Boolean(chosen || placing);
+		if (!chosen) {
+			fill(
+				blank,
+				h("h3", {}, queue?.doubts.length ? "No place is chosen" : "No place to look at"),
+				h(
+					"p",
+					{},
+					queue?.doubts.length
+						? "Y goes to the next one."
+						: "Corrections can be made anywhere: select a track, then Shift F10 or its menu.",
+				),
+			);
+			return;
+		}
+		const number = (queue?.doubts.findIndex(({ id }) => id === chosen.id) ?? -1) + 1;
+		const [from, to] = ends ?? [
+			isOfTwo(chosen) && chosen.kind === "exchange" ? chosen.last : chosen.first,
+			isOfTwo(chosen) && chosen.kind === "exchange" ? null : chosen.last,
+		];
+		fill(
+			head,
+			h("span", { class: "qn on", "aria-hidden": "true" }, number || "–"),
+			h("b", { title: chosen.title }, chosen.title),
+			h("span", { class: "q" }, "steps"),
+			...(isOfTwo(chosen)
+				? [
+						stepper("From step", from, (turn) => moveEnd(0, turn)),
+						h("span", { class: "q" }, "to"),
+						stepper("To step", to, (turn) => moveEnd(1, turn)),
+					]
+				: [
+						h(
+							"span",
+							{},
+							chosen.first === chosen.last ? chosen.first : `${chosen.first} – ${chosen.last}`,
+						),
+					]),
+			h("span", { class: "grow" }),
+			h(
+				"div",
+				{ class: "seg", role: "group", "aria-label": "Shown" },
+				chosen.alternatives.map(({ words, probability }, k) =>
+					h(
+						"button",
+						{
+							"aria-pressed": String(k === other),
+							title: `${words}: ${percent(probability)}${k < 2 ? " (V)" : ""}`,
+							onclick: () => check.show(k),
+						},
+						words,
+					),
+				),
+			),
+		);
+		words();
+		buttons();
+	}
+
+	function words() {
+		const { chosen, placing, other } = state.get();
+		if (placing)
+			return fill(
+				why,
+				placing.clicks.length
+					? `${placing.clicks.length === 1 ? "One picture: feet on the floor" : "Two pictures"}. Enter says it, Esc leaves it.`
+					: `Click where ${placing.track === null ? "somebody stands" : `${placing.track} stands`}, in one picture or in two. Esc leaves it.`,
+			);
+		if (!chosen) return;
+		const { words: what, probability } = chosen.alternatives[other] ?? chosen.alternatives[0];
+		const switches = scoresOf(store.get())?.series.switches.filter(
+			({ step, before, track }) =>
+				step >= (steps[0] ?? 0) &&
+				step <= (steps[steps.length - 1] ?? 0) &&
+				[before, track].some((id) => chosen.tracks.includes(id)),
+		).length;
+		why.title = chosen.why;
+		fill(
+			why,
+			`${chosen.why[0].toUpperCase()}${chosen.why.slice(1)}.`,
+			h(
+				"span",
+				{ class: "q" },
+				` ${what}: ${percent(probability)}.`,
+				switches
+					? ` Truth counts ${switches === 1 ? "a switch" : `${switches} switches`} here.`
+					: "",
+			),
+		);
+	}
+
+	function buttons() {
+		const { chosen, other } = state.get();
+		if (!chosen) return;
+		const best = other || proposed(chosen);
+		const alternative = chosen.alternatives[best]?.words ?? "";
+		const main = !best
+			? "check-confirm"
+			: /^exchanged/.test(alternative)
+				? "check-exchange"
+				: /goes on/.test(alternative)
+					? "check-join"
+					: /^two/.test(alternative)
+						? "check-split"
+						: /^nobody/.test(alternative)
+							? "check-nobody"
+							: (PROPOSES[chosen.kind] ?? "check-confirm");
+		fill(
+			acts,
+			...ACTS.map(([name, sign, word]) =>
+				button(name, sign, name === main && name === "check-join" ? "Join" : word, name === main),
+			),
+			h("span", { class: "grow" }),
+			button("check-skip", "i-next", "Skip", false),
+			button("check-confirm", "i-tick", "Confirm", main === "check-confirm"),
+		);
+	}
+
+	/** Draw the film of what is chosen. */
+	async function roll() {
+		const turn = (drawn += 1);
+		const { chosen, preview } = state.get();
+		if (!chosen || store.get().place !== "check") return;
+		const { frames, fps, cameras: views, basis } = store.get();
+		steps = filmSteps(chosen.first, chosen.last, { frames, fps });
+		const ids = (
+			preview?.tracks.length
+				? [...new Set([...chosen.tracks, ...preview.tracks.map(({ id }) => id)])]
+				: chosen.tracks
+		).slice(0, ROWS);
+		const results = await Promise.all(steps.map(crops.resultAt));
+		if (turn !== drawn || basis !== store.get().basis) return;
+		const best = camerasFor(results, chosen.tracks, views.length);
+		const camera = by !== null && by < views.length ? by : (best[0] ?? 0);
+		numbers(best, camera);
+		const name = views[camera]?.name ?? "";
+		film.ariaLabel = `Pictures of ${ids.join(" and ")} by ${name}`;
+		const inside = (/** @type {number} */ step) => step >= chosen.first && step <= chosen.last;
+		/** @type {{canvas: HTMLCanvasElement, cell: HTMLElement, step: number, box: Box | null, id: number}[]} */
+		const cells = [];
+		const rows = ids.flatMap((id, row) => [
+			h("span", { class: "fid", "--row": row + 2 }, idTag(id)),
+			...steps.map((step, k) => {
+				const result = results[k];
+				const now = preview ? standsFor(preview, id, result) : id;
+				const track = result?.cameras[camera]?.tracks.find((one) => one.id === now);
+				const canvas = h("canvas", { "aria-hidden": "true" });
+				const there = Boolean(track?.box && track.visible);
+				const cell = h(
+					"button",
+					{
+						class: `fr${inside(step) ? " in" : ""}`,
+						"--row": row + 2,
+						"--column": k + 2,
+						"--c": `var(--id-${((id - 1) % 24) + 1})`,
+						"data-at": step,
+						"aria-label": `${id} at step ${step} by ${name}${there ? "" : track ? ", out of view" : ", not there"}`,
+						onclick: () => playback.seek(step),
+					},
+					canvas,
+					!there && h("span", { class: "small" }, track ? "out of view" : "not there"),
+				);
+				cells.push({ canvas, cell, step, box: there ? (track?.box ?? null) : null, id });
+				return cell;
+			}),
+		]);
+		fill(
+			film,
+			...steps.map((step, k) =>
+				h(
+					"span",
+					{ class: `fs${inside(step) ? " in" : ""}`, "--column": k + 2, "data-at": step },
+					step,
+				),
+			),
+			...rows,
+		);
+		film.style.setProperty("--rows", String(ids.length));
+		mark();
+		await Promise.all(
+			cells.map(async ({ canvas, cell, step, box, id }) => {
+				if (!box) return;
+				const bitmap = await crops.pictureOf(camera, step);
+				if (turn !== drawn) return;
+				drawCrop(canvas, bitmap, box, palette().id(id));
+				if (!bitmap && views[camera].has_pictures)
+					cell.append(h("span", { class: "small" }, `no frame ${step}`));
+			}),
+		);
+	}
+
+	/** The cameras by their number, those that see them best first in words. @param {number[]} best @param {number} now */
+	function numbers(best, now) {
+		const views = store.get().cameras;
+		cameras.hidden = views.length < 2;
+		fill(
+			cameras,
+			views.map(({ name }, camera) =>
+				h(
+					"button",
+					{
+						"aria-pressed": String(camera === now),
+						title: `${name}${camera === best[0] ? ", which sees them best" : camera === best[1] ? ", second best" : ""}`,
+						onclick: () => ((by = camera), void roll()),
+					},
+					`C${camera + 1}`,
+				),
+			),
+		);
+	}
+
+	/** The shown step, or the nearest of the film. */
+	function mark() {
+		const { shown } = store.get();
+		const near = steps.reduce(
+			(best, step) => (Math.abs(step - shown) < Math.abs(best - shown) ? step : best),
+			steps[0] ?? 0,
+		);
+		for (const part of all("[data-at]", film))
+			part.classList.toggle("now", Number(part.dataset.at) === near);
+	}
+
+	state.watch(["chosen", "queue", "other", "ends", "placing"], heads);
+	state.on(["chosen"], () => (by = null));
+	state.on(["chosen", "preview"], () => void roll());
+	store.on(["basis", "place", "theme"], () => void roll());
+	store.on(["shown"], mark);
+	store.on(["scores"], words);
+	/** A wider pane has larger pictures. @type {Timer} */
+	let waiting;
+	new ResizeObserver(() => {
+		clearTimeout(waiting);
+		waiting = setTimeout(() => void roll(), 120);
+	}).observe(film);
+}

@@ -1,0 +1,232 @@
+"""The place Check: an exchange is found and put right by keys alone, everywhere, and for good."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.conftest import opened
+from tests.browser.looking import ask, readout, shown_in_3d, until, viser
+from tests.browser.meeting import FRAMES, HIDDEN, write_meeting
+from tests.browser.serving import Server
+
+BEFORE, AFTER = 10, FRAMES - 5
+P_D = "fusion.detection_probability"
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A workbench on two people who meet and turn back: the filter exchanges them."""
+    folder = write_meeting(tmp_path_factory.mktemp("data") / "meeting")
+    running = Server(folder, tmp_path_factory.mktemp("cache"))
+    ask(running, "POST", "seek", {"step": BEFORE})
+    yield running
+    if running.process.poll() is None:
+        running.stop()
+
+
+@pytest.fixture
+def as_it_was(server: Server) -> None:
+    """No correction, and the defaults."""
+    for one in corrections(server)["corrections"]:
+        ask(server, "DELETE", f"corrections/{one['id']}")
+    ask(server, "POST", "parameters/reset", {})
+    server.wait_for_run()
+
+
+@pytest.fixture
+def check(browser: Browser, server: Server, as_it_was: None) -> Iterator[Page]:
+    """The place, without the 3D view."""
+    with opened(browser, server, flat=True) as page:
+        page.get_by_role("link", name="Check").click()
+        expect(places(page).first).to_be_visible()
+        yield page
+
+
+def places(page: Page):  # type: ignore[no-untyped-def]
+    """The queue."""
+    return page.get_by_role("listbox", name="Places").get_by_role("option")
+
+
+def corrections(server: Server) -> dict:
+    told: dict = server.get("/api/corrections").json()
+    return told
+
+
+def side_of(server: Server, step: int) -> dict[int, bool]:
+    """Of each track whether it is on person 2's side of the room."""
+    tracks = server.get(f"/api/step/{step}").json()["tracks"]
+    return {track["id"]: track["position"][0] > 0.0 for track in tracks}
+
+
+def exchanged(server: Server) -> bool:
+    """Whether the shown run has the two exchanged."""
+    server.wait_for_run()
+    before, after = side_of(server, BEFORE), side_of(server, AFTER)
+    assert set(before) == set(after)
+    assert len(before) == 2
+    return before != after
+
+
+def test_an_exchange_is_put_right_by_keys_alone(
+    browser: Browser, server: Server, as_it_was: None, screenshots: Path | None
+) -> None:
+    assert exchanged(server), "the trap holds"
+    with opened(browser, server) as page:
+        frame = viser(page)
+        page.keyboard.press("Control+k")
+        page.keyboard.type("next place to check")
+        page.keyboard.press("Enter")
+        expect(places(page).first).to_have_attribute("aria-selected", "true")
+        expect(page.get_by_role("tab", name="Place")).to_have_attribute("aria-selected", "true")
+        page.keyboard.press("Shift+M")
+        meeting = places(page).and_(page.locator("[aria-selected=true]"))
+        expect(meeting).to_contain_text("1 and 2")
+        film = page.get_by_role("group", name="Pictures of 1 and 2")
+        expect(film.get_by_role("button")).to_have_count(16)
+        sign = page.get_by_role("link", name="Check").locator(".count")
+        before = int(sign.inner_text())
+        page.keyboard.press("v")  # how it would be
+        expect(
+            page.get_by_role("group", name="Shown").get_by_role("button").nth(1)
+        ).to_have_attribute("aria-pressed", "true")
+        if screenshots:
+            page.screenshot(path=screenshots / "check-would-be.png")
+        page.keyboard.press("Shift+X")
+        expect(page.get_by_role("listbox", name="Corrections").get_by_role("option")).to_have_count(
+            1
+        )
+        assert not exchanged(server)
+        until(page, lambda: int(sign.inner_text() or 0) < before, "one place less")
+        # lanes, pictures and 3D are of the run that obeys
+        run = server.wait_for_run()["run"]["key"]
+        assert server.get("/api/timeline").json()["run"] == run
+        page.keyboard.press("End")
+        until(page, lambda: shown_in_3d(frame) == str(FRAMES - 1), "3D is at the last step")
+        cams = page.locator(".cam")
+        left = side_of(server, FRAMES - 1)
+        for camera in range(2):
+            label = cams.nth(camera).get_attribute("aria-label")
+            assert label is not None
+            assert all(str(track) in label for track in left)
+        if screenshots:
+            page.screenshot(path=screenshots / "check-put-right.png")
+
+
+def test_it_holds_after_a_slider_a_reload_and_is_undone(check: Page, server: Server) -> None:
+    check.keyboard.press("Shift+M")
+    check.keyboard.press("Shift+X")
+    listed = check.get_by_role("listbox", name="Corrections").get_by_role("option")
+    expect(listed).to_have_count(1)
+    assert not exchanged(server)
+    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.9}})
+    assert not exchanged(server)
+    assert corrections(server)["corrections"][0]["met"] is True
+    check.reload()
+    expect(listed).to_have_count(1)
+    assert not exchanged(server)
+    check.keyboard.press("Control+z")
+    expect(listed).to_have_count(0)
+    assert exchanged(server)
+    check.keyboard.press("Control+Shift+Z")
+    expect(listed).to_have_count(1)
+    assert not exchanged(server)
+
+
+def test_who_is_right_is_confirmed_and_who_is_skipped_goes(check: Page, server: Server) -> None:
+    count = places(check).count()
+    check.keyboard.press("y")
+    check.keyboard.press("Enter")
+    until(check, lambda: places(check).count() < count, "what is confirmed is done")
+    assert corrections(server)["corrections"] != []
+    assert exchanged(server), "what was confirmed stays as it is"
+    left = places(check).count()
+    if left:
+        check.keyboard.press("Shift+K")
+        until(check, lambda: places(check).count() < left, "what is skipped is gone")
+
+
+def test_the_menu_of_a_lane_works_in_tune_too(
+    browser: Browser, server: Server, as_it_was: None
+) -> None:
+    with opened(browser, server, flat=True) as page:
+        middle = (HIDDEN.start + HIDDEN.stop) // 2
+        ask(server, "POST", "seek", {"step": middle + 12})
+        page.locator(".lane").first.click()
+        page.locator(".lane").first.click(button="right")
+        menu = page.get_by_role("menu", name="Corrections of track")
+        expect(menu.get_by_role("menuitem").first).to_be_focused()
+        page.keyboard.press("Enter")  # Exchange with…
+        page.get_by_role("menu", name="Exchange").get_by_role("menuitem").first.click()
+        expect(page.get_by_text("exchanged from step")).to_be_visible()
+        until(page, lambda: len(corrections(server)["corrections"]) == 1, "it is kept")
+        page.get_by_role("button", name="Undo", exact=True).first.click()
+        until(page, lambda: corrections(server)["corrections"] == [], "it is undone")
+
+
+def test_somebody_is_placed_by_a_click(check: Page, server: Server) -> None:
+    check.keyboard.press("Home")
+    check.locator(".lane").first.click()
+    check.keyboard.press("Shift+H")
+    expect(check.get_by_text("Click where")).to_be_visible()
+    check.locator(".cam").first.click(position={"x": 60, "y": 190})
+    expect(check.get_by_text("Enter says it")).to_be_visible()
+    check.keyboard.press("Enter")
+    until(check, lambda: len(corrections(server)["corrections"]) == 1, "it is said")
+    told = corrections(server)["corrections"][0]
+    assert (told["kind"], told["first"]) == ("here", 0)
+
+
+def test_a_name_and_a_checked_range_leave_as_truth(check: Page, server: Server) -> None:
+    check.locator(".lane").first.click()
+    check.keyboard.press("F2")
+    check.keyboard.type("Anna")
+    check.keyboard.press("Enter")
+    until(check, lambda: "Anna" in corrections(server)["names"].values(), "she has a name")
+    check.keyboard.press("Home")
+    until(check, lambda: readout(check) == "0", "the first step")
+    check.keyboard.press("i")
+    check.keyboard.press("PageDown")
+    until(check, lambda: readout(check) == "10", "the eleventh")
+    check.keyboard.press("o")
+    check.keyboard.press("Shift+G")
+    until(check, lambda: corrections(server)["checked"] == [[0, 10]], "the range is checked")
+    server.wait_for_run()
+    with check.expect_download() as saved:
+        check.get_by_role("button", name="Save truth").click()
+    lines = Path(saved.value.path()).read_text(encoding="utf-8").splitlines()
+    assert len(lines) > 11
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+def test_nothing_serious_in_any_state(check: Page, theme: str, screenshots: Path | None) -> None:
+    check.emulate_media(color_scheme=theme, reduced_motion="reduce")  # type: ignore[arg-type]
+    if check.locator("html").get_attribute("data-theme") != theme:
+        check.keyboard.press("Shift+D")
+
+    def found() -> list[str]:
+        answer = Axe().run(check, context={"exclude": [["iframe"]]}).response
+        return [
+            f"{rule['id']}: {node['html'][:160]}"
+            for rule in answer["violations"]
+            if rule["impact"] in ("serious", "critical")
+            for node in rule["nodes"]
+        ]
+
+    states = {"queue": found()}
+    check.keyboard.press("v")
+    states["would be"] = found()
+    check.keyboard.press("Shift+F10")
+    states["menu"] = found()
+    check.keyboard.press("Escape")
+    check.keyboard.press("Shift+M")
+    check.keyboard.press("Shift+X")
+    expect(check.get_by_role("listbox", name="Corrections").get_by_role("option")).to_have_count(1)
+    states["corrected"] = found()
+    if screenshots:
+        check.screenshot(path=screenshots / f"check-{theme}.png")
+    assert {name: bad for name, bad in states.items() if bad} == {}

@@ -1,0 +1,46 @@
+"""Clicks as places: what a camera shows of a place leads back to it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.engine.synthetic import CAMERAS
+from tracker.corrections import CorrectionError
+from tracker.corrections.pointing import foot_on_floor, triangulated
+
+_SPOTS = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
+
+
+@given(_SPOTS, st.sampled_from(CAMERAS))
+def test_a_click_on_the_feet_is_where_they_stand(spot: tuple[float, float], camera: object) -> None:
+    feet = np.array([[*spot, 0.0]])
+    pixels, _ = camera.project(feet)  # type: ignore[attr-defined]
+    x, y = pixels[0].tolist()
+    found = foot_on_floor(camera, (x, y), floor=0.0, half_height=0.9)  # type: ignore[arg-type]
+    assert found == pytest.approx([*spot, 0.9], abs=1e-3)
+
+
+@given(_SPOTS, st.floats(0.2, 1.8))
+def test_two_clicks_on_one_point_are_that_point(spot: tuple[float, float], height: float) -> None:
+    point = np.array([[*spot, height]])
+    clicks = [(camera, tuple(camera.project(point)[0][0].tolist())) for camera in CAMERAS[:2]]
+    assert triangulated(clicks) == pytest.approx(point[0], abs=1e-3)
+
+
+def test_what_says_nothing_of_a_place_is_refused() -> None:
+    camera = CAMERAS[0]
+    high = camera.project(np.array([[3.0, 3.0, 9.0]]))[0][0]
+    with pytest.raises(CorrectionError, match="does not show the floor"):
+        foot_on_floor(camera, (float(high[0]), float(high[1])), floor=0.0, half_height=0.9)
+    one = (camera, tuple(camera.project(np.array([[0.0, 0.0, 1.0]]))[0][0].tolist()))
+    with pytest.raises(CorrectionError, match="in each of two"):
+        triangulated([one])
+    with pytest.raises(CorrectionError, match="same side"):
+        triangulated([one, one])
+    other = CAMERAS[1]
+    far = (other, tuple(other.project(np.array([[1.0, 1.0, 1.9]]))[0][0].tolist()))
+    with pytest.raises(CorrectionError, match="different points"):
+        triangulated([one, far])

@@ -1,0 +1,80 @@
+"""The queue of doubtful places: what is at stake first, and what was settled no more."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.corrections.test_runs import run_of, with_a_gap
+from tests.engine.synthetic import crossing, sequence, walk
+from tracker.corrections import Place
+from tracker.doubts import queue
+from tracker.doubts.doubt import Lanes, said
+from tracker.doubts.linking import Move, Piece
+from tracker.doubts.opinion import Opinion
+from tracker.trajectories import Trajectories, corrected
+
+
+@pytest.mark.parametrize("smoothing", ["identities", "positions", "none"])
+def test_who_was_away_is_asked_for_first_and_not_again(smoothing: str) -> None:
+    path = walk((-1.1, 0.5, 1.0), (1.1, 0.6, 1.0), 80)
+    other = walk((1.1, -0.7, 1.0), (-1.0, -0.6, 1.0), 80)
+    whole = sequence([(0, path[:30]), (48, path[48:]), (0, other)], 80)
+    run = run_of(whole, (), smoothing=smoothing)
+    assert len(set(run.tracks.ids.tolist())) == 3
+    found = queue(run)
+    first = found.doubts[0]
+    assert first.kind == "join"
+    assert 25 <= first.first < first.last <= 55
+    assert sum(one.probability for one in first.alternatives) == pytest.approx(1.0, abs=0.05)
+    answer = said(first.alternatives[1].corrections, "the same")
+    after = run_of(whole, answer, smoothing=smoothing)
+    assert [one.met for one in after.outcomes] == [True]
+    assert len(set(after.tracks.ids.tolist())) == 2
+    rest = queue(after)
+    assert first.id not in [one.id for one in rest.doubts]
+    kept = run_of(whole, said(first.alternatives[0].corrections), smoothing=smoothing)
+    assert first.id not in [one.id for one in queue(kept).doubts]
+
+
+def test_the_most_at_stake_comes_first() -> None:
+    weights = [one.weight for one in queue(run_of(with_a_gap())).doubts]
+    assert weights == sorted(weights, reverse=True)
+
+
+def test_nobody_is_nothing_to_check() -> None:
+    found = queue(run_of(sequence([], 20)))
+    assert found.doubts == ()
+    assert "nobody" in found.how
+
+
+def test_the_other_run_weighs_a_move_by_who_is_who_there() -> None:
+    run = run_of(sequence(crossing(60), 60))
+    tracks = run.tracks
+    lanes = Lanes(tracks)
+    one, other = (int(track) for track in lanes.ids)
+    places = [lanes.place(one, 29), lanes.place(other, 29), lanes.place(other, 30),
+              lanes.place(one, 30)]  # fmt: skip
+    from tracker.doubts.doubt import unsaid
+
+    swapped: Trajectories = corrected(tracks, unsaid("exchanged", places), 1.0 / 25.0)
+    pieces = [
+        Piece(track, lanes.place(track, 30), lanes.place(track, 29), 30, 30)
+        for track in (one, other)
+    ]
+    move = Move((pieces[0], pieces[1]), (pieces[0], pieces[1]), "exchange", 0.0)
+    assert Opinion(tracks, swapped, 1.0 / 25.0).weighed(move).odds > 0.0
+    assert Opinion(tracks, tracks, 1.0 / 25.0).weighed(move).odds < 0.0
+    told = [m for m in Opinion(tracks, swapped, 1.0 / 25.0).moves() if m.kind == "exchange"]
+    assert told, "it sees the exchange itself"
+    assert abs(told[0].earlier[0].end.step - 29) <= 1
+    assert not list(Opinion(tracks, tracks, 1.0 / 25.0).moves())
+
+
+def test_a_doubt_is_known_again_by_its_places() -> None:
+    run = run_of(with_a_gap())
+    again = [one.id for one in queue(run).doubts]
+    assert again == [one.id for one in queue(run_of(with_a_gap())).doubts]
+    assert len(set(again)) == len(again)
+    assert np.isfinite([one.weight for one in queue(run).doubts]).all()
+    assert Place(3, 1.0, 2.0, 0.8).words == "(1.00, 2.00) at step 3"

@@ -1,0 +1,5 @@
+"""The application that the tests of the workbench share."""
+
+from tests.app.conftest import client, crossing, data
+
+__all__ = ["client", "crossing", "data"]
