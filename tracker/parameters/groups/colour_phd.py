@@ -57,11 +57,12 @@ class ColourPeakParams(Params):
     """Whether a camera without a template of a person gets one from where the others' templates
     and the calibration say that the person is."""
 
-    shapes: Annotated[bool, ui("S_h")] = False
-    """Whether people found by shape are peaks as well, whatever their colours."""
+    shapes: Annotated[Literal["never", "unsure", "always"], ui("S_h", published="never")] = "unsure"
+    """Whether people found by shape are peaks as well, whatever their colours: where the
+    foreground of some camera is not to be believed about somebody with templates, or always."""
 
     shape_odds: Annotated[
-        float, Field(ge=-6.0, le=10.0), ui("ln o", step=0.1, when={"shapes": (True,)})
+        float, Field(ge=-6.0, le=10.0), ui("ln o", step=0.1, when={"shapes": ("unsure", "always")})
     ] = 2.0
     """Logarithm of the odds from which somebody found by shape is taken."""
 

@@ -20,8 +20,15 @@ from tracker.sequences.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.appearance import Appearance, Scene
+from tracker.single_view.colour.trust import template_trust
 from tracker.single_view.protocol import CANDIDATES, DROPPED, TRUST
 from tracker.single_view.shape.finder import ShapeFinder
+
+BELIEVED = 0.9
+"""A foreground that is trusted less than this about somebody is helped by shapes."""
+
+SAME_PERSON = (0.35, 0.5)
+"""Metres across and down within which a peak shows that somebody found by shape is there."""
 
 SHAPE_OVERLAP = 0.3
 """Windows of the shapes that share more than this of what both cover are of one person."""
@@ -76,7 +83,15 @@ class PeakFinder:
             foreground=foreground if p.asks_foreground else None,
             carry_templates=p.carry_templates,
         )
-        self._shapes = ShapeFinder(sequence, camera_index, reader) if p.shapes else None
+        wanted = p.shapes == "always"
+        if p.shapes == "unsure" and p.asks_foreground:
+            # who is doubted in one camera is sought by shape in all: one alone tells no place
+            wanted = any(
+                trust < BELIEVED
+                for camera in range(len(sequence.views))
+                for trust in template_trust(sequence, camera, reader, foreground).values()
+            )
+        self._shapes = ShapeFinder(sequence, camera_index, reader) if wanted else None
 
     @property
     def sizes(self) -> BoxSizes:
@@ -145,8 +160,9 @@ class PeakFinder:
         assert self._shapes is not None
         p = self._parameters
         state, found = self._shapes.find(state, picture, p.shape_odds, SHAPE_OVERLAP)
-        apart = (found.boxes[:, None, :2] - boxes[None, :, :2]) / found.boxes[:, None, 2:]
-        new = found.boxes[((apart**2).sum(axis=2) >= p.merge_distance**2).all(axis=1)]
+        apart = (found.boxes[:, None, :2] - boxes[None, :, :2]) / found.sizes[:, None]
+        taken = (np.abs(apart) < SAME_PERSON).all(axis=2).any(axis=1)
+        new = found.boxes[~taken]
         far = self._appearance.distances(scene, new).min(axis=1) if len(new) else np.zeros(0)
         return state, np.concatenate([boxes, new]), np.concatenate([distances, far])
 
