@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import logging
 import threading
 from collections.abc import Callable, Sequence
@@ -13,7 +12,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from app.state.kept.json_files import write_json
+from app.state.kept.json_files import read_json, write_json
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
 from tracker.corrections import Correction, CorrectionError
@@ -205,7 +204,7 @@ class Correcting:
         """What can be taken back, unless somebody else has changed the log meanwhile."""
         path = self._history_file()
         try:
-            value = json.loads(path.read_text(encoding="utf-8")) if path is not None else None
+            value = read_json(path) if path is not None else None
             if value is None:
                 return
             known = {k: Correction.model_validate(v) for k, v in value["corrections"].items()}

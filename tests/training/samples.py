@@ -121,7 +121,7 @@ def of_room(folder: Path, trees: Trees | None) -> tuple[ndarray, ndarray]:
         factor = min(1.0, PIXELS_PER_METRE / size)
         channels = Channels(background, factor, size * factor, sequence.step_time)
         edges = (windows.edges + 0.5) * np.tile(channels.factors, 2) - 0.5
-        state = channels.start()
+        state = channels.initial()
         for step, sampled in _steps(sequence):
             picture = working.reader.picture(number, step)
             if picture is None:

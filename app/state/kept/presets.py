@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from app.errors import sentence
+from app.errors import FULL, sentence
 from app.state.kept.json_files import read_json, set_aside, write_json
 from app.state.snapshot import Presets
 from app.state.workbench import Workbench
@@ -101,8 +101,12 @@ class OwnPresets:
                 presets = change(self._read(self._path))
                 write_json(self._path, dict(presets))
         except OSError as error:
+            if error.errno in FULL:
+                raise  # the answer says so: it is not the name
             raise ParameterError(
-                "name", f"your presets cannot be saved: {sentence(error)}", "Make room there."
+                "name",
+                f"your presets cannot be saved: {sentence(error)}",
+                "See who may write there.",
             ) from None
         self._workbench.set_presets(presets)
 

@@ -225,7 +225,7 @@ def test_what_cannot_be_used_is_told_and_left_out(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.split()[-1] == "middle"
-    assert len(done.stdout.split()) == 8
+    assert len(done.stdout.split()) == 9
     said = " ".join(done.stderr.split())
     where = "in multiview_phd.single_view of people-trackers 1.2"
     for words in (

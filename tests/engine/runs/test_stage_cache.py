@@ -268,7 +268,7 @@ def test_other_code_has_other_keys(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         ("fusion/model.py", {"fusion", "smoothing", "tracks"}),
         ("smoothing/stage.py", {"smoothing", "tracks"}),
         ("trajectories.py", {"smoothing", "tracks"}),
-        ("evaluation/ospa.py", set()),
+        ("evaluation/measures/ospa.py", set()),
         ("sequences/rendering/walls/paint.py", set()),
     ):
         path = copy / name

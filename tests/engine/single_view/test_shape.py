@@ -75,7 +75,7 @@ def test_another_exposure_neither_moves_nor_differs_and_a_person_does_both() -> 
     background = BackgroundModel.learn([empty] * 3)
     assert background is not None
     channels = Channels(background, 1.0, 40.0, 0.1)
-    state, _ = channels.step(channels.start(), empty)
+    state, _ = channels.step(channels.initial(), empty)
     brighter = cv2.convertScaleAbs(empty, alpha=1.25)
     state, sums = channels.step(state, brighter)
     difference, motion, activity, spread = (sums[-1, -1, 7:] / empty[..., 0].size).tolist()

@@ -80,7 +80,7 @@ class Channels:
         height, width = self._background.picture.shape[:2]
         return self._size[0] / width, self._size[1] / height
 
-    def start(self) -> ChannelState:
+    def initial(self) -> ChannelState:
         """Nothing was seen yet."""
         return ChannelState((), None)
 

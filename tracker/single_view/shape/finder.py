@@ -64,7 +64,7 @@ class ShapeFinder:
 
     def start(self) -> ChannelState | None:
         """The state before the first picture."""
-        return None if self._channels is None else self._channels.start()
+        return None if self._channels is None else self._channels.initial()
 
     def find(
         self,
