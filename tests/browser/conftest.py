@@ -59,7 +59,7 @@ def opened(browser: Browser, server: Server, *, flat: bool = False) -> Iterator[
         context.route("**/viser/**", lambda route: route.abort())
     # what is said once to a new person covers nothing, but moves the panes
     context.add_init_script(
-        "localStorage.page ??= JSON.stringify({ dismissed: ['software', 'tour'] })"
+        "try { localStorage.page ??= JSON.stringify({ dismissed: ['software', 'tour'] }) } catch {}"
     )
     page = context.new_page()
     errors: list[str] = []

@@ -37,15 +37,23 @@ export function mountCheck(root, context) {
 		if (store.get().place === "check" && !chosen && queue?.complete && queue.doubts[0])
 			check.choose(queue.doubts[0]);
 	};
+	let comes = false;
+	/** Who came by its word goes on in the queue, once it is there: there Enter means the place. */
+	const goOn = () => {
+		if (!comes) return;
+		const queue = one(".qlist");
+		if (document.activeElement?.matches('.place[data-go="check"]')) queue.focus();
+		comes = document.activeElement?.matches('.place[data-go="check"]') ?? false;
+	};
 	let before = "";
 	store.watch(["place"], ({ place }) => {
 		if (place === "check" && before !== "check") {
 			actions.showTab("place");
-			// Who came by its word goes on in the queue: there Enter means the place.
-			if (document.activeElement?.matches(".place")) one(".qlist").focus();
+			comes = true;
+			goOn();
 			first();
 		} else if (before === "check" && state.get().other) check.show(0);
 		before = place;
 	});
-	state.on(["queue"], first);
+	state.on(["queue"], () => (first(), goOn()));
 }

@@ -256,8 +256,12 @@ def test_policies_let_through_all_that_the_pages_need(browser: Browser, server: 
         assert [words for words in said if "Content Security Policy" in words] == []
 
 
-def test_what_gets_into_the_page_does_not_run(flat_page: Page) -> None:
-    ran = flat_page.evaluate(
+def test_what_gets_into_the_page_does_not_run(browser: Browser, server: Server) -> None:
+    page = browser.new_page()  # of its own: the policy is to be broken, and says so
+    page.route("**/viser/**", lambda route: route.abort())
+    page.goto(server.address)
+    page.locator(".cam canvas").first.wait_for()
+    ran = page.evaluate(
         """async () => {
           window.ran = [];
           const inside = `<img src=x onerror="ran.push('handler')">
@@ -278,4 +282,5 @@ def test_what_gets_into_the_page_does_not_run(flat_page: Page) -> None:
           return ran;
         }"""
     )
+    page.close()
     assert ran == []

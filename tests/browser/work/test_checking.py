@@ -138,11 +138,12 @@ def test_it_holds_after_a_slider_a_reload_and_is_undone(check: Page, server: Ser
 
 
 def test_who_is_right_is_confirmed_and_who_is_skipped_goes(check: Page, server: Server) -> None:
-    count = places(check).count()
+    server.wait_for_run()
+    until(check, lambda: places(check).count() > 0, "there is something to check")
     check.keyboard.press("y")
     check.keyboard.press("Enter")
-    until(check, lambda: places(check).count() < count, "what is confirmed is done")
-    assert corrections(server)["corrections"] != []
+    until(check, lambda: corrections(server)["corrections"] != [], "what is confirmed is kept")
+    server.wait_for_run()
     assert exchanged(server), "what was confirmed stays as it is"
     left = places(check).count()
     if left:
@@ -157,8 +158,14 @@ def test_the_menu_of_a_lane_works_in_tune_too(
         middle = (HIDDEN.start + HIDDEN.stop) // 2
         ask(server, "POST", "seek", {"step": middle + 12})
         page.locator(".lane").first.click()
-        page.locator(".lane").first.click(button="right")
         menu = page.get_by_role("menu", name="Corrections of track")
+
+        def opens() -> bool:
+            """What makes the menu is read after the first picture."""
+            page.locator(".lane").first.click(button="right")
+            return menu.get_by_role("menuitem").count() > 0
+
+        until(page, opens, "the menu is there")
         expect(menu.get_by_role("menuitem").first).to_be_focused()
         page.keyboard.press("Enter")  # Exchange with…
         page.get_by_role("menu", name="Exchange").get_by_role("menuitem").first.click()
