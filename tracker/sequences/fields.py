@@ -24,6 +24,9 @@ SMALLEST = 1e-4
 SLOWEST, FASTEST = 1e-3, 1000.0
 """Frames a second: from a picture in a quarter of an hour to a high-speed camera."""
 
+LONGEST_NAME = 255
+"""Bytes of the name of a file or folder, as file systems have them."""
+
 LARGEST_COUNT = 10_000_000
 """Of steps, or of frames of a file: four days at 25 a second."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool
 from numpy import ndarray
 
-from tracker.sequences.fields import Fields, did_you_mean, listed
+from tracker.sequences.fields import LONGEST_NAME, Fields, did_you_mean, listed
 from tracker.sequences.numbering import whole_row
 from tracker.sequences.sequence import SequenceError, View
 from tracker.sequences.video import VideoError, index_video, read_image
@@ -61,6 +62,12 @@ def find_images(folder: Path, fields: Fields) -> tuple[tuple[Path, ...], Bool[nd
 def _inside(folder: Path, given: str, fields: Fields, name: str) -> Path:
     """The path, which must stay in the folder, also where a symbolic link leads."""
     path = folder / given
+    longest = max((len(os.fsencode(part)) for part in path.parts), default=0)
+    if longest > LONGEST_NAME:
+        raise fields.error(
+            name,
+            f"expected names of at most {LONGEST_NAME} bytes, found one of {longest}; shorten it",
+        )
     outright = Path(given).is_absolute() or ".." in Path(given).parts
     try:
         leaves = outright or not path.resolve().is_relative_to(folder.resolve())

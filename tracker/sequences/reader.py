@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tracker.sequences.calibration import check_sight
-from tracker.sequences.fields import LARGEST_COUNT, Fields, did_you_mean, shown
+from tracker.sequences.fields import LARGEST_COUNT, LONGEST_NAME, Fields, did_you_mean, shown
 from tracker.sequences.filling import check_missing, find_room, find_time
 from tracker.sequences.sequence import FileState, Sequence, SequenceError
 from tracker.sequences.tables import Reading, read_ground_truth
@@ -26,8 +26,8 @@ FORMAT = 1
 MOST_FRAMES = LARGEST_COUNT
 MOST_BYTES = 4 * 2**20
 """Of a sequence.toml: thousands of templates and entrances."""
-LONGEST_NAME, LONGEST_PATH = 255, 4000
-"""Bytes of the name of a file or folder, and of a whole path, as file systems have them."""
+LONGEST_PATH = 4000
+"""Bytes of a whole path, as file systems have them."""
 MOST_DEPTH = 12
 """Tables and lists within each other; the format itself needs five."""
 

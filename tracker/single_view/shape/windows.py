@@ -15,6 +15,9 @@ from tracker.single_view.box_sizes import upright_boxes
 SPACING = 0.15
 """Metres between the places on the floor."""
 
+MOST_PLACES = 60_000
+"""On the floor; in a hall with more of them they lie further apart."""
+
 CROWNS = (1.05, 1.2, 1.35, 1.5, 1.62, 1.74, 1.86)
 """Metres from the floor to the crown of people who sit, bend and stand."""
 
@@ -76,10 +79,7 @@ class Windows:
     @staticmethod
     def of(camera: Camera, room: Room, half_extents: Float[ndarray, " 3"]) -> Windows:
         """People everywhere on the room's floor, of every height; one window of those alike."""
-        across = [
-            np.arange(low + SPACING / 2.0, high, SPACING)
-            for low, high in zip(room.minimum[:2], room.maximum[:2], strict=True)
-        ]
+        across = _places(room.minimum[:2], room.maximum[:2])
         floor = room.minimum[2]
         grid = np.meshgrid(*across, floor + np.array(CROWNS), indexing="ij")
         crowns = np.stack([axis.ravel() for axis in grid], axis=1)
@@ -92,3 +92,15 @@ class Windows:
         alike = np.concatenate([np.round(places / steps), level], axis=1).astype(np.int64)
         first = np.unique(alike, axis=0, return_index=True)[1]
         return found.take(np.sort(first))
+
+
+def _places(low: Float[ndarray, " 2"], high: Float[ndarray, " 2"]) -> list[Float[ndarray, " K"]]:
+    """Places along both sides of the floor, of which there are not too many together."""
+    spacing, lengths = SPACING, high - low
+    while np.prod(np.ceil(lengths / spacing)) > MOST_PLACES:
+        spacing *= 2.0
+    halves = np.minimum(lengths, spacing) / 2.0  # a side that is shorter has one
+    return [
+        np.arange(begin + half, end, spacing)
+        for begin, end, half in zip(low, high, halves, strict=True)
+    ]
