@@ -183,8 +183,8 @@ def test_every_file_of_a_method_is_registered() -> None:
     for path in (root / "smoothing").rglob("*.py"):
         if "    def smooth(\n" in path.read_text():
             found.add(".".join(path.relative_to(root.parent).with_suffix("").parts))
-    assert found <= loaded
-    assert len(found) > 8
+    measures_for_another = {"tracker.single_view.shape.method"}  # jpda takes its steps
+    assert found | measures_for_another == loaded
 
 
 def without(recording: Sequence, what: str) -> Sequence:
