@@ -7,6 +7,15 @@ export const MOST_PARAMETERS = 6;
 
 /** @typedef {{name: string, of: Server.ObjectiveInfo, at: (trial: Server.TrialInfo) => number | null | undefined}} Measure */
 
+/**
+ * Where elements of these names stand Plotly writes no style sheets of its own, which the page's
+ * policy would not let it: its own, of which css/study.css has what is needed, and one for maps.
+ */
+const STYLED = [
+	"plotly.js-style-global",
+	"9f215cf04c5486422605d13261cb87401f4e7763b6296af81e98efbc0130da53",
+];
+
 /** @type {Promise<any> | null} */
 let reading = null;
 
@@ -19,7 +28,10 @@ export function plotly() {
 			reading = null;
 			reject(new Error("The figures could not be read."));
 		};
-		document.head.append(script);
+		document.head.append(
+			...STYLED.map((id) => h("meta", { id, class: "no-inline-styles" })),
+			script,
+		);
 	});
 	return reading;
 }

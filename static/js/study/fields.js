@@ -46,3 +46,37 @@ export const tag = (word, out, title) =>
 				icon("i-close", "s"),
 			),
 	);
+
+/**
+ * Parameters and their ranges, a row each.
+ * @param {Child} count
+ * @param {Child[]} rows
+ * @param {string} [last]  what a further column is for
+ */
+export const rangesBlock = (count, rows, last) => [
+	h(
+		"h3",
+		{ class: "h" },
+		"Parameters",
+		h("span", { class: "grow" }),
+		h("span", { class: "small" }, count),
+	),
+	h(
+		"table",
+		{ class: "pt" },
+		h(
+			"thead",
+			{},
+			h(
+				"tr",
+				{},
+				h("th", {}, "name"),
+				h("th", { class: "num" }, "from"),
+				h("th", { class: "num" }, "to"),
+				h("th", {}, "scale"),
+				last && h("th", {}, h("span", { class: "vh" }, last)),
+			),
+		),
+		h("tbody", {}, rows),
+	),
+];

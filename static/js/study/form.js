@@ -19,7 +19,7 @@ import { nameOf, symbolOf, valueOf } from "./words.js";
  * @property {string} search
  * @property {string[]} objectives
  */
-/** @typedef {{scheduler: string | null, workers: number}} Where */
+/** @import { Where } from "./where.js" */
 
 const ASKED_MS = 300;
 

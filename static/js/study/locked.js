@@ -1,6 +1,6 @@
 /** What a study that is there tries: it cannot change. */
 import { h } from "../elements/dom.js";
-import { SEARCHES, tag } from "./fields.js";
+import { SEARCHES, rangesBlock, tag } from "./fields.js";
 import { nameOf, symbolOf, valueOf } from "./words.js";
 
 /** @param {Server.Study} study */
@@ -24,44 +24,20 @@ export function lockedParts(study) {
 		h(
 			"div",
 			{ class: "blk" },
-			h(
-				"h3",
-				{ class: "h" },
-				"Parameters",
-				h("span", { class: "grow" }),
-				h("span", { class: "small" }, study.varied.length),
-			),
-			h(
-				"table",
-				{ class: "pt" },
-				h(
-					"thead",
-					{},
+			rangesBlock(
+				study.varied.length,
+				study.varied.map(({ label, symbol, help, low, high, log, choices: all }) =>
 					h(
 						"tr",
 						{},
-						h("th", {}, "name"),
-						h("th", { class: "num" }, "from"),
-						h("th", { class: "num" }, "to"),
-						h("th", {}, "scale"),
-					),
-				),
-				h(
-					"tbody",
-					{},
-					study.varied.map(({ label, symbol, help, low, high, log, choices: all }) =>
-						h(
-							"tr",
-							{},
-							h("td", { title: help }, h("span", { class: "lab" }, label), " ", symbolOf(symbol)),
-							all.length
-								? h("td", { class: "num", colspan: 3 }, all.map(valueOf).join(", "))
-								: [
-										h("td", { class: "num" }, valueOf(low)),
-										h("td", { class: "num" }, valueOf(high)),
-										h("td", {}, log ? "log" : "linear"),
-									],
-						),
+						h("td", { title: help }, h("span", { class: "lab" }, label), " ", symbolOf(symbol)),
+						all.length
+							? h("td", { class: "num", colspan: 3 }, all.map(valueOf).join(", "))
+							: [
+									h("td", { class: "num" }, valueOf(low)),
+									h("td", { class: "num" }, valueOf(high)),
+									h("td", {}, log ? "log" : "linear"),
+								],
 					),
 				),
 			),

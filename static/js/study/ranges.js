@@ -1,6 +1,6 @@
 /** How far each parameter is varied. */
 import { choices, h, icon } from "../elements/dom.js";
-import { numberField } from "./fields.js";
+import { numberField, rangesBlock } from "./fields.js";
 import { symbolOf, valueOf } from "./words.js";
 
 /** @import { Wish } from "./form.js" */
@@ -42,34 +42,10 @@ export function parameterRanges(now, known, all, on) {
 	return h(
 		"div",
 		{ class: "blk" },
-		h(
-			"h3",
-			{ class: "h" },
-			"Parameters",
-			h("span", { class: "grow" }),
-			h("span", { class: "small" }, `${Object.keys(now.parameters).length} of ${all.length}`),
-		),
-		h(
-			"table",
-			{ class: "pt" },
-			h(
-				"thead",
-				{},
-				h(
-					"tr",
-					{},
-					h("th", {}, "name"),
-					h("th", { class: "num" }, "from"),
-					h("th", { class: "num" }, "to"),
-					h("th", {}, "scale"),
-					h("th", {}, h("span", { class: "vh" }, "leave out")),
-				),
-			),
-			h(
-				"tbody",
-				{},
-				Object.entries(now.parameters).map(([key, range]) => parameter(now, known, key, range, on)),
-			),
+		rangesBlock(
+			`${Object.keys(now.parameters).length} of ${all.length}`,
+			Object.entries(now.parameters).map(([key, range]) => parameter(now, known, key, range, on)),
+			"leave out",
 		),
 		more,
 	);

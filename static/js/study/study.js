@@ -227,7 +227,7 @@ export function mountStudy(root, { store, actions }) {
 		);
 	}
 
-	/** @param {import("./form.js").Wish} wish @param {import("./form.js").Where} where */
+	/** @param {import("./form.js").Wish} wish @param {import("./where.js").Where} where */
 	async function start(wish, where) {
 		const made = await actions.ask("POST", "studies", wish);
 		if (!made) return;
