@@ -1,9 +1,12 @@
-"""The assignment of least cost, whose library is imported when it is first needed.
+"""Who gets what: the assignment of least cost, and names by majority.
 
-SciPy's optimisers are slow to import; a server that only shows its page need not wait for them.
+SciPy's optimisers are slow to import; a server that only shows its page need not wait for them:
+they are read when they are first needed.
 """
 
 from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 
 from jaxtyping import Float, Int
 from numpy import ndarray
@@ -33,3 +36,26 @@ def linear_sum_assignment(
 
     rows, columns = optimize.linear_sum_assignment(cost, maximize=maximize)
     return rows, columns
+
+
+def names_by_majority(counts: Sequence[Mapping[int, int]], largest: int) -> list[int]:
+    """A name for each group: the one that it has most of, where no other group has more of it.
+
+    Args:
+        counts: Of each group how often it has each name.
+        largest: Groups that get none of theirs get new names from the next one on.
+    """
+    votes = [
+        (-count, name, group) for group, own in enumerate(counts) for name, count in own.items()
+    ]
+    names: dict[int, int] = {}
+    taken: set[int] = set()
+    for _, name, group in sorted(votes):
+        if group not in names and name not in taken:
+            names[group] = name
+            taken.add(name)
+    for group in range(len(counts)):
+        if group not in names:
+            largest += 1
+            names[group] = largest
+    return [names[group] for group in range(len(counts))]

@@ -5,12 +5,14 @@ Also what shows at once, while a run that obeys them is computed.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence as Many
 
 import numpy as np
 from jaxtyping import Int
 from numpy import ndarray
 
+from tracker.assignment import names_by_majority
 from tracker.corrections.kinds import Correction, Place
 from tracker.corrections.seeking import Whereabouts, mostly_inside
 
@@ -110,21 +112,12 @@ def relabelled(
                 within = rows[inside[rows]]
                 gone.update(rows[(frames[rows] >= frames[within[0]])
                                  & (frames[rows] <= frames[within[-1]])].tolist())  # fmt: skip
-    result, free = np.empty(len(ids), dtype=np.int64), int(ids.max(initial=0)) + 1
+    result = np.empty(len(ids), dtype=np.int64)
     firsts = [n for n in range(len(segments.rows)) if segments.before(n) < 0]
     chains = [np.concatenate([segments.rows[n] for n in segments.chain(f)]) for f in firsts]
-    votes = []
-    for number, rows in enumerate(chains):
-        names, counts = np.unique(ids[rows], return_counts=True)
-        votes += [(-c, n, number) for n, c in zip(names.tolist(), counts.tolist(), strict=True)]
-    labels: dict[int, int] = {}
-    for _, name, number in sorted(votes):
-        if number not in labels and name not in labels.values():
-            labels[number] = name
-    for number, rows in enumerate(chains):
-        if number not in labels:
-            labels[number], free = free, free + 1
-        result[rows] = labels[number]
+    counts = [Counter(ids[rows].tolist()) for rows in chains]
+    for rows, name in zip(chains, names_by_majority(counts, int(ids.max(initial=0))), strict=True):
+        result[rows] = name
     kept = np.array(sorted(set(range(len(ids))) - gone), dtype=np.int64)
     return result, kept
 

@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.special import logsumexp
 
+from tracker.assignment import names_by_majority
 from tracker.corrections import Correction
 from tracker.corrections.kinds import leeway as corrections_leeway
 from tracker.fusion import visibility
@@ -363,24 +364,12 @@ def _most(names: ndarray, weights: ndarray) -> int:
 def _labels(cut: Paths, chains: list[list[int]]) -> list[int]:
     """A label for each chain: that of most of its rows, where no other chain has more of it."""
     lengths = np.diff(cut.starts)
-    votes: list[tuple[int, int, int]] = []
-    for number, chain in enumerate(chains):
+    counts = []
+    for chain in chains:
         names, which = np.unique(cut.labels[chain], return_inverse=True)
-        counts = np.bincount(which, lengths[chain])
-        votes += [
-            (-int(count), int(name), number) for name, count in zip(names, counts, strict=True)
-        ]
-    labels = [-1] * len(chains)
-    taken: set[int] = set()
-    for _, name, number in sorted(votes):
-        if labels[number] < 0 and name not in taken:
-            labels[number] = name
-            taken.add(name)
-    free = int(cut.labels.max(initial=0)) + 1
-    for number, label in enumerate(labels):
-        if label < 0:
-            labels[number], free = free, free + 1
-    return labels
+        rows = np.bincount(which, lengths[chain]).astype(np.int64)
+        counts.append(dict(zip(names.tolist(), rows.tolist(), strict=True)))
+    return names_by_majority(counts, int(cut.labels.max(initial=0)))
 
 
 def _chained(

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import io
-import os
-import tempfile
 import tomllib
 import zipfile
 from pathlib import Path
 from typing import Any
 
 from tracker.folders import cache_folder
-from tracker.placing import filling
+from tracker.placing import filling, write_whole
 from tracker.sequences.library import open_sequence
 from tracker.sequences.reader import FILE
 from tracker.sequences.sequence import Sequence, SequenceError
@@ -58,14 +57,9 @@ def content_of(sequence: Sequence) -> str:
         with path.open("rb") as file:
             digest.update(hashlib.file_digest(file, "sha256").digest())
     content = digest.hexdigest()[:24]
-    try:
+    with contextlib.suppress(OSError):  # it is found out anew the next time
         known.parent.mkdir(parents=True, exist_ok=True)
-        handle, begun = tempfile.mkstemp(dir=known.parent)
-        with os.fdopen(handle, "w", encoding="ascii") as file:
-            file.write(content)
-        os.replace(begun, known)
-    except OSError:
-        pass  # it is found out anew the next time
+        write_whole(known, content.encode("ascii"))
     return content
 
 
