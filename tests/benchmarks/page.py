@@ -80,7 +80,7 @@ LANES = """async ([lanes, steps, runs]) => {
     const g = prepare(canvas, 1254, 40 * 14 + 34);
     const pen = (y, height) => ({ g, view, ink: palette(), row: { y, height } });
     drawLanes(pen(34, 40 * 14), { tracks, pinned: [], scroll: 0, laneHeight: 14, done: steps,
-      selection: 3, hover: null, switches: [] });
+      selection: 3, hover: null, switches: [], decisions: [] });
     drawRange(pen(0, 14), [1, 2, 3], steps, steps);
     drawRuler(pen(14, 20), [null, null]);
     times.push(performance.now() - begin);

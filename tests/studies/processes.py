@@ -37,13 +37,13 @@ def finish(store: Store, *words: str) -> str:
     """The program runs a study to its end; what it said."""
     done = subprocess.run(
         command("study", "resume", str(store.folder), *words),
-        capture_output=True, text=True, timeout=280,
+        capture_output=True, text=True, timeout=900,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return done.stdout + done.stderr
 
 
-def wait(holds: Callable[[], Any], seconds: float = 120.0) -> Any:
+def wait(holds: Callable[[], Any], seconds: float = 300.0) -> Any:
     """Wait for something that another process brings about."""
     until = time.monotonic() + seconds
     while not (found := holds()):

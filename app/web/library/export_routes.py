@@ -160,10 +160,13 @@ def stop(exporter: Out) -> ExportInfo:
     return ExportInfo(**asdict(exporter.now))
 
 
+MEDIA: dict[str, dict[str, str]] = {form.media: {} for form in FORMATS.values()}
+
+
 @router.get(
     "/file",
     response_class=FileResponse,
-    responses={200: {"content": {"application/octet-stream": {}}, "description": "The file."}},
+    responses={200: {"content": MEDIA, "description": "The file."}},
 )
 def file(exporter: Out) -> FileResponse:
     """What the newest export wrote."""

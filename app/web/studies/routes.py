@@ -33,6 +33,13 @@ RUN_BYTES, TRIAL_BYTES = 2500, 4000
 
 SECONDS_FOR_A_SCHEDULER = 5.0
 
+KINDS = {
+    "report.html": "text/html; charset=utf-8",
+    "trials.csv": "text/csv; charset=utf-8",
+    "study.json": "application/json",
+}
+"""What a study is exported as, and the kind of each file."""
+
 
 def _desk(request: Request) -> StudyDesk:
     desk: StudyDesk = request.app.state.studies
@@ -376,18 +383,17 @@ def _proposed(store: Store, bench: Bench) -> dict[str, object]:
 @router.get(
     "/{name}/export/{file}",
     response_class=Response,
-    responses={200: {"content": {"text/html": {}}, "description": "The file."}},
+    responses={200: {"content": {kind: {} for kind in KINDS.values()}, "description": "The file."}},
 )
 def export(store: Named, file: Literal["report.html", "trials.csv", "study.json"]) -> Response:
     """A study as a report, a table, or everything."""
     from tracker.studies.told import report  # and with it the library of plots
 
-    writers = {
-        "report.html": (report.write_report, "text/html; charset=utf-8"),
-        "trials.csv": (report.write_csv, "text/csv; charset=utf-8"),
-        "study.json": (report.write_json, "application/json"),
-    }
-    write, kind = writers[file]
+    write = {
+        "report.html": report.write_report,
+        "trials.csv": report.write_csv,
+        "study.json": report.write_json,
+    }[file]
     try:
         with tempfile.TemporaryDirectory(prefix="multiview-phd-study-") as folder:
             path = Path(folder) / file
@@ -398,7 +404,7 @@ def export(store: Named, file: Literal["report.html", "trials.csv", "study.json"
     name = file_name(store.name, file)
     return Response(
         data,
-        media_type=kind,
+        media_type=KINDS[file],
         headers={
             "content-disposition": f'attachment; filename="{name}"',
             "cache-control": "no-store",

@@ -23,18 +23,18 @@ def test_a_pinned_run_is_compared_with_the_engines_figures(flat_page: Page, serv
     expect(pin).to_be_enabled(timeout=20_000)
     pin.click()
     server.wait(lambda state: state["pinned"] is not None)
-    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.3}})
+    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.15}})
     server.wait_for_run()
     differing = page.get_by_role("table", name="Parameters that differ")
     expect(differing.locator("tbody tr")).to_have_count(1, timeout=20_000)
-    expect(differing).to_contain_text("0.3")
+    expect(differing).to_contain_text("0.15")
     page.get_by_role("button", name="All figures").click()
 
     sequence = open_sequence(str(server.folder))
     defaults = pipeline.default_parameters(sequence)
     runs = [
         pipeline.compute(sequence, parameters, seed=0)
-        for parameters in (defaults, with_values(defaults, {P_D: 0.3}))
+        for parameters in (defaults, with_values(defaults, {P_D: 0.15}))
     ]
     assert runs[0].tracks.positions.tolist() != runs[1].tracks.positions.tolist()
     rows = compare(*(evaluate_sequence(sequence, run.tracks) for run in runs))

@@ -54,8 +54,10 @@ class Writer:
             self._connection = sqlite3.connect(self._path, timeout=10.0, isolation_level=None)
             self._connection.execute("PRAGMA journal_mode = WAL")
             self._connection.execute("PRAGMA synchronous = NORMAL")
+            self._connection.execute("BEGIN IMMEDIATE")  # a reader finds all tables, or none
             for table in _TABLES:
                 self._connection.execute(table)
+            self._connection.execute("COMMIT")
             rows = self._connection.execute("SELECT key, outcome FROM jobs").fetchall()
         self._outcomes = {key: text for key, text in rows}
 
