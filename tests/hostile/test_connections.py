@@ -23,7 +23,8 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
-from app.web import connections, server
+from app.web import server
+from app.web.access import connections
 from tests.app.conftest import wait_until
 
 VISER = Subprotocol(f"viser-v{viser.__version__}")

@@ -12,9 +12,9 @@ from numpy import ndarray
 
 from tracker.sequences.calibration import POSE, read_camera
 from tracker.sequences.clock import FIELDS, Timing, read_timing
-from tracker.sequences.containers import MOST_PIXELS
 from tracker.sequences.fields import Fields, shown
-from tracker.sequences.media import Pictures, check_pictures, find_images, locate, probe
+from tracker.sequences.pictures.containers import MOST_PIXELS
+from tracker.sequences.pictures.media import Pictures, check_pictures, find_images, locate, probe
 from tracker.sequences.sequence import View
 from tracker.sequences.tables import BoxTable, Reading, read_box_table
 
