@@ -182,6 +182,9 @@ class _StoppingReader:
     def iterate(self, camera: int, first: int = 0) -> Iterator[Picture | None]:
         return self._reader.iterate(camera, first)
 
+    def empty(self, camera: int) -> Picture | None:
+        return self._reader.empty(camera)
+
     def once(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
         self.check()
         return self._reader.once(name, make)

@@ -108,6 +108,9 @@ class _WorkingReader:
         for picture in self._reader.iterate(camera, first):
             yield self._look(camera, picture)
 
+    def empty(self, camera: int) -> Picture | None:
+        return self._look(camera, self._reader.empty(camera))
+
     def once(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
         return self._reader.once(("working", self._key, name), make)
 
