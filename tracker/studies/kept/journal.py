@@ -91,11 +91,11 @@ class Journal:
         self._size += len(data)
 
 
-def storage(journal: Journal, *, minimized: bool | None) -> Any:
+def storage(journal: Any, *, minimized: bool | None) -> Any:
     """Optuna's storage over a journal.
 
     Args:
-        journal: Of the study.
+        journal: A :class:`Journal`, which Optuna takes for a backend as it stands.
         minimized: Of a search by TPE whether the smallest value is the best; None of other
             searches, which look at all trials.
     """
