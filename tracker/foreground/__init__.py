@@ -8,6 +8,8 @@ pictures (:mod:`~tracker.foreground.adaptive`).
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import UInt8
 from numpy import ndarray
@@ -18,7 +20,7 @@ from tracker.foreground.motion import MovingForeground
 from tracker.foreground.segmentation import ForegroundModel, Segmentation, pack, unpack
 from tracker.foreground.shares import box_shares, integral, shape_scores, shape_shares
 from tracker.parameters.groups.foreground import ForegroundParams
-from tracker.sequences.frames import Pictures
+from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 
 __all__ = [
@@ -70,7 +72,9 @@ def learn(
         first = reader.once(
             ("first background", camera_index, follow),
             lambda: first_background(
-                _spread(sequence, camera_index, reader), follow_exposure=follow, check=reader.check
+                _empty(sequence, camera_index, reader) or _spread(sequence, camera_index, reader),
+                follow_exposure=follow,
+                check=reader.check,
             ),
         )
         return None if first is None else AdaptiveForeground(first, parameters)
@@ -89,22 +93,42 @@ def learn_background(
 ) -> BackgroundModel | None:
     """The empty scene as one camera sees it, learnt once; None where it has not a single picture.
 
+    Where the recording says what the empty scene looks like, the clip tells only how much
+    its pixels vary.
+
     Args:
         sequence: Whose camera.
         camera_index: Which one.
         reader: Of its pictures.
     """
-    return reader.once(
-        ("background", camera_index),
-        lambda: BackgroundModel.learn(_spread(sequence, camera_index, reader), reader.check),
-    )
+
+    def made() -> BackgroundModel | None:
+        learnt = BackgroundModel.learn(_spread(sequence, camera_index, reader), reader.check)
+        empty = BackgroundModel.learn(_empty(sequence, camera_index, reader), reader.check)
+        if learnt is None or empty is None:
+            return learnt
+        return replace(learnt, picture=empty.picture, restlessness=0.0)
+
+    return reader.once(("background", camera_index), made)
+
+
+def _empty(
+    sequence: Sequence, camera_index: int, reader: Pictures
+) -> list[UInt8[ndarray, "h w 3"]]:
+    """Pictures on which nobody is, as far as the recording tells of some."""
+    stated = sequence.views[camera_index].background
+    if isinstance(stated, range):
+        return _spread(sequence, camera_index, reader, stated)
+    picture = reader.empty(camera_index)
+    return [] if picture is None else [picture]
 
 
 def _spread(
-    sequence: Sequence, camera_index: int, reader: Pictures
+    sequence: Sequence, camera_index: int, reader: Pictures, among: range | None = None
 ) -> list[UInt8[ndarray, "h w 3"]]:
-    """Pictures spread over the clip."""
-    count = min(BACKGROUND_PICTURES, sequence.frames)
-    steps = np.linspace(0, sequence.frames - 1, count).astype(int)
+    """Pictures spread over the clip, or over some of its steps."""
+    among = range(sequence.frames) if among is None else among
+    count = min(BACKGROUND_PICTURES, len(among))
+    steps = np.linspace(among[0], among[-1], count).astype(int)
     found = (reader.picture(camera_index, int(step)) for step in steps)
     return [picture for picture in found if picture is not None]

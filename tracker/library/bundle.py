@@ -28,7 +28,7 @@ from tracker.library.records import KeptRun, Result
 from tracker.library.store import parameters_of
 from tracker.placing import replacing, zip_folder
 from tracker.sequences.clock import FIELDS as CLOCK
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
 FORMAT = 1
@@ -45,8 +45,8 @@ _UNREADABLE = (
 """What the standard library raises of an archive that is none, or of a spoilt or locked one."""
 
 _QUALITY = {"preset": "veryfast", "crf": "32"}
-_ANEW = ("video", "images", "first_frame", "detections", "detections_first_frame",
-         "detected_steps", *CLOCK)  # fmt: skip
+_ANEW = ("video", "images", "first_frame", "background", "detections",
+         "detections_first_frame", "detected_steps", *CLOCK)  # fmt: skip
 """Fields of a camera that are written anew, by steps; its calibration stays as it is."""
 
 
@@ -130,6 +130,11 @@ def _write_sequence(folder: Path, sequence: Sequence, videos: bool) -> None:
         if videos and view.has_pictures:
             camera["video"] = f"camera{index + 1}.mp4"
             _write_video(folder / camera["video"], sequence, index)
+            if isinstance(view.background, range):
+                camera["background"] = [view.background[0], view.background[-1]]
+            elif view.background is not None:
+                camera["background"] = f"camera{index + 1}-empty{view.background.suffix}"
+                shutil.copyfile(view.background, folder / camera["background"])
         cameras.append(camera)
     document["camera"] = cameras
     if not videos:

@@ -12,7 +12,7 @@ import numpy as np
 
 from tracker import single_view
 from tracker.runs.run import Cancelled, Run
-from tracker.sequences.frames import Picture, Pictures
+from tracker.sequences.pictures.frames import Picture, Pictures
 from tracker.single_view.colour.likeness import Likeness, looks_of
 from tracker.single_view.protocol import SingleViewMethod, ViewResult
 from tracker.single_view.working.sequence import Working
@@ -181,6 +181,9 @@ class _StoppingReader:
 
     def iterate(self, camera: int, first: int = 0) -> Iterator[Picture | None]:
         return self._reader.iterate(camera, first)
+
+    def empty(self, camera: int) -> Picture | None:
+        return self._reader.empty(camera)
 
     def once(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
         self.check()

@@ -92,6 +92,10 @@ class Fields:
     def __contains__(self, name: str) -> bool:
         return name in self._values
 
+    def is_list(self, name: str) -> bool:
+        """Whether the field is there and holds a list."""
+        return isinstance(self._values.get(name), list)
+
     def error(self, name: str, message: str) -> SequenceError:
         """An error about one field."""
         return SequenceError(f"{self.where}, {name}: {message}")

@@ -124,6 +124,9 @@ class View:
     """At which steps the detector had a picture; None where it had one at every step."""
     there: Bool[ndarray, " N"] | None = None
     """Which frames of the video or image list were there on opening; None where nobody looked."""
+    background: Path | range | None = None
+    """A picture of the empty scene, or the steps at which nobody is there; None where the
+    background has to be learnt from whatever the clip shows."""
 
     @property
     def has_pictures(self) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,15 +12,23 @@ from numpy import ndarray
 
 from tracker.sequences.calibration import POSE, read_camera
 from tracker.sequences.clock import FIELDS, Timing, read_timing
-from tracker.sequences.containers import MOST_PIXELS
 from tracker.sequences.fields import Fields, shown
-from tracker.sequences.media import Pictures, check_pictures, find_images, locate, probe
+from tracker.sequences.pictures.containers import MOST_PIXELS
+from tracker.sequences.pictures.media import (
+    Pictures,
+    check_pictures,
+    check_size,
+    find_images,
+    locate,
+    probe,
+)
+from tracker.sequences.pictures.video import read_image
 from tracker.sequences.sequence import View
 from tracker.sequences.tables import BoxTable, Reading, read_box_table
 
 CAMERA = (
-    "name", "image_size", "video", "images", "first_frame", *FIELDS, "detections",
-    "detections_first_frame", "detected_steps", *POSE, "projection",
+    "name", "image_size", "video", "images", "first_frame", *FIELDS, "background",
+    "detections", "detections_first_frame", "detected_steps", *POSE, "projection",
 )  # fmt: skip
 """The fields of a camera."""
 
@@ -125,7 +133,38 @@ def _view(source: Source, time: Time, reading: Reading) -> View:
     )
     if pictures is not None:
         reading.warnings += check_pictures(view, pictures, fields, time.steps)
-    return view
+    if "background" not in fields:
+        return view
+    return replace(view, background=_background(view, fields, time.steps, reading))
+
+
+def _background(view: View, fields: Fields, steps: int, reading: Reading) -> Path | range:
+    """What shows the scene without anybody: a picture, or some steps.
+
+    Raises:
+        SequenceError: If the camera has no pictures that could be compared with it, if it is
+            neither, cannot be read, is of another size, or names steps that are not there.
+    """
+    if not view.has_pictures:
+        raise fields.error(
+            "background", "expected a camera with a video or images, found one without; remove it"
+        )
+    if not fields.is_list("background"):
+        path = locate(reading.folder, fields, "background")
+        reading.files.append(path)
+        picture = read_image(path)
+        if picture is None:
+            raise fields.error("background", f'"{path.name}" cannot be read as a picture')
+        check_size(view, fields, (picture.shape[1], picture.shape[0]), "background")
+        return path
+    first, last = fields.vector("background", 2, "the first and the last step without anybody")
+    if first != int(first) or last != int(last) or not 0 <= first <= last < steps:
+        raise fields.error(
+            "background",
+            f"expected the first and the last step without anybody, whole numbers from 0 to "
+            f"{steps - 1}, found {first:g} and {last:g}",
+        )
+    return range(int(first), int(last) + 1)
 
 
 def _image_size(fields: Fields, pictures: Pictures | None) -> tuple[int, int]:

@@ -13,7 +13,7 @@ from numpy import ndarray
 from tracker.boxes import Boxes
 from tracker.foreground import box_shares, integral, learn
 from tracker.parameters import ForegroundParams
-from tracker.sequences.frames import Pictures
+from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template
 
 NOTHING, ENOUGH = 0.1, 0.3

@@ -10,7 +10,7 @@ import numpy as np
 
 from tracker.boxes import Boxes
 from tracker.foreground import pack, unpack
-from tracker.sequences.frames import Picture, Pictures
+from tracker.sequences.pictures.frames import Picture, Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 from tracker.single_view.working.view import WorkingView, working_view
@@ -107,6 +107,9 @@ class _WorkingReader:
     def iterate(self, camera: int, first: int = 0) -> Iterator[Picture | None]:
         for picture in self._reader.iterate(camera, first):
             yield self._look(camera, picture)
+
+    def empty(self, camera: int) -> Picture | None:
+        return self._look(camera, self._reader.empty(camera))
 
     def once(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
         return self._reader.once(("working", self._key, name), make)

@@ -11,13 +11,14 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from jaxtyping import UInt8
 from numpy import ndarray
 
+from tracker.sequences.pictures.video import VideoDecoder, VideoError, index_video, read_image
 from tracker.sequences.sequence import Sequence, View
-from tracker.sequences.video import VideoDecoder, VideoError, index_video, read_image
 
 _Made = TypeVar("_Made")
 
@@ -45,6 +46,10 @@ class Pictures(Protocol):
 
     def iterate(self, camera: int, first: int = 0) -> Iterator[Picture | None]:
         """The pictures of one camera from one step to the last."""
+        ...
+
+    def empty(self, camera: int) -> Picture | None:
+        """The picture of a camera's empty scene, BGR; None where the recording has none."""
         ...
 
     def once(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
@@ -142,6 +147,13 @@ class FrameReader:
         finally:
             source.close()
 
+    def empty(self, camera: int) -> Picture | None:
+        """The picture of a camera's empty scene, BGR; None where the recording has none."""
+        view = self._sequence.views[camera]
+        if not isinstance(view.background, Path):
+            return None
+        return _of_its_size(view, read_image(view.background))
+
     def once(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
         """What follows from the pictures alone, made when it is first asked for.
 
@@ -205,6 +217,12 @@ class FrameReader:
                     self._cache.put(camera, step, source.read(step))
 
 
+def _of_its_size(view: View, picture: Picture | None) -> Picture | None:
+    """None for a picture that is not of the camera's size."""
+    width, height = view.camera.image_size
+    return picture if picture is not None and picture.shape[:2] == (height, width) else None
+
+
 @dataclass(slots=True)
 class _Walk:
     """How somebody moves through the steps of one camera, and what is to be read ahead."""
@@ -258,8 +276,7 @@ class _Source:
             picture = self._read_video(frame)
         elif frame < len(self.view.images):
             picture = read_image(self.view.images[frame])
-        width, height = self.view.camera.image_size
-        return picture if picture is not None and picture.shape[:2] == (height, width) else None
+        return _of_its_size(self.view, picture)
 
     def _read_video(self, frame: int) -> Picture | None:
         if self._decoder is None:

@@ -13,9 +13,9 @@ from jaxtyping import Bool
 from numpy import ndarray
 
 from tracker.sequences.fields import LONGEST_NAME, Fields, did_you_mean, listed
-from tracker.sequences.numbering import whole_row
+from tracker.sequences.pictures.numbering import whole_row
+from tracker.sequences.pictures.video import VideoError, index_video, read_image
 from tracker.sequences.sequence import SequenceError, View
-from tracker.sequences.video import VideoError, index_video, read_image
 
 
 def locate(folder: Path, fields: Fields, name: str) -> Path:
@@ -129,9 +129,9 @@ def check_pictures(view: View, found: Pictures, fields: Fields, frames: int) -> 
         SequenceError: If they have another size.
     """
     if view.video is not None:
-        _check_size(view, fields, found.size, "frame size")
+        check_size(view, fields, found.size, "frame size")
         return list(_short(view, found.frames, frames, "video has"))
-    _check_size(view, fields, found.size, "image size")
+    check_size(view, fields, found.size, "image size")
     warnings = [*_holes(view), *_short(view, found.frames, frames, "images are")]
     by_number = sorted(view.images, key=_by_number)
     for first, other in zip(by_number, view.images, strict=True):
@@ -145,7 +145,12 @@ def check_pictures(view: View, found: Pictures, fields: Fields, frames: int) -> 
     return warnings
 
 
-def _check_size(view: View, fields: Fields, found: tuple[int, int], what: str) -> None:
+def check_size(view: View, fields: Fields, found: tuple[int, int], what: str) -> None:
+    """Whether pictures are as large as their camera's calibration says.
+
+    Raises:
+        SequenceError: If they are not.
+    """
     expected = view.camera.image_size
     if found != expected:
         raise SequenceError(
