@@ -265,7 +265,10 @@ class Stream:
 
 
 def _notice(notice: Notice) -> str:
-    return json.dumps({"type": "notice", **asdict(notice)})
+    told = {"type": "notice", **asdict(notice)}
+    if notice.report is None:
+        del told["report"]
+    return json.dumps(told)
 
 
 def _remind(page: _Page) -> None:
