@@ -17,6 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.command import supervision
 from app.command.arguments.corrections import Corrections
 from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
 from app.command.arguments.library import Bundle, LibraryCommand, OpenRun, Runs
@@ -49,6 +50,8 @@ TRACEBACK = "MULTIVIEW_PHD_TRACEBACK"
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit status."""
+    if arguments is None and sys.argv[1:2] == ["serve"]:
+        return supervision.keep_up(lambda: main(sys.argv[1:]))
     try:
         status = _run(parse(arguments))
         sys.stdout.flush()  # a pipe that is closed raises here, where it is caught, not at exit
@@ -198,7 +201,9 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
             "--no-token",
             f"expected --host of this machine alone, got {command.host}: others need one",
         )
-    keys = Keys(own_token(os.environ) or new_token()) if command.token else None
+    life = supervision.life  # the starts after a crash have token and port of the one before
+    new = new_token() if life is None else life.token
+    keys = Keys(own_token(os.environ) or new) if command.token else None
     place = locate(command.sequence, command.data)
     if place not in rendering.ROOMS:
         library.open_sequence(place)  # what cannot be read is told here, before a page is open
@@ -206,8 +211,12 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
         from tracker.single_view.onnx.network import Network, Settings
 
         Network(command.detector, Settings())  # likewise
-    listener = _listen(command)
+    listener = _listen(
+        command if life is None or life.port is None else replace(command, port=life.port)
+    )
     port = listener.getsockname()[1]
+    if life is not None:
+        life.listens(port)
     host = f"[{command.host}]" if ":" in command.host else command.host
     shown = "127.0.0.1" if command.host == "0.0.0.0" else "[::1]" if host == "[::]" else host
     address = f"http://{shown}:{port}/"
@@ -218,6 +227,9 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
         return address if key is None else f"{address}?{PARAMETER}={key}"
 
     def ready() -> None:
+        if life is not None and life.ended is not None:
+            say(f"it is back at {address}")
+            return
         sys.stdout.write(f"multiview-phd: {link(keys.token if keys else None)} (Ctrl-C ends it)\n")
         sys.stdout.flush()
         if command.open:
@@ -239,6 +251,7 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
             memory=None if command.memory is None else int(command.memory * 2**30),
             run=run,
             say=say,
+            ended=None if life is None else life.ended,
         )
     )
     try:
