@@ -115,6 +115,21 @@ class Writer:
             ) from None
 
     @contextmanager
+    def together(self) -> Iterator[None]:
+        """What is kept and ended within is written down at the end, by one transaction.
+
+        It is written down too where something else goes wrong within.
+        """
+        with self._told():
+            self._connection.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+        finally:
+            with self._told():
+                if self._connection.in_transaction:  # a full disk has ended it already
+                    self._connection.execute("COMMIT")
+
+    @contextmanager
     def _told(self) -> Iterator[None]:
         try:
             yield
