@@ -62,6 +62,7 @@ def test_a_room_has_only_so_many_steps(tmp_path: Path) -> None:
         render_random(SEED, tmp_path / "room", frames=9999)
 
 
+@pytest.mark.full
 def test_pictures_and_files_are_the_same_again(tmp_path: Path, rendered: Path) -> None:
     render_random(SEED, tmp_path / "again", frames=STEPS)
     """But for a detector's boxes, which are there only when they are asked for."""

@@ -263,6 +263,7 @@ def test_visibility_has_a_row_for_every_true_position(rendered: Path) -> None:
     assert np.nanmedian(visible) > 0.9
 
 
+@pytest.mark.full
 def test_the_same_seed_gives_the_same_files(tmp_path: Path) -> None:
     for name, seed in (("a", 3), ("b", 3), ("c", 4)):
         render("room35-2p", tmp_path / name, frames=3, cameras=3, seed=seed)
@@ -284,6 +285,7 @@ def test_the_same_seed_gives_the_same_files(tmp_path: Path) -> None:
     assert read_visibility(tmp_path / "a").size == 0
 
 
+@pytest.mark.full
 def test_progress_is_told_and_cancelling_leaves_nothing(tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
     render(

@@ -19,7 +19,7 @@ from tracker.runs.gaps import where_to_keep
 from tracker.runs.run import Cancelled, Progress, Run, stage_keys
 from tracker.runs.single_views import Cancel, SingleViews
 from tracker.runs.stage_cache import FusionColumn, StageCache, TrackColumn, ViewColumn
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.trajectories import Bounds, Trajectories, corrected
 

@@ -183,8 +183,8 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     gc.disable()  # a seventh of the time: nothing that is imported ever goes
     from app.state.workers.jobs import locate
     from app.web import server
-    from app.web.access import PARAMETER, Keys, new_token, own_token
-    from app.web.security import is_loopback
+    from app.web.access.security import is_loopback
+    from app.web.access.tokens import PARAMETER, Keys, new_token, own_token
     from tracker.library.records import Result
     from tracker.sequences import library, rendering
 

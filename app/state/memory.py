@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 
 from tracker.runs.stage_cache import MEMORY_BYTES
-from tracker.sequences.frames import CACHE_BYTES
+from tracker.sequences.pictures.frames import CACHE_BYTES
 
 LEAST_BYTES = 64 << 20
 """Less keeps no second of pictures, and everything is computed twice."""

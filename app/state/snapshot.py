@@ -16,7 +16,7 @@ from tracker.corrections import Correction
 from tracker.parameters import MethodKey, RunParameters
 from tracker.pipeline import Run
 from tracker.runs.fitting import unfit_methods
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.trajectories import Trajectories
 

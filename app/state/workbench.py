@@ -39,7 +39,7 @@ from tracker import parameters as table
 from tracker.corrections import Correction
 from tracker.parameters import ParameterError, RunParameters
 from tracker.pipeline import Progress, Run
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
 

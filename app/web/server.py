@@ -41,14 +41,16 @@ from app.state.workers.identity_check import IdentityCheck
 from app.state.workers.jobs import Jobs, in_background
 from app.state.workers.keeper import Keeper
 from app.state.workers.sensitivity import Sensitivity
-from app.web import api, description, gateway, stream, teaching_routes
-from app.web.access import Access, Keys
-from app.web.connections import Requests, Sockets
+from app.web import api, description, stream, teaching_routes
+from app.web.access import gateway
+from app.web.access.connections import Requests, Sockets
+from app.web.access.gateway import Gateway
+from app.web.access.security import CONTENT_POLICY, Guard, OnlyLooking, allowed_hosts, is_loopback
+from app.web.access.tokens import Access, Keys
+from app.web.access.viewer import LARGEST_MESSAGE, Entrance, start_viser
 from app.web.corrections import routes as corrections
-from app.web.entrance import LARGEST_MESSAGE, Entrance, start_viser
 from app.web.evaluation import course_routes, identity_routes
 from app.web.evaluation import routes as evaluation
-from app.web.gateway import Gateway
 from app.web.importing import routes as importing
 from app.web.library import export_routes
 from app.web.library import routes as library
@@ -57,7 +59,6 @@ from app.web.pictures import foreground, likelihood_routes, view_routes
 from app.web.pictures.jpegs import Pictures
 from app.web.pictures.likelihood import Likelihoods
 from app.web.pictures.swatches import Swatches
-from app.web.security import CONTENT_POLICY, Guard, OnlyLooking, allowed_hosts, is_loopback
 from app.web.stream import Stream
 from app.web.studies import routes as studies
 from app.web.tables import event_tables, tables, teaching_tables

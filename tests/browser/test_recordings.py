@@ -21,7 +21,7 @@ from tests.browser.looking import (
     viser,
 )
 from tests.browser.serving import Server
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 
 NAME = "av163-seq30-2p-1101"

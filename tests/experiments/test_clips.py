@@ -19,7 +19,7 @@ from tracker.experiments.clips.clip import (
     wall,
     write,
 )
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 
 STEPS, SIZE = 12, (96, 72)
 RED, BLUE = ((20.0, 20.0, 220.0),), ((220.0, 40.0, 20.0),)

@@ -34,7 +34,7 @@ def test_it_finds_what_it_claims(data_folder: Path) -> None:
     found = json.loads(json.dumps(result.numbers))
     ours = found["recordings"]["cmc2"]["methods"]["multi_bernoulli"]
     assert ours["mota"] >= BEST_PUBLISHED["cmc2"][0]
-    assert ours["id_switches"] <= 2  # of the filter alone, step by step
+    assert ours["id_switches"] == 0  # of the filter alone, step by step
     assert ours["steps_per_second"] > 0.0
     # the two scores of the best published filter, and ours against the paper on each recording
     assert len(result.findings) == len(BEST_PUBLISHED) + len(GATES)

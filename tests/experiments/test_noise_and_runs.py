@@ -14,7 +14,7 @@ from tracker.experiments import Context, Unavailable
 from tracker.experiments.laboratory import runs
 from tracker.experiments.laboratory.noise import NoisyReader
 from tracker.parameters import with_values
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
 

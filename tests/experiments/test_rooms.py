@@ -89,6 +89,7 @@ def test_an_unknown_method_is_told() -> None:
         EXPERIMENTS["rooms"].run(Context(rooms=RandomRooms(methods=("yolo",))))
 
 
+@pytest.mark.full
 def test_what_is_kept_is_not_measured_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -48,7 +48,7 @@ def toml(folder: Path, data: bytes) -> None:
 
 def video(folder: Path, data: bytes) -> None:
     """A video."""
-    from tracker.sequences.video import VideoDecoder, index_video
+    from tracker.sequences.pictures.video import VideoDecoder, index_video
 
     path = folder / "case.mp4"
     path.write_bytes(data)
@@ -58,7 +58,7 @@ def video(folder: Path, data: bytes) -> None:
 
 def picture(folder: Path, data: bytes) -> None:
     """An image."""
-    from tracker.sequences.video import read_image
+    from tracker.sequences.pictures.video import read_image
 
     path = folder / "case.jpg"
     path.write_bytes(data)
@@ -97,8 +97,8 @@ def seeds(folder: Path) -> Path:
 def tried(reader: Reader, folder: Path, data: bytes) -> None:
     """Read once; a sentence is what is wanted."""
     from tracker.formats.pieces import FormatError
+    from tracker.sequences.pictures.video import VideoError
     from tracker.sequences.sequence import SequenceError
-    from tracker.sequences.video import VideoError
 
     try:
         reader(folder, data)

@@ -23,7 +23,8 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
-from app.web import connections, server
+from app.web import server
+from app.web.access import connections
 from tests.app.conftest import wait_until
 
 VISER = Subprotocol(f"viser-v{viser.__version__}")
@@ -162,6 +163,7 @@ def test_two_thousand_frames_of_garbage(running: Running, path: str) -> None:
         assert len(os.listdir("/proc/self/fd")) < 400
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "said",
     [
@@ -222,6 +224,7 @@ def test_readers_that_do_not_read_are_dropped(running: Running) -> None:
         there.close()
 
 
+@pytest.mark.full
 def test_a_page_that_is_slow_to_read_the_stream_is_dropped_and_holds_nobody_up(
     running: Running,
 ) -> None:
@@ -244,6 +247,7 @@ def test_a_page_that_is_slow_to_read_the_stream_is_dropped_and_holds_nobody_up(
         there.close()
 
 
+@pytest.mark.full
 def test_an_ordinary_slow_conversation_goes_on(running: Running) -> None:
     with closing(http.client.HTTPConnection("127.0.0.1", running.port, timeout=30.0)) as there:
         for _ in range(4):  # longer in all than one may take to ask

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.web import security
+from app.web.access import security
 from tracker.parameters import METHODS, PARAMETERS
 
 HUGE = [2**63, -(2**63) - 1, 10**400]

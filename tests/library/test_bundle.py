@@ -25,7 +25,7 @@ from tracker.library.errors import LibraryError
 from tracker.library.keeping import recording_of
 from tracker.library.records import Result
 from tracker.library.store import Library
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Detections
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tests.synthetic import camera_toml, head_toml, number_in, write_lines, write_sequence
 from tracker.sequences.clock import Clock, Timing
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence, read_summary
 from tracker.sequences.sequence import SequenceError
 

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from tests.synthetic import CODECS, write_sequence, write_video
-from tracker.sequences.containers import VideoError, check_container, is_video, opened
+from tracker.sequences.pictures.containers import VideoError, check_container, is_video, opened
+from tracker.sequences.pictures.video import index_video, read_image
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import SequenceError
-from tracker.sequences.video import index_video, read_image
 
 LISTS: dict[str, tuple[str, str]] = {
     "hls": ("#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\n{}\n#EXT-X-ENDLIST\n", "HLS playlist"),
@@ -60,7 +60,7 @@ def test_ffmpeg_itself_opens_no_list(
     tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where the first bytes deceive us."""
-    from tracker.sequences import containers
+    from tracker.sequences.pictures import containers
 
     monkeypatch.setattr(containers, "check_container", lambda path: None)
     inside = tmp_path / "a.mp4"
@@ -111,7 +111,7 @@ def test_stream_packets_are_known() -> None:
 LIMITED = """
 import resource, sys
 from pathlib import Path
-from tracker.sequences.video import VideoError, index_video, read_image
+from tracker.sequences.pictures.video import VideoError, index_video, read_image
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 try:
     index_video(Path(sys.argv[1]))

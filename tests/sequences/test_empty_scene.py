@@ -16,7 +16,7 @@ from tests.synthetic import camera_toml, head_toml, write_sequence
 from tracker.foreground import BackgroundModel, learn, learn_background
 from tracker.library import bundle
 from tracker.parameters import ForegroundParams, RunParameters
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence, SequenceError
 from tracker.single_view.working.sequence import Working

@@ -16,10 +16,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.synthetic import CODECS, Container, number_in, numbered_picture, write_sequence
-from tracker.sequences import frames as frames_module
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures import frames as frames_module
+from tracker.sequences.pictures.frames import FrameReader
+from tracker.sequences.pictures.video import VideoDecoder, VideoError, index_video, read_image
 from tracker.sequences.reader import read_sequence
-from tracker.sequences.video import VideoDecoder, VideoError, index_video, read_image
 
 FRAMES = 90
 FIRST = 7

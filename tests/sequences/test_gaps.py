@@ -18,8 +18,8 @@ from tracker.pipeline import Run
 from tracker.runs import gaps
 from tracker.runs.stage_cache import StageCache
 from tracker.runs.stage_files import StageFiles
-from tracker.sequences.frames import FrameReader
-from tracker.sequences.numbering import whole_row
+from tracker.sequences.pictures.frames import FrameReader
+from tracker.sequences.pictures.numbering import whole_row
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
 

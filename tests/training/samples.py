@@ -14,7 +14,7 @@ from tracker import parameters as table
 from tracker.foreground import learn_background
 from tracker.kernels.pictures.channels import cell_means
 from tracker.parameters import RunParameters
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.rendering.random_rooms.figures import HALF_EXTENTS
 from tracker.sequences.sequence import Sequence

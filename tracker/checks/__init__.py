@@ -15,7 +15,7 @@ from tracker.checks.cameras import check_lenses, check_places
 from tracker.checks.check import Check, Remedy, Status
 from tracker.checks.readings import EVERY_ORDER
 from tracker.checks.timing import check_counting, check_time
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Detections, Sequence
 
 __all__ = ["Check", "Remedy", "Status", "check"]

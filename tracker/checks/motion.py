@@ -19,7 +19,7 @@ from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
 from tracker.camera import Camera
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
 PLANES = 64

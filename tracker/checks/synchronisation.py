@@ -15,7 +15,7 @@ from tracker.agreement.sliding import Course, course, slid
 from tracker.agreement.suggestion import LEAST_AGREEING, agreement
 from tracker.checks.motion import MOST_STEPS, motion_pairings
 from tracker.checks.offsets import Curve, Offset, Pairing, solve
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
 WIDEST = 10.0

@@ -8,7 +8,7 @@ import numpy as np
 
 from tracker.checks.check import Check, Remedy, absent, good, warning
 from tracker.checks.synchronisation import CameraOffset, synchronise
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
 _SHIFTS = (-3, -2, -1, 0, 1, 2, 3)

@@ -24,7 +24,7 @@ from tracker.experiments.laboratory.experiment import Context, Experiment, Findi
 from tracker.experiments.laboratory.pool import Desk, spread
 from tracker.parameters import PRESETS, RunParameters, with_values
 from tracker.pipeline import Cancelled
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.single_view.protocol import ViewResult
 
 if TYPE_CHECKING:

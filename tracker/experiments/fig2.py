@@ -14,7 +14,7 @@ from tracker.experiments.fig1 import QUICK_STEPS, ROOM
 from tracker.experiments.laboratory import runs
 from tracker.experiments.laboratory.experiment import Context, Experiment, Finding, Result
 from tracker.pipeline import Run
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.rendering import read_visibility
 
 if TYPE_CHECKING:

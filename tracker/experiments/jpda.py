@@ -34,7 +34,7 @@ from tracker.experiments.laboratory.experiment import (
 )
 from tracker.parameters import PRESETS, RunParameters, with_values
 from tracker.pipeline import Cancelled
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
 from tracker.single_view.protocol import ViewResult

@@ -20,7 +20,7 @@ from tracker.foreground.motion import MovingForeground
 from tracker.foreground.segmentation import ForegroundModel, Segmentation, pack, unpack
 from tracker.foreground.shares import box_shares, integral, shape_scores, shape_shares
 from tracker.parameters.groups.foreground import ForegroundParams
-from tracker.sequences.frames import Pictures
+from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 
 __all__ = [

@@ -28,7 +28,7 @@ from tracker.library.records import KeptRun, Result
 from tracker.library.store import parameters_of
 from tracker.placing import replacing, zip_folder
 from tracker.sequences.clock import FIELDS as CLOCK
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
 FORMAT = 1

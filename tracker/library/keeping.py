@@ -23,7 +23,7 @@ from tracker.runs.fitting import default_parameters
 from tracker.runs.gaps import gaps
 from tracker.runs.numbers_version import numbers_version
 from tracker.runs.run import Run, stage_keys
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 

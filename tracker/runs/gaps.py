@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from tracker.runs.run import Run
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 
 Keeping = Literal["everywhere", "in memory", "nowhere"]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from tracker import single_view
 from tracker.runs.run import Cancelled, Run
-from tracker.sequences.frames import Picture, Pictures
+from tracker.sequences.pictures.frames import Picture, Pictures
 from tracker.single_view.colour.likeness import Likeness, looks_of
 from tracker.single_view.protocol import SingleViewMethod, ViewResult
 from tracker.single_view.working.sequence import Working

@@ -13,7 +13,7 @@ from numpy import ndarray
 from tracker.sequences.clock import Clock
 from tracker.sequences.csv_columns import Columns, read_columns
 from tracker.sequences.fields import SMALLEST, Fields, shown
-from tracker.sequences.media import locate
+from tracker.sequences.pictures.media import locate
 from tracker.sequences.sequence import Detections, GroundTruth, SequenceError
 
 BOX = ("left", "top", "width", "height")

@@ -12,9 +12,9 @@ from numpy import ndarray
 
 from tracker.sequences.calibration import POSE, read_camera
 from tracker.sequences.clock import FIELDS, Timing, read_timing
-from tracker.sequences.containers import MOST_PIXELS
 from tracker.sequences.fields import Fields, shown
-from tracker.sequences.media import (
+from tracker.sequences.pictures.containers import MOST_PIXELS
+from tracker.sequences.pictures.media import (
     Pictures,
     check_pictures,
     check_size,
@@ -22,9 +22,9 @@ from tracker.sequences.media import (
     locate,
     probe,
 )
+from tracker.sequences.pictures.video import read_image
 from tracker.sequences.sequence import View
 from tracker.sequences.tables import BoxTable, Reading, read_box_table
-from tracker.sequences.video import read_image
 
 CAMERA = (
     "name", "image_size", "video", "images", "first_frame", *FIELDS, "background",

@@ -11,7 +11,7 @@ from tracker.single_view.protocol import SingleViewMethod, ViewResult
 
 if TYPE_CHECKING:
     from tracker.parameters import RunParameters
-    from tracker.sequences.frames import Pictures
+    from tracker.sequences.pictures.frames import Pictures
     from tracker.sequences.sequence import Sequence
 
 __all__ = ["SingleViewMethod", "ViewResult", "create"]

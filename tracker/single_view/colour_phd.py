@@ -20,7 +20,7 @@ from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.foreground import pack
 from tracker.kernels.kalman import Expected
 from tracker.parameters import ColourPhdParams
-from tracker.sequences.frames import Pictures
+from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import entrance_boxes
 from tracker.single_view.colour.peaks import PeakFinder, Peaks

@@ -26,7 +26,7 @@ from tracker.single_view.protocol import ViewResult
 
 if TYPE_CHECKING:
     from tracker.parameters import RunParameters
-    from tracker.sequences.frames import Pictures
+    from tracker.sequences.pictures.frames import Pictures
 
 BELIEVED = 0.5
 """A box that people explain with more than this weight goes to the fusion: it is more likely

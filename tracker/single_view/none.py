@@ -15,7 +15,7 @@ from tracker.single_view.protocol import ViewResult
 
 if TYPE_CHECKING:
     from tracker.parameters import RunParameters
-    from tracker.sequences.frames import Pictures
+    from tracker.sequences.pictures.frames import Pictures
 
 
 class DetectionBoxes:

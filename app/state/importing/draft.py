@@ -20,8 +20,8 @@ from app.state.importing.uploads import Upload
 from app.state.importing.wish import Wish, looks_alike, options_of
 from tracker.formats.pieces import FormatError, ImagesPiece, VideoPiece
 from tracker.pipeline import Cancelled
+from tracker.sequences.pictures.video import VideoDecoder, VideoError, index_video, read_image
 from tracker.sequences.reader import FILE
-from tracker.sequences.video import VideoDecoder, VideoError, index_video, read_image
 
 if TYPE_CHECKING:
     from app.state.importing.looking import Looked

@@ -23,7 +23,7 @@ from tracker.importing.settling import Settled
 from tracker.parameters import METHODS
 from tracker.pipeline import Cancelled, compute
 from tracker.runs.fitting import default_parameters, unfit_methods
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
 MOST_STEPS = 200

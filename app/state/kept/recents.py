@@ -17,7 +17,7 @@ from app.state.workbench import Workbench
 from tracker.folders import cache_folder
 from tracker.placing import locked, write_whole
 from tracker.sequences import library
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import FILE
 from tracker.sequences.sequence import SequenceError
 

@@ -33,7 +33,7 @@ from tracker.pipeline import Cancelled, Progress, Run
 from tracker.runs import gaps
 from tracker.runs.stage_cache import StageCache
 from tracker.sequences import library
-from tracker.sequences.frames import CACHE_BYTES, FrameReader
+from tracker.sequences.pictures.frames import CACHE_BYTES, FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.trajectories import Trajectories, corrected
 

@@ -12,7 +12,7 @@ from numpy import ndarray
 from app.errors import ApiError
 from app.state.snapshot import Snapshot
 from app.web.dependencies import FOR_EVER
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
 Missing = Callable[[str, str | None], ApiError]

@@ -10,7 +10,7 @@ import cv2
 
 from app.state.workbench import Workbench
 from app.web.pictures.address import checked, missing, no_picture
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
 KEPT_BYTES = 96 << 20

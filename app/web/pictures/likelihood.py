@@ -15,7 +15,7 @@ from app.state.snapshot import Snapshot
 from app.web.pictures import address
 from tracker.colour import ColourModel
 from tracker.parameters import ColourPhdParams
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.likelihood_map import likelihood_map

@@ -167,6 +167,7 @@ def everywhere(folder: Path, first: str = "") -> dict[str, Any]:
     return found
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("first", ["", "import middle_tracker"])
 def test_a_method_of_another_package_is_everywhere(tmp_path: Path, first: str) -> None:
     installed(tmp_path, POINTS)
@@ -192,6 +193,7 @@ def test_a_method_of_another_package_is_everywhere(tmp_path: Path, first: str) -
     assert "middle" not in found["own"], "the warm-up is of this project's kernels"
 
 
+@pytest.mark.full
 def test_another_version_of_the_package_makes_other_results(tmp_path: Path) -> None:
     keys = []
     for number, change in (("1.2", ""), ("1.3", ""), ("1.3", "# changed\n")):

@@ -208,7 +208,7 @@ def test_no_token_is_for_this_machine_alone(
 def test_visers_public_tunnel_cannot_be_asked_for() -> None:
     from viser import _messages
 
-    from app.web.entrance import start_viser
+    from app.web.access.viewer import start_viser
 
     running = start_viser()
     try:

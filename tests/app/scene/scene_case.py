@@ -14,7 +14,7 @@ from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.protocol import FusionResult
 from tracker.parameters import RunParameters
 from tracker.pipeline import Progress, Run, stage_keys
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Entrance, GroundTruth, Room, Sequence, View
 
 ROOM = Room(

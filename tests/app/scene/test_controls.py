@@ -18,7 +18,7 @@ from app.scene.panel.controls import ORIGIN, Controls
 from app.scene.panel.sliders import Scale, hint_text, label_text, number_text, symbol_parts
 from app.scene.panel.topics import TOPICS, topic_of
 from app.state.workbench import Workbench
-from app.web.entrance import start_viser
+from app.web.access.viewer import start_viser
 from tests.app.scene import scene_case
 from tracker import parameters as table
 from tracker.parameters import PARAMETERS

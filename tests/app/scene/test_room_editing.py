@@ -13,10 +13,10 @@ from viser import _messages
 from app.scene.room_editing import FACES, Face, RoomEditing, dragged, grips
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench
-from app.web.entrance import start_viser
+from app.web.access.viewer import start_viser
 from tests.app.scene import scene_case
 from tracker.parameters import RunParameters
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 
 RIGHT = Face("max", 0)
 

@@ -18,7 +18,7 @@ from app.scene.nodes import linear
 from app.scene.scene import Scene
 from app.scene.worker import LatestWorker
 from app.state.snapshot import Ghosts
-from app.web.entrance import start_viser
+from app.web.access.viewer import start_viser
 from tests.app.scene import scene_case
 from tracker.pipeline import Progress
 

@@ -10,7 +10,7 @@ from app.state.kept import history
 from app.state.kept.history import History
 from app.state.workbench import Workbench
 from tracker import pipeline
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 
 P_D, P_S = "fusion.detection_probability", "fusion.survival_probability"

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.full
 OPENS = """
 import resource, sys, time
 import numpy as np
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 def megabytes():
     with open("/proc/self/statm") as file:

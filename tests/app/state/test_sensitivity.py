@@ -17,7 +17,7 @@ from tracker import parameters as table
 from tracker import pipeline
 from tracker.evaluation import evaluate_sequence
 from tracker.parameters import PARAMETERS, ParameterError
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 
 P_D, T_E = "fusion.detection_probability", "fusion.extraction_threshold"

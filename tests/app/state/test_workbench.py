@@ -12,7 +12,7 @@ from app.state.workbench import Workbench
 from tracker import pipeline
 from tracker.parameters import PARAMETERS, PRESETS, ParameterError, value
 from tracker.pipeline import Progress, Run
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 
 P_D = "fusion.detection_probability"

@@ -12,7 +12,7 @@ import pytest
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
-from app.web.access import Keys, cookie_name, new_token, own_token
+from app.web.access.tokens import Keys, cookie_name, new_token, own_token
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, connect
 

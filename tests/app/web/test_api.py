@@ -15,7 +15,7 @@ import pytest
 from fastapi.routing import APIRoute
 from starlette.testclient import TestClient
 
-from app.web import gateway
+from app.web.access import gateway
 from app.web.server import ROUTERS, Settings, create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tests.app.folders import FRAMES

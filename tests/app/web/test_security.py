@@ -10,7 +10,7 @@ from starlette.routing import Route
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
-from app.web.security import LARGEST_BODY, Guard, allowed_hosts, is_loopback
+from app.web.access.security import LARGEST_BODY, Guard, allowed_hosts, is_loopback
 from tests.app.conftest import ADDRESS, connect
 
 OWN = {"origin": ADDRESS}

@@ -61,6 +61,7 @@ def package(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.full
 def test_a_read_only_package_compiles_once(package: Path, tmp_path: Path) -> None:
     package.chmod(0o555)
     code = USE.format(folder=str(package), result=12.0)
@@ -143,6 +144,7 @@ def test_what_was_not_used_for_long_is_deleted(
     assert left == ["fedcba9876543210", "somebody-elses"]
 
 
+@pytest.mark.full
 def test_the_warm_up_calls_every_kernel_that_a_run_may_call() -> None:
     # in a fresh interpreter; what is read from disk brings the kernels that it calls with it
     code = """
@@ -190,6 +192,7 @@ BY_HAND = """
 """
 
 
+@pytest.mark.full
 def test_while_another_process_compiles_a_kernel_runs_as_plain_python(
     package: Path, tmp_path: Path
 ) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from tests.engine.painted import GREEN, RED, painted_sequence, true_boxes
 from tracker import colour
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.likelihood_map import likelihood_map

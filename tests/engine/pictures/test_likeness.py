@@ -14,7 +14,7 @@ from tests.engine.painted import GREEN, RED, painted_sequence
 from tests.engine.standing import line
 from tracker import pipeline
 from tracker.parameters import RunParameters
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
 from tracker.single_view.colour import templates

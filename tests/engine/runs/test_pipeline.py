@@ -17,7 +17,7 @@ from tracker import pipeline
 from tracker.parameters import RunParameters, with_values
 from tracker.pipeline import Cancelled, Progress, Run, compute, default_parameters, stage_keys
 from tracker.runs.stage_cache import StageCache
-from tracker.sequences.frames import FrameReader, Picture
+from tracker.sequences.pictures.frames import FrameReader, Picture
 from tracker.sequences.sequence import Sequence, Template
 from tracker.single_view.protocol import ViewResult
 from tracker.trajectories import Trajectories

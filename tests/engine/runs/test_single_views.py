@@ -14,7 +14,7 @@ from tracker.parameters import RunParameters
 from tracker.pipeline import stage_keys
 from tracker.runs.run import Run
 from tracker.runs.single_views import SingleViews
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.single_view.protocol import ViewResult
 
 STEPS = 7

@@ -17,7 +17,7 @@ from tracker import pipeline, single_view
 from tracker.experiments.clips.clip import Actor, Clip, constant_size, through, wall, write
 from tracker.foreground import unpack
 from tracker.parameters import PRESETS, RunParameters, with_values
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, View
 from tracker.single_view.association_matrix.method import AssociationMatrixState
 from tracker.single_view.protocol import ViewResult

@@ -13,7 +13,7 @@ from tests.engine.painted import GREEN, RED, painted_sequence, true_boxes, with_
 from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, walk
 from tracker import single_view
 from tracker.parameters import PRESETS, RunParameters, with_values
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, View
 from tracker.single_view.colour_phd import ColourPhd, ColourPhdState
 from tracker.single_view.protocol import ViewResult

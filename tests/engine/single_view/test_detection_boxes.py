@@ -62,7 +62,7 @@ def test_a_camera_without_detections_says_what_to_do() -> None:
 
 
 def test_the_methods_are_made_by_name() -> None:
-    from tracker.sequences.frames import FrameReader
+    from tracker.sequences.pictures.frames import FrameReader
 
     detections = Detections(np.array([0]), BOXES[:1], np.ones(1))
     sequence = sequence_of(detections)

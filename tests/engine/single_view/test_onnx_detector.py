@@ -398,6 +398,7 @@ def test_what_is_kept_depends_on_the_models_content(tmp_path: Path) -> None:
         with_detector(sequence, tmp_path / "nowhere.onnx")
 
 
+@pytest.mark.full
 def test_the_command_writes_boxes_that_a_sequence_reads(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -20,7 +20,7 @@ from tests.engine.painted import (
 from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, walk
 from tracker import pipeline, single_view
 from tracker.parameters import PRESETS, RunParameters, with_values
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, Template, View
 from tracker.single_view.protocol import ViewResult
 from tracker.single_view.pseudo_particle.method import PseudoParticle

@@ -14,7 +14,7 @@ from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, walk
 from tracker import pipeline
 from tracker.boxes import Boxes
 from tracker.parameters import ForegroundParams, RunParameters
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
 from tracker.single_view.colour.carrying import with_carried

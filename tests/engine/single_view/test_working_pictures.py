@@ -21,7 +21,7 @@ from tracker.camera import Camera
 from tracker.foreground import pack, unpack
 from tracker.parameters import RunParameters, with_values
 from tracker.parameters.groups.pictures import PictureParams
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, Template, View
 from tracker.single_view.box_sizes import upright_boxes
 from tracker.single_view.protocol import ViewResult

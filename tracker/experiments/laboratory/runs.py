@@ -13,7 +13,7 @@ from tracker.experiments.laboratory.pool import Desk
 from tracker.parameters import RunParameters
 from tracker.pipeline import Cancelled, Progress, Run
 from tracker.sequences import library, rendering
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence, SequenceError
 from tracker.trajectories import Trajectories

@@ -9,8 +9,8 @@ from pathlib import Path
 from tracker.formats.pieces import ImagesPiece, Piece
 from tracker.formats.protocol import Certainty, Kind
 from tracker.formats.source import SourceFile
-from tracker.sequences.numbering import whole_row
-from tracker.sequences.video import read_image
+from tracker.sequences.pictures.numbering import whole_row
+from tracker.sequences.pictures.video import read_image
 
 NAME = "numbered pictures"
 KIND: Kind = "pictures"

@@ -10,8 +10,8 @@ import numpy as np
 from tracker.formats.pieces import Piece, VideoPiece
 from tracker.formats.protocol import Certainty, Kind
 from tracker.formats.source import SourceFile
-from tracker.sequences.containers import is_video, opened
-from tracker.sequences.video import VideoError, VideoIndex, index_video
+from tracker.sequences.pictures.containers import is_video, opened
+from tracker.sequences.pictures.video import VideoError, VideoIndex, index_video
 
 NAME = "video"
 KIND: Kind = "pictures"

@@ -77,12 +77,12 @@ class FusionParams(Params):
         float,
         Field(ge=0.05, le=10.0),
         ui("σ_a", unit="m/s per √s", step=0.05, log=True, when=_VELOCITY, essential=True),
-    ] = 0.5
+    ] = 0.6
     """Constant velocity: how much a person's speed changes in one second, along each axis."""
 
     vertical_share: Annotated[
         float, Field(ge=0.01, le=1.0), ui("σ_z/σ_x", step=0.01, when=_VELOCITY)
-    ] = 0.2
+    ] = 0.1
     """Constant velocity: the same for the height, as a share of that along the floor."""
 
     velocity_memory: Annotated[

@@ -18,7 +18,7 @@ from tracker.blobs import Blobs, blobs
 from tracker.colour import BINS
 from tracker.foreground import ForegroundModel, learn, pack
 from tracker.parameters import AssociationMatrixParams
-from tracker.sequences.frames import Pictures
+from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.association_matrix.following import follow, object_histograms
 from tracker.single_view.association_matrix.handing_over import advance

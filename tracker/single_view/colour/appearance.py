@@ -16,7 +16,7 @@ from tracker import colour
 from tracker.colour import ColourSpaceName, KernelName
 from tracker.foreground import ForegroundModel, integral, learn, shape_scores
 from tracker.parameters import ForegroundParams
-from tracker.sequences.frames import Pictures
+from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.carrying import with_carried

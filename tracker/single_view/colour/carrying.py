@@ -17,7 +17,7 @@ from tracker import colour
 from tracker.boxes import Boxes
 from tracker.camera import Camera
 from tracker.colour import ColourSpaceName, KernelName
-from tracker.sequences.frames import Pictures
+from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template
 from tracker.single_view.box_sizes import upright_boxes
 

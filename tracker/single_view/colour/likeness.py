@@ -16,7 +16,7 @@ from tracker import colour
 from tracker.boxes import Boxes
 from tracker.colour import ColourModel, ColourSpaceName
 from tracker.parameters import ColourPhdParams
-from tracker.sequences.frames import Pictures
+from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.templates import read_templates
 

@@ -17,7 +17,7 @@ from scipy.special import expit
 from tracker import mean_shift
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.parameters import ColourPeakParams, ForegroundParams
-from tracker.sequences.frames import Pictures
+from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.appearance import Appearance, Scene

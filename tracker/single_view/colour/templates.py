@@ -7,7 +7,7 @@ import numpy as np
 from tracker import colour
 from tracker.boxes import Boxes
 from tracker.colour import ColourModel, ColourSpaceName, KernelName
-from tracker.sequences.frames import Pictures
+from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, SequenceError
 
 

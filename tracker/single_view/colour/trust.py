@@ -16,7 +16,7 @@ from scipy.special import expit
 from tracker.boxes import Boxes
 from tracker.foreground import box_shares, integral, learn
 from tracker.parameters import ForegroundParams
-from tracker.sequences.frames import Pictures
+from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template
 from tracker.single_view.shape.finder import ShapeFinder
 

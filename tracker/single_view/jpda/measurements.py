@@ -22,7 +22,7 @@ from tracker.parameters import (
     ForegroundParams,
     JpdaParams,
 )
-from tracker.sequences.frames import Pictures
+from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.peaks import PeakFinder
 from tracker.single_view.detector_boxes import DetectorBoxes, trust

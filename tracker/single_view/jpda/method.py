@@ -17,7 +17,7 @@ from tracker.association import validation_matrix
 from tracker.filters.gaussian_mixture import gate_distance
 from tracker.foreground import pack
 from tracker.parameters import JpdaParams
-from tracker.sequences.frames import Pictures
+from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.jpda.association import associate
 from tracker.single_view.jpda.cases import Cases, look_into_pieces, part_strangers, tell_apart

@@ -16,7 +16,7 @@ from scipy.special import expit
 from tracker import particles as particle_set
 from tracker.foreground import pack
 from tracker.parameters import PseudoParticleParams
-from tracker.sequences.frames import Pictures
+from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.appearance import Scene
 from tracker.single_view.protocol import ViewEvent, ViewResult

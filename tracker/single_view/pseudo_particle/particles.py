@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tracker import particles as particle_set
 from tracker.parameters import ForegroundParams, PseudoParticleParams
-from tracker.sequences.frames import Pictures
+from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.appearance import Appearance, Scene
 

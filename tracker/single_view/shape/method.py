@@ -11,7 +11,7 @@ from scipy.special import expit
 
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.parameters.groups.shapes import ShapesParams
-from tracker.sequences.frames import Pictures
+from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.jpda import Jpda
 from tracker.single_view.jpda.measurements import Measured

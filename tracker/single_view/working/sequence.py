@@ -10,7 +10,7 @@ import numpy as np
 
 from tracker.boxes import Boxes
 from tracker.foreground import pack, unpack
-from tracker.sequences.frames import Picture, Pictures
+from tracker.sequences.pictures.frames import Picture, Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 from tracker.single_view.working.view import WorkingView, working_view

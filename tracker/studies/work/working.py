@@ -31,7 +31,7 @@ from tracker.parameters import with_values
 from tracker.pipeline import Run
 from tracker.runs.stage_cache import StageCache
 from tracker.runs.stage_files import StageFiles
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, SequenceError
 from tracker.studies.defined.objectives import OBJECTIVES
 from tracker.studies.work import recordings

@@ -7,7 +7,7 @@ from contextlib import ExitStack, closing
 from fractions import Fraction
 from pathlib import Path
 
-from tracker.sequences.frames import FrameReader, Picture
+from tracker.sequences.pictures.frames import FrameReader, Picture
 from tracker.writing.video.drawing import Mosaic
 from tracker.writing.written import Options, Written
 

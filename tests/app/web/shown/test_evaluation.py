@@ -26,7 +26,7 @@ from tracker import pipeline
 from tracker.evaluation import DEFINITIONS, compare, evaluate_sequence
 from tracker.parameters import with_values
 from tracker.pipeline import Progress, Run
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
 

@@ -21,7 +21,7 @@ from tracker.experiments.clips.clip import (
     write,
 )
 from tracker.parameters import PRESETS, RunParameters, stage_values, with_values
-from tracker.sequences.frames import FrameReader
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Detections, Room, Sequence, View
 from tracker.single_view.protocol import ViewResult
 

@@ -17,8 +17,8 @@ from typing import Any, Protocol, TypeVar
 from jaxtyping import UInt8
 from numpy import ndarray
 
+from tracker.sequences.pictures.video import VideoDecoder, VideoError, index_video, read_image
 from tracker.sequences.sequence import Sequence, View
-from tracker.sequences.video import VideoDecoder, VideoError, index_video, read_image
 
 _Made = TypeVar("_Made")
 

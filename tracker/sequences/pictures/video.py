@@ -22,7 +22,7 @@ import numpy as np
 from jaxtyping import Int, UInt8
 from numpy import ndarray
 
-from tracker.sequences.containers import MOST_PIXELS, VideoError, opened
+from tracker.sequences.pictures.containers import MOST_PIXELS, VideoError, opened
 
 __all__ = ["VideoDecoder", "VideoError", "VideoIndex", "index_video", "read_image"]
 

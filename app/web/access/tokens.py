@@ -21,8 +21,8 @@ from starlette.responses import HTMLResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.errors import ErrorDetail
-from app.web import door
-from app.web.security import comes_from_elsewhere, goes_to_a_page, refuse
+from app.web.access import pages
+from app.web.access.security import comes_from_elsewhere, goes_to_a_page, refuse
 
 PARAMETER = "token"
 """Of the address in the printed link."""
@@ -119,11 +119,11 @@ class Access:
             if told and (known or (self._keys is not None and self._keys.opens(told[-1]))):
                 answer = self._welcome(address, headers)
             elif (others or not known) and comes_from_elsewhere(headers):
-                answer = HTMLResponse(door.asks(address, dict(others).get("sequence")), 403)
+                answer = HTMLResponse(pages.asks(address, dict(others).get("sequence")), 403)
             elif not known:
-                answer = HTMLResponse(door.closed(others, bool(told)), 401)
+                answer = HTMLResponse(pages.closed(others, bool(told)), 401)
         if answer is not None:
-            answer.headers["content-security-policy"] = door.CONTENT_POLICY
+            answer.headers["content-security-policy"] = pages.CONTENT_POLICY
             answer.headers["cache-control"] = "no-store"
             await answer(scope, receive, send)
         elif known:
@@ -149,7 +149,7 @@ class Access:
 
     def _welcome(self, address: str, headers: Headers) -> Response:
         """A page that goes on by itself: after a redirect a cookie as strict would not be sent."""
-        answer = HTMLResponse(door.welcome(address))
+        answer = HTMLResponse(pages.welcome(address))
         if self._keys is not None:
             answer.set_cookie(
                 cookie_name(headers.get("host", "")),

@@ -13,9 +13,9 @@ from jaxtyping import Bool
 from numpy import ndarray
 
 from tracker.sequences.fields import LONGEST_NAME, Fields, did_you_mean, listed
-from tracker.sequences.numbering import whole_row
+from tracker.sequences.pictures.numbering import whole_row
+from tracker.sequences.pictures.video import VideoError, index_video, read_image
 from tracker.sequences.sequence import SequenceError, View
-from tracker.sequences.video import VideoError, index_video, read_image
 
 
 def locate(folder: Path, fields: Fields, name: str) -> Path:

@@ -19,7 +19,7 @@ from fastapi.responses import RedirectResponse, Response
 from websockets.asyncio.client import ClientConnection
 
 from app.errors import ApiError
-from app.web.entrance import Entrance
+from app.web.access.viewer import Entrance
 
 CONTENT_POLICY = (
     "default-src 'none'; script-src 'nonce-{nonce}' 'unsafe-eval'; "
