@@ -25,11 +25,11 @@ from tracker.single_view.colour.trust import shape_trust, template_trust
 from tracker.single_view.protocol import CANDIDATES, DROPPED, TRUST
 from tracker.single_view.shape.finder import SAME_PERSON, ShapeFinder, Shapes
 
-BELIEVED = 0.9
-"""A foreground that is trusted less than this about somebody is helped by shapes."""
-
 LEAST_LIKELY = 0.02
 """Added to the probability of a person by shape, as to the share of foreground in a box."""
+
+BELIEVED = 0.9
+"""A foreground that is trusted less than this about somebody is helped by shapes."""
 
 SHAPE_OVERLAP = 0.3
 """Windows of the shapes that share more than this of what both cover are of one person."""
@@ -278,10 +278,13 @@ class PeakFinder:
             least = np.where(person[kept] == person[i], p.same_person_distance, p.merge_distance)
             if good[i] and np.all((apart**2).sum(axis=1) >= least**2):
                 kept.append(int(i))
+        fell = ~good & coloured & covered
+        by_shape = self._instead[person] > self._trusted(person)
         dropped = {
             "colour": int((~good & ~coloured).sum()),
             "foreground": int((~good & coloured & ~covered).sum()),
-            "surroundings": int((~good & coloured & covered).sum()),
+            "surroundings": int((fell & ~by_shape).sum()),
+            "shape": int((fell & by_shape).sum()),
             "another at its place": int(good.sum()) - len(kept),
         }
         return candidates[kept], nearest[kept], dropped

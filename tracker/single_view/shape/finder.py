@@ -50,7 +50,7 @@ class Shapes:
         """
         apart = np.abs(boxes[:, None, :2] - self.windows.boxes[None, :, :2])
         there = (apart < SAME_PERSON * self.windows.sizes).all(axis=2)
-        return np.where(there, self.odds, -np.inf).max(axis=1, initial=-np.inf)
+        return np.asarray(np.where(there, self.odds, -np.inf).max(axis=1, initial=-np.inf))
 
 
 class ShapeFinder:
@@ -98,7 +98,8 @@ class ShapeFinder:
         """
         if self._channels is None or state is None:
             none = np.zeros((0, 4))
-            return state, Shapes(none, np.zeros(0), none[:, :2], 0, Windows(none, none), np.zeros(0))
+            nowhere = Windows(none, none)
+            return state, Shapes(none, np.zeros(0), none[:, :2], 0, nowhere, np.zeros(0))
         state, sums = self._channels.step(state, picture)
         scores = self._trees.scores(sums, self._edges).astype(float)
         ended = np.flatnonzero(np.isfinite(scores))
