@@ -77,67 +77,67 @@ def _run(command: Arguments) -> int:
         case Serve():
             return _serve(command)
         case Track():
-            from app.command.track import track
+            from app.command.commands.track import track
 
             return track(command)
         case Detect():
-            from app.command.detect import detect
+            from app.command.commands.detect import detect
 
             detect(command)
         case Evaluate():
-            from app.command.evaluate import evaluate
+            from app.command.commands.evaluate import evaluate
 
             evaluate(command)
         case Experiment():
-            from app.command.experiment import experiment
+            from app.command.commands.experiment import experiment
 
             experiment(command)
         case Benchmark():
-            from app.command.listing import benchmark
+            from app.command.commands.listing import benchmark
 
             return benchmark(command)
         case Import() | Check() | Formats() | ExportCalibration():
-            from app.command.importing import run
+            from app.command.commands.importing import run
 
             return run(command)
         case Sequences():
-            from app.command.listing import sequences
+            from app.command.commands.listing import sequences
 
             sequences(command)
         case Render():
-            from app.command.listing import render
+            from app.command.commands.listing import render
 
             render(command)
         case Parameters():
-            from app.command.listing import parameters
+            from app.command.commands.listing import parameters
 
             parameters()
         case Runs():
-            from app.command.runs import runs
+            from app.command.commands.runs import runs
 
             return runs(command, _serve_run)
         case Bundle():
-            from app.command.runs import bundle
+            from app.command.commands.runs import bundle
 
             bundle(command)
         case LibraryCommand():
-            from app.command.runs import check
+            from app.command.commands.runs import check
 
             return check(command)
         case Study():
-            from app.command.studies import study
+            from app.command.commands.studies import study
 
             return study(command)
         case Batch():
-            from app.command.batch import batch
+            from app.command.commands.batch import batch
 
             return batch(command)
         case Tune():
-            from app.command.tune import tune
+            from app.command.commands.tune import tune
 
             return tune(command)
         case Corrections():
-            from app.command.correcting import corrections
+            from app.command.commands.correcting import corrections
 
             return corrections(command)
     return 0

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from app.command import listing
 from app.command import main as cli
+from app.command.commands import listing
 from app.command.flags import Track, parse
 from tests.app.conftest import Runs
 from tests.app.folders import write_crossing
@@ -119,7 +119,9 @@ def test_an_installed_package_says_where_its_benchmarks_are(
     run: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        listing, "__file__", str(tmp_path / "site-packages" / "app" / "command" / "listing.py")
+        listing,
+        "__file__",
+        str(tmp_path / "site-packages" / "app" / "command" / "commands" / "listing.py"),
     )
     status, _, stderr = run("benchmark")
     assert status == 1

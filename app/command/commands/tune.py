@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 
 from app.command.arguments.studies import Tune
+from app.command.commands.studies import INTERRUPTED, run, save_preset, shown_value
 from app.command.flags import set_values
-from app.command.studies import INTERRUPTED, run, save_preset, shown_value
 from app.command.terminal import print_table, say
 from tracker import parameters as table
 from tracker.parameters import ParameterError

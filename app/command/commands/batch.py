@@ -8,8 +8,8 @@ import sys
 from collections.abc import Sequence
 
 from app.command.arguments.studies import Batch
+from app.command.commands.studies import INTERRUPTED, crew_of, to_be_stopped
 from app.command.flags import set_values
-from app.command.studies import INTERRUPTED, crew_of, to_be_stopped
 from app.command.terminal import Bar, print_table, say
 from tracker import parameters as table
 from tracker.folders import library_file

@@ -13,7 +13,7 @@ from tracker.parameters import ParameterError
 
 
 def benchmark(command: Benchmark) -> int:
-    root = Path(__file__).resolve().parents[2]
+    root = Path(__file__).resolve().parents[3]
     if not (root / "tests" / "benchmarks" / "__main__.py").is_file():
         raise CommandError(
             "the benchmarks belong to the source, not to the installed package: get a checkout, "

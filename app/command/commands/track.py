@@ -33,7 +33,7 @@ def track(command: Track) -> int:
     if not output.parent.is_dir():
         raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
 
-    from app.command.correcting import of_run
+    from app.command.commands.correcting import of_run
     from app.state.workers.compiling import Compiling
     from tracker import pipeline
     from tracker.checks import check
