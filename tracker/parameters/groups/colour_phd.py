@@ -58,8 +58,8 @@ class ColourPeakParams(Params):
     and the calibration say that the person is."""
 
     shapes: Annotated[Literal["never", "unsure", "always"], ui("S_h", published="never")] = "unsure"
-    """Whether people found by shape are peaks as well, whatever their colours: where the
-    foreground of some camera is not to be believed about somebody with templates, or always."""
+    """Whether people found by shape are peaks as well, whatever their colours, and shape judges
+    whom the foreground does not see: where it is not to be believed about somebody, or always."""
 
     shape_odds: Annotated[
         float, Field(ge=-6.0, le=10.0), ui("ln o", step=0.1, when={"shapes": ("unsure", "always")})
