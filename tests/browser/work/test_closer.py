@@ -172,6 +172,19 @@ def test_the_palette_sets_a_parameter_and_goes_to_a_track(flat_page: Page, serve
     as_at_first(server)
 
 
+def test_the_palette_leads_to_a_place_by_its_word(flat_page: Page, server: Server) -> None:
+    as_at_first(server)
+    expect(flat_page.locator(".lane").first).to_be_visible()
+    flat_page.keyboard.press("Control+k")
+    flat_page.keyboard.type("library")
+    flat_page.get_by_role("option", name=re.compile("^Library")).click()
+    expect(flat_page.get_by_role("link", name="Library")).to_have_attribute("aria-current", "page")
+    flat_page.keyboard.press("Control+k")
+    flat_page.keyboard.type("tune parameters clock")
+    flat_page.keyboard.press("Enter")
+    expect(flat_page.get_by_role("link", name="Tune")).to_have_attribute("aria-current", "page")
+
+
 def test_a_pane_is_kept_as_it_is_drawn(flat_page: Page, server: Server, tmp_path: Path) -> None:
     page = flat_page
     as_at_first(server)
