@@ -192,9 +192,10 @@ class Library(LibraryFile):
                 (number, *packed),
             )
             connection.execute(
+                # this one stays, whatever the clock says of the others
                 f"DELETE FROM runs WHERE id IN (SELECT id FROM runs WHERE {_UNTOUCHED} "
-                "AND deleted IS NULL ORDER BY began DESC LIMIT -1 OFFSET ?)",
-                (max(budget, 1),),
+                "AND deleted IS NULL ORDER BY id = ? DESC, began DESC LIMIT -1 OFFSET ?)",
+                (number, max(budget, 1)),
             )
             connection.execute("DELETE FROM runs WHERE deleted < ?", (time.time() - UNDO_SECONDS,))
             return int(number)
