@@ -215,3 +215,19 @@ def test_a_pane_is_kept_as_it_is_drawn(flat_page: Page, server: Server, tmp_path
     assert timeline.shape[1] == 2 * box["width"]
     assert timeline.std() > 10.0
     until(page, lambda: painted(page)[0].tolist() == before, "the page is as it was")
+
+
+def test_a_card_is_whole_in_a_small_window(flat_page: Page, server: Server) -> None:
+    as_at_first(server)
+    flat_page.set_viewport_size({"width": 1100, "height": 720})
+    flat_page.locator(".lane").first.click()
+    ask(server, "POST", "seek", {"step": 20})
+    card = flat_page.locator(".card:visible").first
+    expect(card).to_be_visible()
+    pictures = flat_page.locator(".mosaic").bounding_box()
+    box = card.bounding_box()
+    assert pictures is not None
+    assert box is not None
+    assert box["y"] + box["height"] <= pictures["y"] + pictures["height"]
+    assert box["x"] + box["width"] <= pictures["x"] + pictures["width"]
+    as_at_first(server)
