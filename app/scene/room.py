@@ -122,6 +122,17 @@ class RoomNodes:
         self._names.show([Tag(tuple(place.tolist()), "entrance") for place in places])
 
 
+def entrance_edges(room: Room) -> Float[ndarray, "N 3"]:
+    """How far the discs of the entrances reach on the floor: four points each, metres."""
+    radius = geometry.mass_radius(geometry.DEFAULT_MASS, 2)
+    points = [np.zeros((0, 3))]
+    for entrance in room.entrances:
+        middle = np.array([*entrance.position[:2], room.minimum[2]])
+        reach = np.diag([*entrance.sigma[:2] * radius, 0.0])[:2]
+        points += [middle + reach, middle - reach]
+    return np.concatenate(points)
+
+
 def _rims(centres: Float[ndarray, "N 3"], axes: Float[ndarray, "N 3"]) -> Float[ndarray, "S 2 3"]:
     """The outlines of flat ellipses."""
     angles = np.linspace(0.0, 2.0 * np.pi, RIM_POINTS + 1)

@@ -20,7 +20,7 @@ from app.scene.geometry import Pose
 from app.scene.ghosts import GhostNodes
 from app.scene.people import PeopleNodes
 from app.scene.reference import ReferenceNodes
-from app.scene.room import FrustumNodes, RoomNodes, grid_cell, pose_through
+from app.scene.room import FrustumNodes, RoomNodes, entrance_edges, grid_cell, pose_through
 from app.scene.views import Views
 from app.scene.worker import LatestWorker
 from app.state.snapshot import Change, Snapshot, View
@@ -219,7 +219,8 @@ class Scene:
         reach = np.linalg.norm(room.maximum - room.minimum)
         near = np.linalg.norm(eyes - centre, axis=1) <= 1.2 * reach
         rims = self._frusta.corners(near)
-        return geometry.overview(np.concatenate([corners, rims]), eyes[near], centre, aspect)
+        seen = np.concatenate([corners, rims, entrance_edges(room)])
+        return geometry.overview(seen, eyes[near], centre, aspect)
 
     def _set_home(self, snapshot: Snapshot) -> None:
         """Where viser's own "reset view" goes."""

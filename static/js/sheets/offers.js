@@ -1,7 +1,8 @@
 /**
- * What the palette finds besides commands: recordings, tracks and parameters, by their words.
- * Nothing here touches the page.
+ * What the palette finds besides commands: places, recordings, tracks and parameters, by their
+ * words. Nothing here touches the page but its address.
  */
+import { PLACES } from "../state/places.js";
 
 /** Offers of each kind at most: who sees as many types another word. */
 const MOST = 12;
@@ -14,11 +15,18 @@ const MOST = 12;
  */
 export function offersOf(state, actions, edit) {
 	const { sequences, timeline, schema, server, link, layouts } = state;
-	const own = Object.keys(layouts).map((name) => ({
-		title: `Layout ${name}, your own`,
-		keys: [],
-		run: () => actions.arrange(name),
-	}));
+	const own = [
+		...PLACES.filter(({ exists }) => !exists || exists(state)).map(({ name, word, tip }) => ({
+			title: `${word}: ${tip[0].toLowerCase()}${tip.slice(1)}`,
+			keys: [],
+			run: () => (location.hash = `#${name}`),
+		})),
+		...Object.keys(layouts).map((name) => ({
+			title: `Layout ${name}, your own`,
+			keys: [],
+			run: () => actions.arrange(name),
+		})),
+	];
 	if (link !== "open") return own;
 	const shown = new Set(server?.shown ?? []);
 	return [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,12 +16,14 @@ from app.colours import PALETTES
 from app.scene import geometry, scene
 from app.scene.geometry import mass_radius
 from app.scene.nodes import linear
+from app.scene.room import entrance_edges
 from app.scene.scene import Scene
 from app.scene.worker import LatestWorker
 from app.state.snapshot import Ghosts
 from app.web.access.viewer import start_viser
 from tests.app.scene import scene_case
 from tracker.pipeline import Progress
+from tracker.sequences.sequence import Entrance
 
 SECONDS = 20.0
 
@@ -257,6 +260,8 @@ def test_the_overview_crops_neither_the_room_nor_a_camera(
     server: viser.ViserServer, aspect: float
 ) -> None:
     of = scene_case.sequence(3)
+    door = Entrance(np.array([of.room.maximum[0], 0.0, 0.9]), np.array([0.4, 0.4, 0.1]))
+    of = replace(of, room=replace(of.room, entrances=(door,)))
     view = Scene(server, scene_case.opened(of))
     assert view.wait(SECONDS)
     pose = view._overview(aspect)
@@ -266,7 +271,10 @@ def test_the_overview_crops_neither_the_room_nor_a_camera(
     right = np.cross(ahead, pose.up)
     right /= np.linalg.norm(right)
     corners = geometry.box_corners(of.room.minimum, of.room.maximum)
-    points = np.concatenate([corners, [camera.centre for camera in of.cameras]]) - pose.position
+    eyes = [camera.centre for camera in of.cameras]
+    doors = entrance_edges(of.room)
+    assert doors[:, 0].max() > of.room.maximum[0] + 0.8
+    points = np.concatenate([corners, eyes, doors]) - pose.position
     depth = points @ ahead
     tall = np.abs(points @ np.cross(right, ahead)) / depth / np.tan(pose.fov / 2.0)
     wide = np.abs(points @ right) / depth / np.tan(pose.fov / 2.0) / aspect

@@ -172,6 +172,19 @@ def test_the_palette_sets_a_parameter_and_goes_to_a_track(flat_page: Page, serve
     as_at_first(server)
 
 
+def test_the_palette_leads_to_a_place_by_its_word(flat_page: Page, server: Server) -> None:
+    as_at_first(server)
+    expect(flat_page.locator(".lane").first).to_be_visible()
+    flat_page.keyboard.press("Control+k")
+    flat_page.keyboard.type("library")
+    flat_page.get_by_role("option", name=re.compile("^Library")).click()
+    expect(flat_page.get_by_role("link", name="Library")).to_have_attribute("aria-current", "page")
+    flat_page.keyboard.press("Control+k")
+    flat_page.keyboard.type("tune parameters clock")
+    flat_page.keyboard.press("Enter")
+    expect(flat_page.get_by_role("link", name="Tune")).to_have_attribute("aria-current", "page")
+
+
 def test_a_pane_is_kept_as_it_is_drawn(flat_page: Page, server: Server, tmp_path: Path) -> None:
     page = flat_page
     as_at_first(server)
@@ -202,3 +215,19 @@ def test_a_pane_is_kept_as_it_is_drawn(flat_page: Page, server: Server, tmp_path
     assert timeline.shape[1] == 2 * box["width"]
     assert timeline.std() > 10.0
     until(page, lambda: painted(page)[0].tolist() == before, "the page is as it was")
+
+
+def test_a_card_is_whole_in_a_small_window(flat_page: Page, server: Server) -> None:
+    as_at_first(server)
+    flat_page.set_viewport_size({"width": 1100, "height": 720})
+    flat_page.locator(".lane").first.click()
+    ask(server, "POST", "seek", {"step": 20})
+    card = flat_page.locator(".card:visible").first
+    expect(card).to_be_visible()
+    pictures = flat_page.locator(".mosaic").bounding_box()
+    box = card.bounding_box()
+    assert pictures is not None
+    assert box is not None
+    assert box["y"] + box["height"] <= pictures["y"] + pictures["height"]
+    assert box["x"] + box["width"] <= pictures["x"] + pictures["width"]
+    as_at_first(server)
