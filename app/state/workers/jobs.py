@@ -32,6 +32,7 @@ from tracker.library.records import Result
 from tracker.parameters import RunParameters, changed, with_values
 from tracker.pipeline import Cancelled, Progress, Run
 from tracker.runs import gaps
+from tracker.runs.gates import notices
 from tracker.runs.stage_cache import StageCache
 from tracker.sequences import library
 from tracker.sequences.pictures.frames import CACHE_BYTES, FrameReader
@@ -394,7 +395,8 @@ class Jobs:
                 logger.exception("a run failed")
             workbench.run_ends(wanted.key, "failed", sentence(error))
         else:
-            workbench.run_ends(wanted.key, "done", warnings=gaps.sentences(run))
+            told = [*gaps.sentences(run), *notices(run)]
+            workbench.run_ends(wanted.key, "done", warnings=told)
 
     def _leave_out(self, wanted: _Wanted, crashed: Note) -> None:
         """Say that a run crashed the program; the last one that went well is shown in its place."""
