@@ -118,13 +118,14 @@ def _real(trials: int) -> Iterator[Measurement]:
 
             def ready(tell: object) -> DaskCrew:
                 nonlocal begin
-                begin = time.perf_counter()  # once warm: the recordings are open
+                begin = time.time()  # once warm: the recordings are open
                 return crew
 
             with store.running() as writer:
                 run_study(store, writer, ready)
-            seconds = time.perf_counter() - begin
+            whole = time.time() - begin
         found = store.trials()
+        seconds = max(one.ended for one in found) - begin
         worked = sum(one.seconds for one in found)
         yield Measurement(
             f"studies: busy, {words}", worked / (WORKERS * seconds), "share", "≥ 0.85",
@@ -132,6 +133,8 @@ def _real(trials: int) -> Iterator[Measurement]:
         )  # fmt: skip
         beside = (WORKERS * seconds - worked) / trials
         yield Measurement(f"studies: beside the runs, {words}", beside * 1e3, "ms/trial", "≤ 30 ms")
+        words_after = f"studies: from the last trial to the end, {words}"
+        yield Measurement(words_after, whole - seconds, "s")
         yield Measurement(f"studies: memory's growth, {words}", memory.growth / 1e6, "MB")
         recordings = open_recordings(store.definition())
         jobs = [
@@ -139,7 +142,7 @@ def _real(trials: int) -> Iterator[Measurement]:
         ]
         by_hand = _by_hand(jobs)
         yield Measurement(
-            f"studies: against joblib by hand, {words}", by_hand / seconds, "×", "≥ 1/1.1"
+            f"studies: against joblib by hand, {words}", by_hand / whole, "×", "≥ 1/1.1"
         )
 
 

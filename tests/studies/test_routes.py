@@ -124,6 +124,10 @@ def test_what_is_not_there_is_told(client: TestClient) -> None:
     assert "no trial 3 has ended" in answer.json()["detail"]
     looked = client.post("/api/studies/scheduler", json={"address": "tcp://127.0.0.1:9"}).json()
     assert looked["error"].startswith("there is no Dask scheduler at tcp://127.0.0.1:9")
+    for none in ("\x9c&\x95\x84ºå", "tcp://", "here", "tcp://127.0.0.1:99999", "a b:1"):
+        answer = client.post("/api/studies/scheduler", json={"address": none})
+        assert answer.status_code == 200
+        assert "expected an address as tcp://10.0.0.1:8786" in answer.json()["error"]
 
 
 @pytest.mark.full

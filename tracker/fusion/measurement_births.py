@@ -17,6 +17,7 @@ from tracker.sequences.sequence import Room
 
 _REFINEMENTS = 3  # Gauss-Newton steps: from where two rays meet, the third moves hardly
 _MOST_SEEDS = 1000  # of a crowd of boxes that nobody explains, where the rays meet best
+_LEAST_VOLUME = 1e-250  # m³: in a room that is flat to the last digits no density overflows
 _START_SIGMA = 1.0  # metres: how loosely the meeting point of two rays binds the refinement
 _UNEXPLAINED = 0.5  # a box that somebody made with more than this probability starts nobody
 
@@ -106,7 +107,8 @@ class MeasurementBirths:
         self._room = room
         self._model = model
         p_d = model.detection_probability
-        self._log_density = np.log(model.birth_rate / np.prod(room.maximum - room.minimum))
+        volume = max(float(np.prod(room.maximum - room.minimum)), _LEAST_VOLUME)
+        self._log_density = np.log(model.birth_rate / volume)
         self._log_hit = float(np.log(p_d))
         # at p_D = 1 no newcomer is ever missed
         self._log_miss = float(np.log1p(-p_d)) if p_d < 1.0 else -np.inf

@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 import logging
 import queue
+import re
 import subprocess
 import sys
 import threading
@@ -24,6 +25,7 @@ from tracker.kernels import compilation
 from tracker.studies.errors import StudyError
 from tracker.studies.work import recordings, working
 from tracker.studies.work.jobs import Job, Outcome
+from tracker.visible import visible
 
 ADDRESS = "DASK_SCHEDULER_ADDRESS"
 """Environment variable: the cluster's scheduler, where none is named."""
@@ -110,8 +112,9 @@ def look_at(address: str, seconds: float) -> dict[str, Any]:
     """Who works for a scheduler: ``workers``, ``threads``, ``machines``.
 
     Raises:
-        StudyError: If there is none at the address.
+        StudyError: If there is none at the address, or it is none.
     """
+    _check_address(address)
     distributed: Any = importlib.import_module("distributed")  # slow, and without types
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
@@ -124,6 +127,17 @@ def look_at(address: str, seconds: float) -> dict[str, Any]:
         "threads": sum(int(about.get("nthreads", 1)) for about in workers.values()),
         "machines": sorted({str(about.get("host", "")) for about in workers.values()}),
     }
+
+
+def _check_address(address: str) -> None:
+    """What is no address Dask may refuse by anything, an assertion included."""
+    found = re.fullmatch(
+        r"(?:[a-z]+://)?(?:[A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\]):(\d{1,5})/?", address
+    )
+    if found is None or not 0 < int(found[1]) < 65536:
+        raise StudyError(
+            f"scheduler: expected an address as tcp://10.0.0.1:8786, got {visible(address)!r}"
+        )
 
 
 def _no_scheduler(address: str | None, error: Exception) -> StudyError:
@@ -173,6 +187,8 @@ class DaskCrew:
         self._closed = False
         if scheduler is None:
             self._cluster = self._start(workers or cores(), processes, tell)
+        else:
+            _check_address(scheduler)
         target = scheduler if scheduler is not None else self._cluster
         try:
             self._client: Any = distributed.Client(

@@ -38,8 +38,9 @@ from tracker.studies.work import recordings
 from tracker.studies.work.jobs import Job, Outcome, code_version
 from tracker.without_truth import estimate
 
-CACHE_BYTES = 256 << 20
-"""Memory of a worker for columns of runs."""
+CACHE_BYTES = 128 << 20
+"""Memory of a worker for columns of runs: those of stage 1 are used by every trial and stay, others
+are seldom used again."""
 
 MOST_OPEN = 16
 """Recordings that a worker keeps open."""
