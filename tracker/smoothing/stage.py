@@ -111,19 +111,23 @@ class Identities(Positions):
         contested = pieces.contested(paths, links)
         fitted, shared, learnt = _settled(smoother, paths, existences, links, p, None, check)
         looks = _looks(views) if p.appearance > 0.0 else None
-        found = identities.settle(
-            smoother, fitted, shared, contested, existences == 1.0, p, looks, corrections
-        )
-        check()
-        learnt = learnt.of_people(found.origins)
-        existences = np.where(found.had, 1.0, lifetimes.UNSURE)
-        return (
-            found.paths,
-            existences,
-            found.links,
-            learnt,
-            _Decided(found.decisions, found.joined, found.limits),
-        )
+        names = np.where(existences == 1.0, paths.labels[paths.owners], -1)
+        for again in range(p.rounds):
+            if again:  # who is who tells whose boxes are whose, and those again who is who
+                fitted, shared, learnt = _settled(
+                    smoother, paths, existences, links, p, learnt, check
+                )
+                contested = pieces.contested(fitted.paths, shared.links)
+            found = identities.settle(
+                smoother, fitted, shared, contested, existences == 1.0, names, p, looks,
+                corrections,
+            )  # fmt: skip
+            check()
+            paths, links, names = found.paths, found.links, found.names
+            learnt = learnt.of_people(found.origins)
+            existences = np.where(found.had, 1.0, lifetimes.UNSURE)
+        decided = _Decided(found.decisions, found.joined, found.limits)
+        return paths, existences, links, learnt, decided
 
 
 def _settled(
