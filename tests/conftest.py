@@ -85,13 +85,15 @@ def foreign() -> Path:
 
 CHROMIUM_FLAGS = [
     "--no-sandbox",
-    "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
     "--no-first-run",
 ]
+"""As Chromium is where there is no graphics card: WebGL is drawn by software, and the page itself
+without any. With ``--use-angle=swiftshader`` the page too would be put together by an emulated
+card, which takes some 100 ms of processor time a frame and is nothing that a person has."""
 
 
 @pytest.fixture(scope="session")

@@ -2,11 +2,46 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import stat
 import sys
+import tempfile
+from functools import cache
 from pathlib import Path
 
 import platformdirs
+
+
+def home() -> Path:
+    """The person's folder; where the system knows of none, as in some containers and services, one
+    among the temporary files that nobody else can open."""
+    try:
+        return Path.home()
+    except RuntimeError:
+        return _instead()
+
+
+@cache
+def _instead() -> Path:
+    place = Path(tempfile.gettempdir()) / f"multiview-phd-{os.getuid()}"
+    with contextlib.suppress(OSError):
+        place.mkdir(mode=0o700)
+    with contextlib.suppress(OSError):
+        found = place.lstat()
+        # somebody else may have made it, or have put a link there
+        if stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o77:
+            return place
+    return Path(tempfile.mkdtemp(prefix="multiview-phd-"))
+
+
+def data_folder() -> Path:
+    """The platform's place for what a person keeps."""
+    try:
+        found = platformdirs.user_data_path("multiview-phd", appauthor=False)
+    except RuntimeError:  # there is no home
+        found = Path("~")
+    return found if found.is_absolute() else home() / "multiview-phd"
 
 
 def cache_folder() -> Path:
@@ -19,12 +54,12 @@ def cache_folder() -> Path:
     if own:
         return Path(own).expanduser().absolute()
     if sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
+        base = home() / "Library" / "Caches"
     elif sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+        base = Path(os.environ.get("LOCALAPPDATA") or home() / "AppData" / "Local")
     else:
         given = Path(os.environ.get("XDG_CACHE_HOME", ""))
-        base = given if given.is_absolute() else Path.home() / ".cache"
+        base = given if given.is_absolute() else home() / ".cache"
     return base / "multiview-phd"
 
 
@@ -37,12 +72,12 @@ def settings_folder() -> Path:
     if own:
         return Path(own).expanduser().absolute()
     if sys.platform == "darwin":
-        base = Path.home() / "Library" / "Application Support"
+        base = home() / "Library" / "Application Support"
     elif sys.platform == "win32":
-        base = Path(os.environ.get("APPDATA") or Path.home() / "AppData" / "Roaming")
+        base = Path(os.environ.get("APPDATA") or home() / "AppData" / "Roaming")
     else:
         given = Path(os.environ.get("XDG_CONFIG_HOME", ""))
-        base = given if given.is_absolute() else Path.home() / ".config"
+        base = given if given.is_absolute() else home() / ".config"
     return base / "multiview-phd"
 
 
@@ -51,4 +86,4 @@ def library_file() -> Path:
     own = os.environ.get("MULTIVIEW_PHD_LIBRARY")
     if own:
         return Path(own).expanduser().absolute()
-    return platformdirs.user_data_path("multiview-phd", appauthor=False) / "library.sqlite3"
+    return data_folder() / "library.sqlite3"

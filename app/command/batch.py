@@ -48,7 +48,7 @@ def batch(command: Batch) -> int:
     ):
         found = run_batch(
             places, changes, command.seeds, library, command.keep,
-            lambda: crew(say), bar.at, stopped.is_set,
+            lambda: crew(say), bar.at, stopped.is_set, corrected=not command.no_corrections,
         )  # fmt: skip
     if command.json:
         sys.stdout.write(json.dumps([_told(one) for one in found], allow_nan=False) + "\n")

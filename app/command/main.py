@@ -9,16 +9,15 @@ from __future__ import annotations
 import errno
 import gc
 import os
-import subprocess
 import sys
 import tempfile
 import threading
 import time
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.command import supervision
 from app.command.arguments.corrections import Corrections
 from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
 from app.command.arguments.library import Bundle, LibraryCommand, OpenRun, Runs
@@ -34,19 +33,14 @@ from app.command.flags import (
     Sequences,
     Serve,
     Track,
-    describe_range,
     parse,
-    show,
 )
-from app.command.interruption import between_steps
-from app.command.terminal import Bar, CommandError, check_data, print_table, say
-from tracker import parameters as table
+from app.command.terminal import CommandError, check_data, check_keep, say
 from tracker.folders import library_file
 from tracker.parameters import ParameterError
 
 if TYPE_CHECKING:
     from tracker.library.records import Result
-    from tracker.pipeline import Run
 
 FAILURE, USAGE, INTERRUPTED = 1, 2, 130
 
@@ -56,6 +50,8 @@ TRACEBACK = "MULTIVIEW_PHD_TRACEBACK"
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit status."""
+    if arguments is None and sys.argv[1:2] == ["serve"]:
+        return supervision.keep_up(lambda: main(sys.argv[1:]))
     try:
         status = _run(parse(arguments))
         sys.stdout.flush()  # a pipe that is closed raises here, where it is caught, not at exit
@@ -81,7 +77,9 @@ def _run(command: Arguments) -> int:
         case Serve():
             return _serve(command)
         case Track():
-            return _track(command)
+            from app.command.track import track
+
+            return track(command)
         case Detect():
             from app.command.detect import detect
 
@@ -95,17 +93,25 @@ def _run(command: Arguments) -> int:
 
             experiment(command)
         case Benchmark():
-            return _benchmark(command)
+            from app.command.listing import benchmark
+
+            return benchmark(command)
         case Import() | Check() | Formats() | ExportCalibration():
             from app.command.importing import run
 
             return run(command)
         case Sequences():
-            _sequences(command)
+            from app.command.listing import sequences
+
+            sequences(command)
         case Render():
-            _render(command)
+            from app.command.listing import render
+
+            render(command)
         case Parameters():
-            _parameters()
+            from app.command.listing import parameters
+
+            parameters()
         case Runs():
             from app.command.runs import runs
 
@@ -177,7 +183,7 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
             "--port", f"expected 0 (any that is free) to 65535, got {command.port}"
         )
     check_data(command.data)
-    _check_keep(command.keep)
+    check_keep(command.keep)
     if command.memory is not None and not 0.0625 <= command.memory <= 65536.0:
         raise ParameterError("--memory", f"expected 0.0625 to 65536 GB, got {command.memory:g}")
     gc.disable()  # a seventh of the time: nothing that is imported ever goes
@@ -195,7 +201,9 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
             "--no-token",
             f"expected --host of this machine alone, got {command.host}: others need one",
         )
-    keys = Keys(own_token(os.environ) or new_token()) if command.token else None
+    life = supervision.life  # the starts after a crash have token and port of the one before
+    new = new_token() if life is None else life.token
+    keys = Keys(own_token(os.environ) or new) if command.token else None
     place = locate(command.sequence, command.data)
     if place not in rendering.ROOMS:
         library.open_sequence(place)  # what cannot be read is told here, before a page is open
@@ -203,8 +211,12 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
         from tracker.single_view.onnx.network import Network, Settings
 
         Network(command.detector, Settings())  # likewise
-    listener = _listen(command)
+    listener = _listen(
+        command if life is None or life.port is None else replace(command, port=life.port)
+    )
     port = listener.getsockname()[1]
+    if life is not None:
+        life.listens(port)
     host = f"[{command.host}]" if ":" in command.host else command.host
     shown = "127.0.0.1" if command.host == "0.0.0.0" else "[::1]" if host == "[::]" else host
     address = f"http://{shown}:{port}/"
@@ -215,6 +227,9 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
         return address if key is None else f"{address}?{PARAMETER}={key}"
 
     def ready() -> None:
+        if life is not None and life.ended is not None:
+            say(f"it is back at {address}")
+            return
         sys.stdout.write(f"multiview-phd: {link(keys.token if keys else None)} (Ctrl-C ends it)\n")
         sys.stdout.flush()
         if command.open:
@@ -236,6 +251,7 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
             memory=None if command.memory is None else int(command.memory * 2**30),
             run=run,
             say=say,
+            ended=None if life is None else life.ended,
         )
     )
     try:
@@ -274,224 +290,6 @@ def _leave(status: int) -> None:
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(status)
-
-
-# track
-
-
-def _track(command: Track) -> int:
-    changes = command.changes()
-    table.with_values(table.RunParameters(), changes)  # wrong usage shows before any work
-    _check_seed(command.seed)
-    _check_keep(command.keep)
-    output = command.output
-    from tracker.writing.registry import format_of, save
-    from tracker.writing.written import Options, Written
-
-    form = format_of(output, command.format)
-    if output.is_dir() and not form.folder:
-        raise CommandError(f"--output {output}: expected a file to write, found a folder")
-    if not output.parent.is_dir():
-        raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
-
-    from app.command.correcting import of_run
-    from app.state.workers.compiling import Compiling
-    from tracker import pipeline
-    from tracker.checks import check
-    from tracker.runs import gaps
-    from tracker.runs.gates import notices
-    from tracker.runs.outcome import why_no_tracks
-    from tracker.runs.run import resting_of
-    from tracker.runs.stage_cache import StageCache
-    from tracker.sequences import library
-
-    with Bar("rendering", "frame") as rendering:
-        sequence = library.open_sequence(command.sequence, progress=rendering.at)
-    sequence = library.with_detector(sequence, command.detector)
-    form.check(sequence)
-    for sentence in sequence.warnings:
-        say(sentence)
-    for found in check(sequence, quick=True):
-        if found.status == "warning" and str(found) not in sequence.warnings:
-            say(str(found))
-    parameters = table.with_values(pipeline.default_parameters(sequence), changes)
-    told_by_hand = of_run(sequence, command.corrections, none=command.no_corrections)
-    begin, began = time.perf_counter(), time.time()
-    stages: set[table.Stage] = set()
-
-    def told(_: pipeline.Run, progress: pipeline.Progress) -> None:
-        stages.add(progress.stage)
-        tracking.at(progress.done, progress.total)
-
-    with (
-        Bar("tracking", "step") as tracking,
-        closing(Compiling(say)) as compiling,
-        between_steps() as interrupted,
-    ):
-        tracking.at(0, sequence.frames)
-        compiling.wait(lambda done, total: None, interrupted)
-        run = pipeline.compute(
-            sequence,
-            parameters,
-            seed=command.seed,
-            corrections=told_by_hand,
-            cache=StageCache.on_disk() if command.cache else None,
-            on_progress=told,
-            cancelled=interrupted,
-        )
-    seconds = time.perf_counter() - begin
-    with Bar("writing", "step") as writing:
-        missing = gaps.sentences(run)
-        written = Written(
-            sequence,
-            run.tracks,
-            parameters,
-            command.seed,
-            remarks=tuple(missing),
-            resting=resting_of(run),
-        )
-        save(output, form, written, Options(progress=writing.at))
-    targets = len(set(run.tracks.ids.tolist()))
-    kept = "" if "single_view" in stages else "; stage 1 was kept from an earlier run"
-    if (reason := why_no_tracks(run)) is not None:
-        say(reason)
-    for sentence in notices(run):
-        say(sentence)
-    if told_by_hand:
-        unmet = {one.id: one.why for one in run.outcomes if not one.met}
-        say(f"{len(told_by_hand) - len(unmet)} of {len(told_by_hand)} corrections met")
-        for one in told_by_hand:
-            if one.id in unmet:
-                say(f"unmet: {one.words}: {unmet[one.id]}")
-    if command.keep and not any(gap.unexpected for gap in gaps.gaps(run)):
-        _keep(command, run, began, seconds)
-    incomplete = "".join(f"; {one}" for one in missing)
-    say(
-        f"{sequence.frames} steps, {targets} tracks, {sequence.frames / seconds:.0f} steps/s "
-        f"({sequence.frames / seconds / sequence.fps:.1f} × real time{kept}), written to {output}"
-        f"{incomplete}"
-    )
-    return FAILURE if command.strict and missing else 0
-
-
-def _keep(command: Track, run: Run, began: float, seconds: float) -> None:
-    """Put a finished run into the library; where that cannot be used, say so and go on."""
-    from tracker.evaluation import evaluate_sequence
-    from tracker.library.errors import LibraryError
-    from tracker.library.keeping import recording_of, run_of, thumbnail_of
-    from tracker.library.store import open_library
-
-    sequence = run.sequence
-    try:
-        with open_library(command.library or library_file()) as library:
-            evaluation = None
-            if sequence.ground_truth is not None:
-                evaluation = evaluate_sequence(sequence, run.tracks)
-            new = run_of(run, source="track", began=began, seconds=seconds, evaluation=evaluation)
-            recording = recording_of(sequence, command.sequence, thumbnail_of(sequence))
-            library.keep(recording, new, command.keep)
-    except LibraryError as error:
-        say(f"the run was not kept: {error}")
-
-
-# the rest
-
-
-def _benchmark(command: Benchmark) -> int:
-    root = Path(__file__).resolve().parents[2]
-    if not (root / "tests" / "benchmarks" / "__main__.py").is_file():
-        raise CommandError(
-            "the benchmarks belong to the source, not to the installed package: get a checkout, "
-            'install it by `pip install --editable ".[test]"`, and run `multiview-phd benchmark` '
-            "from there"
-        )
-    line = [sys.executable, "-m", "tests.benchmarks", *command.names]
-    line += ["--short"] if command.short else []
-    line += ["--json", str(command.json.absolute())] if command.json is not None else []
-    line += ["--record"] if command.record else []
-    line += ["--chart", str(command.chart.absolute())] if command.chart is not None else []
-    return subprocess.run(line, cwd=root).returncode
-
-
-def _sequences(command: Sequences) -> None:
-    check_data(command.data)
-    from tracker.sequences import library
-
-    rows = [
-        (
-            entry.name,
-            entry.kind,
-            "" if entry.cameras is None else str(entry.cameras),
-            "" if entry.frames is None else str(entry.frames),
-            "no" if entry.error else "yes" if entry.ready else "when opened",
-            entry.error or entry.description,
-        )
-        for entry in library.available(command.data)
-    ]
-    print_table(("name", "kind", "cameras", "steps", "ready", "description"), rows)
-
-
-def _render(command: Render) -> None:
-    from tracker.sequences import rendering
-
-    if len(command.places) != (2 if command.random is None else 1):
-        wanted = "NAME FOLDER" if command.random is None else "FOLDER alone with --random"
-        found = " ".join(command.places) or "nothing"
-        raise ParameterError("[NAME] FOLDER", f"expected {wanted}, got {found}")
-    folder = Path(command.places[-1])
-    name = f"random room {command.random}" if command.random is not None else command.places[0]
-    if command.random is None and name not in rendering.ROOMS:
-        known = ", ".join(rendering.ROOMS)
-        raise ParameterError("NAME", f"expected one of {known}, got {name!r}")
-    _check_seed(command.seed)
-    if command.random is not None:
-        _check_seed(command.random, "--random")
-    if command.cameras not in (2, 3):
-        raise ParameterError("--cameras", f"expected 2 or 3, got {command.cameras}")
-    if folder.exists():
-        raise CommandError(f"{folder} exists; name a folder that does not")
-    cameras = command.cameras
-    with Bar("rendering", "frame") as bar:
-        if command.random is not None:
-            cameras = rendering.render_random(
-                command.random, folder, detections=command.detections, progress=bar.at
-            ).cameras
-        else:
-            rendering.render(name, folder, cameras=cameras, seed=command.seed, progress=bar.at)
-    say(f"{name} with {cameras} cameras, written to {folder}")
-
-
-def _check_keep(keep: int) -> None:
-    if keep < 0:
-        raise ParameterError("--keep", f"expected a whole number from 0, got {keep}")
-
-
-def _check_seed(seed: int, flag: str = "--seed") -> None:
-    if seed < 0:
-        raise ParameterError(flag, f"expected a whole number from 0, got {seed}")
-
-
-def _parameters() -> None:
-    methods = {
-        "single_view": "Method of stage 1 (--single-view).",
-        "fusion_method": "Method of stage 2 (--fusion).",
-        "smoothing_method": "Method of stage 3 (--smoothing).",
-    }
-    defaults = table.RunParameters()
-    chosen = {
-        "single_view": table.FOLLOWS,
-        "fusion_method": defaults.fusion_method,
-        "smoothing_method": defaults.smoothing_method,
-    }
-    rows: list[tuple[str, ...]] = [
-        (key, "", "|".join(choices), "", chosen[key], methods[key])
-        for key, choices in table.METHODS.items()
-    ]
-    rows += [
-        (p.key, p.symbol, describe_range(p), p.unit, show(p.default), p.help)
-        for p in table.PARAMETERS.values()
-    ]
-    print_table(("key", "symbol", "range", "unit", "default", "help"), rows)
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from tracker.parameters import ParameterError
 from tracker.visible import visible
 
 
@@ -94,3 +95,13 @@ def print_json(value: Any) -> None:
     if not text.isprintable():
         text = json.dumps(value, allow_nan=False)
     sys.stdout.write(text + "\n")
+
+
+def check_keep(keep: int) -> None:
+    if keep < 0:
+        raise ParameterError("--keep", f"expected a whole number from 0, got {keep}")
+
+
+def check_seed(seed: int, flag: str = "--seed") -> None:
+    if seed < 0:
+        raise ParameterError(flag, f"expected a whole number from 0, got {seed}")

@@ -111,6 +111,8 @@ class Notice:
     level: Level
     message: str
     hint: str | None = None
+    report: str | None = None
+    """What somebody may copy and pass on."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,7 @@ from app.state.kept.drafts import Drafts
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
 from tracker import pipeline
+from tracker.folders import home
 from tracker.parameters import RunParameters
 from tracker.sequences.reader import FILE, given_folder
 from tracker.sequences.sequence import Sequence, SequenceError
@@ -257,7 +258,7 @@ class Teaching:
         folder = self._sequence().folder
         beside = [] if saving.why_not_in_place(folder) else [folder.parent]
         places = [*([self._data.absolute()] if self._data else []), *beside, Path.cwd()]
-        return next((place for place in places if os.access(place, os.W_OK)), Path.home())
+        return next((place for place in places if os.access(place, os.W_OK)), home())
 
     def copy_folder(self) -> Path:
         """A folder that is not there yet, to be offered for a copy."""

@@ -337,6 +337,7 @@ class Workbench:
         parameters: RunParameters,
         opened_as: str = "",
         corrections: tuple[Correction, ...] = (),
+        chosen: RunParameters | None = None,
     ) -> FrameReader | None:
         """Show another sequence, from its first step; the reader of the one before, to be closed.
 
@@ -347,6 +348,7 @@ class Workbench:
             parameters: Its default parameters.
             opened_as: The name or folder that opens it again; its own name where none is given.
             corrections: Those of its log.
+            chosen: What its parameters begin with; its defaults, where none are given.
         """
         with self._edit() as now:
             before = now.reader
@@ -360,7 +362,7 @@ class Workbench:
                 sequence_key=key,
                 reader=reader,
                 opening=None,
-                parameters=parameters,
+                parameters=chosen or parameters,
                 defaults=parameters,
                 corrections=corrections,
                 parameters_origin="",
@@ -436,6 +438,13 @@ class Workbench:
                 warnings=tuple(warnings),
             )
             self._put("run", run=run, run_state=state)
+
+    def show_instead(self, run: Run) -> None:
+        """Show a run that is done in the place of the one that is asked for."""
+        with self._edit() as now:
+            if now.sequence is run.sequence:
+                self._last_good = run
+                self._put("run", run=run)
 
     def show_kept(self, run: Run, number: int, stands_for: str = "") -> None:
         """Show a run of the library with its parameters, in one change.

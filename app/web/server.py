@@ -26,11 +26,12 @@ from app.state import opening_step
 from app.state.correcting import Correcting
 from app.state.doubting import Doubting
 from app.state.importing.desk import Desk
-from app.state.kept.crashes import Crashes
+from app.state.kept.crashes import Crash, Crashes
 from app.state.kept.history import History
 from app.state.kept.presets import OwnPresets
 from app.state.kept.recents import Recents
 from app.state.memory import Budget
+from app.state.snapshot import Notice
 from app.state.studies.desk import StudyDesk
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench
@@ -133,6 +134,8 @@ class Settings:
     is only looked at: nothing is computed, and nothing can be changed."""
     say: Callable[[str], None] = lambda words: None
     """Told what somebody in front of the terminal should know."""
+    ended: tuple[int, int] | None = None
+    """Process and signal of the start before this one, where it crashed."""
 
 
 def create_app(settings: Settings) -> FastAPI:
@@ -197,7 +200,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     kept, looked_at = settings.keep_on_disk, isinstance(settings.run, Result)
     budget = Budget.of(settings.memory)
     crashes = Crashes(settings_folder() / "starts" if kept else None)
-    crashed = crashes.tidy()
+    crashed = crashes.tidy(settings.ended)
     crashes.watch()
     jobs = app.state.jobs = Jobs(
         workbench,
@@ -241,10 +244,9 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     study_desk = app.state.studies = StudyDesk(workbench, studies_folder())
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
-    told.start()
-    for words in crashed:
-        settings.say(words)
-        workbench.notify("warn", words)
+    told.start(_of_crash(crashed[-1], settings.ended is not None) if crashed else None)
+    for crash in crashed:
+        settings.say(crash.words)
     opening_step.follow(workbench)
     room = app.state.room = _Room(workbench, teaching, sensitivity)
     if settings.with_viser:
@@ -261,6 +263,8 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         library.then_show(opening, jobs, workbench, result).add_done_callback(
             _say_failure(result.run.title)
         )
+    elif settings.ended is not None and crashed and (note := crashed[-1].note).place:
+        jobs.take_up(note).add_done_callback(_say_failure(note.place))
     elif settings.sequence is not None:
         jobs.open(settings.sequence).add_done_callback(_say_failure(settings.sequence))
     try:
@@ -290,6 +294,16 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
             )
         )
         crashes.close()
+
+
+def _of_crash(crash: Crash, restarted: bool) -> Notice:
+    """What the pages are told of it."""
+    hint = "Everything that was kept is there."
+    if restarted and crash.note.opening:
+        hint = f"It was opening {crash.note.place}, which is not opened again by itself."
+    elif restarted:
+        hint = "The workbench was started again where it was."
+    return Notice("warn", crash.words, hint, crash.report)
 
 
 def _say_failure(name: str) -> Callable[..., None]:

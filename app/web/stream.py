@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import time
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import asdict
@@ -26,6 +27,9 @@ SECONDS_BETWEEN = {"progress": 0.1, "timeline": 0.25}
 
 LARGEST_MESSAGE = 1 << 14
 """Characters of a page's message."""
+
+BACK_SECONDS = 30.0
+"""So long pages come back to a server that was started again; at least one is told why it was."""
 
 KEPT_STEPS = 64
 MOST_NOTICES = 20
@@ -63,13 +67,20 @@ class Stream:
         self._pages: set[_Page] = set()
         self._unheard: Notice | None = None
         """What was said last while there was no page, for the first that comes."""
+        self._before: Notice | None = None
+        self._begun = 0.0
         self._state: tuple[int, str] = (-1, "")
         self._steps: OrderedDict[tuple[Any, ...], str] = OrderedDict()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._ends: list[Callable[[], None]] = []
 
-    def start(self) -> None:
-        """Called on the event loop that serves."""
+    def start(self, before: Notice | None = None) -> None:
+        """Called on the event loop that serves.
+
+        Args:
+            before: What all pages that come back are told of the start before.
+        """
+        self._before, self._begun = before, time.monotonic()
         loop = self._loop = asyncio.get_running_loop()
 
         def on_change(change: Change) -> None:
@@ -118,6 +129,10 @@ class Stream:
         if self._unheard is not None:
             page.messages.append(_notice(self._unheard))
         self._unheard = None
+        if self._before is not None:
+            page.messages.append(_notice(self._before))
+            if time.monotonic() - self._begun > BACK_SECONDS:
+                self._before = None
         self._pages.add(page)
         sender = asyncio.create_task(self._tell(socket, page))
         try:
@@ -250,7 +265,10 @@ class Stream:
 
 
 def _notice(notice: Notice) -> str:
-    return json.dumps({"type": "notice", **asdict(notice)})
+    told = {"type": "notice", **asdict(notice)}
+    if notice.report is None:
+        del told["report"]
+    return json.dumps(told)
 
 
 def _remind(page: _Page) -> None:

@@ -16,6 +16,7 @@ from tests.benchmarks import (
     cold,
     growth,
     jpda,
+    kept,
     kernels,
     library,
     live,
@@ -43,6 +44,7 @@ SUITES = {
     "server": server.run,
     "page": page.run,
     "library": library.run,
+    "kept": kept.run,
     "studies": studies.run,
 }
 

@@ -109,7 +109,7 @@ def run(short: bool) -> Iterator[Measurement]:
         frames = 150 if short else 400
         folder = write_long(Path(name) / "long", frames, cameras=CAMERAS, size=SIZE)
         server = Server(folder, Path(name) / "cache")
-        others = [flag for flag in CHROMIUM_FLAGS if "swiftshader" not in flag]
+        others = [flag for flag in CHROMIUM_FLAGS if "swiftshader" not in flag]  # no 3D at all
         browser = playwright.chromium.launch(executable_path=path, args=[*others, "--disable-gpu"])
         drawing = playwright.chromium.launch(executable_path=path, args=CHROMIUM_FLAGS)
         try:

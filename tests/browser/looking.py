@@ -109,3 +109,30 @@ def as_at_first(server: Server) -> None:
     ask(server, "POST", "select", {"id": None})
     ask(server, "POST", "seek", {"step": 0})
     server.wait_for_run()
+
+
+_OPENED = """() => new Promise((done, late) => {
+  // From the click until the lanes of the opened run are in the timeline and painted.
+  const button = [...document.querySelectorAll('.lib .btn')].find(
+    (one) => one.textContent === 'Open in Tune');
+  const time = document.querySelector('.time');
+  const begin = performance.now();
+  let renewed = false;
+  new MutationObserver(() => (renewed = true)).observe(
+    time.querySelector('.lanes'), { childList: true });
+  setTimeout(() => late(new Error('the lanes were not painted')), 30000);
+  const look = () => {
+    const there = renewed && time.checkVisibility() && time.querySelectorAll('.lane').length >= 3
+      && !document.querySelector('#tab-changes .count:not([hidden])');
+    if (!there) return requestAnimationFrame(look);
+    requestAnimationFrame(() => done(performance.now() - begin));
+  };
+  button.click();
+  requestAnimationFrame(look);
+})"""
+
+
+def open_kept(page: Page) -> float:
+    """Have the run that the library shows in small opened; milliseconds until its lanes show."""
+    taken: float = page.evaluate(_OPENED)
+    return taken

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import httpx2
+import psutil
 
 from tracker.kernels.compilation import kernel_folder
 
@@ -34,6 +35,7 @@ class Server:
         Kernels are those of the machine, whatever the cache folder, unless a folder is given.
         """
         self.folder = sequence
+        self.cache = cache
         self._arguments = [str(sequence), "--no-open"]
         self._arguments += [] if data is None else ["--data", str(data)]
         self._arguments += ["--no-token"] if token is None else []
@@ -72,6 +74,12 @@ class Server:
         """Have a token from the next start on."""
         self.token = token
         self._environment["MULTIVIEW_PHD_TOKEN"] = token or "none-is-asked-for"
+
+    @property
+    def serving(self) -> psutil.Process:
+        """The process that serves; the one that was started waits for it."""
+        (found,) = psutil.Process(self.process.pid).children()
+        return found
 
     @property
     def address(self) -> str:

@@ -12,6 +12,7 @@ import pytest
 from tests.library.runs import KEPT, RECORDING, filled, run
 from tracker.library import schema
 from tracker.library.errors import LibraryError
+from tracker.library.keeping import remarks_of
 from tracker.library.store import Library
 from tracker.parameters import RunParameters
 
@@ -150,3 +151,15 @@ def test_ten_thousand_runs_are_listed_at_once(path: Path) -> None:
             fastest = min(fastest, time.perf_counter() - begin)
     assert len(found) == 10_000
     assert fastest < 0.25  # 0.05 is the aim on an idle machine; the benchmark tells it
+
+
+def test_what_a_person_corrected_is_kept_with_the_run(path: Path) -> None:
+    said = ({"kind": "exchange", "places": [[12, 0.5, 0.25, 1.0]], "note": "by the door"},)
+    with Library(path) as library:
+        plain = library.keep(RECORDING, run(1))
+        number = library.keep(RECORDING, run(2, corrections=said))
+        assert library.result(number).corrections == said
+        assert [kept.corrected for kept in library.runs()] == [1, 0]
+        assert library.result(plain).corrections == ()
+        assert remarks_of(library.result(plain)) == ()
+        assert remarks_of(library.result(number)) == ("1 correction of a person obeyed",)

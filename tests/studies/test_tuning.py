@@ -12,6 +12,7 @@ from tests.studies.small import Serial, definition, recording, run
 from tracker.parameters import PARAMETERS, table
 from tracker.studies.errors import StudyError
 from tracker.studies.kept.store import Store, create
+from tracker.studies.told.report import report_html
 from tracker.studies.tuning import tuning
 from tracker.studies.work.jobs import Job, Outcome
 
@@ -60,6 +61,10 @@ def test_what_brings_something_is_proposed_without_what_does_not(tmp_path: Path)
     assert found["values"]["fusion.clutter_rate"] == 3.0
     score = next(one for one in found["figures"] if one["key"] == "score")
     assert score["after"] > score["default"]
+    page = report_html(store)
+    assert "<h2>Proposed</h2>" in page
+    assert f"{row['brought']:+.4f}" in page
+    assert "trials below" in page  # what failed takes no room from what tells something
 
 
 def test_from_a_bad_start_it_comes_back_to_the_defaults(tmp_path: Path) -> None:

@@ -75,6 +75,8 @@ class TargetModel:
     projected ends of the axis, the horizontal centre lies between them, the
     width is that of a cylinder of the target's mean half width. So do the boxes of
     person detectors end; the bounds of a projected cuboid reach further below the feet.
+    The camera may be rolled in any way: in a picture turned by a quarter the box is as
+    high as the target is wide.
 
     The projection is nonlinear. ``extended`` linearises it at the mean (extended Kalman
     filter). With ``unscented`` the values are the mean over the state's uncertainty, the

@@ -57,6 +57,10 @@ def expected_boxes(
 ) -> UprightBoxes:
     """The box that a camera should give of each upright target, and its derivative.
 
+    It spans the projected axis from head to foot, whichever is above: a camera may hang upside
+    down. In a picture that is turned by about a quarter the axis lies, and the target's width
+    reaches further up and down than its ends: then the box spans that.
+
     Args:
         states: (J, d), position first, world metres.
         half_height: Of the target, metres.
@@ -96,8 +100,17 @@ def expected_boxes(
             continue
         valid[j] = True
         across = (pixels[head, 0] + pixels[foot, 0]) / 2.0
-        top, bottom = pixels[head, 1], pixels[foot, 1]
-        width = abs(bottom - top) * share
+        upper, lower = head, foot
+        if pixels[head, 1] > pixels[foot, 1]:
+            upper, lower = foot, head
+        top, bottom = pixels[upper, 1], pixels[lower, 1]
+        width = (bottom - top) * share
+        reach = abs(pixels[head, 0] - pixels[foot, 0])
+        sideways = reach * share > bottom - top
+        if sideways:
+            along = (top + bottom) / 2.0
+            top, bottom = along - reach * share / 2.0, along + reach * share / 2.0
+            width = reach
         boxes[j, 0], boxes[j, 1] = across - width / 2.0, top
         boxes[j, 2], boxes[j, 3] = across + width / 2.0, bottom
         if size == 2:
@@ -112,15 +125,24 @@ def expected_boxes(
         values[j, 2] = min(max(bottom, 0.0), last)
         for a in range(3):
             jacobians[j, 0, a] = (slopes[head, 0, a] + slopes[foot, 0, a]) / 2.0
+            rise, fall = slopes[upper, 1, a], slopes[lower, 1, a]
+            if sideways:
+                sign = share if pixels[head, 0] > pixels[foot, 0] else -share
+                grown = sign * (slopes[head, 0, a] - slopes[foot, 0, a]) / 2.0
+                drift = (rise + fall) / 2.0
+                rise, fall = drift - grown, drift + grown
             if values[j, 1] == top:
-                jacobians[j, 1, a] = slopes[head, 1, a]
+                jacobians[j, 1, a] = rise
             if values[j, 2] == bottom:
-                jacobians[j, 2, a] = slopes[foot, 1, a]
+                jacobians[j, 2, a] = fall
         if size == 4:
-            sign = share if bottom >= top else -share
             values[j, 3] = width
             for a in range(3):
-                jacobians[j, 3, a] = sign * (slopes[foot, 1, a] - slopes[head, 1, a])
+                if sideways:
+                    sign = 1.0 if pixels[head, 0] > pixels[foot, 0] else -1.0
+                    jacobians[j, 3, a] = sign * (slopes[head, 0, a] - slopes[foot, 0, a])
+                else:
+                    jacobians[j, 3, a] = share * (slopes[lower, 1, a] - slopes[upper, 1, a])
     return UprightBoxes(values, jacobians, boxes, depths, valid)
 
 

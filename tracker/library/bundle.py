@@ -79,6 +79,7 @@ def _fill(folder: Path, result: Result, sequence: Sequence, videos: bool) -> Non
         "machine": result.machine,
         "parameters": result.values,
         "figures": result.figures,
+        "corrections": result.corrections,
     }
     text = json.dumps(manifest, indent=1, ensure_ascii=False)
     (folder / MANIFEST).write_text(text, encoding="utf-8")
@@ -213,6 +214,7 @@ def unpack_bundle(path: Path, folder: Path) -> Result:
             values=manifest["parameters"],
             figures=manifest["figures"],
             kept=columns.unpack((folder / TRACKS).read_bytes()),
+            corrections=tuple(manifest.get("corrections", ())),
         )
     except LibraryError:
         raise

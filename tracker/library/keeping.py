@@ -149,6 +149,9 @@ def run_of(
         figures=figures,
         kept=kept_of(run),
         ospa=ospa,
+        corrections=tuple(
+            one.model_dump(mode="json", exclude_none=True) for one in run.corrections
+        ),
     )
 
 
@@ -162,8 +165,10 @@ def _in_small(values: ndarray) -> tuple[float, ...]:
 
 def remarks_of(result: Result) -> tuple[str, ...]:
     """What must be said of a kept run wherever it is written to."""
-    missing = result.figures.get(MISSING)
-    return (f"{missing} pictures were missing",) if missing else ()
+    missing, corrected = result.figures.get(MISSING), result.run.corrected
+    pictures = (f"{missing} pictures were missing",) if missing else ()
+    words = "1 correction" if corrected == 1 else f"{corrected} corrections"
+    return pictures + ((f"{words} of a person obeyed",) if corrected else ())
 
 
 def run_from(sequence: Sequence, result: Result, *, key: str) -> Run:

@@ -78,6 +78,8 @@ class KeptRun(NamedTuple):
     star: int
     note: str
     tags_json: str
+    corrected: int = 0
+    """How many corrections of a person it obeys."""
 
     @property
     def changes(self) -> dict[str, Any]:
@@ -133,6 +135,8 @@ class Result:
     kept: KeptTracks
     ospa: tuple[float, ...] = ()
     """Its mean over equally many steps each, metres; empty without a truth."""
+    corrections: tuple[dict[str, Any], ...] = ()
+    """What a person said that it obeys, as a log of corrections has it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -175,5 +179,7 @@ class NewRun:
     kept: KeptTracks
     ospa: tuple[float, ...] = ()
     """Its mean over equally many steps each, metres; empty without a truth."""
+    corrections: tuple[dict[str, Any], ...] = ()
+    """What a person said that it obeys, as a log of corrections has it."""
     name: str = ""
     note: str = ""

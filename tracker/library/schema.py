@@ -72,6 +72,11 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         """,
         f"PRAGMA application_id = {APPLICATION_ID}",
     ),
+    (
+        # how many corrections a person made that the run obeys, and what they say: JSON by zlib
+        "ALTER TABLE runs ADD COLUMN corrected INTEGER NOT NULL DEFAULT 0",
+        "ALTER TABLE results ADD COLUMN corrections BLOB",
+    ),
 )
 """What leads from each version to the next, the first from an empty file."""
 

@@ -125,9 +125,9 @@ class Library(LibraryFile):
         with self._reading() as connection:
             run = self.run(number)
             row = connection.execute(
-                "SELECT parameters, figures, columns, place, key, runs.digest, machine FROM runs "
-                "JOIN results ON run = runs.id JOIN recordings ON recordings.id = recording "
-                "WHERE runs.id = ?",
+                "SELECT parameters, figures, columns, place, key, runs.digest, machine, "
+                "corrections FROM runs JOIN results ON run = runs.id "
+                "JOIN recordings ON recordings.id = recording WHERE runs.id = ?",
                 (number,),
             ).fetchone()
             if row is None:
@@ -135,11 +135,13 @@ class Library(LibraryFile):
             values, figures = _inflated(row[0]), _inflated(row[1])
             parameters, unknown = parameters_of(values)
             kept = columns.unpack(row[2])
-            place, key, digest, machine = row[3:]
+            place, key, digest, machine = row[3:7]
+            said = tuple(_inflated(row[7])["corrections"]) if row[7] is not None else ()
             ospa = tuple(figures.pop(OSPA, ()))
             return Result(
-                run, place, key, digest, machine, parameters, unknown, values, figures, kept, ospa
-            )
+                run, place, key, digest, machine, parameters, unknown, values, figures, kept, ospa,
+                said,
+            )  # fmt: skip
 
     def size(self) -> int:
         """Bytes on disk."""
@@ -167,7 +169,8 @@ class Library(LibraryFile):
             The run's number.
         """
         figures = {**new.figures, OSPA: list(new.ospa)} if new.ospa else new.figures
-        packed = (_deflated(new.parameters), _deflated(figures), columns.pack(new.kept))
+        said = _deflated({"corrections": new.corrections}) if new.corrections else None
+        packed = (_deflated(new.parameters), _deflated(figures), columns.pack(new.kept), said)
         with self._writing() as connection:
             place = self._recording(connection, recording)
             known = connection.execute(
@@ -184,12 +187,15 @@ class Library(LibraryFile):
                     told = [new.figures.get(name) for name in HEADLINES]
                     connection.execute(f"UPDATE runs SET {told_of} WHERE id = ?", (*told, number))
             connection.execute(
-                "INSERT OR REPLACE INTO results VALUES (?, ?, ?, ?)", (number, *packed)
+                "INSERT OR REPLACE INTO results (run, parameters, figures, columns, corrections) "
+                "VALUES (?, ?, ?, ?, ?)",
+                (number, *packed),
             )
             connection.execute(
+                # this one stays, whatever the clock says of the others
                 f"DELETE FROM runs WHERE id IN (SELECT id FROM runs WHERE {_UNTOUCHED} "
-                "AND deleted IS NULL ORDER BY began DESC LIMIT -1 OFFSET ?)",
-                (max(budget, 1),),
+                "AND deleted IS NULL ORDER BY id = ? DESC, began DESC LIMIT -1 OFFSET ?)",
+                (number, max(budget, 1)),
             )
             connection.execute("DELETE FROM runs WHERE deleted < ?", (time.time() - UNDO_SECONDS,))
             return int(number)
@@ -322,6 +328,7 @@ class Library(LibraryFile):
             },
             **{name: new.figures.get(name) for name in HEADLINES},
             "changes": json.dumps(new.changes, ensure_ascii=False),
+            "corrected": len(new.corrections),
         }  # fmt: skip
         marks = ", ".join("?" * len(values))
         done = connection.execute(

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 from tracker.parameters.changing import value
 from tracker.parameters.definition import Stage
-from tracker.parameters.methods import MethodKey
+from tracker.parameters.methods import MethodKey, Uses
 from tracker.parameters.run import RunParameters
 from tracker.parameters.table import METHODS, PARAMETERS
 
@@ -30,19 +31,27 @@ def stage_values(parameters: RunParameters, stage: Stage) -> dict[str, Any]:
         if stage == method.removesuffix("_method"):
             values[method] = value(parameters, method)
     used = parameters.method(CHOSEN_BY[stage]).used(parameters)
-    for key, parameter in PARAMETERS.items():
-        if parameter.stage == stage and used.reads_number(parameter.group, parameter.name):
-            values[key] = value(parameters, key)
-    return values
+    return values | {key: value(parameters, key) for key in _keys_read(used, stage)}
+
+
+@lru_cache(maxsize=256)
+def _keys_read(used: Uses, stage: Stage) -> tuple[str, ...]:
+    """The numbers of a stage that a method reads."""
+    return tuple(
+        key
+        for key, parameter in PARAMETERS.items()
+        if parameter.stage == stage and used.reads_number(parameter.group, parameter.name)
+    )
 
 
 def shown_keys(parameters: RunParameters) -> list[str]:
     """The choices of the methods, and the numbers that have an effect with what is chosen."""
-    used = {stage: parameters.method(key).used(parameters) for stage, key in CHOSEN_BY.items()}
-    shown: list[str] = list(METHODS)
-    for key, parameter in PARAMETERS.items():
-        if used[parameter.stage].reads_number(parameter.group, parameter.name) and all(
-            value(parameters, other) in values for other, values in parameter.when.items()
-        ):
-            shown.append(key)
-    return shown
+    read = set[str]()
+    for stage, method in CHOSEN_BY.items():
+        read |= set(_keys_read(parameters.method(method).used(parameters), stage))
+    return [*METHODS] + [
+        key
+        for key, parameter in PARAMETERS.items()
+        if key in read
+        and all(value(parameters, other) in values for other, values in parameter.when.items())
+    ]

@@ -82,7 +82,8 @@ def notices(run: Run) -> list[str]:
     if unsure:
         told.append(
             f"the background of {', '.join(unsure)} was learnt from people who stay there, for "
-            "their templates lie on it: they are looked for by colour alone"
+            "their templates lie on it: they are looked for by colour, and by shape where "
+            "their templates show one"
         )
     restless = [f'"{one.camera}"' for one in gates if one.doubt > _HALF]
     if restless:

@@ -92,7 +92,7 @@ class StageFiles:
                     if len(columns[-1]) != frames:
                         raise ValueError(f"expected {frames} steps, found {len(columns[-1])}")
             os.utime(path)  # it was used
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return None
         except _UNREADABLE as error:
             logger.warning("%s cannot be used and is computed anew: %s", path, error)

@@ -1,4 +1,7 @@
-"""Many recordings with the same values: every run kept in the library, none computed twice."""
+"""Many recordings with the same values: every run kept in the library, none computed twice.
+
+Each obeys the recording's corrections, as a run by itself does.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from tracker import pipeline
+from tracker.corrections import Correction
+from tracker.corrections.log import place_of, read_log
 from tracker.library.keeping import recording_of
 from tracker.library.records import KeptRun
 from tracker.library.store import Library
@@ -86,6 +91,8 @@ def run_batch(
     crew: Callable[[], Crew],
     told: Callable[[int, int], None] = lambda done, total: None,
     stopped: Callable[[], bool] = lambda: False,
+    *,
+    corrected: bool = True,
 ) -> list[BatchRun]:
     """Track recordings and keep every run as it ends.
 
@@ -100,6 +107,7 @@ def run_batch(
         crew: Makes the workers, once there is something to compute.
         told: Called with the runs that are there and their number.
         stopped: Asked now and then; then what is there is given back.
+        corrected: Whether each recording's corrections are obeyed.
 
     Raises:
         StudyError: If the workers cannot work on.
@@ -108,21 +116,24 @@ def run_batch(
     found: dict[tuple[str, int], BatchRun] = {}
     wanted: dict[str, list[tuple[str, int]]] = {}
     jobs = []
+    by_hand: dict[str, tuple[Correction, ...]] = {}
     total = len(places) * seeds
     for place in places:
         try:
             sequence = open_sequence(place)
             parameters = with_values(pipeline.default_parameters(sequence), changes)
+            told_by_hand = read_log(place_of(sequence.folder)) if corrected else ()
         except (SequenceError, ValueError, OSError) as error:
             words = " ".join(str(error).split())
             found |= {(place, seed): BatchRun(place, seed, None, words) for seed in range(seeds)}
             continue
         for seed in range(seeds):
-            key = pipeline.stage_keys(sequence, parameters, seed)["tracks"]
+            key = pipeline.stage_keys(sequence, parameters, seed, told_by_hand)["tracks"]
             if (kept := library.with_key(key)) is not None:
                 found[place, seed] = BatchRun(place, seed, kept)
                 continue
-            job = _job(sequence, place, parameters, seed)
+            job = _job(sequence, place, parameters, seed, told_by_hand)
+            by_hand[job.key] = told_by_hand
             if job.key not in wanted:
                 jobs.append(job)
             wanted.setdefault(job.key, []).append((place, seed))
@@ -139,7 +150,9 @@ def run_batch(
                     here, _ = wanted[outcome.key][0]
                     # a worker may have it in another place: what counts is where it is here
                     recording = recording_of(open_sequence(here), here, recording.thumbnail)
-                    new = replace(new, digest=recording.digest, key=_key(here, new))
+                    new = replace(
+                        new, digest=recording.digest, key=_key(here, new, by_hand[outcome.key])
+                    )
                     run = library.run(library.keep(recording, new, budget))
                 for place, seed in wanted.pop(outcome.key, ()):
                     found[place, seed] = BatchRun(place, seed, run, outcome.words, True)
@@ -149,14 +162,20 @@ def run_batch(
     ]
 
 
-def _key(place: str, new: Any) -> str:
+def _key(place: str, new: Any, corrections: tuple[Correction, ...]) -> str:
     """Of the run on the recording as it lies here."""
     sequence = open_sequence(place)
     parameters = with_values(pipeline.default_parameters(sequence), new.changes)
-    return pipeline.stage_keys(sequence, parameters, new.seed)["tracks"]
+    return pipeline.stage_keys(sequence, parameters, new.seed, corrections)["tracks"]
 
 
-def _job(sequence: Recording, place: str, parameters: Any, seed: int) -> Any:
+def _job(
+    sequence: Recording,
+    place: str,
+    parameters: Any,
+    seed: int,
+    corrections: tuple[Correction, ...],
+) -> Any:
     job = job_of(
         sequence,
         place,
@@ -167,5 +186,6 @@ def _job(sequence: Recording, place: str, parameters: Any, seed: int) -> Any:
         truth=sequence.ground_truth is not None,
         agreement=False,
         timed=False,
+        corrections=corrections,
     )
     return replace(job, keep=True)

@@ -11,17 +11,20 @@ class Pace:
     def __init__(self) -> None:
         self.runs = 0
         """That ended."""
+        self.worked = 0.0
+        """Seconds that workers took for them."""
         self._warm: float | None = None
-        self._worked = 0.0
+        self._since_warm = 0.0
         self._first: tuple[float, int] | None = None
 
     def came(self, seconds: float) -> None:
         """A run ended that took a worker so long."""
         self.runs += 1
+        self.worked += seconds
         if self._warm is None:
             self._warm = time.monotonic()
         else:
-            self._worked += seconds
+            self._since_warm += seconds
 
     def busy(self, slots: int) -> float | None:
         """Share of the workers' time since the first run ended in which they worked; None before
@@ -29,7 +32,7 @@ class Pace:
         if self._warm is None or self.runs < 2 * slots:
             return None
         elapsed = time.monotonic() - self._warm
-        return min(1.0, self._worked / (elapsed * slots)) if elapsed > 0.0 else None
+        return min(1.0, self._since_warm / (elapsed * slots)) if elapsed > 0.0 else None
 
     def seconds_left(self, done: int, trials: int) -> float | None:
         """From the mean time of a trial so far; None before two ended."""

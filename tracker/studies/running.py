@@ -43,12 +43,14 @@ class _Active:
     values: dict[str, Any]
     jobs: list[tuple[JobRow, Job]]
     sent: int = 0
+    wanted: int = 0
+    """Different runs among those that were sent."""
     outcomes: dict[str, Outcome] = field(default_factory=dict)
 
     @property
     def is_back(self) -> bool:
         """Whether all runs that were sent have ended."""
-        return len(self.outcomes) >= len({row.key for row, _ in self.jobs[: self.sent]})
+        return len(self.outcomes) >= self.wanted
 
 
 def run_study(
@@ -185,9 +187,7 @@ class _Running:
                     break
                 self.state, self.words = "done", words
                 return
-            for outcome in self.crew.finished(SECONDS_BETWEEN):
-                self._came(outcome)
-            self._settle()
+            self._settle(self.crew.finished(SECONDS_BETWEEN))
             self._now_and_then()
         self.state = "stopped"
         self.words = "stopped; `multiview-phd study resume` goes on"
@@ -200,8 +200,10 @@ class _Running:
             self._asked = number + 1
             if number < self._fixed and values is not None:
                 drawn = values if number == 0 else drawn | values
-            self._send(self._take_up(number, drawn))
-            self._settle()
+            active = self._take_up(number, drawn)
+            self._send(active)
+            if active.is_back:  # all its runs are there from other trials
+                self._settle()
 
     def _may_ask(self) -> bool:
         if self._asked >= self._trials or self._stopped():
@@ -240,6 +242,7 @@ class _Running:
                 self._waiting[job.key] = [active]
                 self.crew.submit(job, -active.number)
         active.sent = upto
+        active.wanted = len({row.key for row, _ in active.jobs[:upto]})
 
     def _propose(self) -> bool:
         """Measure the best again on other seeds; False where somebody stopped it."""
@@ -290,28 +293,42 @@ class _Running:
         for active in self._waiting.pop(outcome.key, ()):
             active.outcomes[outcome.key] = outcome
 
-    def _settle(self) -> None:
-        """End the trials whose runs have ended; none before the defaults, by which it is judged."""
-        for active in sorted(self._active.values(), key=lambda one: one.number):
-            while active.is_back and active.number in self._active:
-                failed = next((o for o in active.outcomes.values() if o.became != "done"), None)
-                if failed is not None and active.number == 0:
-                    raise StudyError(
-                        f"the defaults cannot be run, so that nothing can be set against them: "
-                        f"{failed.words}"
-                    )
-                if active.number != 0 and 0 not in self._ended:
-                    break
-                whole = active.sent == len(active.jobs)
-                if failed is None and not whole:
-                    rows = [row for row, _ in active.jobs[: active.sent]]
-                    hopeless = self._judge.is_hopeless(rows, active.outcomes)
-                    if not hopeless or active.number < self._fixed:
-                        self._send(active)
-                        continue
-                self._end(active, failed)
+    def _settle(self, outcomes: Sequence[Outcome] = ()) -> None:
+        """Take up runs that ended, and end the trials that have all of theirs.
 
-    def _end(self, active: _Active, failed: Outcome | None) -> None:
+        All is on disk before the sampler hears of it.
+        """
+        ended = []
+        with self._writer.together():
+            for outcome in outcomes:
+                self._came(outcome)
+            for number in sorted(self._active):
+                if (trial := self._gone_on(self._active[number])) is not None:
+                    ended.append(trial)
+        for trial in ended:
+            self._sampler_hears(trial)
+
+    def _gone_on(self, active: _Active) -> Trial | None:
+        """A trial that ended now; none before the defaults, by which it is judged."""
+        while active.is_back:
+            failed = next((o for o in active.outcomes.values() if o.became != "done"), None)
+            if failed is not None and active.number == 0:
+                raise StudyError(
+                    f"the defaults cannot be run, so that nothing can be set against them: "
+                    f"{failed.words}"
+                )
+            if active.number != 0 and 0 not in self._ended:
+                return None
+            if failed is None and active.sent < len(active.jobs):
+                rows = [row for row, _ in active.jobs[: active.sent]]
+                hopeless = self._judge.is_hopeless(rows, active.outcomes)
+                if not hopeless or active.number < self._fixed:
+                    self._send(active)
+                    continue
+            return self._end(active, failed)
+        return None
+
+    def _end(self, active: _Active, failed: Outcome | None) -> Trial:
         rows = tuple(row for row, _ in active.jobs[: active.sent])
         words = "the defaults" if active.number == 0 else ""
         if active.number == 1 and self._fixed > 1:
@@ -326,9 +343,9 @@ class _Running:
             failed=failed is not None,
         )
         self._writer.end(trial)
-        self._sampler_hears(trial)
         self._ended.add(trial.number)
         del self._active[active.number]
+        return trial
 
     def _sampler_hears(self, trial: Trial) -> None:
         values = None if trial.state == "failed" else self._judge.for_sampler(trial)
@@ -401,6 +418,8 @@ class _Running:
 
     def _weigh(self, *, last: bool = False) -> None:
         """Write down what matters, where that was found out anew."""
-        found = self._weighing.news(self._judge.complete, self.crew, last=last)
+        found = self._weighing.news(
+            self._judge.complete, self.crew, worked=self._pace.worked, last=last
+        )
         if found is not None:
             self._writer.tell("importance", found)

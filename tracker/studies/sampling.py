@@ -8,9 +8,7 @@ NSGA-II: Deb, Pratap, Agarwal, Meyarivan, IEEE TEVC 6(2), 2002.
 from __future__ import annotations
 
 import itertools
-import json
-import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +17,7 @@ from tracker.studies.defined import space
 from tracker.studies.defined.definition import Definition, Varied
 from tracker.studies.defined.objectives import Objective
 from tracker.studies.errors import StudyError
+from tracker.studies.kept import journal
 
 STARTUP = 12
 """Trials drawn at random before TPE trusts what it has."""
@@ -50,18 +49,17 @@ class Sampler:
             StudyError: If the file cannot be read.
         """
         import optuna
-        from optuna.storages import JournalStorage
 
         optuna.logging.set_verbosity(optuna.logging.ERROR)
         self._optuna: Any = optuna
         self._definition, self._bases = definition, bases
         self._varied = {one.key: one for one in definition.varied}
         self._single = len(objectives) == 1
-        self._journal: Any = None
+        self._journal: journal.Journal | None = None
         try:
-            self._journal = _journal(path)
+            self._journal = journal.Journal(path)
             self._study: Any = optuna.create_study(
-                storage=JournalStorage(self._journal),
+                storage=journal.storage(self._journal, minimized=self._minimized(objectives)),
                 study_name=definition.name,
                 directions=["maximize" if one.higher else "minimize" for one in objectives],
                 sampler=self._sampler(),
@@ -94,6 +92,11 @@ class Sampler:
             return samplers.NSGAIISampler(population_size=size, seed=seed)
         return samplers.RandomSampler(seed=seed)
 
+    def _minimized(self, objectives: Sequence[Objective]) -> bool | None:
+        """Of a search by TPE whether the smallest value is the best; None of other searches."""
+        by_tpe = self._single and self._definition.search in ("auto", "tpe")
+        return not objectives[0].higher if by_tpe else None
+
     @property
     def asked(self) -> int:
         """How many trials were asked for, ever."""
@@ -118,12 +121,14 @@ class Sampler:
         Args:
             values: To be tried, where that is not the sampler's choice.
         """
-        if values is not None:
-            fit = {k: v for k, v in values.items() if self._varied[k].contains(v)}
-            self._study.enqueue_trial(fit)
-        trial = self._study.ask()
-        self._trials[trial.number] = trial
-        return trial.number, self._drawn(trial.number)
+        assert self._journal is not None
+        with self._journal.together():
+            if values is not None:
+                fit = {k: v for k, v in values.items() if self._varied[k].contains(v)}
+                self._study.enqueue_trial(fit)
+            trial = self._study.ask()
+            self._trials[trial.number] = trial
+            return trial.number, self._drawn(trial.number)
 
     def _drawn(self, number: int) -> dict[str, Any]:
         trial = self._trials[number]
@@ -148,14 +153,16 @@ class Sampler:
             pruned: Whether it was given up: then the values are of its first runs only.
         """
         trial, state = self._trials.pop(number), self._optuna.trial.TrialState
-        if values is None:
-            self._study.tell(trial, state=state.FAIL)
-        elif pruned:
-            if self._single:
-                trial.report(float(values[0]), 0)
-            self._study.tell(trial, state=state.PRUNED)
-        else:
-            self._study.tell(trial, [float(one) for one in values])
+        assert self._journal is not None
+        with self._journal.together():
+            if values is None:
+                self._study.tell(trial, state=state.FAIL)
+            elif pruned:
+                if self._single:
+                    trial.report(float(values[0]), 0)
+                self._study.tell(trial, state=state.PRUNED)
+            else:
+                self._study.tell(trial, [float(one) for one in values])
 
     def grid(self) -> list[dict[str, Any]]:
         """All trials of a grid.
@@ -171,52 +178,3 @@ class Sampler:
                 "take fewer steps, or another search"
             )
         return found
-
-
-def _journal(path: Path) -> Any:
-    from optuna.storages.journal import BaseJournalBackend
-
-    class Journal(BaseJournalBackend):
-        """Optuna's lines in a file that one process writes: no lock, and each write at once.
-
-        What a killed program had not written to its end is cut off. The system holds what was
-        written: only a machine that loses its power can lose the last trials' values, and their
-        results are kept apart.
-        """
-
-        def __init__(self) -> None:
-            whole = path.read_bytes() if path.exists() else b""
-            complete = whole[: whole.rfind(b"\n") + 1]
-            if len(complete) < len(whole):
-                with path.open("r+b") as file:
-                    file.truncate(len(complete))
-            self._lines: list[dict[str, Any]] = [json.loads(one) for one in complete.splitlines()]
-            self._first = 0
-            self._file = path.open("ab", buffering=0)
-
-        def close(self) -> None:
-            self._file.close()
-
-        def read_logs(self, log_number_from: int) -> Iterator[dict[str, Any]]:
-            # what Optuna has read it does not ask for again
-            del self._lines[: log_number_from - self._first]
-            self._first = max(self._first, log_number_from)
-            yield from list(self._lines)
-
-        def append_logs(self, logs: list[dict[str, Any]]) -> None:
-            texts = [json.dumps(one, separators=(",", ":")) for one in logs]
-            data = "".join(f"{one}\n" for one in texts).encode()
-            before = os.fstat(self._file.fileno()).st_size
-            try:
-                written = self._file.write(data)
-                if written != len(data):
-                    raise OSError(28, "No space left on device")
-            except OSError as error:
-                os.ftruncate(self._file.fileno(), before)
-                raise StudyError(
-                    f"{path}: cannot be written ({error.strerror}); free some space and go on by "
-                    "`multiview-phd study resume`: every run that ended is kept"
-                ) from None
-            self._lines += [json.loads(one) for one in texts]
-
-    return Journal()

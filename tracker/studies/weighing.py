@@ -11,8 +11,14 @@ from tracker.studies.defined.definition import Varied
 from tracker.studies.kept.records import Trial
 from tracker.studies.work.cluster import Crew
 
-GROWTH = 1.5
+GROWTH = 2.0
 """It is found out anew when there are so many times more trials."""
+
+SHARE = 0.01
+"""Of the workers' time at most so much is spent on it before the end."""
+
+NEARLY = 0.9
+"""At the end it is left as it is where it was told by this share of the trials."""
 
 LAST_SECONDS = 60.0
 """At most so long the end of a study waits for it."""
@@ -31,20 +37,23 @@ class Weighing:
         self._varied, self._defaults = tuple(varied), dict(defaults)
         self._asked: Callable[[], Any | None] | None = None
         self._weighed = 0
+        self._spent = self._took = 0.0
 
     def news(
-        self, complete: Sequence[Trial], crew: Crew, *, last: bool = False
+        self, complete: Sequence[Trial], crew: Crew, *, worked: float, last: bool = False
     ) -> dict[str, Any] | None:
         """What was found out since, if anything was.
 
         Args:
             complete: Trials that ended with all their runs.
             crew: Has it computed.
+            worked: Seconds that the workers took for runs so far.
             last: Whether no more trials come: then it is waited for.
         """
         found = self._found()
-        needed = self._weighed + 1 if last else self._weighed * GROWTH
-        if self._asked is None and len(complete) >= max(importance.FEWEST, needed):
+        needed = self._weighed / NEARLY if last else self._weighed * GROWTH
+        spared = last or self._spent + GROWTH * self._took <= SHARE * worked
+        if self._asked is None and spared and len(complete) >= max(importance.FEWEST, needed):
             self._weighed = len(complete)
             rows = [(one.values, one.objectives) for one in complete if one.objectives]
             self._asked = crew.call(importance.importance, self._varied, rows, self._defaults)
@@ -58,4 +67,6 @@ class Weighing:
         found = None if self._asked is None else self._asked()
         if found is not None:
             self._asked = None
+            self._took = found.pop("seconds")
+            self._spent += self._took
         return found

@@ -163,6 +163,8 @@ class Batch(Where):
     """The file that the runs are kept in."""
     keep: Annotated[int, arg(metavar="INT")] = KEEP
     """Kept runs without star, name, note and tags that stay, the newest ones."""
+    no_corrections: FlagCreatePairsOff[bool] = False
+    """Do not obey what was put right by hand in the recordings."""
     json: FlagCreatePairsOff[bool] = False
     """Print the figures of every run as JSON."""
 

@@ -1,9 +1,10 @@
 """What was computed when a start of the program crashed, so that the next one does not do it again.
 
 A native crash (a fault in compiled code) ends the whole process. What was taught and not saved is
-taken up again at the next start, and would crash that as well: so a start notes which draft it
-computes with, the interpreter writes where a crash happened, and the next start puts the draft
-aside. An end by a signal from outside leaves no such report, and its draft is taken up as always.
+taken up again at the next start, and would crash that as well; so would the same run. So a start
+notes what it computes, the interpreter writes where a crash happened, and the next start puts the
+draft aside and leaves the run out. An end by a signal from outside leaves no such report, and its
+draft is taken up as always.
 """
 
 from __future__ import annotations
@@ -12,16 +13,50 @@ import contextlib
 import faulthandler
 import json
 import os
+import platform
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import version
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 from app.state.kept.json_files import set_aside
 
 LAST = "last-crash.txt"
-"""What the interpreter wrote at the last crash: for whoever reports it."""
+"""What is known of the last crash: for whoever reports it."""
+
+REPORT_LETTERS = 6000
+"""Of what the interpreter wrote: its beginning tells of the thread that crashed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """What a start does."""
+
+    place: str = ""
+    """What opens the recording; empty while there is none."""
+    opening: bool = False
+    """Whether it was being opened."""
+    draft: str | None = None
+    """The file of what was taught and not saved, where it is computed with."""
+    run: str | None = None
+    """Key of the run under way."""
+    values: dict[str, Any] = field(default_factory=dict)
+    """Its parameters, where they are not the recording's own."""
+    good: dict[str, Any] | None = None
+    """Those of the last run that was done."""
+
+
+@dataclass(frozen=True, slots=True)
+class Crash:
+    """An earlier start's."""
+
+    words: str
+    report: str
+    """All that is known of it, to be passed on."""
+    note: Note
 
 
 class Crashes:
@@ -35,6 +70,7 @@ class Crashes:
         """
         self._folder = folder
         self._report: TextIO | None = None
+        self._note = Note()
 
     def watch(self) -> None:
         """Have the interpreter write where this process crashes, if it does."""
@@ -56,52 +92,131 @@ class Crashes:
             self._own(kind).unlink(missing_ok=True)
 
     @contextmanager
-    def computing(self, draft: Path | None) -> Iterator[None]:
-        """Within it something is computed with what this draft holds; None: with what is saved."""
-        if self._report is None or draft is None:
-            yield
-            return
-        note = self._own("json")
-        with contextlib.suppress(OSError):
-            note.write_text(json.dumps(str(draft)), encoding="utf-8")
+    def opening(self, place: str) -> Iterator[None]:
+        """Within it a recording is opened."""
+        before = self._note
+        self._write(Note(place, opening=True))
+        opened = before
         try:
             yield
+            opened = Note(place)
         finally:
-            note.unlink(missing_ok=True)
+            self._write(opened)
 
-    def tidy(self) -> list[str]:
-        """Put aside what crashed earlier starts; a sentence for each that did."""
+    @contextmanager
+    def computing(
+        self, draft: Path | None, run: str = "", values: Mapping[str, Any] | None = None
+    ) -> Iterator[None]:
+        """Within it a run is computed.
+
+        Args:
+            draft: The file of what was taught and not saved; None: with what is saved.
+            run: Its key.
+            values: Its parameters, where they are not the recording's own.
+        """
+        place, good = self._note.place, self._note.good
+        told = None if draft is None else str(draft)
+        self._write(Note(place, False, told, run, dict(values or {}), good))
+        try:
+            yield
+            good = dict(values or {})
+        finally:
+            if not self._note.opening:  # else another recording is on its way
+                self._write(Note(self._note.place, good=good, values=dict(values or {})))
+
+    def _write(self, note: Note) -> None:
+        self._note = note
+        if self._report is not None:
+            with contextlib.suppress(OSError):
+                self._own("json").write_text(json.dumps(asdict(note)), encoding="utf-8")
+
+    def tidy(self, ended: tuple[int, int] | None = None) -> list[Crash]:
+        """Put aside what crashed earlier starts.
+
+        Args:
+            ended: Process and signal of the start before this one, where that is known.
+
+        Returns:
+            All that did, the one before this one last.
+        """
         if self._folder is None or not self._folder.is_dir():
             return []
-        told = []
-        for report in sorted(self._folder.glob("start-*.txt")):
+        found = []
+        for report in sorted(self._folder.glob("start-*.txt"), key=_time_of):
             number = report.stem.removeprefix("start-")
             if not number.isdecimal() or _is_alive(int(number)):
                 continue
-            note = report.with_suffix(".json")
+            by = ended[1] if ended is not None and int(number) == ended[0] else None
             with contextlib.suppress(OSError, ValueError):
-                if report.stat().st_size:
-                    report.replace(self._folder / LAST)
-                    told.append(self._of_crash(note))
-            for left in (report, note):
+                if report.stat().st_size or by is not None:
+                    found.append(self._of_crash(report, by))
+            for left in (report, report.with_suffix(".json")):
                 left.unlink(missing_ok=True)
-        return told
+        return found
 
-    def _of_crash(self, note: Path) -> str:
+    def _of_crash(self, report: Path, by: int | None) -> Crash:
         assert self._folder is not None
-        words = f"The program crashed at an earlier start; {self._folder / LAST} says where"
-        try:
-            draft = Path(json.loads(note.read_text(encoding="utf-8")))
-        except (OSError, ValueError, TypeError):
-            return words
-        aside = set_aside(draft) if draft.is_file() else None
-        if aside is None:
-            return words
-        return f"{words}. It computed with changes that were not saved: they are now in {aside}"
+        note = _note_of(report.with_suffix(".json"))
+        trace = report.read_text(encoding="utf-8", errors="replace")[:REPORT_LETTERS]
+        told = _report(note, trace, by)
+        words = "The program crashed"
+        with contextlib.suppress(OSError):
+            (self._folder / LAST).write_text(told, encoding="utf-8")
+            words = f"The program crashed; {self._folder / LAST} says where"
+        draft = Path(note.draft) if note.draft and trace else None
+        aside = set_aside(draft) if draft is not None and draft.is_file() else None
+        if aside is not None:
+            words += f". It computed with changes that were not saved: they are now in {aside}"
+        return Crash(words, told, note)
 
     def _own(self, kind: str) -> Path:
         assert self._folder is not None
         return self._folder / f"start-{os.getpid()}.{kind}"
+
+
+def _note_of(path: Path) -> Note:
+    try:
+        return Note(**json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return Note()
+
+
+def _report(note: Note, trace: str, by: int | None) -> str:
+    """What somebody who is to mend it needs."""
+    from tracker import __version__
+
+    packages = ("numpy", "numba", "llvmlite", "opencv-python-headless", "av")
+    known = [f"{name} {version(name)}" for name in packages if _is_there(name)]
+    doing = f"opening {note.place}" if note.opening else f"open: {note.place or 'nothing'}"
+    run = "no run under way"
+    if note.run is not None:
+        run = f"run {note.run} under way, values {json.dumps(note.values, ensure_ascii=False)}"
+    return "\n".join(
+        [
+            f"multiview-phd {__version__}, Python {platform.python_version()}, "
+            f"{platform.platform()}",
+            ", ".join(known),
+            "ended by a fault" if by is None else f"ended by signal {by}",
+            doing,
+            run,
+            trace or "the interpreter wrote nothing, as where the system ended the process",
+        ]
+    )
+
+
+def _is_there(name: str) -> bool:
+    try:
+        version(name)
+    except ImportError:
+        return False
+    return True
+
+
+def _time_of(path: Path) -> float:
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return 0.0
 
 
 def _is_alive(process: int) -> bool:

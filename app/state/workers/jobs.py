@@ -12,14 +12,15 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from app.errors import sentence
-from app.state.kept.crashes import Crashes
+from app.state.kept.crashes import Crashes, Note
 from app.state.snapshot import Change, Opening, Snapshot
 from app.state.workbench import Workbench
 from app.state.workers.compiling import WORDS, Compiling
@@ -28,9 +29,10 @@ from tracker import pipeline
 from tracker.corrections.log import open_log
 from tracker.library.keeping import run_from
 from tracker.library.records import Result
-from tracker.parameters import RunParameters
+from tracker.parameters import RunParameters, changed, with_values
 from tracker.pipeline import Cancelled, Progress, Run
 from tracker.runs import gaps
+from tracker.runs.gates import notices
 from tracker.runs.stage_cache import StageCache
 from tracker.sequences import library
 from tracker.sequences.pictures.frames import CACHE_BYTES, FrameReader
@@ -49,6 +51,10 @@ OPENING_TELLS_SECONDS = 0.1
 
 CLOSING_SECONDS = 1.0
 """How long what is under way may take to notice that it is to end."""
+
+CRASHED = (
+    "the program crashed while this run was computed; it is left out until it is asked for again"
+)
 
 SWITCH_SECONDS = 0.001
 """A thread that computes gives the interpreter back this soon; Python's own 5 ms add up
@@ -116,6 +122,8 @@ class Jobs:
         self._computes = computes
         self._picture_bytes = picture_bytes
         self._crashes = crashes or Crashes(None)
+        self._crashed: Note | None = None
+        self._refused = ""
         self._draft_of = draft_of
         self._opening: threading.Event | None = None
         self._openings: list[threading.Thread] = []
@@ -128,8 +136,26 @@ class Jobs:
 
     # opening
 
-    def open(self, name: str) -> Future[None]:
+    def take_up(self, note: Note) -> Future[None]:
+        """Open what a start had open that crashed, with its values; its run is left out.
+
+        Returns:
+            As :meth:`open`; where it crashed when that was opened, it is not, and is refused once.
+        """
+        if note.opening or not note.place:
+            self._refused = note.place
+            nothing: Future[None] = Future()
+            nothing.set_result(None)
+            return nothing
+        self._crashed = note
+        return self.open(note.place, note.values)
+
+    def open(self, name: str, values: Mapping[str, Any] | None = None) -> Future[None]:
         """Open a sequence, built-in or a folder, in the background; the newest request wins.
+
+        Args:
+            name: Of it.
+            values: Parameters that are not its own; they begin at its own, where none are given.
 
         Returns:
             Done when it is shown; its exception says why it is not. Whatever was
@@ -137,6 +163,12 @@ class Jobs:
         """
         future: Future[None] = Future()
         cancelled = threading.Event()
+        if name and name == self._refused:  # by a page that comes back
+            self._refused = ""
+            error = ValueError("the program crashed when it was opened; open it again to try anew")
+            self._opening_failed(name, cancelled, error)
+            future.set_exception(error)
+            return future
         with self._condition:
             if self._closed:
                 raise RuntimeError("the jobs are closed")
@@ -144,14 +176,23 @@ class Jobs:
                 self._opening.set()
             self._opening = cancelled
             thread = threading.Thread(
-                target=self._open, args=(name, cancelled, future), name="opening", daemon=True
+                target=self._open,
+                args=(name, values or {}, cancelled, future),
+                name="opening",
+                daemon=True,
             )
             self._openings = [t for t in self._openings if t.is_alive()] + [thread]
         self._workbench.set_opening(Opening(name, "reading"))
         thread.start()
         return future
 
-    def _open(self, name: str, cancelled: threading.Event, future: Future[None]) -> None:
+    def _open(
+        self,
+        name: str,
+        values: Mapping[str, Any],
+        cancelled: threading.Event,
+        future: Future[None],
+    ) -> None:
         be_nice()
 
         told_at = 0.0
@@ -166,16 +207,17 @@ class Jobs:
                 self._workbench.set_opening(Opening(name, words, done, total))
 
         try:
-            sequence = library.open_sequence(
-                locate(name, self._data),
-                progress=partial(progress, "rendering"),
-                cancelled=cancelled.is_set,
-            )
-            sequence = library.with_detector(sequence, self._detector)
-            parameters = RunParameters()
-            if self._computes:  # else neither pictures nor boxes are needed
-                parameters = pipeline.default_parameters(sequence)
-            reader = FrameReader(sequence, cache_bytes=self._picture_bytes)
+            with self._crashes.opening(name):
+                sequence = library.open_sequence(
+                    locate(name, self._data),
+                    progress=partial(progress, "rendering"),
+                    cancelled=cancelled.is_set,
+                )
+                sequence = library.with_detector(sequence, self._detector)
+                parameters = RunParameters()
+                if self._computes:  # else neither pictures nor boxes are needed
+                    parameters = pipeline.default_parameters(sequence)
+                reader = FrameReader(sequence, cache_bytes=self._picture_bytes)
             with self._condition:
                 if cancelled.is_set():
                     reader.close()
@@ -183,7 +225,10 @@ class Jobs:
                 self._opening = None
             key = sequence.digest[:16]
             log = open_log(sequence.folder)
-            before = self._workbench.open(sequence, key, reader, parameters, name, log.corrections)
+            before = self._workbench.open(
+                sequence, key, reader, parameters, name, log.corrections,
+                with_values(parameters, values),
+            )  # fmt: skip
         except Exception as error:
             if cancelled.is_set():
                 future.set_exception(Cancelled("another sequence was asked for"))
@@ -223,7 +268,8 @@ class Jobs:
     # running
 
     def run_again(self) -> None:
-        """Go on with a run that was cancelled or failed."""
+        """Go on with a run that was cancelled or failed, or with which the program crashed."""
+        self._crashed = None
         self._ask(again=True)
 
     def show_kept(self, result: Result) -> None:
@@ -329,21 +375,12 @@ class Jobs:
         try:
             if self._compiling is not None:
                 self._compiling.wait(on_compiling, wanted.cancelled.is_set)
-            draft = self._draft_of(sequence.folder)
-            with Watchdog(on_silence) as watchdog, self._crashes.computing(draft):
-                run = pipeline.compute(
-                    sequence,
-                    snapshot.parameters,
-                    seed=self._seed,
-                    corrections=snapshot.corrections,
-                    meanwhile=_meanwhile(snapshot, self._seed),
-                    reader=snapshot.reader,
-                    cache=self._cache,
-                    wanted=lambda: workbench.snapshot().playhead,
-                    on_progress=on_progress,
-                    cancelled=wanted.cancelled.is_set,
-                    thread_begins=be_nice,
-                )
+            crashed = self._crashed
+            if crashed is not None and crashed.run == wanted.key:
+                self._leave_out(wanted, crashed)
+                return
+            with Watchdog(on_silence) as watchdog:
+                run = self._tracked(wanted, snapshot.parameters, wanted.key, on_progress)
         except Cancelled:
             if wanted.stopped_by_person:
                 workbench.run_ends(wanted.key, "cancelled")
@@ -358,7 +395,46 @@ class Jobs:
                 logger.exception("a run failed")
             workbench.run_ends(wanted.key, "failed", sentence(error))
         else:
-            workbench.run_ends(wanted.key, "done", warnings=gaps.sentences(run))
+            told = [*gaps.sentences(run), *notices(run)]
+            workbench.run_ends(wanted.key, "done", warnings=told)
+
+    def _leave_out(self, wanted: _Wanted, crashed: Note) -> None:
+        """Say that a run crashed the program; the last one that went well is shown in its place."""
+        snapshot, workbench = wanted.snapshot, self._workbench
+        if crashed.good is not None and workbench.snapshot().run is None:
+            assert snapshot.sequence is not None
+            parameters = with_values(snapshot.defaults, crashed.good)
+            key = pipeline.stage_keys(
+                snapshot.sequence, parameters, self._seed, snapshot.corrections
+            )["tracks"]
+            if key != wanted.key:
+                workbench.show_instead(self._tracked(wanted, parameters, key, lambda *_: None))
+        workbench.run_ends(wanted.key, "failed", CRASHED)
+
+    def _tracked(
+        self,
+        wanted: _Wanted,
+        parameters: RunParameters,
+        key: str,
+        on_progress: Callable[[Run, Progress], None],
+    ) -> Run:
+        snapshot = wanted.snapshot
+        assert snapshot.sequence is not None
+        draft = self._draft_of(snapshot.sequence.folder)
+        with self._crashes.computing(draft, key, changed(parameters, snapshot.defaults)):
+            return pipeline.compute(
+                snapshot.sequence,
+                parameters,
+                seed=self._seed,
+                corrections=snapshot.corrections,
+                meanwhile=_meanwhile(snapshot, self._seed),
+                reader=snapshot.reader,
+                cache=self._cache,
+                wanted=lambda: self._workbench.snapshot().playhead,
+                on_progress=on_progress,
+                cancelled=wanted.cancelled.is_set,
+                thread_begins=be_nice,
+            )
 
     def close(self) -> None:
         """Stop everything; what is under way ends after its step."""

@@ -20,6 +20,7 @@ from app.web.tables.markup import (
     symbol,
     table,
 )
+from tracker.sequences.sequence import Room
 
 MOST_LANES = 6
 
@@ -39,12 +40,16 @@ def preview(
     people: Sequence[float],
     courses: Sequence[Course],
     ospa: Sequence[float],
+    room: Room | None = None,
 ) -> str:
-    """Lanes, people, OSPA, ways from above, and what differs."""
+    """Lanes, people, OSPA, ways from above, and what differs.
+
+    The room is drawn where it is known: that of the open recording.
+    """
     curves = _curve("People", "", people) + (_curve("OSPA", " m", ospa) if ospa else "")
     return (
         f'<div class="pv-lanes">{_lanes(run, frames, tracks)}{curves}</div>'
-        f'<div class="pv-top">{_ways(courses)}</div>'
+        f'<div class="pv-top">{_ways(courses, room)}</div>'
         f'<dl class="pv-facts">{_facts(run)}</dl>'
     )
 
@@ -56,6 +61,7 @@ def comparison(runs: Sequence[KeptRunInfo]) -> str:
         ("Single view", [run.single_view for run in runs]),
         ("Fusion", [run.fusion_method for run in runs]),
         ("Seed", [str(run.seed) for run in runs]),
+        ("Corrections", [str(run.corrected) for run in runs]),
         ("Program", [_program(run) for run in runs]),
     ):
         if len(set(values)) > 1:
@@ -105,6 +111,7 @@ def _facts(run: KeptRunInfo) -> str:
     facts: list[tuple[Cell, Cell]] = [
         ("Note", note),
         *((_named(c), joined(quiet(f"{c.default} → "), c.value)) for c in run.changes),
+        *([("Corrections of a person", run.corrected)] if run.corrected else []),
         ("Missed", number(run.misses, 0)),
         ("False", number(run.false_positives, 0)),
         ("Identity switches", number(run.id_switches, 0)),
@@ -131,10 +138,20 @@ def _lanes(run: KeptRunInfo, frames: int, tracks: Sequence[TrackLife]) -> str:
     more = len(tracks) - len(longest)
     under = f'<span></span><span class="q">and {more} more</span>' if more else ""
     words = f"Lanes of run {run.id}: {len(tracks)} tracks over {frames} steps"
-    ends = f"<span></span><span class='ends'><span>0</span><span>{frames - 1}</span></span>"
+    ends = f"<span></span><span class='ends'>{_ticks(frames)}</span>"
     return (
         f'<div class="lines" role="img" aria-label="{escaped(words)}">{ends}{"".join(lanes)}'
         f"{under}</div>"
+    )
+
+
+def _ticks(frames: int) -> str:
+    """Round steps, four to ten of them, where they are on the lanes."""
+    power = 10.0 ** np.floor(np.log10(max(10, frames) / 4.0))
+    apart = next(int(k * power) for k in (5, 2, 1) if k * power <= max(10, frames) / 4.0)
+    return "".join(
+        f'<span style="left:{100 * step / max(1, frames):.2f}%">{step}</span>'
+        for step in range(0, frames, max(1, apart))
     )
 
 
@@ -153,15 +170,18 @@ def _curve(word: str, unit: str, values: Sequence[float]) -> str:
     )
 
 
-def _ways(courses: Sequence[Course]) -> str:
+def _ways(courses: Sequence[Course], room: Room | None) -> str:
     points = np.array([p for course in courses for p in course.points]).reshape(-1, 2)
     if not len(points):
         return ""
     # a stray point far away does not make all others small
     (left, low), (right, high) = np.percentile(points, [0.5, 99.5], axis=0)
+    if room is not None:
+        left, low = np.minimum((left, low), room.minimum[:2])
+        right, high = np.maximum((right, high), room.maximum[:2])
     side = max(right - left, high - low, 1.0)
     pad = 0.06 * side
-    lines = []
+    lines = [] if room is None else [_room(room)]
     for course in courses:
         n = track_index(course.id) + 1
         way = " ".join(f"{x:g},{-y:g}" for x, y in course.points)
@@ -173,3 +193,14 @@ def _ways(courses: Sequence[Course]) -> str:
     box = f"{left - pad:.2f} {-high - pad:.2f} {right - left + 2 * pad:.2f} "
     box += f"{high - low + 2 * pad:.2f}"
     return f'<svg viewBox="{box}" role="img" aria-label="Ways from above">{"".join(lines)}</svg>'
+
+
+def _room(room: Room) -> str:
+    """The volume and the entrances from above."""
+    (x, y), (right, top) = room.minimum[:2], room.maximum[:2]
+    doors = "".join(
+        f'<ellipse cx="{e.position[0]:g}" cy="{-e.position[1]:g}" rx="{2 * e.sigma[0]:g}" '
+        f'ry="{2 * e.sigma[1]:g}"/>'
+        for e in room.entrances
+    )
+    return f'<rect x="{x:g}" y="{-top:g}" width="{right - x:g}" height="{top - y:g}"/>{doors}'

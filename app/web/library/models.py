@@ -87,6 +87,8 @@ class KeptRunInfo(Model):
     star: bool
     note: str
     tags: list[str]
+    corrected: int
+    """How many corrections of a person it obeys."""
 
 
 class KeptRuns(Model):

@@ -156,7 +156,10 @@ async def move(recording: int, wish: models.Place, opened: Opened) -> models.Rec
 @router.get("/runs/{number}")
 def run(number: RowNumber, opened: Opened) -> models.Preview:
     """One kept run in small: its facts, lanes, people and ways from above."""
-    result = _result(opened, number)
+    return _small(opened, _result(opened, number))
+
+
+def _small(opened: Library, result: Result) -> models.Preview:
     fps = next((r.fps for r in opened.recordings() if r.id == result.run.recording), 25.0)
     tracks = result.kept.tracks
     return models.Preview(
@@ -170,10 +173,15 @@ def run(number: RowNumber, opened: Opened) -> models.Preview:
 
 
 @router.get("/runs/{number}/drawn", response_class=HTMLResponse)
-def drawn(number: RowNumber, opened: Opened) -> str:
+def drawn(number: RowNumber, opened: Opened, bench: Bench) -> str:
     """One kept run in small, as a part of the page."""
-    told = run(number, opened)
-    return drawing.preview(told.run, told.frames, told.tracks, told.people, told.courses, told.ospa)
+    result, now = _result(opened, number), bench.snapshot()
+    told, room = _small(opened, result), None
+    if now.saved is not None and recording_of(now.saved, now.opened_as).place == result.place:
+        room = now.saved.room
+    return drawing.preview(
+        told.run, told.frames, told.tracks, told.people, told.courses, told.ospa, room
+    )
 
 
 @router.get("/compared", response_class=HTMLResponse)

@@ -64,18 +64,32 @@ export function mountFeet({ store, playback }, check) {
 		const on = place === "check" && !playing && shown >= 0 && (placing || track !== null);
 		const key = on ? `${track} ${shown} ${basis} ${Boolean(placing)} ${result?.run}` : "";
 		if (key === wanted) return put();
+		// A click counts from the moment it is asked for, and stays said whatever arrives later.
+		const same = placing && wanted.startsWith(`${track} ${shown} `);
+		const clicked = same ? feet.filter(({ said }) => said) : [];
 		wanted = key;
-		feet = [];
-		put();
-		if (!on) return;
-		const there = track === null ? null : await footprints(track, shown);
+		/** @param {([number, number] | null)[] | null} there @param {typeof feet} known */
+		const spots = (there, known) =>
+			cameras.flatMap(({ name, width, height }, index) => {
+				const at = there?.[index];
+				if (!at && !placing) return [];
+				const [x, y] = at ?? [width / 2, height * 0.75];
+				return [
+					known.find((one) => one.said && one.index === index) ?? {
+						index,
+						camera: name,
+						x,
+						y,
+						said: false,
+					},
+				];
+			});
+		feet = on && placing ? spots(null, clicked) : [];
+		build();
+		if (!on || track === null) return;
+		const there = await footprints(track, shown);
 		if (key !== wanted) return;
-		feet = cameras.flatMap(({ name, width, height }, index) => {
-			const at = there?.[index];
-			if (!at && !placing) return [];
-			const [x, y] = at ?? [width / 2, height * 0.75];
-			return [{ index, camera: name, x, y, said: false }];
-		});
+		feet = spots(there, feet);
 		build();
 	}
 

@@ -123,9 +123,10 @@ function createCheck({ store, actions, playback }) {
 		void refresh();
 	});
 	let heard = "";
-	store.on(["server", "basis"], ({ server, basis }) => {
-		const now = `${server?.corrections?.key} ${basis}`;
-		if (now === heard) return;
+	// Lanes of another run come first: who opens one waits for them.
+	store.on(["server", "timeline"], ({ server, timeline }) => {
+		const now = `${server?.corrections?.key} ${timeline?.run}`;
+		if (!timeline || now === heard) return;
 		heard = now;
 		void refresh();
 	});

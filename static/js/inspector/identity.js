@@ -26,6 +26,12 @@ export function mountIdentity({ store, actions }) {
 		store.set({ identity: told });
 		void watch();
 	};
-	// It may have been begun in another window, or before this page was loaded.
-	store.watch(["basis", "tab"], () => void watch());
+	// It may have been begun in another window, or before this page was loaded; lanes come first.
+	let heard = "";
+	store.watch(["timeline", "tab"], ({ timeline, tab }) => {
+		const now = `${timeline?.run} ${tab}`;
+		if (!timeline || now === heard) return;
+		heard = now;
+		void watch();
+	});
 }

@@ -143,6 +143,19 @@ export function mountLibrary(root, { store, actions }) {
 	const focusedRun = () => runs.find(({ id }) => id === focused);
 	const ofChosen = () => runs.filter(({ id }) => chosen.has(id));
 
+	/** Its own, once it was opened; else one of the list of what can be opened, if it has any. */
+	/** @param {Server.RecordingInfo} one */
+	function picture(one) {
+		const kept = one.id !== null;
+		if (one.missing || (kept && !one.has_thumbnail)) return icon("i-folder");
+		const src = kept
+			? `/api/library/thumbnail/${one.id}.jpg`
+			: `/api/recordings/picture?name=${encodeURIComponent(one.name)}`;
+		const image = h("img", { src, alt: "", loading: "lazy" });
+		image.onerror = () => image.replaceWith(icon("i-folder"));
+		return image;
+	}
+
 	/** @param {Server.RecordingInfo} one */
 	function item(one) {
 		const on = one.place === recording?.place;
@@ -157,13 +170,7 @@ export function mountLibrary(root, { store, actions }) {
 				onclick: () => void choose(one),
 				ondblclick: () => openRecording(one),
 			},
-			h(
-				"span",
-				{ class: "th" },
-				one.id !== null && one.has_thumbnail
-					? h("img", { src: `/api/library/thumbnail/${one.id}.jpg`, alt: "" })
-					: icon("i-folder"),
-			),
+			h("span", { class: "th" }, picture(one)),
 			h(
 				"span",
 				{ class: "tx" },

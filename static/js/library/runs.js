@@ -21,13 +21,20 @@ export function symbol({ symbol }) {
 
 /** @param {Server.KeptRunInfo} run */
 function pills(run) {
-	if (!run.changes.length) return h("span", { class: "q" }, "–");
+	if (!run.changes.length && !run.corrected) return h("span", { class: "q" }, "–");
 	const all = run.changes.map(({ key, value }) => `${key} ${value}`).join("\n");
 	const shown = run.changes
 		.slice(0, PILLS)
 		.map((change) => h("span", { class: "pc" }, symbol(change), " ", change.value));
 	const more = run.changes.length - PILLS;
-	return h("span", { title: all }, shown, more > 0 ? h("span", { class: "pc" }, `+${more}`) : null);
+	return h(
+		"span",
+		{ title: all },
+		shown,
+		more > 0 && h("span", { class: "pc" }, `+${more}`),
+		run.corrected > 0 &&
+			h("span", { class: "pc" }, icon("i-pin", "s"), `${run.corrected} corrected`),
+	);
 }
 
 const COLUMNS = "library columns";

@@ -184,7 +184,13 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 					act: () => (location.hash = "#study"),
 				});
 		},
-		notice: ({ level, message, hint }) => actions.note(level, message, hint ?? ""),
+		notice: ({ level, message, hint, report }) =>
+			actions.note(
+				level,
+				message,
+				hint ?? "",
+				report && { word: "Copy the report", act: () => navigator.clipboard.writeText(report) },
+			),
 		command({ name }) {
 			// Of a 3D view in a window of its own: keys of our frame come by themselves.
 			if (document.hasFocus() && document.activeElement instanceof HTMLIFrameElement) return;

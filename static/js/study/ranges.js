@@ -147,4 +147,4 @@ function parameter(now, known, key, range, { changed, show }) {
 }
 
 /** @param {number | null} value */
-const tidy = (value) => (value === null ? null : Number(value.toPrecision(4)));
+const tidy = (value) => (value === null ? null : Number(value.toPrecision(3)));

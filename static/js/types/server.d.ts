@@ -643,6 +643,8 @@ declare namespace Server {
 		star: boolean;
 		note: string;
 		tags: string[];
+		/** How many corrections of a person it obeys. */
+		corrected: number;
 	}
 
 	/** The runs of one recording, the newest first. */

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from app.command import listing
 from app.command import main as cli
 from app.command.flags import Track, parse
 from tests.app.conftest import Runs
@@ -100,7 +101,7 @@ def test_benchmarks_run_from_a_checkout(
         lines.append((line[1:], cwd))
         return subprocess.CompletedProcess(line, 1)
 
-    monkeypatch.setattr(cli.subprocess, "run", note)
+    monkeypatch.setattr(listing.subprocess, "run", note)
     wanted = tmp_path / "figures.json"
     assert run("benchmark", "kernels", "targets", "--short", "--json", wanted, "--record")[0] == 1
     chart = tmp_path / "chart.html"
@@ -118,7 +119,7 @@ def test_an_installed_package_says_where_its_benchmarks_are(
     run: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        cli, "__file__", str(tmp_path / "site-packages" / "app" / "command" / "main.py")
+        listing, "__file__", str(tmp_path / "site-packages" / "app" / "command" / "listing.py")
     )
     status, _, stderr = run("benchmark")
     assert status == 1

@@ -16,6 +16,7 @@ from app.state.workbench import Workbench
 from app.state.workers.jobs import Jobs
 from tests.app.conftest import wait_until
 from tests.app.folders import write_crossing
+from tests.synthetic import write_sequence
 from tracker import pipeline
 from tracker.pipeline import Cancelled, Run
 from tracker.sequences.reader import read_sequence
@@ -105,6 +106,23 @@ def test_opening_shows_a_sequence_and_runs_it(desk: Desk) -> None:
     assert desk.now.run_state.done == 120
     assert len(set(engine(desk).tracks.ids.tolist())) >= 2
     assert_same_tracks(desk.now.run, engine(desk))
+
+
+def test_a_run_that_finds_nobody_says_at_which_gate_they_fell(desk: Desk, tmp_path: Path) -> None:
+    folder = write_sequence(tmp_path / "noise", frames=6)
+    desk.jobs.open(str(folder)).result(30.0)
+    desk.wait("done")
+    strict = {"colour_phd.acceptance_distance": 0.05, "colour_phd.shapes": "never"}
+    desk.bench.set_parameters(strict, "test")
+    wait_until(lambda: desk.now.run_state.state == "done" and desk.now.run is not None
+               and desk.now.run.parameters == desk.now.parameters)  # fmt: skip
+    assert desk.now.run is not None
+    assert not len(desk.now.run.tracks.ids)
+    for camera in ("cam1", "cam2"):
+        about = f'camera "{camera}": '
+        (told,) = [one for one in desk.now.run_state.warnings if one.startswith(about)]
+        assert "candidates a picture, dropped" in told
+        assert "0.0 passed on" in told
 
 
 def test_twenty_changes_end_in_one_run_equal_to_the_engines(

@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.conftest import opened
-from tests.browser.looking import ask
+from tests.browser.looking import ask, open_kept
 from tests.browser.serving import Server
 from tests.browser.work.test_library import kept
 from tests.long_recording import write_long
@@ -16,27 +16,7 @@ from tests.long_recording import write_long
 STEPS = 1500
 
 BOUND_MS = 3000.0
-"""Generous: 300 ms are asked for of a machine that does nothing else."""
-
-FROM_CLICK = """() => new Promise((done, late) => {
-  // From the click until the lanes of the opened run are in the timeline and painted.
-  const button = [...document.querySelectorAll('.lib .btn')].find(
-    (one) => one.textContent === 'Open in Tune');
-  const time = document.querySelector('.time');
-  const begin = performance.now();
-  let renewed = false;
-  new MutationObserver(() => (renewed = true)).observe(
-    time.querySelector('.lanes'), { childList: true });
-  setTimeout(() => late(new Error('the lanes were not painted')), 30000);
-  const look = () => {
-    const there = renewed && time.checkVisibility() && time.querySelectorAll('.lane').length >= 3
-      && !document.querySelector('#tab-changes .count:not([hidden])');
-    if (!there) return requestAnimationFrame(look);
-    requestAnimationFrame(() => done(performance.now() - begin));
-  };
-  button.click();
-  requestAnimationFrame(look);
-})"""
+"""Generous: 300 ms are asked for of a machine that does nothing else, see the benchmark."""
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +43,7 @@ def test_a_kept_run_is_painted_at_once(page: Page, server: Server) -> None:
     expect(page.locator("tr[data-run]")).to_have_count(2)
     page.locator('tr[data-run="1"]').click()
     expect(page.locator(".pv-lanes")).to_be_visible()
-    taken = page.evaluate(FROM_CLICK)
+    taken = open_kept(page)
     print(f"\na kept run of {STEPS} steps is painted {taken:.0f} ms after the click")
     state = server.get("/api/state").json()
     assert (state["run"]["kept"], state["run"]["done"]) == (1, STEPS)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy import ndarray
@@ -25,8 +27,31 @@ def places(seed: int, count: int = 40) -> ndarray:
     return rng.uniform([-1.5, -1.5, 0.8], [1.5, 1.5, 1.0], (count, 3))
 
 
+def rolled(camera: Camera, quarters: int) -> Camera:
+    """A camera whose picture is turned about its middle."""
+    cos, sin = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)][quarters % 4]
+    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    intrinsics = camera.intrinsics.copy()
+    width, height = camera.image_size
+    if quarters % 2:
+        width, height = height, width
+    intrinsics[:2, 2] = (width - 1) / 2.0, (height - 1) / 2.0
+    return replace(
+        camera,
+        name=f"{camera.name} turned {90 * quarters}°",
+        image_size=(width, height),
+        intrinsics=intrinsics,
+        rotation=turn @ camera.rotation,
+        translation=turn @ camera.translation,
+        distortion=np.zeros(5),
+    )
+
+
+ROLLED = [*CAMERAS[:2], *(rolled(CAMERAS[0], quarters) for quarters in (1, 2, 3))]
+
+
 @every_kind
-@pytest.mark.parametrize("camera", CAMERAS[:2], ids=lambda camera: camera.name)
+@pytest.mark.parametrize("camera", ROLLED, ids=lambda camera: camera.name)
 def test_the_derivative_is_that_of_finite_differences(
     kind: MeasurementKind, camera: Camera
 ) -> None:
@@ -59,6 +84,36 @@ def test_the_box_spans_the_axis() -> None:
     assert_allclose(found.depths, np.linalg.norm(states - camera.centre, axis=1))
     centre = TargetModel(HALF_EXTENTS, "centre").expected(camera, states)
     assert_allclose(centre.values, camera.project(states)[0])
+
+
+def test_a_camera_upside_down_sees_the_same_box_turned() -> None:
+    upright, states = rolled(CAMERAS[0], 0), places(3)
+    model = TargetModel(HALF_EXTENTS, "box_and_width")
+    boxes = model.expected(upright, states).boxes
+    turned = model.expected(rolled(upright, 2), states)
+    width, height = upright.image_size
+    assert_allclose(turned.boxes[:, [2, 3]], [width - 1, height - 1] - boxes[:, [0, 1]])
+    assert_allclose(turned.boxes[:, [0, 1]], [width - 1, height - 1] - boxes[:, [2, 3]])
+    assert (turned.values[:, 1] <= turned.values[:, 2]).all()
+
+
+@pytest.mark.parametrize("quarters", [1, 3])
+def test_in_a_picture_turned_by_a_quarter_a_box_is_as_high_as_the_target_is_wide(
+    quarters: int,
+) -> None:
+    camera, states = rolled(CAMERAS[0], quarters), places(4)
+    found = TargetModel(HALF_EXTENTS, "box_and_width").expected(camera, states)
+    rise = np.array([0.0, 0.0, HALF_EXTENTS[2]])
+    head, foot = camera.project(states + rise)[0], camera.project(states - rise)[0]
+    along = np.abs(head[:, 0] - foot[:, 0])
+    share = HALF_EXTENTS[:2].mean() / HALF_EXTENTS[2]
+    sideways = along * share > np.abs(head[:, 1] - foot[:, 1])
+    assert sideways.mean() > 0.8, "of those at the picture's edge the axis leans"
+    sizes = found.boxes[sideways, 2:] - found.boxes[sideways, :2]
+    assert_allclose(sizes[:, 0], along[sideways])
+    assert_allclose(sizes[:, 1], share * along[sideways])
+    middles = (found.boxes[:, :2] + found.boxes[:, 2:]) / 2.0
+    assert_allclose(middles, (head + foot) / 2.0)
 
 
 def test_beyond_the_edge_a_box_ends_and_tells_nothing() -> None:

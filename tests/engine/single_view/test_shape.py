@@ -12,12 +12,14 @@ import pytest
 from tracker import pipeline
 from tracker.foreground import BackgroundModel
 from tracker.parameters import RunParameters, with_values
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.rendering import render_random
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
+from tracker.single_view.colour.trust import shape_trust
 from tracker.single_view.shape.channels import Channels
-from tracker.single_view.shape.finder import strongest
+from tracker.single_view.shape.finder import Shapes, strongest
 from tracker.single_view.shape.windows import ABOVE, BELOW, WIDTH, Windows
 
 STEPS = 45
@@ -69,6 +71,20 @@ def test_the_best_of_windows_that_overlap_takes_the_others() -> None:
     assert [len(one) for one in nobody] == [0, 0]
 
 
+def test_a_box_is_supported_by_the_best_window_at_its_place() -> None:
+    boxes = np.array([[50, 60, 8, 20], [54, 60, 8, 20], [90, 60, 8, 20]], float)
+    edges = np.array([[30, 30, 70, 80], [34, 30, 74, 80], [70, 30, 110, 80]], float)
+    none = np.zeros((0, 4))
+    odds = np.array([1.0, 3.0, -2.0])
+    found = Shapes(none, np.zeros(0), none[:, :2], 0, Windows(edges, boxes), odds)
+    # 40 pixels a metre: within 0.35 m are 14 pixels
+    there = found.support(
+        np.array([[51, 60, 9, 9], [91, 61, 9, 9], [70, 60, 9, 9], [51, 90, 9, 9]])
+    )
+    assert there.tolist() == [3.0, -2.0, -np.inf, -np.inf]
+    assert found.support(none).shape == (0,)
+
+
 def test_another_exposure_neither_moves_nor_differs_and_a_person_does_both() -> None:
     rng = np.random.default_rng(1)
     empty = cv2.GaussianBlur(rng.integers(40, 160, (80, 100, 3)).astype(np.uint8), (0, 0), 3.0)
@@ -107,3 +123,19 @@ def test_who_walks_is_found_by_shape_alone(room: Sequence) -> None:
         place = rows[rows[:, 0] == step][0, 2:5]
         near += bool(len(there)) and np.linalg.norm(there - place, axis=1).min() < 0.5
     assert near > 0.8 * (STEPS - 20)
+
+
+def test_shape_is_believed_of_whose_template_shows_one(room: Sequence) -> None:
+    (template,) = {t.name: t for t in room.templates}.values()
+    left, top, width, height = template.box
+    camera = next(c for c in room.cameras if c.name == template.camera)
+    # the same box where nobody is: on the other side of the picture
+    across = left - 3.0 * width if left > camera.image_size[0] / 2.0 else left + 3.0 * width
+    nobody = replace(template, name="wall", box=np.array([across, top, width, height]))
+    unseen = replace(template, name="elsewhere", camera="none")
+    taught = replace(room, templates=(template, nobody, unseen))
+    with FrameReader(taught) as reader:
+        trust = shape_trust(taught, reader)
+    assert trust[template.name] > 0.5
+    assert trust["wall"] < 0.2
+    assert trust["elsewhere"] == 0.0

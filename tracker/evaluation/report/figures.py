@@ -209,8 +209,9 @@ def top_view(sequence: Sequence, tracks: Tracks, evaluation: Evaluation) -> go.F
         type="rect", x0=low[0], y0=low[1], x1=high[0], y1=high[1],
         line={"color": LINE, "width": 1}, layer="below",
     )  # fmt: skip
-    figure.update_xaxes(title_text="x (m)")
-    figure.update_yaxes(title_text="y (m)", scaleanchor="x", scaleratio=1)
+    # a line at zero would cover a wall that stands there
+    figure.update_xaxes(title_text="x (m)", zeroline=False)
+    figure.update_yaxes(title_text="y (m)", scaleanchor="x", scaleratio=1, zeroline=False)
     figure.update_layout(_layout(), height=620, hovermode="closest")
     figure.update_layout(legend={"x": 1.01, "y": 1.0, "xanchor": "left", "itemsizing": "constant"})
     return figure

@@ -127,7 +127,11 @@ def _section(name: str, title: str, body: str) -> str:
 
 
 def _plot(figure: str, label: str) -> str:
-    return f'<div class="plot" data-figure="{figure}" role="img" aria-label="{label}"></div>'
+    # in a narrow window it scrolls: legends would stand on titles
+    return (
+        f'<div class="wide" tabindex="0"><div class="plot" data-figure="{figure}" role="img" '
+        f'aria-label="{label}"></div></div>'
+    )
 
 
 def _head(sequence: Sequence, evaluation: Evaluation, seed: int | None) -> str:

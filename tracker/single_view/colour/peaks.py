@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
+from scipy.special import expit
 
 from tracker import mean_shift
 from tracker.filters.gaussian_mixture import GaussianMixture
@@ -20,15 +21,15 @@ from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.appearance import Appearance, Scene
-from tracker.single_view.colour.trust import template_trust
+from tracker.single_view.colour.trust import shape_trust, template_trust
 from tracker.single_view.protocol import CANDIDATES, DROPPED, TRUST
-from tracker.single_view.shape.finder import ShapeFinder
+from tracker.single_view.shape.finder import SAME_PERSON, ShapeFinder, Shapes
+
+LEAST_LIKELY = 0.02
+"""Added to the probability of a person by shape, as to the share of foreground in a box."""
 
 BELIEVED = 0.9
 """A foreground that is trusted less than this about somebody is helped by shapes."""
-
-SAME_PERSON = (0.35, 0.5)
-"""Metres across and down within which a peak shows that somebody found by shape is there."""
 
 SHAPE_OVERLAP = 0.3
 """Windows of the shapes that share more than this of what both cover are of one person."""
@@ -92,6 +93,12 @@ class PeakFinder:
                 for trust in template_trust(sequence, camera, reader, foreground).values()
             )
         self._shapes = ShapeFinder(sequence, camera_index, reader) if wanted else None
+        self._instead = np.zeros(len(self._appearance.model.names))
+        """How far the shape stands in for the foreground about each person, 0 … 1."""
+        if self._shapes is not None:
+            by_shape = shape_trust(sequence, reader)
+            names = self._appearance.model.names
+            self._instead = (1.0 - self._appearance.trust) * [by_shape[name] for name in names]
 
     @property
     def sizes(self) -> BoxSizes:
@@ -122,18 +129,22 @@ class PeakFinder:
             The state for the next picture, and what was found.
         """
         background, shape_state = state
+        p = self._parameters
         background, scene = self._appearance.look(background, picture)
-        samples = self._sample(intensity, scene, rng)
-        scores, _, _ = self._score(scene, samples)
-        candidates = self._climb(samples, scores)
-        boxes, distances, dropped = self._accept(scene, candidates)
+        shapes: Shapes | None = None
         if self._shapes is not None:
-            shape_state, boxes, distances = self._with_shapes(
-                shape_state, picture, scene, boxes, distances
+            shape_state, shapes = self._shapes.find(
+                shape_state, picture, p.shape_odds, SHAPE_OVERLAP
             )
+        samples = self._sample(intensity, scene, rng)
+        scores, _, _ = self._score(scene, shapes, samples)
+        candidates = self._climb(samples, scores)
+        boxes, distances, dropped = self._accept(scene, shapes, candidates)
+        if shapes is not None:
+            boxes, distances = self._with_shapes(scene, shapes, boxes, distances)
         return (background, shape_state), Peaks(
             boxes=boxes,
-            scores=np.exp(-0.5 * (distances / self._parameters.likelihood_sigma) ** 2),
+            scores=np.exp(-0.5 * (distances / p.likelihood_sigma) ** 2),
             samples=samples,
             sample_weights=(
                 np.exp(scores.max(axis=1) - scores.max()) if len(scores) else np.zeros(0)
@@ -150,21 +161,17 @@ class PeakFinder:
 
     def _with_shapes(
         self,
-        state: Any,
-        picture: UInt8[ndarray, "h w 3"],
         scene: Scene,
+        found: Shapes,
         boxes: Float[ndarray, "N 4"],
         distances: Float[ndarray, " N"],
-    ) -> tuple[Any, Float[ndarray, "M 4"], Float[ndarray, " M"]]:
+    ) -> tuple[Float[ndarray, "M 4"], Float[ndarray, " M"]]:
         """The peaks, and people found by shape where there is none, with their distances."""
-        assert self._shapes is not None
-        p = self._parameters
-        state, found = self._shapes.find(state, picture, p.shape_odds, SHAPE_OVERLAP)
         apart = (found.boxes[:, None, :2] - boxes[None, :, :2]) / found.sizes[:, None]
         taken = (np.abs(apart) < SAME_PERSON).all(axis=2).any(axis=1)
         new = found.boxes[~taken]
         far = self._appearance.distances(scene, new).min(axis=1) if len(new) else np.zeros(0)
-        return state, np.concatenate([boxes, new]), np.concatenate([distances, far])
+        return np.concatenate([boxes, new]), np.concatenate([distances, far])
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
         """Standard deviations of peaks: proportional to the box, and no more of a large one."""
@@ -197,14 +204,18 @@ class PeakFinder:
         return self._appearance.within(np.concatenate(parts))
 
     def _score(
-        self, scene: Scene, boxes: Float[ndarray, "N 4"]
+        self, scene: Scene, shapes: Shapes | None, boxes: Float[ndarray, "N 4"]
     ) -> tuple[Float[ndarray, "N G"], Float[ndarray, "N G"], Float[ndarray, " N"]]:
-        """Log-likelihood and distance D of each box for each person, and share of foreground."""
+        """Log-likelihood and distance D of each box for each person, and share of foreground.
+
+        About somebody whom the foreground does not see the shape says instead whether there
+        is a person: a ln(P + 0.02), with the probability P of one.
+        """
         p = self._parameters
         distances = self._appearance.distances(scene, boxes)
-        trust = self._appearance.trust[None, :]
+        trust, instead = self._appearance.trust[None, :], self._instead[None, :]
         if not p.peaks_per_person:
-            trust = trust.min(axis=1, keepdims=True)
+            trust, instead = (each.min(axis=1, keepdims=True) for each in (trust, instead))
             distances = distances.min(axis=1, keepdims=True)
         scores = -0.5 * (distances / p.likelihood_sigma) ** 2
         factors, inside = self._appearance.shape_scores(
@@ -213,7 +224,11 @@ class PeakFinder:
             inside_weight=p.foreground_weight,
             around_weight=p.surroundings_weight,
         )
-        return scores + trust * factors[:, None], distances, inside
+        scores = scores + trust * factors[:, None]
+        if shapes is not None and instead.any():
+            likely = np.log(expit(shapes.support(boxes)) + LEAST_LIKELY)
+            scores += p.foreground_weight * instead * likely[:, None]
+        return scores, distances, inside
 
     def _trusted(self, person: Int[ndarray, " N"]) -> Float[ndarray, " N"]:
         """How far the foreground is believed about each person of some boxes."""
@@ -244,12 +259,12 @@ class PeakFinder:
         return np.concatenate(found)
 
     def _accept(
-        self, scene: Scene, candidates: Float[ndarray, "M 4"]
+        self, scene: Scene, shapes: Shapes | None, candidates: Float[ndarray, "M 4"]
     ) -> tuple[Float[ndarray, "K 4"], Float[ndarray, " K"], dict[str, int]]:
         """The peaks that look enough like a person, and their distances; one at each place.
         How many others fell at which gate."""
         p = self._parameters
-        scores, distances, inside = self._score(scene, candidates)
+        scores, distances, inside = self._score(scene, shapes, candidates)
         best, nearest, person = scores.max(axis=1), distances.min(axis=1), scores.argmax(axis=1)
         coloured = nearest <= p.acceptance_distance
         likely = best >= -0.5 * (p.acceptance_distance / p.likelihood_sigma) ** 2
@@ -263,10 +278,13 @@ class PeakFinder:
             least = np.where(person[kept] == person[i], p.same_person_distance, p.merge_distance)
             if good[i] and np.all((apart**2).sum(axis=1) >= least**2):
                 kept.append(int(i))
+        fell = ~good & coloured & covered
+        by_shape = self._instead[person] > self._trusted(person)
         dropped = {
             "colour": int((~good & ~coloured).sum()),
             "foreground": int((~good & coloured & ~covered).sum()),
-            "surroundings": int((~good & coloured & covered).sum()),
+            "surroundings": int((fell & ~by_shape).sum()),
+            "shape": int((fell & by_shape).sum()),
             "another at its place": int(good.sum()) - len(kept),
         }
         return candidates[kept], nearest[kept], dropped

@@ -1,7 +1,9 @@
-"""How far the foreground is to be believed about each person, by their templates.
+"""How far foreground and shape are to be believed about each person, by their templates.
 
 Somebody who never leaves is learnt as background. A template is proof that a person
 was there: where it lies on background, the foreground is wrong and not the template.
+So it is with shapes: somebody who lies, or whose template nobody would take for a person, is
+not found by shape.
 """
 
 from __future__ import annotations
@@ -9,12 +11,17 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
+from scipy.special import expit
 
 from tracker.boxes import Boxes
 from tracker.foreground import box_shares, integral, learn
 from tracker.parameters import ForegroundParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template
+from tracker.single_view.shape.finder import ShapeFinder
+
+PICTURES_BEFORE = 8
+"""Before a template's, that are looked at for what moves."""
 
 NOTHING, ENOUGH = 0.1, 0.3
 """Shares of foreground in a template's box: below the first the foreground knows nothing of the
@@ -57,6 +64,45 @@ def template_trust(
         u = float(np.clip((np.mean(shares) - NOTHING) / (ENOUGH - NOTHING), 0.0, 1.0))
         trust[name] = u * u * (3.0 - 2.0 * u)
     return trust
+
+
+def shape_trust(sequence: Sequence, reader: Pictures) -> dict[str, float]:
+    """Trust in the shapes about each person with templates, 0 … 1.
+
+    It is the probability of a person by shape at the likeliest of their templates.
+
+    Args:
+        sequence: Its templates, as stage 1 sees its pictures.
+        reader: Of the pictures.
+    """
+    trust: dict[str, float] = {}
+    for template in sequence.templates:
+        found = _likelihood(sequence, template, reader)
+        trust[template.name] = max(trust.get(template.name, 0.0), found)
+    return trust
+
+
+def _likelihood(sequence: Sequence, template: Template, reader: Pictures) -> float:
+    """The probability of a person by shape in a template's box; 0 where nothing can be said."""
+    names = [view.camera.name for view in sequence.views]
+    if template.camera not in names:
+        return 0.0
+    camera = names.index(template.camera)
+    what = (template.camera, template.frame, template.box.tobytes())
+
+    def look() -> float:
+        finder = ShapeFinder(sequence, camera, reader)
+        state, odds = finder.start(), -np.inf
+        box = Boxes.from_left_top(template.box[None]).centred
+        # the pictures before show what moves
+        for step in range(max(0, template.frame - PICTURES_BEFORE), template.frame + 1):
+            picture = reader.picture(camera, step)
+            if picture is not None:
+                state, found = finder.find(state, picture, np.inf, 1.0)
+                odds = float(found.support(box)[0]) if step == template.frame else -np.inf
+        return float(expit(odds))
+
+    return reader.once(("template by shape", what), look)
 
 
 def _share(

@@ -19,6 +19,9 @@ PIXELS_PER_METRE = 48.0
 """Pictures are reduced until people in the middle of the room are this large: what the trees
 learnt from. Smaller ones are left as they are."""
 
+SAME_PERSON = np.array([0.35, 0.5])
+"""Metres across and down within which two places in a picture are of one person."""
+
 _NEAR = 2.0
 """Log odds below the best of a person's windows from which another says nothing of the place."""
 
@@ -32,10 +35,22 @@ class Shapes:
     log_odds: Float[ndarray, " N"]
     sizes: Float[ndarray, "N 2"]
     """Pixels a metre there, across and down."""
-    looked_at: int
-    """How many windows were looked at to the end."""
     unlikely: int
     """How many people were not likely enough."""
+    windows: Windows
+    """Those that were looked at to the end."""
+    odds: Float[ndarray, " W"]
+    """Log odds that a person is in each of them."""
+
+    def support(self, boxes: Float[ndarray, "M 4"]) -> Float[ndarray, " M"]:
+        """Log odds that somebody is in each of some boxes: of the best window there, -inf for none.
+
+        Args:
+            boxes: Of the target: centre and half sizes, pixels.
+        """
+        apart = np.abs(boxes[:, None, :2] - self.windows.boxes[None, :, :2])
+        there = (apart < SAME_PERSON * self.windows.sizes).all(axis=2)
+        return np.asarray(np.where(there, self.odds, -np.inf).max(axis=1, initial=-np.inf))
 
 
 class ShapeFinder:
@@ -83,7 +98,8 @@ class ShapeFinder:
         """
         if self._channels is None or state is None:
             none = np.zeros((0, 4))
-            return state, Shapes(none, np.zeros(0), none[:, :2], 0, 0)
+            nowhere = Windows(none, none)
+            return state, Shapes(none, np.zeros(0), none[:, :2], 0, nowhere, np.zeros(0))
         state, sums = self._channels.step(state, picture)
         scores = self._trees.scores(sums, self._edges).astype(float)
         ended = np.flatnonzero(np.isfinite(scores))
@@ -96,7 +112,7 @@ class ShapeFinder:
             weights = np.exp(scores[own] - scores[i])
             boxes[n] = weights @ windows.boxes[own] / weights.sum()
         found = Shapes(
-            boxes, scores[likely], windows.sizes[likely], len(ended), len(best) - len(likely)
+            boxes, scores[likely], windows.sizes[likely], len(best) - len(likely), windows, scores
         )
         return state, found
 

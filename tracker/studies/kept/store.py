@@ -15,8 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import platformdirs
-
+from tracker.folders import data_folder
 from tracker.placing import filling
 from tracker.studies.defined.defining import read_definition
 from tracker.studies.defined.definition import Definition
@@ -36,7 +35,7 @@ def studies_folder() -> Path:
     own = os.environ.get("MULTIVIEW_PHD_STUDIES")
     if own:
         return Path(own).expanduser().absolute()
-    return platformdirs.user_data_path("multiview-phd", appauthor=False) / "studies"
+    return data_folder() / "studies"
 
 
 def create(definition: Definition, folder: Path) -> Store:

@@ -59,6 +59,8 @@ class Writer:
                 self._connection.execute(table)
             self._connection.execute("COMMIT")
             rows = self._connection.execute("SELECT key, outcome FROM jobs").fetchall()
+            found = self._connection.execute("SELECT max(ended) FROM trials").fetchone()
+        self._ended = float(found[0] or 0.0)
         self._outcomes = {key: text for key, text in rows}
 
     def __enter__(self) -> Writer:
@@ -88,7 +90,9 @@ class Writer:
 
     def end(self, trial: Trial) -> None:
         """Write down a trial that ended."""
-        told = {**trial.to_json(), "ended": time.time()}
+        # whoever asks for the trials since the last one misses none where the clock goes back
+        self._ended = max(time.time(), self._ended + 1e-5)
+        told = {**trial.to_json(), "ended": self._ended}
         with self._told():
             self._connection.execute(
                 "INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?)",
@@ -113,6 +117,21 @@ class Writer:
                 f"{error}; free some space and go on by `multiview-phd study resume`: every run "
                 "that ended is kept"
             ) from None
+
+    @contextmanager
+    def together(self) -> Iterator[None]:
+        """What is kept and ended within is written down at the end, by one transaction.
+
+        It is written down too where something else goes wrong within.
+        """
+        with self._told():
+            self._connection.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+        finally:
+            with self._told():
+                if self._connection.in_transaction:  # a full disk has ended it already
+                    self._connection.execute("COMMIT")
 
     @contextmanager
     def _told(self) -> Iterator[None]:

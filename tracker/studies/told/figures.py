@@ -11,6 +11,10 @@ from tracker.studies.told.summary import Summary
 
 _HEIGHT = 340
 _FAINT, _ACCENT, _DEFAULT = "#6b7a90", "#d9480f", "#1971c2"
+_CALM = 1.5
+"""Below so many times the distance of the lower quartile from the best, values are not shown: a few
+failures would leave no room to tell the good ones apart."""
+
 _MOST = 12
 """Parameters that have a plot each, those that matter most first."""
 
@@ -22,7 +26,6 @@ def objective_figure(summary: Summary) -> Any | None:
     trials = usable(summary.trials)
     if not trials:
         return None
-    lead = summary.objectives[0]
     figure = go.Figure(layout=_layout())
     several = len(summary.objectives) > 1
     across = summary.objectives[-1] if several else None
@@ -51,9 +54,12 @@ def objective_figure(summary: Summary) -> Any | None:
         figure.add_trace(default)
     if summary.best is not None:
         ring = {"color": _ACCENT, "width": 2}
-        figure.add_trace(points([summary.best], "best", symbol="circle-open", size=15, line=ring))
+        best = points(
+            [summary.best], "best", color=_ACCENT, symbol="circle-open", size=15, line=ring
+        )
+        figure.add_trace(best)
     figure.update_xaxes(title=_axis(across) if across is not None else "trial")
-    figure.update_yaxes(title=_axis(lead))
+    _calm(figure, summary)
     return figure
 
 
@@ -71,9 +77,8 @@ def importance_figure(summary: Summary) -> Any | None:
         orientation="h",
         marker_color=_FAINT,
     )
-    figure = go.Figure(bars, layout=_layout(90 + 24 * len(shown)))
-    name = summary.objectives[0].name
-    figure.update_xaxes(title=f"share of the variance of {name}", range=[0.0, 1.0])
+    figure = go.Figure(bars, layout=_layout(90 + 24 * len(shown)) | {"showlegend": False})
+    figure.update_xaxes(title="share of the variance", range=[0.0, 1.0])
     return figure
 
 
@@ -102,7 +107,9 @@ def parameter_figures(summary: Summary) -> list[Any]:
             (summary.default, "default", _DEFAULT), (summary.best, "best", _ACCENT),
         ):  # fmt: skip
             if trial is not None and key in trial.values and trial.objectives is not None:
-                marker = {"color": colour, "size": 11}
+                marker: dict[str, Any] = {"color": colour, "size": 12, "symbol": "diamond"}
+                if name == "best":
+                    marker |= {"symbol": "circle-open", "line": {"color": colour, "width": 2}}
                 figure.add_trace(
                     go.Scatter(
                         x=[trial.values[key]], y=[trial.objectives[0]], mode="markers", name=name,
@@ -113,9 +120,28 @@ def parameter_figures(summary: Summary) -> list[Any]:
         figure.update_xaxes(
             title=f"{key}{f' [{unit}]' if unit else ''}", type="log" if logs.get(key) else None
         )
-        figure.update_yaxes(title=_axis(summary.objectives[0]))
+        _calm(figure, summary)
         found.append(figure)
     return found
+
+
+def _calm(figure: Any, summary: Summary) -> None:
+    """Name the axis of the first objective, and show the values that tell something."""
+    lead = summary.objectives[0]
+    sign = 1.0 if lead.higher else -1.0
+    values = sorted(sign * one.objectives[0] for one in usable(summary.trials) if one.objectives)
+    best, quartile = values[-1], values[len(values) // 4]
+    least = best - max(_CALM * (best - quartile), 1e-6 * abs(best), 1e-9)
+    if summary.default is not None and summary.default.objectives is not None:
+        least = min(least, sign * summary.default.objectives[0])
+    beyond = sum(value < least for value in values)
+    if not beyond:
+        figure.update_yaxes(title=_axis(lead))
+        return
+    margin = 0.06 * (best - least)
+    ends = sign * (least - margin), sign * (best + margin)
+    words = f"{beyond} trial{'s' if beyond > 1 else ''} {'below' if lead.higher else 'above'}"
+    figure.update_yaxes(title=f"{_axis(lead)}<br><sub>{words}</sub>", range=sorted(ends))
 
 
 def _axis(objective: Any) -> str:
@@ -126,6 +152,7 @@ def _layout(height: int = _HEIGHT) -> dict[str, Any]:
     return {
         "template": "plotly_white",
         "height": height,
-        "margin": {"l": 60, "r": 20, "t": 20, "b": 50},
+        "margin": {"l": 70, "r": 20, "t": 40, "b": 50},
         "showlegend": True,
+        "legend": {"orientation": "h", "x": 0.0, "y": 1.0, "yanchor": "bottom"},
     }

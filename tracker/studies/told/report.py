@@ -13,6 +13,7 @@ from tracker import __version__
 from tracker.evaluation.report.tables import escaped
 from tracker.placing import replacing
 from tracker.sequences.sequence import SequenceError
+from tracker.studies.defined.definition import MOST_TRIALS
 from tracker.studies.kept.records import Trial
 from tracker.studies.kept.store import Store
 from tracker.studies.told.commands import track_commands
@@ -20,14 +21,20 @@ from tracker.studies.told.figures import importance_figure, objective_figure, pa
 from tracker.studies.told.summary import Summary, summary_of
 
 _STYLE = """
-:root { color-scheme: light dark; --line: #8884; --faint: #777; }
-body { font: 14px/1.5 system-ui, sans-serif; max-width: 1100px; margin: 2rem auto; }
+:root { color-scheme: light dark; --line: #8884; }
+body { font: 14px/1.5 system-ui, sans-serif; max-width: 1100px; margin: 2rem auto;
+  padding: 0 1rem; overflow-wrap: break-word; }
 h1 { font-size: 1.5rem; } h2 { font-size: 1.1rem; margin-top: 2rem; }
-table { border-collapse: collapse; }
-th, td { padding: 2px 10px; border-bottom: 1px solid var(--line); }
-td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; } th { text-align: left; }
-.faint { color: var(--faint); } .wide { overflow-x: auto; } tr.best { font-weight: 600; }
+table { border-collapse: collapse; margin-bottom: 1rem; } td + td { overflow-wrap: anywhere; }
+.wide td + td { overflow-wrap: normal; }
+th, td { padding: 2px 10px; border-bottom: 1px solid var(--line); text-align: left; }
+td { font-variant-numeric: tabular-nums; } .wide { overflow-x: auto; }
 pre { overflow-x: auto; border: 1px solid var(--line); padding: .6rem; font-size: 12px; }
+pre.command { white-space: pre-wrap; } summary { cursor: pointer; }
+.plots { display: grid; gap: 1rem;
+  grid-template-columns: repeat(auto-fit, minmax(min(100%, 480px), 1fr)); }
+.plots > * { min-width: 0; } .plots > :first-child { grid-column: 1 / -1; }
+@media (prefers-color-scheme: dark) { .plots { filter: invert(.93) hue-rotate(180deg); } }
 """
 
 _BEST = 40
@@ -114,13 +121,19 @@ def report_html(store: Store) -> str:
     sentences = "".join(f"<p>{escaped(one)}.</p>" for one in summary.sentences())
     figures = [objective_figure(summary), importance_figure(summary)]
     plots = "".join(
-        one.to_html(full_html=False, include_plotlyjs=False, config={"displaylogo": False})
+        one.to_html(
+            full_html=False,
+            include_plotlyjs=False,
+            config={"displaylogo": False, "responsive": True},
+        )
         for one in [*figures, *parameter_figures(summary)]
         if one is not None
     )
-    status = summary.status
+    status, within = summary.status, f"of {definition.trials}"
+    if definition.minutes is not None and definition.trials >= MOST_TRIALS:
+        within = f"in {definition.minutes:g} minutes"
     facts = [
-        ("Trials", f"{len(summary.trials)} of {definition.trials}, {status.state}"),
+        ("Trials", f"{len(summary.trials)} {within}, {status.state}"),
         ("Seeds", ", ".join(map(str, definition.seeds))),
         ("Search", f"{definition.search}, sampler's seed {definition.seed}"),
         ("Objectives", ", ".join(one.name for one in summary.objectives)),
@@ -131,21 +144,50 @@ def report_html(store: Store) -> str:
         [
             "<!doctype html>",
             f'<html lang="en"><head><meta charset="utf-8"><title>{escaped(summary.name)}</title>',
+            '<meta name="viewport" content="width=device-width">',
             f"<style>{_STYLE}</style><script>{get_plotlyjs()}</script></head><body>",
             f"<h1>Study {escaped(summary.name)}</h1>",
             sentences,
             _table(("", ""), facts),
+            _proposed(store.told("tuned")),
             "<h2>Figures</h2>",
-            plots,
+            f'<div class="plots">{plots}</div>',
             "<h2>Best trials</h2>",
             f'<div class="wide">{_trials(summary)}</div>',
             "<h2>Repeat the best one</h2>",
-            f"<pre>{escaped(_commands(summary))}</pre>",
+            f'<pre class="command">{escaped(_commands(summary))}</pre>',
             "<h2>Definition</h2>",
-            f"<pre>{escaped(definition.to_toml())}</pre>",
+            "<details><summary>As a file that starts it again</summary>",
+            f"<pre>{escaped(definition.to_toml())}</pre></details>",
             "</body></html>",
         ]
     )
+
+
+def _proposed(found: dict[str, Any] | None) -> str:
+    """What was measured again on other seeds, and what is proposed after that."""
+    if found is None:
+        return ""
+    parts = ["<h2>Proposed</h2>", f"<p>{escaped(found['words'])}.</p>"]
+    if found["rows"]:
+        rows = [
+            (
+                row["key"],
+                *(_value(row[key]) for key in ("before", "default", "after")),
+                "–" if row["brought"] is None else f"{row['brought']:+.4f}",
+            )
+            for row in found["rows"]
+        ]
+        head = ("parameter", "before", "default", "now", "brings")
+        parts.append(f'<div class="wide">{_table(head, rows)}</div>')
+    if found["figures"]:
+        told = [
+            (row["name"], *(_value(row[key]) for key in ("default", "before", "after")))
+            for row in found["figures"]
+        ]
+        head_of_figures = ("figure", "default", "before", "now")
+        parts.append(f'<div class="wide">{_table(head_of_figures, told)}</div>')
+    return "\n".join(parts)
 
 
 def _commands(summary: Summary) -> str:

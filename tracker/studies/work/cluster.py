@@ -33,6 +33,15 @@ TOPIC = "multiview-phd"
 CONNECT_SECONDS = 10.0
 SENDING_SECONDS = 600.0
 
+_QUIET = {
+    "distributed.worker.profile.enabled": False,  # looks at every worker a hundred times a second
+    "distributed.admin.tick.interval": "1 s",  # else fifty times a second, in each worker
+    "distributed.admin.tick.limit": "1 minute",
+    "distributed.admin.system-monitor.interval": "10 s",
+}
+"""What Dask tells its dashboard; nobody looks there, and with many workers it takes the time that
+the scheduler has for them."""
+
 Told = Callable[[str], None]
 
 
@@ -186,8 +195,7 @@ class DaskCrew:
         tell(f"starting {count} worker{'s' if count > 1 else ''}")
         own = {"preload": ["tracker.studies.work.local"]} if processes else {}
         environment = {"NUMBA_NUM_THREADS": "1"}
-        # its profiler looks at every worker a hundred times a second
-        with dask.config.set({"distributed.worker.profile.enabled": False}):
+        with dask.config.set(_QUIET):
             return distributed.LocalCluster(
                 n_workers=count,
                 threads_per_worker=1,

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from tracker import evaluation
+from tracker.corrections import Correction
 from tracker.library.records import NewRecording, NewRun
 from tracker.parameters import RunParameters
 from tracker.runs.numbers_version import numbers_version
@@ -52,6 +53,8 @@ class Job:
     """Whether what stage 1 takes must be known, be it from an earlier run."""
     keep: bool = False
     """Whether the whole run is wanted, for the library."""
+    corrections: tuple[Correction, ...] = ()
+    """What the run obeys of what was put right by hand."""
 
 
 Became = Literal["done", "failed", "unreadable", "version"]
@@ -96,6 +99,7 @@ def job_of(
     truth: bool,
     agreement: bool,
     timed: bool,
+    corrections: tuple[Correction, ...] = (),
 ) -> Job:
     """The job of a run.
 
@@ -109,10 +113,15 @@ def job_of(
         truth: Whether to score it against the truth.
         agreement: Whether to hold it against other looks.
         timed: Whether its speed is asked for.
+        corrections: What it obeys of what was put right by hand.
     """
-    run = stage_keys(replace(sequence, digest=content), parameters, seed)["tracks"]
+    own = replace(sequence, digest=content)
+    run = stage_keys(own, parameters, seed, corrections)["tracks"]
     code = code_version()
     # whoever asks for the speed alone asks for no other run
     asked = [run, code, truth, agreement]
     key = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:24]
-    return Job(key, place, content, dict(values), seed, code, truth, agreement, timed)
+    return Job(
+        key, place, content, dict(values), seed, code, truth, agreement, timed,
+        corrections=corrections,
+    )  # fmt: skip

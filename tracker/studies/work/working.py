@@ -212,6 +212,7 @@ def _tracked(job: Job, sequence: Sequence, reader: FrameReader) -> tuple[Run, fl
         sequence,
         parameters,
         seed=job.seed,
+        corrections=job.corrections,
         reader=reader,
         cache=cache,
         on_progress=lambda _, progress: began.add(progress.stage),
@@ -222,8 +223,9 @@ def _tracked(job: Job, sequence: Sequence, reader: FrameReader) -> tuple[Run, fl
         _write_seconds(key, known, run)
         if cache is None:  # for the next trials
             pipeline.compute(
-                sequence, parameters, seed=job.seed, previous=run, cache=_process.cache
-            )
+                sequence, parameters, seed=job.seed, corrections=job.corrections, previous=run,
+                cache=_process.cache,
+            )  # fmt: skip
     return run, None if known is None else known + own
 
 

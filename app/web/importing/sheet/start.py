@@ -150,5 +150,5 @@ def _duration(seconds: float) -> str:
 def _ago(opened: float) -> str:
     if not opened:
         return ""
-    days = int((time.time() - opened) // DAY)
+    days = max(0, int((time.time() - opened) // DAY))  # a clock may have gone back
     return ("today", "yesterday")[days] if days < 2 else f"{days} days ago"

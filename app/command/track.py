@@ -1,0 +1,133 @@
+"""`track`: the pipeline without a browser."""
+
+from __future__ import annotations
+
+import time
+from contextlib import closing
+from typing import TYPE_CHECKING
+
+from app.command.flags import Track
+from app.command.interruption import between_steps
+from app.command.terminal import Bar, CommandError, check_keep, check_seed, say
+from tracker import parameters as table
+from tracker.folders import library_file
+
+if TYPE_CHECKING:
+    from tracker.pipeline import Run
+
+FAILURE = 1
+
+
+def track(command: Track) -> int:
+    changes = command.changes()
+    table.with_values(table.RunParameters(), changes)  # wrong usage shows before any work
+    check_seed(command.seed)
+    check_keep(command.keep)
+    output = command.output
+    from tracker.writing.registry import format_of, save
+    from tracker.writing.written import Options, Written
+
+    form = format_of(output, command.format)
+    if output.is_dir() and not form.folder:
+        raise CommandError(f"--output {output}: expected a file to write, found a folder")
+    if not output.parent.is_dir():
+        raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
+
+    from app.command.correcting import of_run
+    from app.state.workers.compiling import Compiling
+    from tracker import pipeline
+    from tracker.checks import check
+    from tracker.runs import gaps
+    from tracker.runs.gates import notices
+    from tracker.runs.outcome import why_no_tracks
+    from tracker.runs.run import resting_of
+    from tracker.runs.stage_cache import StageCache
+    from tracker.sequences import library
+
+    with Bar("rendering", "frame") as rendering:
+        sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    sequence = library.with_detector(sequence, command.detector)
+    form.check(sequence)
+    for sentence in sequence.warnings:
+        say(sentence)
+    for found in check(sequence, quick=True):
+        if found.status == "warning" and str(found) not in sequence.warnings:
+            say(str(found))
+    parameters = table.with_values(pipeline.default_parameters(sequence), changes)
+    told_by_hand = of_run(sequence, command.corrections, none=command.no_corrections)
+    begin, began = time.perf_counter(), time.time()
+    stages: set[table.Stage] = set()
+
+    def told(_: pipeline.Run, progress: pipeline.Progress) -> None:
+        stages.add(progress.stage)
+        tracking.at(progress.done, progress.total)
+
+    with (
+        Bar("tracking", "step") as tracking,
+        closing(Compiling(say)) as compiling,
+        between_steps() as interrupted,
+    ):
+        tracking.at(0, sequence.frames)
+        compiling.wait(lambda done, total: None, interrupted)
+        run = pipeline.compute(
+            sequence,
+            parameters,
+            seed=command.seed,
+            corrections=told_by_hand,
+            cache=StageCache.on_disk() if command.cache else None,
+            on_progress=told,
+            cancelled=interrupted,
+        )
+    seconds = time.perf_counter() - begin
+    with Bar("writing", "step") as writing:
+        missing = gaps.sentences(run)
+        written = Written(
+            sequence,
+            run.tracks,
+            parameters,
+            command.seed,
+            remarks=tuple(missing),
+            resting=resting_of(run),
+        )
+        save(output, form, written, Options(progress=writing.at))
+    targets = len(set(run.tracks.ids.tolist()))
+    kept = "" if "single_view" in stages else "; stage 1 was kept from an earlier run"
+    if (reason := why_no_tracks(run)) is not None:
+        say(reason)
+    for sentence in notices(run):
+        say(sentence)
+    if told_by_hand:
+        unmet = {one.id: one.why for one in run.outcomes if not one.met}
+        say(f"{len(told_by_hand) - len(unmet)} of {len(told_by_hand)} corrections met")
+        for one in told_by_hand:
+            if one.id in unmet:
+                say(f"unmet: {one.words}: {unmet[one.id]}")
+    if command.keep and not any(gap.unexpected for gap in gaps.gaps(run)):
+        _keep(command, run, began, seconds)
+    incomplete = "".join(f"; {one}" for one in missing)
+    say(
+        f"{sequence.frames} steps, {targets} tracks, {sequence.frames / seconds:.0f} steps/s "
+        f"({sequence.frames / seconds / sequence.fps:.1f} × real time{kept}), written to {output}"
+        f"{incomplete}"
+    )
+    return FAILURE if command.strict and missing else 0
+
+
+def _keep(command: Track, run: Run, began: float, seconds: float) -> None:
+    """Put a finished run into the library; where that cannot be used, say so and go on."""
+    from tracker.evaluation import evaluate_sequence
+    from tracker.library.errors import LibraryError
+    from tracker.library.keeping import recording_of, run_of, thumbnail_of
+    from tracker.library.store import open_library
+
+    sequence = run.sequence
+    try:
+        with open_library(command.library or library_file()) as library:
+            evaluation = None
+            if sequence.ground_truth is not None:
+                evaluation = evaluate_sequence(sequence, run.tracks)
+            new = run_of(run, source="track", began=began, seconds=seconds, evaluation=evaluation)
+            recording = recording_of(sequence, command.sequence, thumbnail_of(sequence))
+            library.keep(recording, new, command.keep)
+    except LibraryError as error:
+        say(f"the run was not kept: {error}")

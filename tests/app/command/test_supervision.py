@@ -1,0 +1,149 @@
+"""A workbench that crashes in the middle of a run ends that run and nothing else."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from app.state.kept.crashes import LAST
+from tests.app.folders import write_crossing
+from tests.browser.serving import Server
+
+TOKEN = "the-token-of-these-calls"
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    folder = write_crossing(tmp_path / "long", frames=2000)
+    server = Server(folder, tmp_path / "cache", data=tmp_path, token=TOKEN)
+    yield server
+    if server.process.poll() is None:
+        server.stop()
+
+
+def change(server: Server, values: dict[str, float]) -> None:
+    answer = httpx2.patch(
+        f"{server.address}api/parameters",
+        json={"changes": values},
+        headers={"Authorization": f"Bearer {TOKEN}"},
+    )
+    answer.raise_for_status()
+
+
+def post(server: Server, path: str) -> None:
+    headers = {"Authorization": f"Bearer {TOKEN}"}
+    httpx2.post(f"{server.address}api/{path}", headers=headers).raise_for_status()
+
+
+def crash(server: Server, number: int) -> None:
+    """End the process that serves, and wait for the next one."""
+    ended = server.serving
+    ended.send_signal(number)
+    deadline = time.monotonic() + 10.0
+    while ended.is_running() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert not ended.is_running()
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGKILL])
+def test_a_crash_in_a_run_ends_that_run_and_nothing_else(server: Server, number: int) -> None:
+    server.wait_for_run()
+    change(server, {"fusion.clutter_rate": 2.5})
+    good = server.wait_for_run()
+    tracks = server.get("/api/export/tracks.csv").content
+    assert tracks.count(b"\n") > 2000
+    change(server, {"fusion.clutter_rate": 4.5})
+    state = server.wait(lambda state: state["run"]["key"] != good["run"]["key"])
+    state = server.wait(lambda state: state["run"]["done"] > 0)
+    assert state["run"]["state"] == "computing"  # in the middle of it
+    crash(server, number)
+    begin = time.monotonic()
+    after = server.wait(
+        lambda state: state["sequence"] is not None and state["run"]["state"] == "failed"
+    )
+    assert time.monotonic() - begin < 60.0
+    assert after["session"] != state["session"]
+    assert after["sequence"]["key"] == state["sequence"]["key"]
+    assert after["parameters"]["fusion.clutter_rate"] == 4.5
+    assert "crashed while this run was computed" in after["run"]["error"]
+    assert server.get("/api/export/tracks.csv").content == tracks  # the last that went well
+    report = (server.cache / "settings" / "starts" / LAST).read_text(encoding="utf-8")
+    assert f"ended by signal {int(number)}" in report
+    assert "fusion.clutter_rate" in report
+    assert ("Fatal Python error: Segmentation fault" in report) == (number == signal.SIGSEGV)
+    post(server, "run")
+    again = server.wait_for_run()
+    assert again["parameters"]["fusion.clutter_rate"] == 4.5
+    assert again["run"]["key"] == after["run"]["key"] != good["run"]["key"]
+    assert server.stop() < 10.0
+    assert server.process.returncode == 0
+
+
+@pytest.mark.full
+def test_whoever_ends_it_ends_both(server: Server) -> None:
+    serving = server.serving
+    server.process.send_signal(signal.SIGTERM)
+    server.process.communicate(timeout=20.0)
+    assert not serving.is_running()
+    server.start()
+    serving = server.serving
+    server.process.kill()
+    server.process.communicate(timeout=20.0)
+    serving.wait(timeout=5.0)
+
+
+CRASHES = """
+import os, signal, sys
+from app.command import supervision
+from pathlib import Path
+
+def serve():
+    with Path(sys.argv[1]).open("a") as file:
+        file.write(f"{supervision.life.port} {supervision.life.ended} {supervision.life.token}\\n")
+    if sys.argv[2] != "at once":
+        supervision.life.listens(4711)
+    os.kill(os.getpid(), getattr(signal, sys.argv[3]))
+
+sys.exit(supervision.keep_up(serve))
+"""
+
+
+def starts(path: Path, when: str, name: str) -> tuple[int, list[list[str]], str]:
+    path.write_text("")
+    line = [sys.executable, "-c", CRASHES, str(path), when, name]
+    done = subprocess.run(line, capture_output=True, text=True, timeout=60.0, check=False)
+    return done.returncode, [row.split() for row in path.read_text().splitlines()], done.stderr
+
+
+def test_what_crashes_again_and_again_is_left(tmp_path: Path) -> None:
+    status, rows, told = starts(tmp_path / "starts", "later", "SIGSEGV")
+    assert status == 128 + signal.SIGSEGV
+    assert len(rows) == 5
+    assert rows[0][:2] == ["None", "None"]
+    assert {row[0] for row in rows[1:]} == {"4711"}
+    assert len({row[-1] for row in rows}) == 1
+    assert "SIGSEGV (segmentation fault); it is not started again" in told
+
+
+def test_a_crash_before_anybody_could_come_is_not_repeated(tmp_path: Path) -> None:
+    status, rows, _ = starts(tmp_path / "starts", "at once", "SIGABRT")
+    assert (status, len(rows)) == (128 + signal.SIGABRT, 1)
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_an_end_on_purpose_is_one(tmp_path: Path, name: str) -> None:
+    status, rows, told = starts(tmp_path / "starts", "later", name)
+    assert (status, len(rows), told) == (-getattr(signal, name), 1, "")
+
+
+def test_a_function_that_ends_gives_its_status() -> None:
+    line = "import sys; from app.command import supervision as s; sys.exit(s.keep_up(lambda: 7))"
+    assert subprocess.run([sys.executable, "-c", line], check=False).returncode == 7
