@@ -8,7 +8,7 @@ that are surely one person's; all of them together are joined at the least cost.
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -24,6 +24,7 @@ from tracker.kernels.smoothing import evidence
 from tracker.parameters import SmoothingParams
 from tracker.smoothing import joining, pieces
 from tracker.smoothing.appearance import Appearance
+from tracker.smoothing.exchanges import exchange_breaks
 from tracker.smoothing.lifetimes import independence, lifetimes, misses
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.pieces import Pairs
@@ -57,6 +58,8 @@ class Settled:
     """The path before the cuts of which each has most."""
     had: Bool[ndarray, " N"]
     """The rows of pieces: the others are of the gaps between them."""
+    names: Int[ndarray, " N"]
+    """The filter's label of each row, -1 where it had nobody."""
     decisions: list[Decision]
     joined: Joined
     limits: dict[int, tuple[int, int]]
@@ -69,6 +72,7 @@ def settle(
     shared: Shared,
     contested: Float[ndarray, " N"],
     had: Bool[ndarray, " N"],
+    names: Int[ndarray, " N"],
     parameters: SmoothingParams,
     looks: Many[Float[ndarray, "B A"]] | None,
     corrections: Many[Correction] = (),
@@ -77,16 +81,17 @@ def settle(
 
     Args:
         smoother: The models.
-        fitted: The filter's tracks, fitted to their boxes.
+        fitted: The filter's tracks, or what was made of them before, fitted to their boxes.
         shared: Whose box each is.
-        contested: By which share each row's boxes were as well another's, as the filter ran.
-        had: At which rows the filter had the track.
+        contested: By which share each row's boxes were as well another's.
+        had: At which rows there was a track before.
+        names: The filter's label of each row, -1 where it had nobody.
         parameters: When to cut, and what holds together.
         looks: A unit vector for each box of each camera; None where there is none.
         corrections: What a person said of who is who.
     """
     seeker = Seeker(fitted.paths, corrections, corrections_leeway(smoother.model.step_time))
-    cut, kept, reasons = _cut(smoother, fitted, shared, contested, had, parameters, seeker)
+    cut, kept, reasons = _cut(smoother, fitted, shared, contested, had, names, parameters, seeker)
     ties = seeker.ties(cut, kept)
     links = pieces.moved(shared.links, kept, len(fitted.paths.states))
     refitted = smoother.fit(cut, links)
@@ -118,7 +123,7 @@ def settle(
     ]
     pairs = pairs.with_more(back.of_ends(first))
     labels = _labels(cut, chains)
-    decisions = [*_cuts(cut, fitted.paths, kept, reasons, chains, labels)]
+    decisions = _cuts(cut, fitted.paths, kept, reasons, chains, labels)
     decisions += _joins(cut, pairs, chains, labels, _anew(smoother), set(ties.together))
     paths, rows = _chained(refitted.paths, chains, labels)
     lengths = np.diff(cut.starts)
@@ -128,6 +133,8 @@ def settle(
     links = pieces.moved_to(links, rows)
     of_piece = np.zeros(len(paths.states), dtype=bool)
     of_piece[rows[rows >= 0]] = True
+    names_of = np.full(len(paths.states), -1, dtype=np.int64)
+    names_of[rows[rows >= 0]] = names[kept[rows >= 0]]
     of_pieces = np.full(len(cut.labels), -1, dtype=np.int64)
     for chain, label in zip(chains, labels, strict=True):
         of_pieces[chain] = label
@@ -138,7 +145,7 @@ def settle(
     )  # fmt: skip
     limits = {labels[k]: span for k, span in ties.limits(chains, cut).items()}
     origins_of = np.array(origins, dtype=np.int64)
-    return Settled(paths, links, origins_of, of_piece, decisions, joined, limits)
+    return Settled(paths, links, origins_of, of_piece, names_of, decisions, joined, limits)
 
 
 def _cut(
@@ -147,11 +154,12 @@ def _cut(
     shared: Shared,
     contested: Float[ndarray, " N"],
     had: Bool[ndarray, " N"],
+    names: Int[ndarray, " N"],
     p: SmoothingParams,
     seeker: Seeker,
 ) -> tuple[Paths, Int[ndarray, " M"], Int[ndarray, " N"]]:
-    """The pieces, the row that each of their rows was, and why each row was left out: 0 for not,
-    1 contested, 2 jump, 3 away or not seen."""
+    """The pieces under the filter's labels, the row that each of their rows was, and why each row
+    was left out: 0 for not, 1 contested, 2 jump, 3 away or not seen."""
     step_time, paths = smoother.model.step_time, fitted.paths
     rows = len(paths.states)
     there, _ = lifetimes(smoother, paths, shared, p)
@@ -172,8 +180,14 @@ def _cut(
     reasons[contested >= p.doubt] = 1
     breaks = np.zeros(rows, dtype=bool)
     breaks[jumps] = True
+    breaks |= exchange_breaks(
+        fitted, reach=1.0 + _FASTEST * step_time, least=p.exchange, apart=too_long
+    )
     breaks |= seeker.breaks()
     clear = _between(paths, fed & (reasons == 0)) & (reasons == 0)
+    begins, between = _of_two(paths, names)
+    breaks |= begins
+    clear &= ~between
     cut, kept = pieces.cut(paths, clear, breaks)
     if len(more := seeker.overlaps(cut, kept)):
         breaks[more] = True
@@ -188,7 +202,33 @@ def _cut(
     short[list(seeker.meant(cut, kept))] = False
     clear[kept[np.repeat(short, lengths)]] = False
     cut, kept = pieces.cut(paths, clear, breaks)
-    return cut, kept, reasons
+    return replace(cut, labels=_named(cut, names[kept])), kept, reasons
+
+
+def _of_two(
+    paths: Paths, names: Int[ndarray, " N"]
+) -> tuple[Bool[ndarray, " N"], Bool[ndarray, " N"]]:
+    """The rows at which a path goes on under another label of the filter's, and those in between
+    that have none."""
+    begins = np.zeros(len(names), dtype=bool)
+    between = begins.copy()
+    rows = np.flatnonzero(names >= 0)
+    if len(rows):
+        owners = paths.owners
+        other = (np.diff(names[rows]) != 0) & (np.diff(owners[rows]) == 0)
+        begins[rows[1:][other]] = True
+        before = np.searchsorted(rows, np.arange(len(names)), side="right") - 1
+        between = (names < 0) & np.append(other, False)[before] & (before >= 0)
+    return begins, between
+
+
+def _named(cut: Paths, names: Int[ndarray, " M"]) -> Int[ndarray, " n"]:
+    """The filter's label of each piece; one that it never had keeps its own."""
+    labels = cut.labels.copy()
+    known = np.flatnonzero(names >= 0)
+    owners, first = np.unique(cut.owners[known], return_index=True)
+    labels[owners] = names[known[first]]
+    return labels
 
 
 def _runs(paths: Paths, flags: Bool[ndarray, " N"]) -> Int[ndarray, " N"]:
@@ -258,7 +298,8 @@ def _goes_on(
     looks: Many[Float[ndarray, "B A"]] | None,
 ) -> Pairs:
     """Every pair of pieces of which the second may continue the first, with its gain: by their
-    motion over a short gap and their looks, and by the label that the filter gave both."""
+    motion over a short gap, and their looks. The label that the filter gave both says nothing
+    more: it came of the same boxes."""
     step_time, count = smoother.model.step_time, len(paths.labels)
     survival, _ = _survival(smoother)
     longest = max(round(p.longest / step_time), 1)
@@ -276,8 +317,6 @@ def _goes_on(
         told += p.appearance * alike.log_ratio(motion.earlier, motion.later)[0]
     gains = np.full((count, count), -np.inf)
     gains[motion.earlier, motion.later] = told
-    one = _same_label(paths)
-    gains[one, one + 1] += p.keeping
     return _of_table(gains, paths)
 
 
@@ -304,16 +343,19 @@ def _comes_back(
         earlier, later, ratio = earlier[known], later[known], ratio[known]
         gains[earlier, later] = anew - np.log(gone[later]) + p.appearance * ratio
     chain_of = {piece: number for number, chain in enumerate(chains) for piece in chain}
-    for piece in _same_label(paths).tolist():
-        i, j = chain_of.get(piece, -1), chain_of.get(piece + 1, -1)
+    for one, other in _same_label(paths):
+        i, j = chain_of.get(one, -1), chain_of.get(other, -1)
         if min(i, j) >= 0 and before[i, j]:
             gains[i, j] = max(gains[i, j], anew) + p.keeping
     return _of_table(gains, whole)
 
 
-def _same_label(paths: Paths) -> Int[ndarray, " K"]:
-    """The pieces after which the filter's track goes on in the next one."""
-    return np.asarray(np.flatnonzero(paths.labels[1:] == paths.labels[:-1]))
+def _same_label(paths: Paths) -> list[tuple[int, int]]:
+    """Each piece and the next one that has the same label of the filter's."""
+    order = np.lexsort((paths.firsts, paths.labels))
+    one, other = order[:-1], order[1:]
+    same = (paths.labels[one] == paths.labels[other]) & (paths.lasts[one] < paths.firsts[other])
+    return list(zip(one[same].tolist(), other[same].tolist(), strict=True))
 
 
 def _of_table(gains: Float[ndarray, "n n"], paths: Paths) -> Pairs:
@@ -414,11 +456,11 @@ def _cuts(
     """The cuts after which a track did not go on as the filter had it."""
     chain_of = {piece: number for number, chain in enumerate(chains) for piece in chain}
     found = []
-    for piece in range(len(cut.labels) - 1):
-        one, other = chain_of.get(piece), chain_of.get(piece + 1)
-        if cut.labels[piece] != cut.labels[piece + 1] or one is None or one == other:
+    for piece, after in _same_label(cut):
+        one, other = chain_of.get(piece), chain_of.get(after)
+        if one is None or one == other:
             continue
-        last, first = kept[cut.starts[piece + 1] - 1], kept[cut.starts[piece + 1]]
+        last, first = kept[cut.starts[piece + 1] - 1], kept[cut.starts[after]]
         why = int(np.max(reasons[last + 1 : first], initial=0))
         if (reasons[last + 1 : first] == 1).any():
             why = 1

@@ -162,14 +162,14 @@ def motion_pairs(
     centre = pieces.states[begins].copy()
     centre[:, 3:] = 0.0
     vectors = np.einsum("pij,pj->pi", inverse, pieces.states[begins]) - centre @ origin
-    newcomer = _log_integral(centre, np.broadcast_to(prior, inverse.shape), information, vectors)
+    newcomer = log_integral(centre, np.broadcast_to(prior, inverse.shape), information, vectors)
     gains = (
-        _log_integral(a, spread, information[later], vectors[later]) - newcomer[later] - log_place
+        log_integral(a, spread, information[later], vectors[later]) - newcomer[later] - log_place
     )
     return Pairs(earlier, later, gaps, gains)
 
 
-def _log_integral(
+def log_integral(
     means: Float[ndarray, "P d"],
     covariances: Float[ndarray, "P d d"],
     information: Float[ndarray, "P d d"],

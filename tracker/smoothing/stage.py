@@ -76,7 +76,10 @@ class Positions:
         paths, existences, links, learnt, decided = self._named(
             smoother, paths, existences, links, views, check, corrections
         )
-        fitted, shared, learnt = _settled(smoother, paths, existences, links, p, learnt, check)
+        turns = p.iterations if learnt is None else 1  # what was settled lies near its boxes
+        fitted, shared, learnt = _settled(
+            smoother, paths, existences, links, p, learnt, check, turns=turns
+        )
         return _finished(smoother, fitted, shared, learnt, p, decided)
 
     def _named(
@@ -109,21 +112,27 @@ class Identities(Positions):
     ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, _Decided]:
         p = self._parameters.smoothing
         contested = pieces.contested(paths, links)
-        fitted, shared, learnt = _settled(smoother, paths, existences, links, p, None, check)
+        fitted, shared, learnt = _settled(
+            smoother, paths, existences, links, p, None, check, turns=p.iterations
+        )
         looks = _looks(views) if p.appearance > 0.0 else None
-        found = identities.settle(
-            smoother, fitted, shared, contested, existences == 1.0, p, looks, corrections
-        )
-        check()
-        learnt = learnt.of_people(found.origins)
-        existences = np.where(found.had, 1.0, lifetimes.UNSURE)
-        return (
-            found.paths,
-            existences,
-            found.links,
-            learnt,
-            _Decided(found.decisions, found.joined, found.limits),
-        )
+        names = np.where(existences == 1.0, paths.labels[paths.owners], -1)
+        for again in range(p.rounds):
+            if again:  # who is who tells whose boxes are whose, and those again who is who
+                fitted, shared, learnt = _settled(
+                    smoother, paths, existences, links, p, learnt, check, turns=1
+                )
+                contested = pieces.contested(fitted.paths, shared.links)
+            found = identities.settle(
+                smoother, fitted, shared, contested, existences == 1.0, names, p, looks,
+                corrections,
+            )  # fmt: skip
+            check()
+            paths, links, names = found.paths, found.links, found.names
+            learnt = learnt.of_people(found.origins)
+            existences = np.where(found.had, 1.0, lifetimes.UNSURE)
+        decided = _Decided(found.decisions, found.joined, found.limits)
+        return paths, existences, links, learnt, decided
 
 
 def _settled(
@@ -134,12 +143,13 @@ def _settled(
     p: SmoothingParams,
     learnt: Calibration | None,
     check: Callable[[], None],
+    turns: int,
 ) -> tuple[Fitted, Shared, Calibration]:
     """Tracks fitted to their boxes, boxes shared out by the tracks that are there, in turns."""
     learnt = learnt or smoother.stated(paths)
     fitted = smoother.fit(paths, links, 2, learnt)
     shared = smoother.share(fitted.paths, existences, learnt)
-    for _ in range(p.iterations):
+    for _ in range(turns):
         check()
         existences, _ = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
         if p.learning:

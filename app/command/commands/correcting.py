@@ -39,7 +39,7 @@ def corrections(command: Corrections) -> int:
     """
     match command.action:
         case ListCorrections() as action:
-            _list(read_log(_log(action.log)), as_json=action.json)
+            _list(action)
         case CheckCorrections() as action:
             return _check(action)
         case DiffCorrections() as action:
@@ -78,19 +78,24 @@ def of_run(sequence: Sequence, file: Path | None, *, none: bool = False) -> tupl
 
 
 def _log(name: str) -> Path:
-    """The log that a file or a sequence stands for."""
+    """The log that a file or a sequence stands for, and that is there."""
+    found = _named(name)
+    if not found.is_file():
+        raise CommandError(f"{name}: has no corrections yet; its log would be {found}")
+    return found
+
+
+def _named(name: str) -> Path:
+    """The log that a file or a sequence stands for, whether it is there or not."""
     path = Path(name).expanduser()
     if path.is_file():
         return path
     if path.is_dir() and (path / FILE).is_file():
         return path / FILE
     try:
-        own = place_of(library.open_sequence(name).folder)
+        return place_of(library.open_sequence(name).folder)
     except ValueError as error:
         raise CommandError(f"{name}: expected a {FILE} or a sequence: {error}") from None
-    if not own.is_file():
-        raise CommandError(f"{name}: has no corrections yet; its log would be {own}")
-    return own
 
 
 def _values(one: Correction) -> dict[str, Any]:
@@ -101,9 +106,14 @@ def _print(document: Any) -> None:
     sys.stdout.write(json.dumps(document, allow_nan=False) + "\n")
 
 
-def _list(found: tuple[Correction, ...], *, as_json: bool) -> None:
-    if as_json:
+def _list(action: ListCorrections) -> None:
+    log = _named(action.log)
+    found = read_log(log)
+    if action.json:
         _print([_values(one) for one in found])
+        return
+    if not log.is_file():
+        say(f"{action.log} has no corrections yet; its log would be {log}")
         return
     print_table(("id", "time", "what", "where", "note"), [_row(one) for one in found])
 

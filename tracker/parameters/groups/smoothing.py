@@ -36,6 +36,9 @@ class SmoothingParams(Params):
     jump: Annotated[float, Field(ge=5.0, le=1000.0), ui("J", step=5.0, log=True)] = 40.0
     """Identities: squared Mahalanobis distance of past and future from which a track is cut."""
 
+    exchange: Annotated[float, Field(ge=-20.0, le=50.0), ui("x", step=0.5)] = -2.0
+    """Identities: log odds of two people exchanged from which both are cut, to be joined anew."""
+
     gap: Annotated[float, Field(ge=0.1, le=30.0), ui("t_g", unit="s", step=0.1)] = 1.0
     """Identities: a track is cut where nobody saw it for longer."""
 
@@ -43,13 +46,18 @@ class SmoothingParams(Params):
     """Identities: pieces are joined by motion over gaps up to this; over longer ones by looks."""
 
     keeping: Annotated[float, Field(ge=0.0, le=20.0), ui("k", step=0.5)] = 2.0
-    """Identities: log odds with which the filter's own label holds two of its pieces together."""
+    """Identities: log odds with which the filter's label joins who is back after longer."""
+
+    rounds: Annotated[int, Field(ge=1, le=5), ui("n_i", step=1)] = 2
+    """Identities: how often who is who is settled, each time by the tracks of the time before."""
 
     appearance: Annotated[float, Field(ge=0.0, le=5.0), ui("α", step=0.1)] = 1.0
     """Identities: weight of what people look like; 0 leaves it out."""
 
 
-_IDENTITIES_ONLY = frozenset({"doubt", "jump", "gap", "longest", "keeping", "appearance"})
+_IDENTITIES_ONLY = frozenset(
+    {"doubt", "jump", "exchange", "gap", "longest", "keeping", "rounds", "appearance"}
+)
 
 NONE = Method(
     name="none",
