@@ -18,8 +18,9 @@ from tracker.fusion.protocol import FusionResult
 from tracker.parameters import RunParameters, SmoothingParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
-from tracker.smoothing import identities, lifetimes, pieces, reading
+from tracker.smoothing import lifetimes, reading
 from tracker.smoothing.calibration import Calibration
+from tracker.smoothing.identity import identities, pieces
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.result import Decision, Joined, Smoothed
 from tracker.smoothing.smoother import Fitted, Shared, Smoother

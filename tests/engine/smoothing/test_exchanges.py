@@ -14,7 +14,7 @@ from tracker.filters.models import Motion
 from tracker.kernels.smoothing import passes
 from tracker.parameters import with_values
 from tracker.pipeline import Run
-from tracker.smoothing.exchanges import exchange_breaks
+from tracker.smoothing.identity.exchanges import exchange_breaks
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Fitted
 

@@ -12,9 +12,9 @@ from numpy.testing import assert_allclose
 from tracker.filters.models import Motion
 from tracker.kernels.smoothing.presence import Habits, presence
 from tracker.parameters import FusionParams
-from tracker.smoothing.joining import chains, join
+from tracker.smoothing.identity.joining import chains, join
+from tracker.smoothing.identity.pieces import contested, cut, motion_pairs
 from tracker.smoothing.paths import Links, Paths
-from tracker.smoothing.pieces import contested, cut, motion_pairs
 
 
 def worth_of(

@@ -17,7 +17,7 @@ from scipy.optimize import Bounds, LinearConstraint, linear_sum_assignment, milp
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from tracker.smoothing.ties import Ties
+from tracker.smoothing.identity.ties import Ties
 
 _FREE = Ties()
 

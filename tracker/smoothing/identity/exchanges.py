@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.smoothing.pieces import log_integral
+from tracker.smoothing.identity.pieces import log_integral
 from tracker.smoothing.smoother import Fitted
 
 _BEYOND = 1e-9

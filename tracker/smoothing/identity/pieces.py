@@ -185,3 +185,34 @@ def log_integral(
     fixed = np.einsum("pi,pi->p", means, vectors)
     fixed -= 0.5 * np.einsum("pi,pij,pj->p", means, information, means)
     return np.asarray(fixed + 0.5 * np.einsum("pi,pi->p", told, shift) - 0.5 * log_determinant)
+
+
+def same_label(paths: Paths) -> list[tuple[int, int]]:
+    """Each piece and the next one that has the same label of the filter's."""
+    order = np.lexsort((paths.firsts, paths.labels))
+    one, other = order[:-1], order[1:]
+    same = (paths.labels[one] == paths.labels[other]) & (paths.lasts[one] < paths.firsts[other])
+    return list(zip(one[same].tolist(), other[same].tolist(), strict=True))
+
+
+def chained(
+    cut: Paths, chains: list[list[int]], labels: list[int]
+) -> tuple[Paths, Int[ndarray, " M"]]:
+    """The chains as paths, drawn straight through their gaps, and each row's place in them."""
+    dimension = cut.states.shape[1]
+    steps, place = cut.steps, np.full(len(cut.states), -1, dtype=np.int64)
+    firsts, states, covariances, begin = [], [], [], 0
+    for chain in chains:
+        rows = np.concatenate([np.arange(cut.starts[k], cut.starts[k + 1]) for k in chain])
+        own = steps[rows]
+        every = np.arange(own[0], own[-1] + 1)
+        states.append(
+            np.stack([np.interp(every, own, cut.states[rows, a]) for a in range(dimension)], axis=1)
+        )
+        spread = np.tile(np.eye(dimension), (len(every), 1, 1))
+        spread[own - own[0]] = cut.covariances[rows]
+        covariances.append(spread)
+        firsts.append(int(own[0]))
+        place[rows] = begin + own - own[0]
+        begin += len(every)
+    return Paths.of(labels, firsts, states, covariances, dimension), place

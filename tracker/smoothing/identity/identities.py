@@ -1,0 +1,148 @@
+"""Who is who over the whole recording: tracks cut where it was a draw, and joined again.
+
+The tracks of the filter are cut where its association marginals were near a draw, where past
+and future contradict each other, and where nobody saw them for long. What is left are pieces
+that are surely one person's; all of them together are joined at the least cost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Many
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+
+from tracker.assignment import names_by_majority
+from tracker.corrections import Correction
+from tracker.corrections.kinds import leeway as corrections_leeway
+from tracker.parameters import SmoothingParams
+from tracker.smoothing.identity import cutting, joining, odds, pieces
+from tracker.smoothing.identity import decisions as decided
+from tracker.smoothing.identity.ties import Seeker, Ties
+from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.result import Decision, Joined
+from tracker.smoothing.smoother import Fitted, Shared, Smoother
+
+_SURE = 1e6
+"""Log odds of chains that were found somebody's already."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Settled:
+    """Pieces joined into the tracks of people."""
+
+    paths: Paths
+    links: Links
+    origins: Int[ndarray, " n"]
+    """The path before the cuts of which each has most."""
+    had: Bool[ndarray, " N"]
+    """The rows of pieces: the others are of the gaps between them."""
+    names: Int[ndarray, " N"]
+    """The filter's label of each row, -1 where it had nobody."""
+    decisions: list[Decision]
+    joined: Joined
+    limits: dict[int, tuple[int, int]]
+    """Of some labels the first and the last step at which corrections let them be."""
+
+
+def settle(
+    smoother: Smoother,
+    fitted: Fitted,
+    shared: Shared,
+    contested: Float[ndarray, " N"],
+    had: Bool[ndarray, " N"],
+    names: Int[ndarray, " N"],
+    parameters: SmoothingParams,
+    looks: Many[Float[ndarray, "B A"]] | None,
+    corrections: Many[Correction] = (),
+) -> Settled:
+    """Cut and join.
+
+    Args:
+        smoother: The models.
+        fitted: The filter's tracks, or what was made of them before, fitted to their boxes.
+        shared: Whose box each is.
+        contested: By which share each row's boxes were as well another's.
+        had: At which rows there was a track before.
+        names: The filter's label of each row, -1 where it had nobody.
+        parameters: When to cut, and what holds together.
+        looks: A unit vector for each box of each camera; None where there is none.
+        corrections: What a person said of who is who.
+    """
+    seeker = Seeker(fitted.paths, corrections, corrections_leeway(smoother.model.step_time))
+    cut, kept, reasons = cutting.cut(
+        smoother, fitted, shared, contested, had, names, parameters, seeker
+    )
+    ties = seeker.ties(cut, kept)
+    links = pieces.moved(shared.links, kept, len(fitted.paths.states))
+    refitted = smoother.fit(cut, links)
+    own = Shared(links, shared.chances[:, kept], shared.missed[:, kept], shared.hidden_by[:, kept])
+    worths, births, deaths = odds.of_pieces(smoother, refitted, own, parameters)
+    pairs = odds.goes_on(smoother, refitted.paths, links, parameters, looks)
+    longest = max(round(parameters.longest / smoother.model.step_time), 1)
+    now, later = ties.parted(cut, longest)
+    following, used = joining.join(
+        worths, births, deaths, pairs.earlier, pairs.later, pairs.gains, now
+    )
+    first = joining.chains(following, used)
+    of_chains = later.of_chains(first, cut)
+    if of_chains is None:  # who is tied to somebody far away may not be joined to another meanwhile
+        following, used = joining.join(
+            worths, births, deaths, pairs.earlier, pairs.later, pairs.gains, ties
+        )
+        first = joining.chains(following, used)
+        of_chains = Ties(apart=ties.apart).of_chains(first, cut) or Ties()
+    # what goes on by its motion tells more of its looks than each piece alone
+    back = odds.comes_back(smoother, refitted.paths, links, first, parameters, looks)
+    following, _ = joining.join(
+        np.full(len(first), _SURE), births[[c[0] for c in first]], deaths[[c[-1] for c in first]],
+        back.earlier, back.later, back.gains, of_chains,
+    )  # fmt: skip
+    chains = [
+        [piece for number in numbers for piece in first[number]]
+        for numbers in joining.chains(following, np.ones(len(first), dtype=bool))
+    ]
+    pairs = pairs.with_more(back.of_ends(first))
+    labels = _labels(cut, chains)
+    decisions = decided.cuts(cut, fitted.paths, kept, reasons, chains, labels)
+    decisions += decided.joins(cut, pairs, chains, labels, odds.anew(smoother), set(ties.together))
+    paths, rows = pieces.chained(refitted.paths, chains, labels)
+    lengths = np.diff(cut.starts)
+    origins = [
+        _most(fitted.paths.owners[kept[cut.starts[chain]]], lengths[chain]) for chain in chains
+    ]
+    links = pieces.moved_to(links, rows)
+    of_piece = np.zeros(len(paths.states), dtype=bool)
+    of_piece[rows[rows >= 0]] = True
+    names_of = np.full(len(paths.states), -1, dtype=np.int64)
+    names_of[rows[rows >= 0]] = names[kept[rows >= 0]]
+    of_pieces = np.full(len(cut.labels), -1, dtype=np.int64)
+    for chain, label in zip(chains, labels, strict=True):
+        of_pieces[chain] = label
+    places = refitted.paths.states[:, :3]
+    joined = Joined(
+        of_pieces, cut.firsts, cut.lasts, places[cut.starts[:-1]], places[cut.starts[1:] - 1],
+        worths, births, deaths, pairs.earlier, pairs.later, pairs.gains,
+    )  # fmt: skip
+    limits = {labels[k]: span for k, span in ties.limits(chains, cut).items()}
+    origins_of = np.array(origins, dtype=np.int64)
+    return Settled(paths, links, origins_of, of_piece, names_of, decisions, joined, limits)
+
+
+def _most(names: ndarray, weights: ndarray) -> int:
+    """The name with most weight, of equal ones the smallest."""
+    values, which = np.unique(names, return_inverse=True)
+    return int(values[np.argmax(np.bincount(which, weights))])
+
+
+def _labels(cut: Paths, chains: list[list[int]]) -> list[int]:
+    """A label for each chain: that of most of its rows, where no other chain has more of it."""
+    lengths = np.diff(cut.starts)
+    counts = []
+    for chain in chains:
+        names, which = np.unique(cut.labels[chain], return_inverse=True)
+        rows = np.bincount(which, lengths[chain]).astype(np.int64)
+        counts.append(dict(zip(names.tolist(), rows.tolist(), strict=True)))
+    return names_by_majority(counts, int(cut.labels.max(initial=0)))
