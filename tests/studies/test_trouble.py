@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from tests.studies.small import Serial, definition, made_up, run
 from tracker.studies.errors import StudyError
+from tracker.studies.kept import writer
 from tracker.studies.kept.store import JOURNAL, Store, create, find
 from tracker.studies.kept.writer import Writer
 from tracker.studies.work.jobs import Job, Outcome
@@ -50,6 +52,23 @@ def test_a_damaged_record_of_the_sampler_is_told(tmp_path: Path) -> None:
     journal.write_bytes(b"".join([lines[0], b"{no json\n", *lines[2:]]))
     with pytest.raises(StudyError, match="the record of what was tried cannot be read"):
         run(store, Serial(made_up(lambda values: 0.5)))
+
+
+def test_a_reader_finds_all_tables_or_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store, looked = study(tmp_path), 0
+    tables = writer._TABLES
+
+    def one_by_one() -> Iterator[str]:
+        nonlocal looked
+        for table in tables:
+            assert store.trials() == []
+            looked += 1
+            yield table
+
+    monkeypatch.setattr(writer, "_TABLES", one_by_one())
+    with Writer(store.folder):
+        assert store.trials() == []
+    assert looked == len(tables)
 
 
 def test_results_that_are_no_database_are_told(tmp_path: Path) -> None:
