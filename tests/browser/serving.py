@@ -15,6 +15,7 @@ import httpx2
 import psutil
 
 from tracker.kernels.compilation import kernel_folder
+from tracker.studies.kept.store import stores
 
 
 class Server:
@@ -114,7 +115,22 @@ class Server:
         """End it as Ctrl-C does; the seconds that took."""
         begin = time.monotonic()
         self.process.send_signal(signal.SIGINT)
-        self.process.wait(timeout=20.0)
+        self.process.wait(timeout=60.0)
+        taken = time.monotonic() - begin
         if self.process.stdout is not None:
             self.process.stdout.close()
-        return time.monotonic() - begin
+        return taken
+
+    def end_studies(self) -> None:
+        """Have the studies that it started end too: they go on without it."""
+        running = [
+            store
+            for store in stores(Path(self._environment["MULTIVIEW_PHD_STUDIES"]))
+            if store.is_running()
+        ]
+        for store in running:
+            store.ask_to_stop()
+        deadline = time.monotonic() + 60.0
+        while any(store.is_running() for store in running):
+            assert time.monotonic() < deadline, "a study did not stop"
+            time.sleep(0.1)

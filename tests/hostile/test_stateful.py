@@ -46,3 +46,4 @@ def test_no_call_makes_the_server_fail_or_answer_what_is_not_documented(
         assert running.get("/api/state").status_code == 200
     finally:
         running.stop()
+        running.end_studies()
