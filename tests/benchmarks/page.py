@@ -212,7 +212,8 @@ def _played(page: Page, frames: int, seconds: float, also: str) -> Iterator[Meas
     skipped = sum(b - a - 1 for a, b in pairwise(shown))
     taken = (paints[-1]["at"] - paints[0]["at"]) / 1e3
     words = f"page: play, {CAMERAS} cameras of {SIZE[0]}×{SIZE[1]}{also}"
-    yield Measurement(f"{words}: steps a second", (len(shown) - 1) / taken, "1/s", "25 /s")
+    pace = (len(shown) - 1) / taken
+    yield Measurement(f"{words}: steps a second", pace, "1/s", "25 /s", better="higher")
     yield Measurement(f"{words}: steps skipped", skipped, "", "0")
     yield Measurement(f"{words}: steps without all their overlays", whole.count(False), "", "0")
 
