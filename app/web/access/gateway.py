@@ -124,14 +124,18 @@ class Gateway:
         except (ApiError, OSError, TimeoutError, websockets.InvalidHandshake):
             await socket.close(1013, "the 3D view is not running")
             return
-        async with upstream:
-            await socket.accept(upstream.subprotocol)
-            up = asyncio.create_task(_to_viser(socket, upstream))
-            down = asyncio.create_task(_to_browser(upstream, socket))
-            _, pending = await asyncio.wait({up, down}, return_when=asyncio.FIRST_COMPLETED)
-            for task in pending:
-                task.cancel()
-            await asyncio.gather(up, down, return_exceptions=True)
+        try:
+            async with upstream:
+                await socket.accept(upstream.subprotocol)
+                up = asyncio.create_task(_to_viser(socket, upstream))
+                down = asyncio.create_task(_to_browser(upstream, socket))
+                _, pending = await asyncio.wait({up, down}, return_when=asyncio.FIRST_COMPLETED)
+                for task in pending:
+                    task.cancel()
+                await asyncio.gather(up, down, return_exceptions=True)
+        finally:  # a server that ends cancels this even while it says goodbye
+            upstream.transport.abort()
+            await asyncio.sleep(0)
         with contextlib.suppress(RuntimeError, WebSocketDisconnect):  # the browser went first
             code = upstream.close_code
             await socket.close(
