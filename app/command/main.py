@@ -35,14 +35,14 @@ from app.command.flags import (
     Track,
     parse,
 )
-from app.command.terminal import CommandError, check_data, check_keep, say
+from app.command.terminal import FAILURE, CommandError, check_data, check_keep, say
 from tracker.folders import library_file
 from tracker.parameters import ParameterError
 
 if TYPE_CHECKING:
     from tracker.library.records import Result
 
-FAILURE, USAGE, INTERRUPTED = 1, 2, 130
+USAGE, INTERRUPTED = 2, 130
 
 TRACEBACK = "MULTIVIEW_PHD_TRACEBACK"
 """Environment variable: with any value, an unexpected failure shows where it happened."""

@@ -13,6 +13,9 @@ from typing import Any
 from tracker.parameters import ParameterError
 from tracker.visible import visible
 
+FAILURE = 1
+"""The status of a command that could not do what was asked, or found what must not be."""
+
 
 class CommandError(Exception):
     """A failure with its sentence."""

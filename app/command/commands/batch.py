@@ -10,14 +10,13 @@ from collections.abc import Sequence
 from app.command.arguments.studies import Batch
 from app.command.commands.studies import INTERRUPTED, crew_of, to_be_stopped
 from app.command.flags import set_values
-from app.command.terminal import Bar, print_table, say
+from app.command.terminal import FAILURE, Bar, print_table, say
 from tracker import parameters as table
 from tracker.folders import library_file
 from tracker.library.store import open_library
 from tracker.parameters import PRESETS, ParameterError
 from tracker.studies.batches import BatchRun, places_of, run_batch
 
-FAILED = 1
 _FIGURES = ("mota", "idf1", "hota", "ospa")
 
 
@@ -57,7 +56,7 @@ def batch(command: Batch) -> int:
     if stopped.is_set():
         say("stopped; what is there is kept: the same command goes on")
         return INTERRUPTED
-    return FAILED if any(one.run is None for one in found) else 0
+    return FAILURE if any(one.run is None for one in found) else 0
 
 
 def _told(one: BatchRun) -> dict[str, object]:

@@ -7,10 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
-from app.command.terminal import Bar, CommandError, print_table, say
+from app.command.terminal import FAILURE, Bar, CommandError, print_table, say
 from tracker.parameters import ParameterError
-
-FAILURE = 1
 
 SIGNS = {"good": "ok", "warning": "!", "absent": "–"}
 """Of a check's outcome, in the first column."""

@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING
 
 from app.command.flags import Track
 from app.command.interruption import between_steps
-from app.command.terminal import Bar, CommandError, check_keep, check_seed, say
+from app.command.terminal import FAILURE, Bar, CommandError, check_keep, check_seed, say
 from tracker import parameters as table
 from tracker.folders import library_file
 
 if TYPE_CHECKING:
     from tracker.pipeline import Run
-
-FAILURE = 1
 
 
 def track(command: Track) -> int:

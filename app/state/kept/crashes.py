@@ -186,7 +186,7 @@ def _report(note: Note, trace: str, by: int | None) -> str:
     from tracker import __version__
 
     packages = ("numpy", "numba", "llvmlite", "opencv-python-headless", "av")
-    known = [f"{name} {version(name)}" for name in packages if _is_there(name)]
+    known = [f"{name} {told}" for name in packages if (told := _version(name)) is not None]
     doing = f"opening {note.place}" if note.opening else f"open: {note.place or 'nothing'}"
     run = "no run under way"
     if note.run is not None:
@@ -204,12 +204,11 @@ def _report(note: Note, trace: str, by: int | None) -> str:
     )
 
 
-def _is_there(name: str) -> bool:
+def _version(package: str) -> str | None:
     try:
-        version(name)
-    except ImportError:
-        return False
-    return True
+        return version(package)
+    except ImportError:  # it is not there
+        return None
 
 
 def _time_of(path: Path) -> float:
