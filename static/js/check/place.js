@@ -180,8 +180,8 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 
 	function words() {
 		const { chosen, placing, other } = state.get();
-		if (placing) return fill(why, placingWords(placing));
 		if (!chosen) return;
+		if (placing) return fill(why, placingWords(placing));
 		const { words: what, probability } = chosen.alternatives[other] ?? chosen.alternatives[0];
 		const switches = scoresOf(store.get())?.series.switches.filter(
 			({ step, before, track }) =>
