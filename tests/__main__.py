@@ -39,8 +39,9 @@ STAMP = ENVIRONMENT / "installed-from"
 PASSED = ENVIRONMENT / "passed"
 """A digest of the files on which the short form has passed."""
 
-WORKERS = min(4, os.cpu_count() or 1)
-"""Processes that run tests side by side; each takes up to a gigabyte."""
+WORKERS = min(4, 1 + (os.cpu_count() or 1))
+"""Processes that run tests side by side, one more than there are cores, since many wait for what
+another process does; each takes up to a gigabyte."""
 
 SHORT = "not full and not long"
 FULL = "full or long"
