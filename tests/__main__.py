@@ -25,8 +25,9 @@ import sys
 import threading
 import time
 import venv
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -85,21 +86,34 @@ def tell(words: str) -> None:
         print(words, flush=True)
 
 
-def install() -> None:
-    """Make the environment and install the project, unless nothing has changed since."""
+@contextmanager
+def installing() -> Iterator[None]:
+    """Make the environment and install the project, unless nothing has changed since.
+
+    Within it the program itself is there; the tools of the tests are when it is left.
+    """
     if not Path(PYTHON).exists():
         venv.EnvBuilder(with_pip=True).create(ENVIRONMENT)
     wanted = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     if STAMP.exists() and STAMP.read_text(encoding="utf-8") == wanted:
+        yield
         return
     begin = time.monotonic()
     # compiled when imported: the tests import a small part of what is installed
     pip = [PYTHON, "-m", "pip", "install", "--quiet", "--no-compile"]
+    subprocess.run([*pip, "--editable", str(ROOT)], check=True)
+    yield
     subprocess.run([*pip, "--editable", f"{ROOT}[test]"], check=True)
     # by itself: its own requirements bring a second OpenCV that clashes with the headless one
     subprocess.run([*pip, "--no-deps", "trackeval>=1.3"], check=True)
     STAMP.write_text(wanted, encoding="utf-8")
     tell(f"── installation: {time.monotonic() - begin:.0f} s")
+
+
+def install() -> None:
+    """All of it."""
+    with installing():
+        pass
 
 
 @cache
@@ -225,8 +239,8 @@ def main() -> int:
             before = digest()
             with ThreadPoolExecutor(2) as lanes:
                 reading = lanes.submit(in_order, page)
-                install()
-                compiling = lanes.submit(kernels.run)
+                with installing():
+                    compiling = lanes.submit(kernels.run)
                 failed += in_order(code) + reading.result()
                 failed += [] if compiling.result() else [kernels.name]
             failed += [] if tests.run(shown=True) else [tests.name]
