@@ -146,7 +146,8 @@ def _width_first(size: tuple[int, int], k: Float[ndarray, "3 3"]) -> tuple[int, 
         return float(np.abs(k[:2, 2] / (width, height) - 0.5).max())
 
     width, height = size
-    return (height, width) if off(width, height) > 0.15 and off(height, width) < 0.1 else size
+    given, exchanged = off(width, height), off(height, width)
+    return (height, width) if given > 0.15 and exchanged < 0.5 * given else size
 
 
 def cameras(file: SourceFile, values: Any, convention: Convention) -> Iterator[RawCamera]:
