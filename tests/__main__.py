@@ -25,8 +25,9 @@ import sys
 import threading
 import time
 import venv
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -39,8 +40,9 @@ STAMP = ENVIRONMENT / "installed-from"
 PASSED = ENVIRONMENT / "passed"
 """A digest of the files on which the short form has passed."""
 
-WORKERS = min(4, os.cpu_count() or 1)
-"""Processes that run tests side by side; each takes up to a gigabyte."""
+WORKERS = min(4, 1 + (os.cpu_count() or 1))
+"""Processes that run tests side by side, one more than there are cores, since many wait for what
+another process does; each takes up to a gigabyte."""
 
 SHORT = "not full and not long"
 FULL = "full or long"
@@ -84,21 +86,34 @@ def tell(words: str) -> None:
         print(words, flush=True)
 
 
-def install() -> None:
-    """Make the environment and install the project, unless nothing has changed since."""
+@contextmanager
+def installing() -> Iterator[None]:
+    """Make the environment and install the project, unless nothing has changed since.
+
+    Within it the program itself is there; the tools of the tests are when it is left.
+    """
     if not Path(PYTHON).exists():
         venv.EnvBuilder(with_pip=True).create(ENVIRONMENT)
     wanted = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     if STAMP.exists() and STAMP.read_text(encoding="utf-8") == wanted:
+        yield
         return
     begin = time.monotonic()
     # compiled when imported: the tests import a small part of what is installed
     pip = [PYTHON, "-m", "pip", "install", "--quiet", "--no-compile"]
+    subprocess.run([*pip, "--editable", str(ROOT)], check=True)
+    yield
     subprocess.run([*pip, "--editable", f"{ROOT}[test]"], check=True)
     # by itself: its own requirements bring a second OpenCV that clashes with the headless one
     subprocess.run([*pip, "--no-deps", "trackeval>=1.3"], check=True)
     STAMP.write_text(wanted, encoding="utf-8")
     tell(f"── installation: {time.monotonic() - begin:.0f} s")
+
+
+def install() -> None:
+    """All of it."""
+    with installing():
+        pass
 
 
 @cache
@@ -224,8 +239,8 @@ def main() -> int:
             before = digest()
             with ThreadPoolExecutor(2) as lanes:
                 reading = lanes.submit(in_order, page)
-                install()
-                compiling = lanes.submit(kernels.run)
+                with installing():
+                    compiling = lanes.submit(kernels.run)
                 failed += in_order(code) + reading.result()
                 failed += [] if compiling.result() else [kernels.name]
             failed += [] if tests.run(shown=True) else [tests.name]

@@ -187,7 +187,7 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     if command.memory is not None and not 0.0625 <= command.memory <= 65536.0:
         raise ParameterError("--memory", f"expected 0.0625 to 65536 GB, got {command.memory:g}")
     gc.disable()  # a seventh of the time: nothing that is imported ever goes
-    from app.state.workers.jobs import locate
+    from app.state.workers.opening import locate
     from app.web import server
     from app.web.access.security import is_loopback
     from app.web.access.tokens import PARAMETER, Keys, new_token, own_token

@@ -39,9 +39,10 @@ from app.state.workers.compiling import Compiling
 from app.state.workers.evaluator import Evaluator
 from app.state.workers.exporter import Exporter
 from app.state.workers.identity_check import IdentityCheck
-from app.state.workers.jobs import Jobs, in_background
+from app.state.workers.jobs import Jobs
 from app.state.workers.keeper import Keeper
 from app.state.workers.sensitivity import Sensitivity
+from app.state.workers.threads import in_background
 from app.web import api, description, stream, teaching_routes
 from app.web.access import gateway
 from app.web.access.connections import Requests, Sockets

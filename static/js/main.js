@@ -64,7 +64,6 @@ mountSide(one(".side"), context);
 const timeline = mountTimeline(one(".time"), context);
 mountDoor(context);
 mountLayout(context);
-mountControls(context);
 // The rest is read once the page stands; what it brings may be asked for before.
 /** @type {Promise<void> | undefined} */
 let rest;
@@ -75,7 +74,6 @@ const readRest = () =>
 	));
 const brought = /** @type {const} */ ([
 	"help",
-	"palette",
 	"bookmark",
 	"keepPicture",
 	"drawTemplate",
@@ -93,6 +91,14 @@ for (const name of brought) {
 	};
 	actions[name] = early;
 }
+// What is typed before it can offer anything stands in its field.
+actions.palette = () => {
+	const dialog = /** @type {any} */ (one(".palette"));
+	if (dialog.open) return dialog.close();
+	dialog.showModal();
+	void readRest();
+};
+mountControls(context);
 void readRest();
 
 // Also for a click inside the 3D view, which the server hears of first.

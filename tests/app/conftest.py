@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -65,14 +66,28 @@ def crossing(data: Path) -> Path:
     return data / "crossing"
 
 
-@pytest.fixture
-def client(data: Path) -> Iterator[TestClient]:
-    """The application with ``crossing`` open and computed."""
+@contextmanager
+def opened(data: Path) -> Iterator[TestClient]:
+    """The application with ``crossing`` open, computed and scored, at the first step."""
     app = create_app(Settings(sequence="crossing", data=data, with_viser=False))
     with TestClient(app, base_url=ADDRESS) as client:
         wait_until(run_is(client, "done"))
         wait_until(is_evaluated(client))
         client.post("/api/seek", json={"step": 0})  # it was where something happens
+        yield client
+
+
+@pytest.fixture
+def client(data: Path) -> Iterator[TestClient]:
+    """An application that a test has for itself."""
+    with opened(data) as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def refusing(data: Path) -> Iterator[TestClient]:
+    """One application for all tests of a module that ask for what it refuses."""
+    with opened(data) as client:
         yield client
 
 

@@ -338,6 +338,18 @@ def test_a_script_of_ones_own(tmp_path: Path) -> None:
         assert_same(raw, camera)
 
 
+def test_rows_before_columns(tmp_path: Path) -> None:
+    """As MATLAB and NumPy tell a picture's size; the principal point gives it away."""
+    camera = cameras()[0]
+    table = {"name": "a", "K": camera.intrinsics, "R": camera.rotation, "t": camera.translation}
+    for name, size in (("rows", SIZE[::-1]), ("columns", SIZE)):
+        scipy.io.savemat(
+            tmp_path / f"{name}.mat", {"cameras": {**table, "ImageSize": np.array(size)}}
+        )
+        (raw,) = raw_cameras(tmp_path / f"{name}.mat")
+        assert raw.image_size == SIZE
+
+
 def test_a_lens_that_cameras_do_not_have_is_refused_by_its_name(tmp_path: Path) -> None:
     (tmp_path / "cameras.txt").write_text("1 THIN_PRISM_FISHEYE 10 10 1 1 1 1 0 0 0 0 0 0 0 0\n")
     (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 0 1 a.jpg\n\n")

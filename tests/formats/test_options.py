@@ -35,6 +35,20 @@ def test_boxes_as_parts_of_the_picture_are_read_where_it_is_told(tmp_path: Path)
     np.testing.assert_allclose(view.detections.boxes, boxes(cameras()[0], PLACES)[1], atol=1e-6)
 
 
+def test_parts_of_the_picture_may_reach_beyond_it(tmp_path: Path) -> None:
+    toml(tmp_path)
+    for camera in cameras():
+        frames, found = boxes(camera, PLACES)
+        found[::50, 3] += 2.0 * SIZE[1]  # drawn on below the picture
+        corners = np.hstack([found[:, :2], found[:, :2] + found[:, 2:]])
+        parts = (corners + 0.5) / np.array([*SIZE, *SIZE])
+        rows = [f"{f},{','.join(map(str, b))}" for f, b in zip(frames, parts.tolist(), strict=True)]
+        (tmp_path / f"{camera.name}.csv").write_text("\n".join(["frame,x1,y1,x2,y2", *rows]))
+    for view in settled_of(tmp_path).views:
+        assert view.detections is not None
+        assert np.median(view.detections.boxes[:, 3]) > 50.0
+
+
 def test_exchanged_calibrations_are_named_and_mended_by_a_flag(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -42,6 +42,7 @@ def processes() -> ForkServerContext:
     return context
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", KINDS.values(), ids=lambda kind: kind.name)
 def test_what_was_confirmed_survives_a_kill_at_any_instant(
     tmp_path: Path, kind: Kind, processes: ForkServerContext

@@ -1,5 +1,5 @@
 """The application that the tests of the workbench share."""
 
-from tests.app.conftest import client, crossing, data
+from tests.app.conftest import client, crossing, data, refusing
 
-__all__ = ["client", "crossing", "data"]
+__all__ = ["client", "crossing", "data", "refusing"]

@@ -137,6 +137,7 @@ def garbage(chance: random.Random) -> bytes | str:
             return b"\x82\xa4type" + bytes([0xA0 + len(name)]) + name + chance.randbytes(20)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("path", ["/api/stream", "/viser"])
 def test_two_thousand_frames_of_garbage(running: Running, path: str) -> None:
     chance, frames = random.Random(7), 0
@@ -218,6 +219,7 @@ UPGRADE = (
 )
 
 
+@pytest.mark.full
 def test_readers_that_do_not_read_are_dropped(running: Running) -> None:
     # more than the system keeps for whoever does not read
     page = b"GET /viser/ HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" * 20

@@ -58,6 +58,7 @@ def no_folder(tmp_path: Path) -> Path:
     return tmp_path / "file" / "home"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("is_there", [False, True], ids=["no home", "not to be written to"])
 def test_recordings_are_tracked_without_a_home(
     tmp_path: Path, no_folder: Path, is_there: bool

@@ -61,8 +61,9 @@ class Consensus:
     """Pairs of boxes that meet and have the common rise, each box in one pair at most."""
     possible: int
     """The largest number of such pairs that there could be."""
-    feet: Float[ndarray, "N 3"]
+    steps: Int[ndarray, " N"]
     """Of the agreeing pairs, as the following."""
+    feet: Float[ndarray, "N 3"]
     rises: Float[ndarray, "N 3"]
     gaps: Float[ndarray, " N"]
     """As of :class:`Meetings`."""
@@ -142,6 +143,7 @@ def consensus(
         [np.zeros(0)],
     )
     cameras: list[tuple[int, int]] = []
+    steps = [np.zeros(0, dtype=np.int64)]
     for key, met in found.items():
         own = pairs[key]
         near = np.flatnonzero(_agree(met.rises, rise))
@@ -149,6 +151,7 @@ def consensus(
                                 met.gaps[near])]  # fmt: skip
         agreeing += len(kept)
         shares[key] = len(kept) / own.most if own.most else 0.0
+        steps.append(rays[key[0]].frames[own.first[met.pairs[kept]]])
         feet.append(met.feet[kept])
         all_rises.append(met.rises[kept])
         gaps.append(met.gaps[kept])
@@ -162,6 +165,7 @@ def consensus(
         shares,
         agreeing,
         possible,
+        np.concatenate(steps),
         np.concatenate(feet),
         np.concatenate(all_rises),
         np.concatenate(gaps),

@@ -9,7 +9,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.agreement.observed import rays_of
+from tracker.agreement.observed import Rays, rays_of
+from tracker.agreement.pace import WALKING, pace
 from tracker.agreement.suggestion import STANDING, Suggestion, agreement, suggest
 from tracker.camera import Camera
 from tracker.checks.reading import Reading, read_boxes, to_camera
@@ -19,7 +20,14 @@ from tracker.importing.finding.calibrations import camera_sets
 from tracker.importing.finding.geometry import read_poses
 from tracker.importing.finding.matching import MatchedCamera, match_all
 from tracker.importing.finding.pictures import picture_sizes, scaled
-from tracker.importing.finding.times import CameraTime, Times, first_index, frames_of, settle_times
+from tracker.importing.finding.times import (
+    USUAL_RATE,
+    CameraTime,
+    Times,
+    first_index,
+    frames_of,
+    settle_times,
+)
 from tracker.importing.finding.truths import settle_truth
 from tracker.importing.gathering import Taken
 from tracker.importing.options import ImportOptions
@@ -95,10 +103,12 @@ def settle(taken: Sequence[Taken], options: ImportOptions | None = None) -> Sett
     reading, raws, boxes = _read(raws, boxes, times, arbitrary, found)
     settled = [to_camera(raw, reading, size) for raw, size in zip(raws, sizes, strict=True)]
     detections = [_detections(own) for own in boxes]
-    at_steps = [
-        None if own is None else at_steps_of(own, time)
-        for own, time in zip(detections, times.cameras, strict=True)
-    ]
+    at_steps = _at_steps(detections, times)
+    if not times.stated:
+        fps, why = _rate(settled, at_steps)
+        found.append(("fps", f"{fps:g}, {why}, since no file says it; --fps"))
+        times = settle_times(cameras, matched.truths, replace(options, fps=fps), [])
+        at_steps = _at_steps(detections, times)
     suggested = _room(settled, at_steps, found)
     room = _as_told(suggested, options)
     truth = settle_truth(
@@ -130,6 +140,13 @@ def settle(taken: Sequence[Taken], options: ImportOptions | None = None) -> Sett
         tuple(found),
         tuple(told),
     )
+
+
+def _at_steps(detections: Sequence[Detections | None], times: Times) -> list[Detections | None]:
+    return [
+        None if own is None else at_steps_of(own, time)
+        for own, time in zip(detections, times.cameras, strict=True)
+    ]
 
 
 def at_steps_of(own: Detections, time: CameraTime) -> Detections:
@@ -322,12 +339,7 @@ def _room(
     """Where people are, and how large they are: from the boxes, else from the views."""
     agreed = None
     if any(own is not None for own in detections):
-        nothing = Detections(np.zeros(0, dtype=np.int64), np.zeros((0, 4)), np.zeros(0))
-        rays = [
-            rays_of((own or nothing).frames, (own or nothing).boxes, camera)
-            for camera, own in zip(cameras, detections, strict=True)
-        ]
-        agreed = agreement(cameras, rays)
+        agreed = agreement(cameras, _rays(cameras, detections))
     room = suggest(cameras, agreed)
     if room is None:
         centres = np.array([camera.centre for camera in cameras])
@@ -347,6 +359,28 @@ def _room(
         ("target", f"{size} m, {'from the boxes' if room.people else 'a standing person'}")
     )
     return room
+
+
+def _rate(cameras: Sequence[Camera], detections: Sequence[Detections | None]) -> tuple[float, str]:
+    """Steps a second where no file says it, and how that is known.
+
+    Who goes half a metre from one step to the next would run at 25 steps a second; who goes
+    little may as well be slow.
+    """
+    way = pace(cameras, _rays(cameras, detections))
+    if way is None or WALKING / way > USUAL_RATE / 2.0:
+        return USUAL_RATE, "as usual"
+    fps = WALKING / way
+    rounded = max(0.5, round(fps) if fps >= 3.0 else round(2.0 * fps) / 2.0)
+    return rounded, f"by people who go {way:.2f} m from step to step"
+
+
+def _rays(cameras: Sequence[Camera], detections: Sequence[Detections | None]) -> list[Rays]:
+    nothing = Detections(np.zeros(0, dtype=np.int64), np.zeros((0, 4)), np.zeros(0))
+    return [
+        rays_of((own or nothing).frames, (own or nothing).boxes, camera)
+        for camera, own in zip(cameras, detections, strict=True)
+    ]
 
 
 def _sides(room: Suggestion) -> Float[ndarray, " 3"]:

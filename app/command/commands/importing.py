@@ -49,7 +49,8 @@ def _import(command: Import) -> int:
         [(one.label, one.format if one.pieces else "–", one.complaint) for one in taken],
     )
     settled = settle(taken, options)
-    print_table(("\nfound out", "as"), [*settled.found, *(("not used", t) for t in settled.told)])
+    print()
+    print_table(("found out", "as"), [*settled.found, *(("not used", t) for t in settled.told)])
     facts = (
         f"{len(settled.views)} cameras, {settled.frames} steps at {settled.fps:g} a second, "
         f"{'with' if settled.truth is not None else 'without'} truth"

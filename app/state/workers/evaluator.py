@@ -12,7 +12,7 @@ from app.errors import sentence
 from app.state.scores import Scored
 from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
-from app.state.workers.jobs import CLOSING_SECONDS, be_nice
+from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
 from tracker.trajectories import Trajectories
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from app.errors import sentence
-from app.state.workers.jobs import CLOSING_SECONDS, be_nice
+from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from tracker.writing.registry import Format, save
 from tracker.writing.written import Options, Stopped, Written
 

@@ -10,7 +10,7 @@ from typing import Literal
 from app.errors import sentence
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
-from app.state.workers.jobs import CLOSING_SECONDS, be_nice
+from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from tracker.experiments.laboratory.experiment import Context
 from tracker.experiments.laboratory.pool import cores
 from tracker.pipeline import Cancelled, Run

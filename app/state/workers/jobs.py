@@ -1,4 +1,4 @@
-"""The only owner of threads that work: opening a sequence, computing runs.
+"""The only owner of the threads that compute runs; what is opened, the runs follow.
 
 Runs are coalesced, not queued: at most one is under way, the newest parameters
 win, the last always runs, and a superseded one stops between two steps.
@@ -6,27 +6,25 @@ win, the last always runs, and a superseded one stops between two steps.
 
 from __future__ import annotations
 
-import contextlib
 import logging
-import os
 import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from app.errors import sentence
 from app.state.kept.crashes import Crashes, Note
-from app.state.snapshot import Change, Opening, Snapshot
+from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
 from app.state.workers.compiling import WORDS, Compiling
+from app.state.workers.opening import Opener
+from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from app.state.workers.watchdog import Watchdog
 from tracker import pipeline
-from tracker.corrections.log import open_log
 from tracker.library.keeping import run_from
 from tracker.library.records import Result
 from tracker.parameters import RunParameters, changed, with_values
@@ -34,23 +32,11 @@ from tracker.pipeline import Cancelled, Progress, Run
 from tracker.runs import gaps
 from tracker.runs.gates import notices
 from tracker.runs.stage_cache import StageCache
-from tracker.sequences import library
 from tracker.sequences.pictures.frames import CACHE_BYTES, FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.trajectories import Trajectories, corrected
 
 logger = logging.getLogger("app")
-
-NICENESS = 2
-"""Priority (Unix niceness) of the threads that work on pictures: the operating system runs them
-when the server is idle, so that scrubbing stays fluent. The fusion keeps the usual one: it is
-short, and whoever moves a slider waits for it."""
-
-OPENING_TELLS_SECONDS = 0.1
-"""At most this often an opening tells how far it is."""
-
-CLOSING_SECONDS = 1.0
-"""How long what is under way may take to notice that it is to end."""
 
 CRASHED = (
     "the program crashed while this run was computed; it is left out until it is asked for again"
@@ -69,13 +55,6 @@ class _Wanted:
     key: str
     cancelled: threading.Event = field(default_factory=threading.Event)
     stopped_by_person: bool = False
-
-
-def locate(name: str, data: Path | None) -> str:
-    """The folder under the data folder that a name of the list stands for, else the name."""
-    if data is not None and (data / name / "sequence.toml").is_file():
-        return str(data / name)
-    return name
 
 
 class Jobs:
@@ -111,8 +90,6 @@ class Jobs:
             draft_of: The file of what was taught of a folder and not saved.
         """
         self._workbench = workbench
-        self._data = data
-        self._detector = detector
         self._seed = seed
         self._condition = threading.Condition()
         self._wanted: _Wanted | None = None
@@ -120,13 +97,18 @@ class Jobs:
         self._cache = cache or StageCache()
         self._compiling = compiling
         self._computes = computes
-        self._picture_bytes = picture_bytes
         self._crashes = crashes or Crashes(None)
         self._crashed: Note | None = None
-        self._refused = ""
         self._draft_of = draft_of
-        self._opening: threading.Event | None = None
-        self._openings: list[threading.Thread] = []
+        self._opener = Opener(
+            workbench,
+            self._crashes,
+            self._close_when_unused,
+            data=data,
+            detector=detector,
+            computes=computes,
+            picture_bytes=picture_bytes,
+        )
         self._closed = False
         self._unsubscribe = workbench.subscribe(self._on_change)
         self._switch_interval = sys.getswitchinterval()
@@ -136,6 +118,10 @@ class Jobs:
 
     # opening
 
+    def open(self, name: str, values: Mapping[str, Any] | None = None) -> Future[None]:
+        """Open a sequence in the background, as :meth:`Opener.open` does."""
+        return self._opener.open(name, values)
+
     def take_up(self, note: Note) -> Future[None]:
         """Open what a start had open that crashed, with its values; its run is left out.
 
@@ -143,115 +129,12 @@ class Jobs:
             As :meth:`open`; where it crashed when that was opened, it is not, and is refused once.
         """
         if note.opening or not note.place:
-            self._refused = note.place
+            self._opener.refuse_once(note.place)
             nothing: Future[None] = Future()
             nothing.set_result(None)
             return nothing
         self._crashed = note
         return self.open(note.place, note.values)
-
-    def open(self, name: str, values: Mapping[str, Any] | None = None) -> Future[None]:
-        """Open a sequence, built-in or a folder, in the background; the newest request wins.
-
-        Args:
-            name: Of it.
-            values: Parameters that are not its own; they begin at its own, where none are given.
-
-        Returns:
-            Done when it is shown; its exception says why it is not. Whatever was
-            open stays open after a failure.
-        """
-        future: Future[None] = Future()
-        cancelled = threading.Event()
-        if name and name == self._refused:  # by a page that comes back
-            self._refused = ""
-            error = ValueError("the program crashed when it was opened; open it again to try anew")
-            self._opening_failed(name, cancelled, error)
-            future.set_exception(error)
-            return future
-        with self._condition:
-            if self._closed:
-                raise RuntimeError("the jobs are closed")
-            if self._opening is not None:
-                self._opening.set()
-            self._opening = cancelled
-            thread = threading.Thread(
-                target=self._open,
-                args=(name, values or {}, cancelled, future),
-                name="opening",
-                daemon=True,
-            )
-            self._openings = [t for t in self._openings if t.is_alive()] + [thread]
-        self._workbench.set_opening(Opening(name, "reading"))
-        thread.start()
-        return future
-
-    def _open(
-        self,
-        name: str,
-        values: Mapping[str, Any],
-        cancelled: threading.Event,
-        future: Future[None],
-    ) -> None:
-        be_nice()
-
-        told_at = 0.0
-
-        def progress(words: str, done: int, total: int) -> None:
-            nonlocal told_at
-            now = time.monotonic()
-            if cancelled.is_set():
-                return
-            if now - told_at >= OPENING_TELLS_SECONDS or done == total:
-                told_at = now
-                self._workbench.set_opening(Opening(name, words, done, total))
-
-        try:
-            with self._crashes.opening(name):
-                sequence = library.open_sequence(
-                    locate(name, self._data),
-                    progress=partial(progress, "rendering"),
-                    cancelled=cancelled.is_set,
-                )
-                sequence = library.with_detector(sequence, self._detector)
-                parameters = RunParameters()
-                if self._computes:  # else neither pictures nor boxes are needed
-                    parameters = pipeline.default_parameters(sequence)
-                reader = FrameReader(sequence, cache_bytes=self._picture_bytes)
-            with self._condition:
-                if cancelled.is_set():
-                    reader.close()
-                    raise Cancelled
-                self._opening = None
-            key = sequence.digest[:16]
-            log = open_log(sequence.folder)
-            before = self._workbench.open(
-                sequence, key, reader, parameters, name, log.corrections,
-                with_values(parameters, values),
-            )  # fmt: skip
-        except Exception as error:
-            if cancelled.is_set():
-                future.set_exception(Cancelled("another sequence was asked for"))
-                return
-            if not isinstance(error, ValueError | OSError):
-                logger.exception("opening %s failed", name)
-            self._opening_failed(name, cancelled, error)
-            future.set_exception(error)
-        else:
-            if before is not None:
-                self._close_when_unused(before)
-            future.set_result(None)
-
-    def _opening_failed(self, name: str, cancelled: threading.Event, error: Exception) -> None:
-        with self._condition:
-            if cancelled.is_set():
-                return
-            self._opening = None
-        self._workbench.set_opening(None)
-        words = sentence(error).removeprefix(f"{name}: ")
-        self._workbench.notify(
-            "error", f"{name} cannot be opened: {words}", "What was open still is."
-        )
 
     def _close_when_unused(self, reader: FrameReader) -> None:
         """Close a reader as soon as the run that may decode from it is over."""
@@ -439,17 +322,16 @@ class Jobs:
     def close(self) -> None:
         """Stop everything; what is under way ends after its step."""
         self._unsubscribe()
+        opening = self._opener.close()
         with self._condition:
             self._closed = True
-            if self._opening is not None:
-                self._opening.set()
             if self._under_way is not None:
                 self._under_way.cancelled.set()
             self._condition.notify_all()
         if self._compiling is not None:
             self._compiling.stop()
         deadline = time.monotonic() + CLOSING_SECONDS
-        for thread in (self._worker, *self._openings):
+        for thread in (self._worker, *opening):
             if thread.ident is not None:
                 thread.join(timeout=max(0.0, deadline - time.monotonic()))
         if self._compiling is not None and not self._worker.is_alive():
@@ -472,21 +354,3 @@ def _meanwhile(snapshot: Snapshot, seed: int) -> Trajectories | None:
         return None  # something was taken back: that run is kept, and there at once
     new = [one for one in snapshot.corrections if one not in known]
     return corrected(shown.tracks, new, sequence.step_time)
-
-
-def in_background(work: Callable[[], object]) -> None:
-    """Run something in a daemon thread of low priority; the end of the program may cut it short."""
-
-    def nicely() -> None:
-        be_nice()
-        work()
-
-    threading.Thread(target=nicely, name="stage-files", daemon=True).start()
-
-
-def be_nice() -> None:
-    """Lower the priority of this thread and of those it starts, where the system lets threads."""
-    set_priority: Callable[[int, int, int], None] | None = getattr(os, "setpriority", None)
-    if set_priority is not None and sys.platform.startswith("linux"):
-        with contextlib.suppress(OSError):
-            set_priority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)

@@ -15,7 +15,7 @@ from app.errors import sentence
 from app.state.opening_step import is_settled
 from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
-from app.state.workers.jobs import CLOSING_SECONDS, be_nice
+from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from tracker.library import KEEP
 from tracker.library.errors import LibraryError
 from tracker.library.keeping import recording_of, run_of, thumbnail_of

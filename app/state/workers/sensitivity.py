@@ -17,7 +17,7 @@ from typing import Any
 from app.errors import sentence
 from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
-from app.state.workers.jobs import CLOSING_SECONDS, be_nice
+from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from tracker import parameters as table
 from tracker import pipeline
 from tracker.evaluation import EvaluationSettings, evaluate_sequence

@@ -32,9 +32,9 @@ export function mountCheck(root, context) {
 
 	const { state } = check;
 	const first = () => {
-		const { chosen, queue } = state.get();
-		// While a run goes on another may still come before it.
-		if (store.get().place === "check" && !chosen && queue?.complete && queue.doubts[0])
+		const { chosen, placing, queue } = state.get();
+		// While a run goes on another may still come before it; who places somebody is not led away.
+		if (store.get().place === "check" && !chosen && !placing && queue?.complete && queue.doubts[0])
 			check.choose(queue.doubts[0]);
 	};
 	let comes = false;

@@ -30,6 +30,15 @@ const PROPOSES = {
 	missing: "check-here",
 };
 
+/** What is to be done while somebody is placed. */
+/** @param {NonNullable<ReturnType<Check["state"]["get"]>["placing"]>} placing */
+function placingWords({ track, clicks }) {
+	if (clicks.length === 1) return "One picture: feet on the floor. Enter says it, Esc leaves it.";
+	if (clicks.length) return "Two pictures. Enter says it, Esc leaves it.";
+	const who = track === null ? "somebody stands" : `${track} stands`;
+	return `Click where ${who}, in one picture or in two. Esc leaves it.`;
+}
+
 /**
  * @param {HTMLElement} root @param {Context} context @param {Check} check
  * @param {ReturnType<typeof import("./crops.js").createCrops>} crops
@@ -109,7 +118,8 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 
 	function heads() {
 		const { chosen, other, queue, ends, placing } = state.get();
-		blank.hidden = Boolean(chosen || placing);
+		blank.hidden = Boolean(chosen);
+		if (!chosen && placing) return fill(blank, h("p", {}, placingWords(placing)));
 		if (!chosen) {
 			fill(
 				blank,
@@ -170,14 +180,8 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 
 	function words() {
 		const { chosen, placing, other } = state.get();
-		if (placing)
-			return fill(
-				why,
-				placing.clicks.length
-					? `${placing.clicks.length === 1 ? "One picture: feet on the floor" : "Two pictures"}. Enter says it, Esc leaves it.`
-					: `Click where ${placing.track === null ? "somebody stands" : `${placing.track} stands`}, in one picture or in two. Esc leaves it.`,
-			);
 		if (!chosen) return;
+		if (placing) return fill(why, placingWords(placing));
 		const { words: what, probability } = chosen.alternatives[other] ?? chosen.alternatives[0];
 		const switches = scoresOf(store.get())?.series.switches.filter(
 			({ step, before, track }) =>

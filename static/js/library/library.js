@@ -1,10 +1,12 @@
 /** The place Library: recordings, the runs of one, and one run in small. */
-import { fill, h, icon, one } from "../elements/dom.js";
-import { getJson, request } from "../state/api.js";
-import { exportMenu } from "./exports.js";
+import { fill, h, icon } from "../elements/dom.js";
+import { getJson } from "../state/api.js";
+import { chosenBar } from "./chosen.js";
 import { lostRecording } from "./lost.js";
+import { preview } from "./preview.js";
 import { runsTable } from "./runs.js";
-import { factsOf, has, many, size, titleOf, when } from "./words.js";
+import { shelf } from "./shelf.js";
+import { has, many, titleOf } from "./words.js";
 
 /** A run that has just ended is kept a moment later. */
 const KEPT_MS = 1500;
@@ -21,20 +23,21 @@ export function mountLibrary(root, { store, actions }) {
 	const chosen = new Set();
 	/** @type {number | null} */
 	let focused = null;
-	/** @type {number | null} whose preview is there */
-	let drawn = null;
-	/** @type {Server.Deleted | null} */
-	let deleted = null;
 	let starred = false;
 
-	const find = h("input", {
-		type: "search",
-		placeholder: "find a recording, run or note",
-		"aria-label": "Find",
-		oninput: () => show(),
+	const recordings = shelf({
+		choose: (one) => void choose(one),
+		open: openRecording,
+		add: () => actions.openSheet(),
+		find: () => show(),
 	});
-	const list = h("div", { class: "scroll list", role: "listbox", "aria-label": "Recordings" });
-	const foot = h("div", { class: "foot" });
+	const small = preview({ store, actions }, (run, note) => void change(run, { note }));
+	const bar = chosenBar({
+		actions,
+		chosen: () => runs.filter(({ id }) => chosen.has(id)).map(({ id }) => id),
+		none: chooseNone,
+		refresh,
+	});
 	const title = h("h2", { class: "pane-title" }, "Runs");
 	const sub = h("span", { class: "sub" });
 	const only = h(
@@ -45,7 +48,7 @@ export function mountLibrary(root, { store, actions }) {
 	);
 	const table = runsTable({
 		focus: (run) => void focus(run.id),
-		open: (run) => void open(run),
+		open: (run) => void small.open(run),
 		star: (run) => void change(run, { star: !run.star }),
 		tick: (run) => tick(run.id),
 	});
@@ -57,69 +60,9 @@ export function mountLibrary(root, { store, actions }) {
 		},
 		actions,
 	});
-	const picked = h("b");
-	const line = h("span", { role: "status", class: "gone-line" });
-	const stop = h("button", { class: "btn" }, "Stop");
-	const undo = h("button", { class: "btn", "data-key": "Ctrl Z", onclick: takeBack }, "Undo");
-	const side = h(
-		"button",
-		{ class: "btn box", onclick: () => void compare() },
-		icon("i-swap"),
-		"Compare",
-	);
-	/** @param {string} words @param {() => void} [cancel] */
-	const say = (words, cancel) => {
-		fill(line, words);
-		undo.hidden = true;
-		stop.hidden = !cancel;
-		stop.onclick = cancel ?? null;
-		bar.hidden = !words && !chosen.size;
-	};
-	const tools = h(
-		"span",
-		{ class: "picked", role: "toolbar", "aria-label": "Chosen runs" },
-		picked,
-		side,
-		exportMenu({ actions, say, chosen: () => ofChosen().map(({ id }) => id) }),
-		h("button", { class: "btn box", onclick: () => void remove() }, icon("i-trash"), "Delete"),
-		h(
-			"button",
-			{ class: "btn icon", "aria-label": "Choose none", onclick: () => (chosen.clear(), show()) },
-			icon("i-close", "s"),
-		),
-	);
-	const bar = h(
-		"div",
-		{ class: "undo-line" },
-		tools,
-		h("span", { class: "grow" }),
-		line,
-		stop,
-		undo,
-	);
-	const small = h("section", { class: "pane pv", "aria-label": "The run" });
-	const head = h("div", { class: "pane-head" });
-	const body = h("div", { class: "pv-body" });
-	small.append(head, body);
-	body.addEventListener("change", ({ target }) => {
-		const run = focusedRun();
-		if (run) void change(run, { note: /** @type {HTMLInputElement} */ (target).value });
-	});
 	fill(
 		root,
-		h(
-			"section",
-			{ class: "pane", "aria-label": "Recordings" },
-			h(
-				"div",
-				{ class: "pane-head" },
-				h("h2", { class: "pane-title" }, "Recordings"),
-				h("span", { class: "grow" }),
-			),
-			h("div", { class: "lib-find" }, icon("i-search", "s"), find),
-			list,
-			foot,
-		),
+		recordings.element,
 		h(
 			"section",
 			{ class: "pane runs", "aria-label": "Runs" },
@@ -135,60 +78,21 @@ export function mountLibrary(root, { store, actions }) {
 			gone.element,
 			table.element,
 			empty,
-			bar,
+			bar.element,
 		),
-		small,
+		small.element,
 	);
 
-	const focusedRun = () => runs.find(({ id }) => id === focused);
-	const ofChosen = () => runs.filter(({ id }) => chosen.has(id));
+	const focusedRun = () => runs.find(({ id }) => id === focused) ?? null;
 
-	/** Its own, once it was opened; else one of the list of what can be opened, if it has any. */
-	/** @param {Server.RecordingInfo} one */
-	function picture(one) {
-		const kept = one.id !== null;
-		if (one.missing || (kept && !one.has_thumbnail)) return icon("i-folder");
-		const src = kept
-			? `/api/library/thumbnail/${one.id}.jpg`
-			: `/api/recordings/picture?name=${encodeURIComponent(one.name)}`;
-		const image = h("img", { src, alt: "", loading: "lazy" });
-		image.onerror = () => image.replaceWith(icon("i-folder"));
-		return image;
-	}
-
-	/** @param {Server.RecordingInfo} one */
-	function item(one) {
-		const on = one.place === recording?.place;
-		return h(
-			"button",
-			{
-				class: `item${one.missing ? " bad" : ""}`,
-				role: "option",
-				"aria-selected": String(on),
-				tabindex: on ? 0 : -1,
-				title: one.place,
-				onclick: () => void choose(one),
-				ondblclick: () => openRecording(one),
-			},
-			h("span", { class: "th" }, picture(one)),
-			h(
-				"span",
-				{ class: "tx" },
-				h("b", {}, one.name),
-				h("span", { class: `small${one.missing ? " missing" : ""}` }, factsOf(one)),
-			),
-			h(
-				"span",
-				{ class: "en" },
-				h("b", {}, one.runs || ""),
-				h("span", { class: "small" }, one.opened ? when(one.opened) : ""),
-			),
-		);
+	function chooseNone() {
+		chosen.clear();
+		show();
 	}
 
 	/** Those that are neither of another name nor without a star, where that is asked for. */
 	function listed() {
-		const text = find.value.trim();
+		const text = recordings.text();
 		return runs.filter(
 			(run) =>
 				(!starred || run.star) &&
@@ -199,35 +103,8 @@ export function mountLibrary(root, { store, actions }) {
 
 	function show() {
 		if (!library) return;
-		const text = find.value.trim();
 		const matching = listed();
-		const kinds = /** @type {const} */ ([
-			["Own", "folder"],
-			["Rendered rooms", "rendered"],
-		]);
-		const walked = list.contains(document.activeElement);
-		fill(
-			list,
-			kinds.flatMap(([word, kind]) => {
-				const found = (library?.recordings ?? []).filter(
-					(one) =>
-						one.kind === kind &&
-						(!text || has(text, [one.name, one.place]) || one.place === recording?.place),
-				);
-				const head = h("div", { class: "cap" }, h("span", {}, word), h("span", {}, "runs"));
-				return found.length ? [head, ...found.map(item)] : [];
-			}),
-		);
-		// The items are new: who walks through them by arrows goes on from the chosen one.
-		if (walked)
-			/** @type {HTMLElement | null} */ (list.querySelector('[aria-selected="true"]'))?.focus();
-		const kept = library.recordings.reduce((sum, one) => sum + one.runs, 0);
-		fill(
-			foot,
-			library.error ??
-				`${many(kept, "run")} · ${size(library.bytes)}${library.read_only ? " · read only" : ""}`,
-		);
-		foot.title = library.file;
+		recordings.show(library, recording);
 		fill(title, recording ? `Runs of ${recording.name}` : "Runs");
 		fill(
 			sub,
@@ -251,19 +128,7 @@ export function mountLibrary(root, { store, actions }) {
 			);
 		table.show(matching, chosen, focused);
 		gone.show(recording);
-		fill(picked, `${chosen.size} chosen`);
-		tools.hidden = !chosen.size;
-		side.disabled = chosen.size < 2 || chosen.size > 4;
-		side.title = side.disabled ? "Two to four runs stand side by side" : "";
-		undo.hidden = !deleted;
-		stop.hidden = true;
-		if (deleted)
-			fill(
-				line,
-				icon("i-trash", "s"),
-				`${deleted.runs.length === 1 ? `Run ${deleted.runs[0]}` : many(deleted.runs.length, "run")} deleted, ${size(deleted.bytes)}`,
-			);
-		bar.hidden = !chosen.size && !deleted;
+		bar.show();
 	}
 
 	/** @param {Server.RecordingInfo} one */
@@ -293,56 +158,20 @@ export function mountLibrary(root, { store, actions }) {
 		for (const id of chosen) if (!runs.some((run) => run.id === id)) chosen.delete(id);
 		const there = runs.some(({ id }) => id === focused);
 		await focus(there && again ? focused : (runs[0]?.id ?? null));
-		if (!again) list.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: "nearest" });
+		if (!again) recordings.reveal();
 	}
 
 	/** @param {number | null} id */
 	async function focus(id) {
 		focused = id;
 		show();
-		const run = focusedRun();
-		if (!run) {
-			drawn = null;
-			fill(head);
-			return fill(body, h("p", { class: "blank" }, "A run that is chosen is shown here in small."));
-		}
-		const facts = [when(run.began), many(run.targets, "track")];
-		if (run.seconds) facts.push(`computed in ${run.seconds.toFixed(run.seconds < 9.5 ? 1 : 0)} s`);
-		fill(
-			head,
-			h("h2", { class: "pane-title" }, titleOf(run)),
-			h("span", { class: "sub" }, facts.join(" · ")),
-			h("span", { class: "grow" }),
-			h("button", { class: "btn main", onclick: () => void open(run) }, "Open in Tune"),
-			h("button", { class: "btn box", onclick: () => void pin(run) }, "Pin as A"),
-		);
-		const answer = await request(`/api/library/runs/${id}/drawn`).catch((error) => error);
-		const text = answer instanceof Error ? "" : await answer.text();
-		if (id !== focused) return;
-		// Whoever writes a note is not disturbed.
-		if (id === drawn && body.contains(document.activeElement)) return;
-		drawn = text ? id : null;
-		if (text) body.innerHTML = text;
-		else fill(body, h("p", { class: "blank" }, answer.message));
-	}
-
-	async function compare() {
-		const dialog = /** @type {any} */ (one(".compare"));
-		const numbers = ofChosen().map(({ id }) => `runs=${id}`);
-		const answer = await request(`/api/library/compared?${numbers.join("&")}`).catch(
-			(error) => error,
-		);
-		if (answer instanceof Error)
-			return actions.note("error", "The runs cannot be compared", answer.message);
-		dialog.innerHTML = await answer.text();
-		dialog.onclick = () => dialog.close();
-		dialog.showModal();
+		await small.show(focusedRun());
 	}
 
 	/** @param {number} id */
 	function tick(id) {
 		if (!chosen.delete(id)) chosen.add(id);
-		deleted = null;
+		bar.forget();
 		show();
 	}
 
@@ -352,42 +181,6 @@ export function mountLibrary(root, { store, actions }) {
 		if (!told) return;
 		runs = runs.map((one) => (one.id === run.id ? told : one));
 		await focus(focused);
-	}
-
-	async function remove() {
-		const ids = chosen.size ? [...chosen] : focused === null ? [] : [focused];
-		if (!ids.length) return;
-		deleted = await actions.ask("POST", "library/delete", { runs: ids });
-		chosen.clear();
-		await refresh();
-	}
-
-	async function takeBack() {
-		if (!deleted) return;
-		if (await actions.ask("POST", "library/take-back", { runs: deleted.runs })) deleted = null;
-		await refresh();
-	}
-
-	/** @param {Server.KeptRunInfo} run */
-	async function open(run) {
-		const state = await actions.ask("POST", `library/runs/${run.id}/open`);
-		if (!state) return;
-		location.hash = "#tune";
-		const older = state.run.stands_for;
-		actions.note(
-			older ? "warn" : "info",
-			`${titleOf(run)} is shown as it was`,
-			older
-				? "Another version of the program, or another state of the recording, made it."
-				: "Its tracks were kept; what the cameras found comes back by computing again.",
-			{ word: "Compute again", act: actions.runAgain },
-		);
-	}
-
-	/** @param {Server.KeptRunInfo} run */
-	async function pin(run) {
-		if (await actions.ask("POST", `library/runs/${run.id}/pin`))
-			actions.note("info", `${titleOf(run)} is run A now`, "Tune sets the shown run against it.");
 	}
 
 	/** Have a name written in the run's row. */
@@ -412,22 +205,22 @@ export function mountLibrary(root, { store, actions }) {
 		field.select();
 	}
 
+	/** What a key does with the run that is shown in small. */
+	/** @param {(run: Server.KeptRunInfo) => void} act */
+	const ofFocused = (act) => () => {
+		const run = focusedRun();
+		if (run) act(run);
+	};
 	/** What a key does here. @type {Record<string, () => void>} */
 	const KEYS = {
-		Enter: () => {
-			const run = focusedRun();
-			if (run) void open(run);
-		},
-		" ": () => focused !== null && tick(focused),
-		s: () => {
-			const run = focusedRun();
-			if (run) void change(run, { star: !run.star });
-		},
+		Enter: ofFocused((run) => void small.open(run)),
+		" ": ofFocused(({ id }) => tick(id)),
+		s: ofFocused((run) => void change(run, { star: !run.star })),
 		F2: rename,
-		Delete: () => void remove(),
+		Delete: () => void bar.remove(chosen.size ? [...chosen] : focused === null ? [] : [focused]),
 		"Ctrl+a": () => (listed().forEach(({ id }) => chosen.add(id)), show()),
-		"Ctrl+z": () => void takeBack(),
-		"/": () => find.focus(),
+		"Ctrl+z": () => void bar.takeBack(),
+		"/": () => recordings.find.focus(),
 	};
 	document.addEventListener(
 		"keydown",
@@ -437,20 +230,13 @@ export function mountLibrary(root, { store, actions }) {
 			const types = target.matches("input:not([type=checkbox])");
 			if (event.key === "Escape" && !target.closest("[popover]")) {
 				if (types) target.blur();
-				else if (chosen.size) (chosen.clear(), show());
+				else if (chosen.size) chooseNone();
 				else location.hash = "#tune";
 				return event.stopPropagation();
 			}
 			const control = event.ctrlKey || event.metaKey;
 			if (types || event.altKey) return;
-			if (target.closest(".list") && ["ArrowDown", "ArrowUp"].includes(event.key)) {
-				const items = [...list.querySelectorAll("button")];
-				const next =
-					items[items.indexOf(/** @type {any} */ (target)) + (event.key === "ArrowDown" ? 1 : -1)];
-				next?.focus();
-				next?.click();
-				return stopped(event);
-			}
+			if (recordings.walk(event)) return stopped(event);
 			const act = KEYS[(control ? "Ctrl+" : "") + (control ? event.key.toLowerCase() : event.key)];
 			const onButton = target.closest("button, a, input");
 			if (!act || (onButton && ["Enter", " "].includes(event.key))) return;

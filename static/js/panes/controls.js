@@ -1,5 +1,5 @@
 /** Buttons, layer chips and keys: each performs a command of the one list. */
-import { all } from "../elements/dom.js";
+import { all, one } from "../elements/dom.js";
 import { commandFor, commandOf, keyLabel, keyOf, perform } from "../state/commands.js";
 import { isBench } from "../state/places.js";
 
@@ -9,6 +9,12 @@ const TYPING =
 
 /** What is heard while somebody types: it means nothing in a text. */
 const ALWAYS = ["Ctrl+k", "Ctrl+s", "Ctrl+o"];
+
+/**
+ * Commands of keys that came before the server's first word: what they are about is not known yet.
+ * @type {Command[]}
+ */
+const early = [];
 
 /** @param {Context} context */
 export function mountControls({ store, actions, press }) {
@@ -59,6 +65,18 @@ export function mountControls({ store, actions, press }) {
 		true,
 	);
 	document.addEventListener("keydown", press);
+	// What was pressed while the page was read comes first; after Ctrl K it is what is sought.
+	/** @type {KeyboardEvent[]} */
+	const before = /** @type {any} */ (document).takeKeys();
+	const asks = before.findIndex((event) => keyOf(event) === "Ctrl+k");
+	const typed = asks < 0 ? [] : before.splice(asks + 1);
+	before.forEach(press);
+	one(".palette input").value = typed.map(({ key }) => (key.length === 1 ? key : "")).join("");
+	const forget = store.on(["server"], ({ server }) => {
+		if (!server) return;
+		forget();
+		for (const command of early.splice(0)) perform(command, actions);
+	});
 	// A click leaves the focus where it was, so that Space goes on meaning play; only the 3D view,
 	// which keeps all keys to itself while it has the focus, gives it back.
 	document.addEventListener("mousedown", (event) => {
@@ -97,6 +115,7 @@ export function pressed(event, store, actions) {
 	event.preventDefault();
 	// What is being typed is kept first.
 	if (types && key !== "Ctrl+k") target.blur();
-	perform(command, actions);
+	if (command.group !== "Page" && !store.get().server) early.push(command);
+	else perform(command, actions);
 	return true;
 }

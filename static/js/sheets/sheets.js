@@ -169,4 +169,6 @@ export function mountSheets({ store, actions }) {
 		palette.showModal();
 		offer();
 	};
+	// Asked for before there was anything to offer.
+	if (palette.open) offer();
 }

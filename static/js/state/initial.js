@@ -80,6 +80,7 @@ export function initialState() {
 		moved: false,
 		place: "tune",
 		signs: {},
+		wantsStudy: false,
 		dismissed: [],
 		undoable: [0, 0],
 		...kept,

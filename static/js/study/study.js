@@ -420,7 +420,16 @@ export function mountStudy(root, { store, actions }) {
 		if (place === "study") void refreshList();
 	});
 	store.on(["theme"], () => show(true));
-	void refreshList().then(() =>
-		open(studies.find(({ state }) => state === "running")?.name ?? studies[0]?.name ?? NEW),
-	);
+	/** Somebody comes from a run, to try values around its own. */
+	const wanted = () => {
+		if (!store.get().wantsStudy) return false;
+		store.set({ wantsStudy: false });
+		void begin();
+		return true;
+	};
+	store.on(["wantsStudy"], () => void wanted());
+	void refreshList().then(() => {
+		if (wanted()) return;
+		void open(studies.find(({ state }) => state === "running")?.name ?? studies[0]?.name ?? NEW);
+	});
 }

@@ -142,6 +142,8 @@ interface PageState {
 	asked: string;
 	/** Which of the page's places is looked at. */
 	place: string;
+	/** Whether a new study was asked for, of what is open. */
+	wantsStudy: boolean;
 	/** What stands beside the words of the places, by name. */
 	signs: Record<string, string>;
 	/** Whether somebody has chosen a step of this sequence. */

@@ -124,3 +124,13 @@ def test_a_run_is_pinned_as_a(library: Page, server: Server) -> None:
     library.get_by_role("button", name="Pin as A").click()
     server.wait(lambda state: state["pinned"] is not None)
     ask(server, "DELETE", "run/pin")
+
+
+def test_a_study_starts_around_the_values_of_a_run(library: Page, server: Server) -> None:
+    library.locator('tr[data-run="2"]').click()
+    expect(library.get_by_role("img", name="Lanes of run 2")).to_be_visible()
+    library.get_by_role("button", name="Start a study here").click()
+    expect(library.get_by_role("textbox", name="Name of the study")).to_be_visible()
+    assert server.get("/api/state").json()["parameters"][P_D] == 0.8
+    low, high = library.get_by_role("spinbutton", name="Detection probability").all()
+    assert float(low.input_value()) < 0.8 < float(high.input_value())

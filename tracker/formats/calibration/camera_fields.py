@@ -11,6 +11,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 
 from tracker.formats.pieces import Convention, RawCamera
 from tracker.formats.source import SourceFile
@@ -107,6 +109,8 @@ def camera(
         both = [number(file, at(side), fields[side]) for side in ("width", "height")]
         size = image_size(file, at("size"), both)
     k = intrinsics(file, at("K"), fields["K"]) if _length(fields.get("K")) == 9 else None
+    if size is not None and k is not None and "size" in fields:
+        size = _width_first(size, k)
     distortion, model = lens(
         file, at("distortion"), fields.get("D"), fisheye=_is_set(fields.get("fisheye"))
     )
@@ -132,6 +136,18 @@ def camera(
         convention=convention,
         projection=projection,
     )
+
+
+def _width_first(size: tuple[int, int], k: Float[ndarray, "3 3"]) -> tuple[int, int]:
+    """A size as width and height: MATLAB and NumPy count rows first, which a principal point far
+    from the middle of the one and near that of the other tells."""
+
+    def off(width: int, height: int) -> float:
+        return float(np.abs(k[:2, 2] / (width, height) - 0.5).max())
+
+    width, height = size
+    given, exchanged = off(width, height), off(height, width)
+    return (height, width) if given > 0.15 and exchanged < 0.5 * given else size
 
 
 def cameras(file: SourceFile, values: Any, convention: Convention) -> Iterator[RawCamera]:

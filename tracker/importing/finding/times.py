@@ -41,6 +41,8 @@ class Times:
     """The steps, and the clock of every camera."""
 
     fps: float
+    stated: bool
+    """Whether a file or a flag says the rate."""
     frames: int
     """The number of steps."""
     cameras: tuple[CameraTime, ...]
@@ -63,7 +65,8 @@ def settle_times(
     Raises:
         FormatError: If there is no step, or there are more than a recording has.
     """
-    fps = _rate(cameras, truths, options, found)
+    stated = _rate(cameras, truths, options, found)
+    fps = USUAL_RATE if stated is None else stated
     timings = [_timing(camera, fps, options) for camera in cameras]
     stamped = [timing.stamps[0] for timing in timings if timing.stamps]
     beginning = min(stamped, default=0.0)
@@ -95,7 +98,7 @@ def settle_times(
         CameraTime(timing, timing.clock(fps, frames, beginning if timing.stamps else 0.0))
         for timing in timings
     )
-    return Times(fps, frames, own)
+    return Times(fps, stated is not None, frames, own)
 
 
 def _pictures(camera: MatchedCamera) -> int | None:
@@ -124,7 +127,7 @@ def _rate(
     truths: Sequence[tuple[str, TruthPiece]],
     options: ImportOptions,
     found: list[tuple[str, str]],
-) -> float:
+) -> float | None:
     """Steps a second: as time stamps say, else the videos' usual rate, else that of the truth."""
     if options.fps is not None:
         return options.fps
@@ -138,8 +141,7 @@ def _rate(
     if not rates:
         rates = [truth.fps for _, truth in truths if truth.fps is not None]
     if not rates:
-        found.append(("fps", f"{USUAL_RATE:g}, since no file says it; --fps"))
-        return USUAL_RATE
+        return None
     fps = sorted(rates)[len(rates) // 2]
     for camera in cameras:
         own = _own_rate(camera.video, fps)

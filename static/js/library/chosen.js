@@ -1,0 +1,116 @@
+/** The bar under the runs: what can be done with those that are ticked, and what was just done. */
+import { fill, h, icon, one } from "../elements/dom.js";
+import { request } from "../state/api.js";
+import { exportMenu } from "./exports.js";
+import { many, size } from "./words.js";
+
+/**
+ * @param {object} how
+ * @param {Actions} how.actions
+ * @param {() => number[]} how.chosen
+ * @param {() => void} how.none  choose none
+ * @param {() => Promise<void>} how.refresh  runs are others now
+ */
+export function chosenBar({ actions, chosen, none, refresh }) {
+	/** @type {Server.Deleted | null} */
+	let deleted = null;
+	const picked = h("b");
+	const line = h("span", { role: "status", class: "gone-line" });
+	const stop = h("button", { class: "btn" }, "Stop");
+	const undo = h(
+		"button",
+		{ class: "btn", "data-key": "Ctrl Z", onclick: () => void takeBack() },
+		"Undo",
+	);
+	const side = h(
+		"button",
+		{ class: "btn box", onclick: () => void compare() },
+		icon("i-swap"),
+		"Compare",
+	);
+	/** @param {string} words @param {() => void} [cancel] */
+	const say = (words, cancel) => {
+		fill(line, words);
+		undo.hidden = true;
+		stop.hidden = !cancel;
+		stop.onclick = cancel ?? null;
+		element.hidden = !words && !chosen().length;
+	};
+	const tools = h(
+		"span",
+		{ class: "picked", role: "toolbar", "aria-label": "Chosen runs" },
+		picked,
+		side,
+		exportMenu({ actions, say, chosen }),
+		h(
+			"button",
+			{ class: "btn box", onclick: () => void remove(chosen()) },
+			icon("i-trash"),
+			"Delete",
+		),
+		h(
+			"button",
+			{ class: "btn icon", "aria-label": "Choose none", onclick: none },
+			icon("i-close", "s"),
+		),
+	);
+	const element = h(
+		"div",
+		{ class: "undo-line" },
+		tools,
+		h("span", { class: "grow" }),
+		line,
+		stop,
+		undo,
+	);
+
+	async function compare() {
+		const dialog = /** @type {any} */ (one(".compare"));
+		const numbers = chosen().map((id) => `runs=${id}`);
+		const answer = await request(`/api/library/compared?${numbers.join("&")}`).catch(
+			(error) => error,
+		);
+		if (answer instanceof Error)
+			return actions.note("error", "The runs cannot be compared", answer.message);
+		dialog.innerHTML = await answer.text();
+		dialog.onclick = () => dialog.close();
+		dialog.showModal();
+	}
+
+	/** @param {number[]} ids */
+	async function remove(ids) {
+		if (!ids.length) return;
+		deleted = await actions.ask("POST", "library/delete", { runs: ids });
+		none();
+		await refresh();
+	}
+
+	async function takeBack() {
+		if (!deleted) return;
+		if (await actions.ask("POST", "library/take-back", { runs: deleted.runs })) deleted = null;
+		await refresh();
+	}
+
+	return {
+		element,
+		remove,
+		takeBack,
+		/** What was deleted is over: others are chosen. */
+		forget: () => (deleted = null),
+		show() {
+			const count = chosen().length;
+			fill(picked, `${count} chosen`);
+			tools.hidden = !count;
+			side.disabled = count < 2 || count > 4;
+			side.title = side.disabled ? "Two to four runs stand side by side" : "";
+			undo.hidden = !deleted;
+			stop.hidden = true;
+			if (deleted) {
+				const { runs, bytes } = deleted;
+				const what = runs.length === 1 ? `Run ${runs[0]}` : many(runs.length, "run");
+				fill(line, icon("i-trash", "s"), `${what} deleted, ${size(bytes)}`);
+			}
+			element.hidden = !count && !deleted;
+		},
+	};
+}

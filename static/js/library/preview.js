@@ -1,0 +1,98 @@
+/** One run in small, and what can be done with it: opened, pinned, taken as the start of a study. */
+import { fill, h } from "../elements/dom.js";
+import { request } from "../state/api.js";
+import { many, titleOf, when } from "./words.js";
+
+/**
+ * @param {Pick<Context, "store" | "actions">} context
+ * @param {(run: Server.KeptRunInfo, note: string) => void} written  somebody wrote a note
+ */
+export function preview({ store, actions }, written) {
+	const head = h("div", { class: "pane-head" });
+	const body = h("div", { class: "pv-body" });
+	const element = h("section", { class: "pane pv", "aria-label": "The run" }, head, body);
+	/** @type {Server.KeptRunInfo | null} */
+	let now = null;
+	/** @type {number | null} what the body shows */
+	let drawn = null;
+	body.addEventListener("change", ({ target }) => {
+		if (now) written(now, /** @type {HTMLInputElement} */ (target).value);
+	});
+
+	/** Show it in the workbench as it was. @param {Server.KeptRunInfo} run */
+	async function open(run) {
+		const state = await actions.ask("POST", `library/runs/${run.id}/open`);
+		if (!state) return;
+		location.hash = "#tune";
+		const older = state.run.stands_for;
+		actions.note(
+			older ? "warn" : "info",
+			`${titleOf(run)} is shown as it was`,
+			older
+				? "Another version of the program, or another state of the recording, made it."
+				: "Its tracks were kept; what the cameras found comes back by computing again.",
+			{ word: "Compute again", act: actions.runAgain },
+		);
+	}
+
+	/** @param {Server.KeptRunInfo} run */
+	async function pin(run) {
+		if (await actions.ask("POST", `library/runs/${run.id}/pin`))
+			actions.note("info", `${titleOf(run)} is run A now`, "Tune sets the shown run against it.");
+	}
+
+	/** A study varies what is on the sliders, so the run's values come there. */
+	/** @param {Server.KeptRunInfo} run */
+	async function study(run) {
+		if (!(await actions.ask("POST", `library/runs/${run.id}/open`))) return;
+		store.set({ wantsStudy: true });
+		location.hash = "#study";
+	}
+
+	/** @param {Server.KeptRunInfo} run */
+	function facts(run) {
+		const told = [when(run.began), many(run.targets, "track")];
+		if (run.seconds) told.push(`computed in ${run.seconds.toFixed(run.seconds < 9.5 ? 1 : 0)} s`);
+		return told.join(" · ");
+	}
+
+	return {
+		element,
+		open,
+		/** @param {Server.KeptRunInfo | null} run */
+		async show(run) {
+			now = run;
+			if (!run) {
+				drawn = null;
+				fill(head);
+				const empty = "A run that is chosen is shown here in small.";
+				return fill(body, h("p", { class: "blank" }, empty));
+			}
+			fill(
+				head,
+				h("h2", { class: "pane-title" }, titleOf(run)),
+				h("span", { class: "sub" }, facts(run)),
+				h("span", { class: "grow" }),
+				h("button", { class: "btn main", onclick: () => void open(run) }, "Open in Tune"),
+				h("button", { class: "btn box", onclick: () => void pin(run) }, "Pin as A"),
+				h(
+					"button",
+					{
+						class: "btn box",
+						title: "A new study of this recording, around the values of this run",
+						onclick: () => void study(run),
+					},
+					"Start a study here",
+				),
+			);
+			const answer = await request(`/api/library/runs/${run.id}/drawn`).catch((error) => error);
+			const text = answer instanceof Error ? "" : await answer.text();
+			if (run.id !== now?.id) return;
+			// Whoever writes a note is not disturbed.
+			if (run.id === drawn && body.contains(document.activeElement)) return;
+			drawn = text ? run.id : null;
+			if (text) body.innerHTML = text;
+			else fill(body, h("p", { class: "blank" }, answer.message));
+		},
+	};
+}
