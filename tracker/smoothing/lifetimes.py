@@ -42,7 +42,12 @@ def lifetimes(
     """
     p = smoother.parameters
     hit = -np.log1p(-min(p.detection_probability, 1.0 - 1e-6))
-    votes = hit * np.bincount(shared.links.rows, shared.links.shares, len(paths.states))
+    links = shared.links
+    looks = np.zeros(len(links.rows))
+    for c, camera in enumerate(smoother.cameras):
+        own = links.cameras == c
+        looks[own] = -np.log(camera.clutter_factors[links.boxes[own]])
+    votes = np.bincount(links.rows, links.shares * (hit + looks), len(paths.states))
     votes[smoother.pinned(paths)[0]] += _SAID
     weight = independence(smoother.model.step_time, parameters.memory)
     survival = min(p.survival_probability, 1.0 - 1e-9)

@@ -151,7 +151,8 @@ class Smoother:
                     learnt.measured(c, camera.measurements),
                     information,
                 )
-                log_hit = np.log(self.parameters.detection_probability / model.clutter[c])
+                clutter = model.clutter[c] * camera.clutter_factors[own.boxes]
+                log_hit = np.log(self.parameters.detection_probability / clutter)
                 np.add.at(information.constants, own.rows, own.shares * log_hit)
             pinned, told = self.pinned(paths)
             for row, one in zip(pinned.tolist(), told, strict=True):
@@ -219,7 +220,7 @@ class Smoother:
                     camera.starts,
                     camera.blind,
                     learnt.measured(c, camera.measurements),
-                    self.model.clutter[c],
+                    self.model.clutter[c] * camera.clutter_factors,
                 ),
                 self._seen(c, paths.states, paths.covariances, owners, learnt),
                 self.model.cameras[c].calibration.image_size,

@@ -51,7 +51,13 @@ def evidence(
     measured = Measurements(
         np.concatenate([one.values for one in each]), np.concatenate([one.noises for one in each])
     )
-    return Evidence(seen.boxes[:, :2], measured, np.full(len(seen.boxes), unexplained), seen.starts)
+    return Evidence(
+        seen.boxes[:, :2],
+        measured,
+        np.full(len(seen.boxes), unexplained),
+        seen.starts,
+        seen.clutter_factors,
+    )
 
 
 def seen(places: ndarray, clutter_rate: float = 0.0, seed: int = 0) -> tuple[ViewResult, ...]:
