@@ -138,7 +138,7 @@ test("another window draws no more often than it may, and at once when it is tou
     addEventListener: (name, act) => (listeners[name] = act),
   };
   let apart = 0;
-  pace(view, () => apart);
+  pace(view, (last) => last + apart);
   const drawn = [];
   const draw = () => frames.splice(0).forEach((act) => act(0));
   view.requestAnimationFrame(() => drawn.push("at once"));

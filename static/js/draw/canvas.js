@@ -7,6 +7,12 @@
 export const writers = new Map();
 
 /**
+ * How canvases are drawn. Where a graphics card is emulated they are kept in plain memory, as those
+ * that are read often: drawing by the emulation takes twice the time.
+ */
+export const drawing = { willReadFrequently: false };
+
+/**
  * Fit a canvas to its element, in CSS pixels, and to the screen's pixels; clear it.
  * @param {HTMLCanvasElement} canvas
  * @param {number} width
@@ -16,7 +22,7 @@ export function prepare(canvas, width, height) {
 	const ratio = devicePixelRatio || 1;
 	const [w, hgt] = [width, height].map((side) => Math.max(1, Math.round(side * ratio)));
 	if (canvas.width !== w || canvas.height !== hgt) Object.assign(canvas, { width: w, height: hgt });
-	const g = /** @type {Brush} */ (canvas.getContext("2d"));
+	const g = /** @type {Brush} */ (canvas.getContext("2d", drawing));
 	const writer = writers.get(canvas);
 	if (writer) return writer(g);
 	g.setTransform(ratio, 0, 0, ratio, 0, 0);

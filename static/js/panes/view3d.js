@@ -1,4 +1,5 @@
 /** The 3D pane: viser's page inside ours, with its layers and view points. */
+import { drawing } from "../draw/canvas.js";
 import { all, fill, h, icon, parts } from "../elements/dom.js";
 import { pace } from "../play/pace.js";
 
@@ -22,6 +23,7 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 
 	if (softwareRenderer()) {
 		playback.slow3d();
+		drawing.willReadFrequently = true;
 		actions.note(
 			"info",
 			"The 3D view is drawn without a graphics card",
@@ -55,7 +57,7 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 	frame.addEventListener("load", () => {
 		const view = frame.contentWindow;
 		if (!view) return;
-		pace(view, playback.rest3d);
+		pace(view, playback.after3d);
 		view.addEventListener(
 			"keydown",
 			(event) => {

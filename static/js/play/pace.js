@@ -8,11 +8,11 @@
 const TOUCHED = 400;
 
 /**
- * Have a window's animation frames at least so far apart.
+ * Have a window's animation frames come no earlier than they may.
  * @param {Window} view
- * @param {() => number} apart  milliseconds; 0: as they come
+ * @param {(last: number) => number} after  when, from when the last one was; the page's clock
  */
-export function pace(view, apart) {
+export function pace(view, after) {
 	const ask = view.requestAnimationFrame.bind(view);
 	const cancel = view.cancelAnimationFrame.bind(view);
 	/** Those that wait, by a number of ours. @type {Map<number, Timer>} */
@@ -32,7 +32,7 @@ export function pace(view, apart) {
 		);
 	view.requestAnimationFrame = (act) => {
 		const now = performance.now();
-		const rest = now - touched < TOUCHED ? 0 : last + apart() - now;
+		const rest = now - touched < TOUCHED ? 0 : after(last) - now;
 		if (rest <= 0) return ask(drawn(act));
 		const own = (counted += 1);
 		const then = () => {

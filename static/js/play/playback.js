@@ -19,6 +19,8 @@ const STILL = 200;
 
 /** How long the 3D view is left alone at first where it is slow, milliseconds. */
 const SLOW_3D = 1000;
+/** Where it is slow it waits so long after another run or place came in sight, milliseconds. */
+const LAST_3D = 400;
 
 /** How many steps of the shown run are there. @param {Readonly<PageState>} state */
 export function shownDone({ basis, run, timeline }) {
@@ -37,6 +39,8 @@ export function createPlayback(store, sendSeek) {
 	let lastSent = -1;
 	/** Since when, and for how long, the 3D view is left alone while it plays, milliseconds. */
 	let [sentAt, wait] = [0, 0];
+	/** Whether 3D is drawn without a graphics card, and when there was something new to see. */
+	let [slow, newsAt] = [false, -Infinity];
 	/** Around which step was read last, and since when that is.  */
 	let [around, jumpedAt] = [0, -Infinity];
 	/** @type {Timer} */
@@ -231,6 +235,8 @@ export function createPlayback(store, sendSeek) {
 		windowDirty = true;
 		ask();
 	});
+	// Lanes, pictures and tables come first.
+	store.on(["place", "basis"], () => (newsAt = performance.now()));
 	store.on(["link"], () => {
 		// A server that was started anew stands at its own first step.
 		lastSent = -1;
@@ -243,10 +249,14 @@ export function createPlayback(store, sendSeek) {
 	});
 
 	return {
-		/** How long the 3D view is left alone now, milliseconds. */
-		rest3d: () => (store.get().playing ? wait : 0),
+		/** When the 3D view may draw again, having drawn at a time: the page's own clock, milliseconds. */
+		after3d: (/** @type {number} */ last) =>
+			store.get().playing ? last + wait : slow ? newsAt + LAST_3D : 0,
 		/** It is drawn without a graphics card: it begins by being left alone. */
-		slow3d: () => (wait = SLOW_3D),
+		slow3d() {
+			slow = true;
+			wait = SLOW_3D;
+		},
 		/** @param {(frame: Frame) => void} painter */
 		onPaint(painter) {
 			painters.push(painter);

@@ -12,13 +12,15 @@ from __future__ import annotations
 import ast
 import csv
 import io
+import json
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from tracker.formats.columns import Column, is_table, layout_of, meanings, number_in, read_table
 from tracker.formats.pieces import FormatError, Piece
 from tracker.formats.protocol import Certainty, Kind
-from tracker.formats.source import SourceFile
+from tracker.formats.source import MOST_TREE_BYTES, SourceFile
 from tracker.formats.values import is_list_of_tables
 
 NAME = "table of boxes or places (CSV, JSON)"
@@ -44,7 +46,7 @@ def recognise(file: SourceFile) -> Certainty:
 def read(file: SourceFile) -> Iterator[Piece]:
     """One piece a camera; of a series of files a frame, all together."""
     parts = [_columns(file.member(path)) for path in file.series]
-    alone = ["frame" in meanings(list(columns)) for columns, _ in parts]
+    alone = [bool({"frame", "time"} & meanings(list(columns)).keys()) for columns, _ in parts]
     if len(parts) == 1 or any(alone):
         for path, (columns, frames) in zip(file.series, parts, strict=True):
             member = file.member(path)
@@ -123,7 +125,7 @@ def _with_boxes(columns: dict[str, Column]) -> dict[str, Column]:
 
 def _records(file: SourceFile) -> list[tuple[int | None, dict[str, Any]]]:
     """Records with their frame, where they are in a list a frame."""
-    values = file.json
+    values = _lines_of_json(file) or file.json
     if isinstance(values, dict):  # one list under some name
         lists = [value for value in values.values() if is_list_of_tables(value) and value]
         values = lists[0] if len(lists) == 1 else []
@@ -137,6 +139,29 @@ def _records(file: SourceFile) -> list[tuple[int | None, dict[str, Any]]]:
             if isinstance(record, dict)
         ]
     return [(None, record) for record in values if isinstance(record, dict)]
+
+
+def _lines_of_json(file: SourceFile) -> list[dict[str, Any]]:
+    """The records of a file that has one a line, those of a list among a record's fields each with
+    the record's other fields; empty where it is no such file."""
+    first = file.head_text.lstrip().split("\n", 1)
+    if len(first) == 1 or not (first[0].startswith("{") and first[0].rstrip().endswith("}")):
+        return []
+    records: list[dict[str, Any]] = []
+    for number, line in enumerate(file.text(MOST_TREE_BYTES).splitlines(), 1):
+        try:
+            record = json.loads(line) if line.strip() else None
+        except (ValueError, RecursionError):
+            raise file.error(f"line {number}: is not valid JSON, expected a record") from None
+        if not isinstance(record, dict):
+            continue
+        several = [key for key, value in record.items() if is_list_of_tables(value)]
+        if len(several) == 1:
+            shared = {key: value for key, value in record.items() if key != several[0]}
+            records += [{**shared, **own} for own in record[several[0]]]
+        else:
+            records.append(record)
+    return records
 
 
 def _flat(record: Mapping[str, Any]) -> dict[str, Any]:
@@ -153,11 +178,16 @@ def _flat_names(names: list[str]) -> list[str]:
 
 
 def _data_lines(text: str) -> list[str]:
-    lines = text.splitlines()
-    first = next(
-        (n for n, line in enumerate(lines) if line.strip() and not line.startswith("#")), len(lines)
-    )
-    return [line for line in lines[first:] if line.strip()]
+    """The header and the rows; a header may be a comment, and blanks may stand for commas."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    first = next((n for n, line in enumerate(lines) if not line.startswith("#")), len(lines))
+    header = lines[first - 1].lstrip("#") if first else ""
+    if first < len(lines) and not re.search("[A-Za-z]", lines[first]) and header:
+        lines[first - 1], first = header, first - 1
+    lines = lines[first:]
+    if lines and not any(sign in lines[0] for sign in ",;\t"):
+        return [",".join(line.split()) for line in lines]
+    return lines
 
 
 def _delimiter(line: str) -> str:
