@@ -193,7 +193,8 @@ class Smoother:
             learnt.measured(camera, self.cameras[camera].measurements),
             found,
         )
-        log_hit = np.log(self.parameters.detection_probability / self.model.clutter[camera])
+        clutter = self.model.clutter[camera] * self.cameras[camera].clutter_factors[own.boxes]
+        log_hit = np.log(self.parameters.detection_probability / clutter)
         found.constants[:] += np.bincount(own.rows, own.shares * log_hit, rows)
         return found
 
@@ -245,7 +246,7 @@ class Smoother:
                     camera.starts,
                     camera.blind,
                     learnt.measured(c, camera.measurements),
-                    self.model.clutter[c],
+                    self.model.clutter[c] * camera.clutter_factors,
                 ),
                 self._seen(c, paths.states, paths.covariances, owners, learnt),
                 self.model.cameras[c].calibration.image_size,

@@ -122,8 +122,8 @@ class CameraSteps(NamedTuple):
     blind: ndarray
     """(T,), whether it had no frame."""
     measurements: Measurements
-    clutter: float
-    """κ."""
+    clutter: ndarray
+    """κ (B,) of each of its boxes."""
 
 
 class SharedCamera(NamedTuple):
@@ -324,7 +324,7 @@ def share_camera(
         told = belief_propagation(
             1.0 - weights * chances_here,
             detected,
-            np.full(count, camera.clutter),
+            camera.clutter[first : first + count],
             Settling(rule.tolerance, rule.iterations),
         ).rows
         for i in range(len(own)):
