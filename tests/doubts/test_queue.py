@@ -87,7 +87,7 @@ def test_who_is_who_is_asked_between_places_where_people_stand_clear() -> None:
     run = run_of(sequence([(0, one), (0, other)], 80))
     lanes = Lanes(run.tracks)
     track, third = (int(name) for name in lanes.ids)
-    clear = Clear(lanes, 1.0 / 25.0)
+    clear = Clear(lanes, 1.0 / 25.0, 0.25)
     apart = np.linalg.norm((one - other)[:, :2], axis=1)
     near = np.flatnonzero(apart < 1.0)
     before, after = clear.before(track, 40), clear.after(track, 40)
