@@ -245,3 +245,42 @@ def test_a_video_of_another_rate_keeps_its_own(tmp_path: Path) -> None:
     assert text.count("fps = 20.0") == 1
     assert text.count("fps = 10.0") == 1
     assert not read_sequence(tmp_path / "out").warnings
+
+
+def test_the_world_of_a_first_camera_is_levelled(tmp_path: Path) -> None:
+    """As stereo calibrations have it: the origin is a camera, and z is where it looks."""
+    first = cameras()[0]
+    tables = {
+        c.name: {
+            "K": c.intrinsics.tolist(),
+            "dist": c.distortion.tolist(),
+            "R": (c.rotation @ first.rotation.T).tolist(),
+            "t": (c.translation - c.rotation @ first.rotation.T @ first.translation).tolist(),
+        }
+        for c in cameras()
+    }
+    (tmp_path / "cams.json").write_text(json.dumps(tables))
+    detections(tmp_path)
+    at = np.stack(np.broadcast_arrays(np.arange(len(PLACES))[:, None], np.arange(4)), axis=-1)
+    own = PLACES @ first.rotation.T + first.translation
+    rows = np.concatenate([at, own], axis=-1).reshape(-1, 5).tolist()
+    lines = [f"{f:.0f},{i:.0f},{x},{y},{z}" for f, i, x, y, z in rows]
+    (tmp_path / "truth.csv").write_text("\n".join(["frame,id,x,y,z", *lines]))
+    settled = settled_of(tmp_path)
+    assert "turned by" in dict(settled.found)["level"]
+    turn = settled.views[0].camera.rotation.T @ first.rotation
+    assert np.degrees(np.arccos(turn[2, 2])) < 1.0
+    for view, camera in zip(settled.views, cameras(), strict=True):
+        np.testing.assert_allclose(view.camera.rotation, camera.rotation @ turn.T, atol=1e-9)
+    assert settled.truth is not None
+    heights = settled.truth.positions[:, 2]
+    assert np.ptp(heights) < 0.1
+    assert heights.mean() == pytest.approx(settled.room.floor + HALF_EXTENTS[2], abs=0.15)
+
+
+def test_a_level_world_is_left_as_it_is(tmp_path: Path) -> None:
+    toml(tmp_path)
+    detections(tmp_path)
+    settled = settled_of(tmp_path)
+    assert settled.reading.lean == (0.0, 0.0)
+    assert "level" not in dict(settled.found)

@@ -7,7 +7,7 @@ from numpy import ndarray
 
 from tracker.single_view.shape.trees import Trees
 
-ROUNDS, RATE, MOST = 110, 0.2, 40_000
+ROUNDS, RATE, MOST = 200, 0.2, 160_000
 GIVEN_UP = 0.002
 """Share of the people found that each tree of the cascade may lose."""
 _FOUND, _SLACK = -1.0, 0.1

@@ -30,6 +30,9 @@ class Reading:
     """Whether boxes are parts of the picture's size."""
     unit: Unit = "m"
     up: Up = "z"
+    lean: tuple[float, float] = (0.0, 0.0)
+    """x and y of the unit vector along which people stand once ``up`` is z: the world of a rig
+    whose first camera is the origin leans as that camera does."""
     order: tuple[int, ...] | None = None
     """Of each camera's boxes and pictures: whose calibration is theirs. None: their own."""
 
@@ -71,6 +74,18 @@ def upright(up: Up) -> Float[ndarray, "3 3"]:
     return np.asarray(turns[up])
 
 
+def levelled(reading: Reading) -> Float[ndarray, "3 3"]:
+    """The rotation from the file's world to one in which people stand along z."""
+    x, y = reading.lean
+    if x == y == 0.0:
+        return upright(reading.up)
+    z = float(np.sqrt(1.0 - x * x - y * y))
+    # the smallest rotation that takes (x, y, z) to the z axis (Rodrigues)
+    across = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
+    turn = np.eye(3) + across + across @ across / (1.0 + z)
+    return np.asarray(turn @ upright(reading.up))
+
+
 def to_camera(camera: RawCamera, reading: Reading, image_size: tuple[int, int]) -> Camera:
     """The camera in metres, z up, world to camera, OpenCV axes.
 
@@ -79,8 +94,9 @@ def to_camera(camera: RawCamera, reading: Reading, image_size: tuple[int, int]) 
     """
     lens = lens_of(camera, image_size)
     stands = pose(camera, reading)
-    rotation = stands.rotation @ upright(reading.up).T
-    centre = METRES[reading.unit] * upright(reading.up) @ stands.centre
+    to_world = levelled(reading)
+    rotation = stands.rotation @ to_world.T
+    centre = METRES[reading.unit] * to_world @ stands.centre
     return replace(lens, name=camera.name, rotation=rotation, translation=-rotation @ centre)
 
 

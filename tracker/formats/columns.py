@@ -23,6 +23,8 @@ WORDS: dict[str, tuple[str, ...]] = {
     "frame": ("frame", "frameid", "frameindex", "framenumber", "frameno", "frameidx", "framenr",
               "imageid", "imgid", "step", "image", "imagename", "filename", "file", "framename",
               "imageindex"),
+    "time": ("time", "timestamp", "seconds", "sec", "times", "t", "timesec", "timems",
+             "timestampms"),
     "camera": ("camera", "cam", "cameraid", "camid", "view", "cameraname", "viewid", "viewnum"),
     "left": ("left", "xmin", "x1", "bbleft", "bboxleft", "xtl", "l", "bboxx1", "boxx1", "minx",
              "bboxxmin", "x0"),
@@ -55,6 +57,9 @@ PEOPLE = ("person", "pedestrian", "people", "human", "1", "0")
 
 _OURS = "existence"
 """A column of the track files that this program writes, which are no one's truth."""
+
+_LONGEST = 1e6
+"""Seconds: larger numbers are not times since a recording began."""
 
 Column = Sequence[Any]
 
@@ -95,7 +100,8 @@ def is_table(names: Sequence[str]) -> bool:
     if _OURS in names:
         return False
     found = meanings(names)
-    return layout_of(found) is not None or all(p in found for p in ("frame", "id", "x", "y"))
+    when = "frame" in found or "time" in found
+    return layout_of(found) is not None or (when and all(p in found for p in ("id", "x", "y")))
 
 
 def read_table(
@@ -119,26 +125,29 @@ def read_table(
     """
     found = meanings(list(columns))
     rows = len(next(iter(columns.values()), ()))
-    if frame is None and "frame" not in found:
+    fps = None
+    if frame is None and "frame" not in found and "time" in found:
+        column = found["time"]
+        frames, fps = _frames_of_times(file, column, _numbers(file, column, columns[column]))
+    elif frame is None and "frame" not in found:
         raise file.error(
             'expected a column "frame" (or a number in the name of a file a frame), found the '
             f"columns {shown(', '.join(columns))}"
         )
-    frames = (
-        np.full(rows, frame, dtype=np.int64)
-        if frame is not None
-        else _frames(file, found["frame"], columns[found["frame"]])
-    )
+    elif frame is not None:
+        frames = np.full(rows, frame, dtype=np.int64)
+    else:
+        frames = _frames(file, found["frame"], columns[found["frame"]])
     form = layout_of(found)
     if form is None and "box" in found:
         values = _table(file, found["box"], columns[found["box"]])
-        yield from _detections(file, name, columns, found, frames, values, boxes_layout)
+        yield from _detections(file, name, columns, found, frames, values, boxes_layout, fps)
     elif form is not None:
         layout, parts = form
         values = np.column_stack([_numbers(file, found[p], columns[found[p]]) for p in parts])
-        yield from _detections(file, name, columns, found, frames, values, layout)
+        yield from _detections(file, name, columns, found, frames, values, layout, fps)
     else:
-        yield _truth(file, name, columns, found, frames)
+        yield _truth(file, name, columns, found, frames, fps)
 
 
 def to_unit(scores: Float[ndarray, " D"]) -> Float[ndarray, " D"]:
@@ -168,6 +177,7 @@ def _detections(
     frames: Int[ndarray, " D"],
     boxes: Float[ndarray, "D 4"],
     layout: Layout | None,
+    fps: float | None,
 ) -> Iterator[Piece]:
     scores = np.ones(len(frames))
     if "score" in found:
@@ -191,7 +201,9 @@ def _detections(
             scores=scores[rows],
             layout=layout,
             normalised=is_normalised(boxes[rows]),
+            first_index=None if fps is None else 0,
             last_frame=int(frames.max()) if len(frames) else None,
+            fps=fps,
         )
 
 
@@ -214,6 +226,7 @@ def _truth(
     columns: Mapping[str, Column],
     found: Mapping[str, str],
     frames: Int[ndarray, " G"],
+    fps: float | None,
 ) -> TruthPiece:
     axes = [axis for axis in "xyz" if axis in found]
     places = np.full((len(frames), 3), np.nan)
@@ -236,6 +249,8 @@ def _truth(
         positions=places[good],
         unit=unit,
         valid=None if valid is None else valid[good],
+        fps=fps,
+        first_index=None if fps is None else 0,
     )
 
 
@@ -263,6 +278,33 @@ def _frames(file: SourceFile, name: str, cells: Column) -> Int[ndarray, " D"]:
             f"row {row + 1}: expected the whole number of a frame, found {shown(cells[row])}", name
         )
     return values.astype(np.int64)
+
+
+def _frames_of_times(
+    file: SourceFile, name: str, times: Float[ndarray, " D"]
+) -> tuple[Int[ndarray, " D"], float]:
+    """Frames that are as far apart as the times, counted from time 0, and how many a second.
+
+    Times are seconds, or milliseconds where the column is called so. The rate that fits all of
+    them is taken: times are rounded, and where nobody was seen there are none.
+    """
+    unit = 1e-3 if plain(name).endswith("ms") else 1.0
+    seconds = times * unit
+    if not np.isfinite(seconds).all():
+        raise file.error("expected a time in every row", name)
+    own = np.unique(seconds)
+    if len(own) < 2 or own[0] < 0.0 or own[-1] > _LONGEST:
+        raise file.error(
+            f"expected two or more times from 0 to {_LONGEST:g} s since the beginning, found "
+            f'{own[0]:g} … {own[-1]:g} s; have a column "frame" instead'
+            if len(own)
+            else "expected times, found none",
+            name,
+        )
+    apart = np.diff(own)
+    steps = np.round(apart / np.median(apart))
+    fps = float(round(steps.sum() / apart[steps > 0].sum(), 3))
+    return np.round(seconds * fps).astype(np.int64), fps
 
 
 def _numbers(

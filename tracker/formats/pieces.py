@@ -101,6 +101,8 @@ class DetectionPiece:
     """The number of the first frame; None where the format leaves it open."""
     last_frame: int | None = None
     """The last frame that was looked at, where the file says so although nobody was seen in it."""
+    fps: float | None = None
+    """Frames a second, where the file has times."""
     keypoints: Float[ndarray, "D J 3"] | None = None
     """x, y in pixels and confidence of J joints, NaN where not seen."""
     classes: tuple[str, ...] | None = None

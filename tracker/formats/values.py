@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -151,11 +151,14 @@ def lens(
 
 
 def image_size(file: SourceFile, field: str, value: Any) -> tuple[int, int]:
-    """Width and height, pixels.
+    """Width and height, pixels; of a table those of its fields that are called so.
 
     Raises:
         FormatError: If they are not two whole numbers from 1 to 65535.
     """
+    if isinstance(value, Mapping):
+        by_name = {str(key).lower(): one for key, one in value.items()}
+        value = [by_name.get(side, by_name.get(side[0])) for side in ("width", "height")]
     found = vector(file, field, value, 2, "width and height")
     if (found != np.round(found)).any() or (found < 1).any() or (found > LARGEST_SIDE).any():
         raise file.error(

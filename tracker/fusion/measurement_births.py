@@ -34,6 +34,8 @@ class Evidence:
     """Probability that no target made the box."""
     starts: Int[ndarray, " C1"]
     """Where each camera's boxes begin, and the end."""
+    clutter_factors: Float[ndarray, " B"]
+    """On κ: by what each box looks like, it is the likelier false the larger this is."""
     seeing: Bool[ndarray, " C"] | None = None
     """Which cameras have a frame at this step: others miss nobody; None where all have."""
 
@@ -86,7 +88,8 @@ class MeasurementBirths:
         Λ = λ_b/V ∫ Π_{c sees} p_c g(z_c | x) / κ_c  Π_{c misses} (1 − p_c) dx
 
     and the newcomer's existence is Λ / (1 + Λ): the rule for new tracks of the
-    Poisson multi-Bernoulli filter, taken over all cameras at once; the integral
+    Poisson multi-Bernoulli filter, taken over all cameras at once; κ_c is that of such a box as
+    z_c, where stage 1 tells how likely each is somebody's. The integral
     is approximated by Laplace's method, around the place that fits the boxes best. After the
     adaptive birth of Ristic, Clark, Vo and Vo (IEEE TAES 48(2), 2012), with the rule for new
     tracks of Williams (IEEE TAES 51(3), 2015).
@@ -179,11 +182,11 @@ class MeasurementBirths:
         )
         from scipy.special import expit  # a server starts without it
 
-        existences = expit(self._log_odds(found, fitted.fits[:, kept], evidence.seeing))
+        existences = expit(self._log_odds(found, fitted.fits[:, kept], evidence))
         return Newborns(found.positions, found.covariances, existences, found.sources)
 
     def _log_odds(
-        self, found: Newborns, fits: Float[ndarray, "C N"], seeing: Bool[ndarray, " C"] | None
+        self, found: Newborns, fits: Float[ndarray, "C N"], evidence: Evidence
     ) -> Float[ndarray, " N"]:
         """log Λ of each newcomer, of whose boxes ``fits`` are the log likelihoods."""
         log_odds = self._log_density + 1.5 * np.log(2.0 * np.pi)
@@ -191,7 +194,9 @@ class MeasurementBirths:
         for c, camera in enumerate(self._cameras):
             hit = found.sources[c] >= 0
             missed = ~hit & camera.sees(found.positions)
-            if seeing is None or seeing[c]:
+            if evidence.seeing is None or evidence.seeing[c]:
                 log_odds[missed] += self._log_miss
-            log_odds[hit] += self._log_hit - self._log_clutter[c] + fits[c][hit]
+            factors = evidence.clutter_factors[evidence.starts[c] + found.sources[c][hit]]
+            log_clutter = self._log_clutter[c] + np.log(factors)
+            log_odds[hit] += self._log_hit - log_clutter + fits[c][hit]
         return np.asarray(log_odds)

@@ -209,4 +209,5 @@ def all_boxes(views: Many[ViewResult]) -> CameraBoxes:
         np.concatenate([view.boxes for view in views], dtype=float),
         np.concatenate([view.sigmas for view in views], dtype=float),
         np.array(starts),
+        np.concatenate([view.clutter_factors for view in views]),
     )

@@ -141,6 +141,7 @@ class MultiBernoulli:
                 Measurements(found.values, found.noises),
                 found.unexplained,
                 seen.starts,
+                seen.clutter_factors,
             )
             proposed, recent = self._model.newborns_and_recent(evidence, seen.boxes, views, recent)
             if proposed is not None:

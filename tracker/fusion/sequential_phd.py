@@ -147,7 +147,7 @@ class SequentialPhd:
             expected=expected.expected,
             noise=measurements.noises,
             detection_probability=seen.detection_probabilities,
-            clutter_intensity=model.clutter[index],
+            clutter_intensity=model.clutter[index] * view.clutter_factors,
             gate=model.gate,
         )
         owners = None
@@ -189,7 +189,9 @@ class SequentialPhd:
         )
         seen = all_boxes(views)
         unexplained = np.concatenate(work.unexplained)
-        evidence = Evidence(seen.boxes[:, :2], measured, unexplained, seen.starts)
+        evidence = Evidence(
+            seen.boxes[:, :2], measured, unexplained, seen.starts, seen.clutter_factors
+        )
         found, later = self._model.newborns_and_recent(evidence, seen.boxes, views, recent)
         if found is None:
             return later

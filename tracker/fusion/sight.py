@@ -102,6 +102,7 @@ def with_recent(now: Glimpse, recent: Recent, step_time: float, half_height: flo
         ),
         np.concatenate([part.unexplained for part in parts]),
         starts,
+        np.concatenate([part.clutter_factors for part in parts]),
         ~now.blind,
     )
 
@@ -126,6 +127,7 @@ def _last(
         Measurements(values[rows], noises[rows] + looser),
         evidence.unexplained[rows],
         evidence.starts,
+        evidence.clutter_factors[rows],
     )
 
 

@@ -9,8 +9,6 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.agreement.observed import Rays, rays_of
-from tracker.agreement.pace import WALKING, pace
 from tracker.agreement.suggestion import STANDING, Suggestion, agreement, suggest
 from tracker.camera import Camera
 from tracker.checks.reading import Reading, read_boxes, to_camera
@@ -19,9 +17,9 @@ from tracker.formats.pieces import FormatError, Layout, RawCamera
 from tracker.importing.finding.calibrations import camera_sets
 from tracker.importing.finding.geometry import read_poses
 from tracker.importing.finding.matching import MatchedCamera, match_all
+from tracker.importing.finding.people import lean_of, rate_of, rays_of_all
 from tracker.importing.finding.pictures import picture_sizes, scaled
 from tracker.importing.finding.times import (
-    USUAL_RATE,
     CameraTime,
     Times,
     first_index,
@@ -105,7 +103,7 @@ def settle(taken: Sequence[Taken], options: ImportOptions | None = None) -> Sett
     detections = [_detections(own) for own in boxes]
     at_steps = _at_steps(detections, times)
     if not times.stated:
-        fps, why = _rate(settled, at_steps)
+        fps, why = rate_of(settled, at_steps)
         found.append(("fps", f"{fps:g}, {why}, since no file says it; --fps"))
         times = settle_times(cameras, matched.truths, replace(options, fps=fps), [])
         at_steps = _at_steps(detections, times)
@@ -290,6 +288,11 @@ def _read(
         why = "from where the cameras look; the boxes do not tell"
     else:
         reading = meaning.reading
+        if convention.up is None:
+            reading = replace(reading, lean=lean_of(meaning))
+        if reading.lean != (0.0, 0.0):
+            degrees = np.degrees(np.arcsin(np.hypot(*reading.lean)))
+            found.append(("level", f"the world is turned by {degrees:.0f}° so that people stand"))
         share = 100.0 * meaning.best.consensus.share
         why = f"since {share:.0f} % of the boxes meet so"
         if unknown:
@@ -339,7 +342,7 @@ def _room(
     """Where people are, and how large they are: from the boxes, else from the views."""
     agreed = None
     if any(own is not None for own in detections):
-        agreed = agreement(cameras, _rays(cameras, detections))
+        agreed = agreement(cameras, rays_of_all(cameras, detections))
     room = suggest(cameras, agreed)
     if room is None:
         centres = np.array([camera.centre for camera in cameras])
@@ -359,28 +362,6 @@ def _room(
         ("target", f"{size} m, {'from the boxes' if room.people else 'a standing person'}")
     )
     return room
-
-
-def _rate(cameras: Sequence[Camera], detections: Sequence[Detections | None]) -> tuple[float, str]:
-    """Steps a second where no file says it, and how that is known.
-
-    Who goes half a metre from one step to the next would run at 25 steps a second; who goes
-    little may as well be slow.
-    """
-    way = pace(cameras, _rays(cameras, detections))
-    if way is None or WALKING / way > USUAL_RATE / 2.0:
-        return USUAL_RATE, "as usual"
-    fps = WALKING / way
-    rounded = max(0.5, round(fps) if fps >= 3.0 else round(2.0 * fps) / 2.0)
-    return rounded, f"by people who go {way:.2f} m from step to step"
-
-
-def _rays(cameras: Sequence[Camera], detections: Sequence[Detections | None]) -> list[Rays]:
-    nothing = Detections(np.zeros(0, dtype=np.int64), np.zeros((0, 4)), np.zeros(0))
-    return [
-        rays_of((own or nothing).frames, (own or nothing).boxes, camera)
-        for camera, own in zip(cameras, detections, strict=True)
-    ]
 
 
 def _sides(room: Suggestion) -> Float[ndarray, " 3"]:

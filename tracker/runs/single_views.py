@@ -160,6 +160,7 @@ def without_boxes(result: ViewResult) -> ViewResult:
         weights=nothing.weights,
         labels=nothing.labels,
         sigmas=nothing.sigmas,
+        log_ratios=nothing.log_ratios,
         blind=True,
     )
 

@@ -29,7 +29,7 @@ BELOW_FLOOR = 0.1
 
 
 def upright_boxes(
-    camera: Camera, positions: Float[ndarray, "N 3"], half_extents: Float[ndarray, " 3"]
+    camera: Camera, positions: Float[ndarray, "N 3"], half_extents: Float[ndarray, "*N 3"]
 ) -> tuple[Float[ndarray, "N 4"], Bool[ndarray, " N"]]:
     """The picture boxes of upright targets that face the camera.
 
@@ -41,7 +41,7 @@ def upright_boxes(
     Args:
         camera: The calibrated camera.
         positions: World metres.
-        half_extents: Half width, depth and height, metres.
+        half_extents: Half width, depth and height, metres, of all or of each.
 
     Returns:
         ``centre_x, centre_y, half_width, half_height`` in pixels, NaN where invalid;
@@ -50,8 +50,8 @@ def upright_boxes(
     right = camera.rotation[0] * [1.0, 1.0, 0.0]
     norm = np.linalg.norm(right)
     right = right / norm if norm > 1e-9 else np.array([1.0, 0.0, 0.0])
-    across = right * (half_extents[0] + half_extents[1]) / 2.0
-    up = np.array([0.0, 0.0, half_extents[2]])
+    across = right * (half_extents[..., :1] + half_extents[..., 1:2]) / 2.0
+    up = np.array([0.0, 0.0, 1.0]) * half_extents[..., 2:]
     points = np.concatenate(
         [positions, positions - across, positions + across, positions - up, positions + up]
     )

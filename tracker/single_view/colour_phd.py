@@ -164,15 +164,21 @@ class ColourPhd:
     def _result(self, mixture: GaussianMixture, peaks: Peaks | None = None) -> ViewResult:
         p = self._parameters
         found = np.zeros((0, 4)) if peaks is None else peaks.boxes
+        ratios = np.zeros(0)
         scores = np.zeros(0) if peaks is None else peaks.scores
         chosen = phd.extract(mixture, p.extraction_threshold)
         estimates, weights = mixture.means[chosen], mixture.weights[chosen]
         labels = mixture.labels[chosen]
         if p.output == "estimates":
             boxes, box_weights, box_labels = estimates, weights, labels
+            sigmas = self._finder.sigmas(boxes)
         else:
-            boxes, box_weights = found, scores
-            box_labels = np.full(len(found), -1, dtype=np.int64)
+            boxes, box_weights, sigmas = found, scores, self._finder.sigmas(found)
+            if peaks is not None and peaks.passed is not None:
+                passed = peaks.passed
+                boxes, box_weights, sigmas = passed.boxes, passed.scores, passed.sigmas
+                ratios = passed.log_ratios
+            box_labels = np.full(len(boxes), -1, dtype=np.int64)
         samples = np.zeros((0, 4)) if peaks is None else peaks.samples
         sample_weights = np.zeros(0) if peaks is None else peaks.sample_weights
         information = {} if peaks is None else peaks.information
@@ -180,7 +186,8 @@ class ColourPhd:
             boxes=boxes,
             weights=box_weights,
             labels=box_labels,
-            sigmas=self._finder.sigmas(boxes),
+            sigmas=sigmas,
+            log_ratios=ratios,
             estimates=estimates,
             estimate_weights=weights,
             estimate_labels=labels,

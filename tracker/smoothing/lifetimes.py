@@ -36,13 +36,21 @@ def lifetimes(
 
     A camera that shows the person votes for him with as much as it would against him if it
     showed nothing, log 1/(1 − p_D): a false box that stays is no better witness than a miss.
+    Where stage 1 tells how much likelier a person looks so, log Λ is added to that.
 
     Returns:
         (N,) probabilities; (n,) log odds of a person at some step against nobody.
     """
     p = smoother.parameters
     hit = -np.log1p(-min(p.detection_probability, 1.0 - 1e-6))
-    votes = hit * np.bincount(shared.links.rows, shared.links.shares, len(paths.states))
+    links = shared.links
+    looks = np.zeros(len(links.rows))
+    for c, camera in enumerate(smoother.cameras):
+        own = links.cameras == c
+        looks[own] = -np.log(camera.clutter_factors[links.boxes[own]])
+    rows = len(paths.states)
+    votes = hit * np.bincount(links.rows, links.shares, rows)
+    votes += np.bincount(links.rows, links.shares * looks, rows)
     votes[smoother.pinned(paths)[0]] += _SAID
     weight = independence(smoother.model.step_time, parameters.memory)
     survival = min(p.survival_probability, 1.0 - 1e-9)

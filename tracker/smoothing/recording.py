@@ -26,6 +26,8 @@ class CameraBoxes:
     """Of the target model, pixels and squared pixels."""
     boxes: Float[ndarray, "B 4"]
     """Centre and half sizes, pixels."""
+    clutter_factors: Float[ndarray, " B"]
+    """As :attr:`tracker.single_view.protocol.ViewResult.clutter_factors`."""
 
     @staticmethod
     def of(views: Many[ViewResult], model: TargetModel, factor: float) -> CameraBoxes:
@@ -36,4 +38,5 @@ class CameraBoxes:
         measurements = model.measured_boxes(boxes, sigmas, factor)
         blind = np.array([view.blind for view in views], dtype=bool)
         starts = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
-        return CameraBoxes(starts, blind, measurements, boxes)
+        factors = np.concatenate([np.zeros(0), *(view.clutter_factors for view in views)])
+        return CameraBoxes(starts, blind, measurements, boxes, factors)

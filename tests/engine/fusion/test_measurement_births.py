@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy import ndarray
@@ -51,7 +53,13 @@ def evidence(
     measured = Measurements(
         np.concatenate([one.values for one in each]), np.concatenate([one.noises for one in each])
     )
-    return Evidence(seen.boxes[:, :2], measured, np.full(len(seen.boxes), unexplained), seen.starts)
+    return Evidence(
+        seen.boxes[:, :2],
+        measured,
+        np.full(len(seen.boxes), unexplained),
+        seen.starts,
+        seen.clutter_factors,
+    )
 
 
 def seen(places: ndarray, clutter_rate: float = 0.0, seed: int = 0) -> tuple[ViewResult, ...]:
@@ -104,6 +112,20 @@ def test_the_odds_are_the_integral_over_the_room(
         log_terms += np.log(P_D) + density - np.log(clutter_of(kind))
     log_odds = logsumexp(log_terms - proposal.logpdf(places)) - np.log(len(places))
     assert logit(found.existences[0]) == pytest.approx(log_odds, abs=0.1)
+
+
+def test_what_a_box_looks_like_adds_to_the_odds() -> None:
+    views = seen(np.array([[0.5, -0.3, 0.85]]), seed=3)
+    before = proposed(births().propose(evidence(views))).take(np.array([0]))
+    told = [1.5, -4.0, 0.0, -2.0]
+    looks = tuple(
+        replace(view, log_ratios=np.full(len(view.boxes), ratio))
+        for view, ratio in zip(views, told, strict=True)
+    )
+    after = proposed(births().propose(evidence(looks))).take(np.array([0]))
+    assert after.sources.tolist() == before.sources.tolist()
+    change = logit(after.existences[0]) - logit(before.existences[0])
+    assert change == pytest.approx(sum(told), abs=1e-6)
 
 
 def test_no_box_is_used_twice() -> None:

@@ -87,7 +87,7 @@ def one_by_one(
             Measurements(values, noises),
             ExpectedBoxes(expected.expected, expected.boxes, expected.depths, expected.valid),
             camera.calibration.image_size,
-            CLUTTER[c],
+            np.full(len(values), CLUTTER[c]),
             RULE,
         )
         p_d, by, best, share = found.record
@@ -149,7 +149,9 @@ def test_one_call_is_all_cameras(
         Tracks(known.weights, known.means, known.covariances, known.labels),
         20,
         undetected.gaussians,
-        step.CameraBoxes(np.concatenate(boxes), np.concatenate(sigmas), starts),
+        step.CameraBoxes(
+            np.concatenate(boxes), np.concatenate(sigmas), starts, np.ones(starts[-1])
+        ),
         step.StepModel(
             transition=TRANSITION,
             motion_noise=NOISE[None],

@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from scipy.special import logit
 
 from tracker import pipeline
 from tracker.foreground import BackgroundModel
@@ -123,6 +124,31 @@ def test_who_walks_is_found_by_shape_alone(room: Sequence) -> None:
         place = rows[rows[:, 0] == step][0, 2:5]
         near += bool(len(there)) and np.linalg.norm(there - place, axis=1).min() < 0.5
     assert near > 0.8 * (STEPS - 20)
+
+
+def test_what_is_little_in_one_camera_is_passed_on_and_weighed(room: Sequence) -> None:
+    nobody_marked = replace(room, templates=(), digest=f"{room.digest}-passed")
+    chosen = with_values(RunParameters(), {"single_view": "shapes"})
+    views = pipeline.compute(nobody_marked, chosen, steps=25).views
+    boxes = [view for step in views for view in step]
+    odds = logit(np.concatenate([view.weights for view in boxes]))
+    ratios = np.concatenate([view.log_ratios for view in boxes])
+    p = chosen.shapes
+    assert p.passed_odds <= odds.min() < p.least_odds < odds.max()
+    np.testing.assert_allclose(
+        ratios, np.minimum(p.odds_weight * (odds - p.even_odds), p.largest_ratio), atol=1e-6
+    )
+    assert ratios[odds < p.even_odds].max() < 0.0
+
+
+def test_a_box_ends_at_the_floor(room: Sequence) -> None:
+    camera, whole_body = room.cameras[1], np.array([0.28, 0.28, 0.86])
+    middle = (room.room.minimum[:2] + room.room.maximum[:2]) / 2.0
+    crowns = np.array([[*middle, 1.2], [*middle, 1.8]])
+    found, _ = Windows.at(camera, crowns, whole_body, floor=0.0)
+    sits, _ = upright_boxes(camera, crowns[:1] / [1.0, 1.0, 2.0], np.array([0.28, 0.28, 0.6]))
+    stands, _ = upright_boxes(camera, crowns[1:] - [0.0, 0.0, 0.86], whole_body)
+    np.testing.assert_allclose(found.boxes, np.concatenate([sits, stands]))
 
 
 def test_shape_is_believed_of_whose_template_shows_one(room: Sequence) -> None:

@@ -12,18 +12,25 @@ from __future__ import annotations
 import ast
 import csv
 import io
+import json
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from tracker.formats.columns import Column, is_table, layout_of, meanings, number_in, read_table
 from tracker.formats.pieces import FormatError, Piece
 from tracker.formats.protocol import Certainty, Kind
-from tracker.formats.source import SourceFile
+from tracker.formats.source import MOST_TREE_BYTES, SourceFile
 from tracker.formats.values import is_list_of_tables
 
 NAME = "table of boxes or places (CSV, JSON)"
 KIND: Kind = "detections"
 SERIES = True
+
+
+_FIVE = ["frame", "1", "2", "3", "4"]
+"""The header that five columns are given which have none: the four numbers of a box, meant
+somehow."""
 
 
 def recognise(file: SourceFile) -> Certainty:
@@ -38,13 +45,15 @@ def recognise(file: SourceFile) -> Certainty:
         return Certainty.LIKELY if has_box or is_table(names) else Certainty.NO
     lines = _data_lines(file.head_text)
     names = _cells(lines[0], _delimiter(lines[0])) if lines else []
+    if names == _FIVE:
+        return Certainty.POSSIBLE
     return Certainty.LIKELY if len(names) > 3 and is_table(_flat_names(names)) else Certainty.NO
 
 
 def read(file: SourceFile) -> Iterator[Piece]:
     """One piece a camera; of a series of files a frame, all together."""
     parts = [_columns(file.member(path)) for path in file.series]
-    alone = ["frame" in meanings(list(columns)) for columns, _ in parts]
+    alone = [bool({"frame", "time"} & meanings(list(columns)).keys()) for columns, _ in parts]
     if len(parts) == 1 or any(alone):
         for path, (columns, frames) in zip(file.series, parts, strict=True):
             member = file.member(path)
@@ -103,6 +112,8 @@ def _columns(file: SourceFile) -> tuple[dict[str, Column], list[int] | None]:
                 f"row {line}: expected {len(names)} columns as in the header, found {len(row)}"
             )
     cells = list(zip(*rows[1:], strict=True)) or [()] * len(names)
+    if names == _FIVE:
+        return {"frame": cells[0], "box": list(zip(*cells[1:], strict=True))}, None
     return _with_boxes(dict(zip(names, cells, strict=True))), None
 
 
@@ -123,7 +134,7 @@ def _with_boxes(columns: dict[str, Column]) -> dict[str, Column]:
 
 def _records(file: SourceFile) -> list[tuple[int | None, dict[str, Any]]]:
     """Records with their frame, where they are in a list a frame."""
-    values = file.json
+    values = _lines_of_json(file) or file.json
     if isinstance(values, dict):  # one list under some name
         lists = [value for value in values.values() if is_list_of_tables(value) and value]
         values = lists[0] if len(lists) == 1 else []
@@ -137,6 +148,29 @@ def _records(file: SourceFile) -> list[tuple[int | None, dict[str, Any]]]:
             if isinstance(record, dict)
         ]
     return [(None, record) for record in values if isinstance(record, dict)]
+
+
+def _lines_of_json(file: SourceFile) -> list[dict[str, Any]]:
+    """The records of a file that has one a line, those of a list among a record's fields each with
+    the record's other fields; empty where it is no such file."""
+    first = file.head_text.lstrip().split("\n", 1)
+    if len(first) == 1 or not (first[0].startswith("{") and first[0].rstrip().endswith("}")):
+        return []
+    records: list[dict[str, Any]] = []
+    for number, line in enumerate(file.text(MOST_TREE_BYTES).splitlines(), 1):
+        try:
+            record = json.loads(line) if line.strip() else None
+        except (ValueError, RecursionError):
+            raise file.error(f"line {number}: is not valid JSON, expected a record") from None
+        if not isinstance(record, dict):
+            continue
+        several = [key for key, value in record.items() if is_list_of_tables(value)]
+        if len(several) == 1:
+            shared = {key: value for key, value in record.items() if key != several[0]}
+            records += [{**shared, **own} for own in record[several[0]]]
+        else:
+            records.append(record)
+    return records
 
 
 def _flat(record: Mapping[str, Any]) -> dict[str, Any]:
@@ -153,11 +187,25 @@ def _flat_names(names: list[str]) -> list[str]:
 
 
 def _data_lines(text: str) -> list[str]:
-    lines = text.splitlines()
-    first = next(
-        (n for n, line in enumerate(lines) if line.strip() and not line.startswith("#")), len(lines)
-    )
-    return [line for line in lines[first:] if line.strip()]
+    """The header and the rows; a header may be a comment, and blanks may stand for commas."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    first = next((n for n, line in enumerate(lines) if not line.startswith("#")), len(lines))
+    header = lines[first - 1].lstrip("#") if first else ""
+    if first < len(lines) and not re.search("[A-Za-z]", lines[first]) and header:
+        lines[first - 1], first = header, first - 1
+    lines = lines[first:]
+    if lines and not any(sign in lines[0] for sign in ",;\t"):
+        lines = [",".join(line.split()) for line in lines]
+    return [_delimiter(lines[0]).join(_FIVE), *lines] if lines and _is_five(lines[0]) else lines
+
+
+def _is_five(line: str) -> bool:
+    """Whether a line is the whole number of a frame and four numbers of pixels."""
+    try:
+        frame, *four = [float(cell) for cell in re.split("[,;\t]", line)]
+    except ValueError:
+        return False
+    return len(four) == 4 and frame == round(frame) and max(four) > 1.5
 
 
 def _delimiter(line: str) -> str:

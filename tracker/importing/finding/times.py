@@ -128,7 +128,8 @@ def _rate(
     options: ImportOptions,
     found: list[tuple[str, str]],
 ) -> float | None:
-    """Steps a second: as time stamps say, else the videos' usual rate, else that of the truth."""
+    """Steps a second: as time stamps say, else the videos' usual rate, else that of boxes
+    and truth."""
     if options.fps is not None:
         return options.fps
     stamps = [c.times.times for c in cameras if c.times is not None and len(c.times.times) > 1]
@@ -139,7 +140,9 @@ def _rate(
         return fps
     rates = [c.video.fps for c in cameras if c.video is not None and c.video.fps > 0.0]
     if not rates:
-        rates = [truth.fps for _, truth in truths if truth.fps is not None]
+        pieces = [c.detections for c in cameras if c.detections is not None]
+        rates = [own.fps for own in pieces if own.fps is not None]
+        rates += [truth.fps for _, truth in truths if truth.fps is not None]
     if not rates:
         return None
     fps = sorted(rates)[len(rates) // 2]

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.camera import Camera
-from tracker.checks.reading import Reading, upright
+from tracker.checks.reading import Reading, levelled, upright
 from tracker.formats.pieces import METRES, TruthPiece, Unit
 from tracker.sequences.sequence import Detections, GroundTruth
 
@@ -100,12 +100,13 @@ def settle_truth(
 
 def _ways(piece: TruthPiece, reading: Reading) -> Iterator[tuple[float, Float[ndarray, "3 3"]]]:
     """Metres in a unit and rotation into the cameras' world, the plain reading first."""
-    own = upright(piece.up or reading.up)
+    same = piece.up in (None, reading.up)
+    own = levelled(reading) if same else upright(piece.up or reading.up)
     units: tuple[Unit, ...] = (
         (piece.unit,) if piece.unit else (reading.unit, *(u for u in METRES if u != reading.unit))
     )
     for unit in units:
-        for turn in range(4 if piece.up not in (None, reading.up) or piece.unit is None else 1):
+        for turn in range(4 if not same or piece.unit is None else 1):
             angle = turn * np.pi / 2.0
             c, s = round(np.cos(angle)), round(np.sin(angle))
             yaw = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -134,7 +134,7 @@ def update_by_camera(
     measurements: Measurements,
     seen: ExpectedBoxes,
     image_size: ndarray,
-    clutter: float,
+    clutter: ndarray,
     rule: CameraRule,
 ) -> CameraUpdate:
     """The update of n tracks, and of the U people never yet detected, by one camera's M boxes.
@@ -150,7 +150,7 @@ def update_by_camera(
         measurements: M of them, each with its noise or all with one.
         seen: What the camera should see of U + n.
         image_size: (2,) width and height, pixels.
-        clutter: κ.
+        clutter: κ (M,).
         rule: How the boxes are taken.
     """
     size, count = len(undetected.weights), len(measurements.values)
@@ -170,7 +170,7 @@ def update_by_camera(
             image_size,
             rule.soft,
         ),
-        np.full(count, clutter),
+        clutter,
         rule.gate,
     )
     born = merge_moments(

@@ -28,6 +28,8 @@ class CameraBoxes(NamedTuple):
     """(B, 4), standard deviations of the same, pixels."""
     starts: ndarray
     """(C + 1,), where each camera's boxes begin, and the end."""
+    clutter_factors: ndarray
+    """(B,), on κ: by what each looks like, it is the likelier false the larger this is."""
 
 
 class StepModel(NamedTuple):
@@ -172,7 +174,7 @@ def predict_and_update(
                 camera,
             ),
             camera.image_size,
-            model.clutter[c],
+            model.clutter[c] * seen.clutter_factors[own],
             rule,
         )
         existences, means, covariances = found.existences, found.means, found.covariances

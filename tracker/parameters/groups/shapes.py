@@ -20,7 +20,23 @@ class ShapesParams(Params):
     least_odds: Annotated[float, Field(ge=-6.0, le=10.0), ui("ln o", step=0.1, essential=True)] = (
         0.5
     )
-    """Logarithm of the odds from which a window of the picture is taken for a person."""
+    """Logarithm of the odds from which a window of the picture is taken for a person there."""
+
+    passed_odds: Annotated[float, Field(ge=-6.0, le=10.0), ui("ln o_2", step=0.1)] = -1.5
+    """Likewise from which it is passed on to the fusion, where several cameras may agree on it."""
+
+    even_odds: Annotated[float, Field(ge=-6.0, le=10.0), ui("ln o_0", step=0.1, advanced=True)] = (
+        2.3
+    )
+    """Logarithm of the odds at which what was passed on is as likely somebody's as nobody's."""
+
+    odds_weight: Annotated[float, Field(ge=0.0, le=5.0), ui("a_s", step=0.1, advanced=True)] = 2.0
+    """By how much each further unit of them speaks for a person, and each below it against one."""
+
+    largest_ratio: Annotated[float, Field(ge=0.0, le=20.0), ui("ln Λ", step=0.1, advanced=True)] = (
+        3.0
+    )
+    """Logarithm of the largest likelihood ratio with which a shape alone speaks for a person."""
 
     overlap: Annotated[float, Field(ge=0.05, le=0.9), ui("o_s", step=0.05, advanced=True)] = 0.3
     """Windows whose intersection over union is larger are of one person: the best one stays."""
@@ -62,7 +78,7 @@ _TRACKING = frozenset(
 METHOD = Method(
     name="shapes",
     help="People by the shape of head and trunk, tracked in the picture by data association.",
-    made_by="tracker.single_view.shape.method:shapes",
+    made_by="tracker.single_view.shape.method:ShapesInCamera",
     uses=Uses(
         pictures=True,
         reads=(Reads("shapes"), Reads("jpda", without=_TRACKING), Reads("pictures")),

@@ -10,19 +10,21 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 from numpy import ndarray
 from scipy.special import expit
 
 from tracker import mean_shift
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.parameters import ColourPeakParams, ForegroundParams
+from tracker.parameters.groups.shapes import ShapesParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.appearance import Appearance, Scene
 from tracker.single_view.colour.trust import shape_trust, template_trust
 from tracker.single_view.protocol import CANDIDATES, DROPPED, TRUST
+from tracker.single_view.shape.evidence import log_ratios, shape_sigmas
 from tracker.single_view.shape.finder import SAME_PERSON, ShapeFinder, Shapes
 
 LEAST_LIKELY = 0.02
@@ -33,6 +35,24 @@ BELIEVED = 0.9
 
 SHAPE_OVERLAP = 0.3
 """Windows of the shapes that share more than this of what both cover are of one person."""
+
+COLOUR_RATIO = 1.0
+"""Logarithm of how much likelier a shape is somebody's where the colours are a template's: about
+three of four of such places are people, and one of two others."""
+
+_SHAPES = ShapesParams()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Passed:
+    """People by colour and by shape, as the fusion gets them."""
+
+    boxes: Float[ndarray, "N 4"]
+    scores: Float[ndarray, " N"]
+    """Of the colours, 0 … 1."""
+    sigmas: Float[ndarray, "N 4"]
+    log_ratios: Float[ndarray, " N"]
+    """As :attr:`tracker.single_view.protocol.ViewResult.log_ratios`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,6 +68,8 @@ class Peaks:
     mask: UInt8[ndarray, "h w"] | None
     """The foreground, where it was asked for."""
     information: dict[str, float]
+    passed: Passed | None = None
+    """What the fusion is to get instead of the boxes, where shapes are looked at, too."""
 
 
 class PeakFinder:
@@ -67,6 +89,7 @@ class PeakFinder:
         parameters: ColourPeakParams,
         foreground: ForegroundParams,
         reader: Pictures,
+        shapes: ShapesParams = _SHAPES,
     ) -> None:
         """Read the templates and learn the background.
 
@@ -74,6 +97,7 @@ class PeakFinder:
             ValueError: If there are no pictures or templates, or a template cannot be read.
         """
         self._parameters = p = parameters
+        self._half_extents = sequence.target_half_extents
         self._appearance = Appearance(
             sequence,
             camera_index,
@@ -95,10 +119,14 @@ class PeakFinder:
         self._shapes = ShapeFinder(sequence, camera_index, reader) if wanted else None
         self._instead = np.zeros(len(self._appearance.model.names))
         """How far the shape stands in for the foreground about each person, 0 … 1."""
+        self._shape_numbers = shapes
+        self._by_shape = np.zeros(len(self._appearance.model.names))
+        """How far the shapes are to be believed about each person, 0 … 1."""
         if self._shapes is not None:
             by_shape = shape_trust(sequence, reader)
             names = self._appearance.model.names
-            self._instead = (1.0 - self._appearance.trust) * [by_shape[name] for name in names]
+            self._by_shape = np.array([by_shape[name] for name in names])
+            self._instead = (1.0 - self._appearance.trust) * self._by_shape
 
     @property
     def sizes(self) -> BoxSizes:
@@ -129,22 +157,27 @@ class PeakFinder:
             The state for the next picture, and what was found.
         """
         background, shape_state = state
-        p = self._parameters
+        p, s = self._parameters, self._shape_numbers
         background, scene = self._appearance.look(background, picture)
         shapes: Shapes | None = None
         if self._shapes is not None:
             shape_state, shapes = self._shapes.find(
-                shape_state, picture, p.shape_odds, SHAPE_OVERLAP
+                shape_state, picture, min(s.passed_odds, p.shape_odds), SHAPE_OVERLAP
             )
         samples = self._sample(intensity, scene, rng)
         scores, _, _ = self._score(scene, shapes, samples)
         candidates = self._climb(samples, scores)
-        boxes, distances, dropped = self._accept(scene, shapes, candidates)
+        boxes, distances, person, dropped = self._accept(scene, shapes, candidates)
+        passed = None
         if shapes is not None:
-            boxes, distances = self._with_shapes(scene, shapes, boxes, distances)
+            passed = self._passed(scene, shapes, boxes, distances, person)
+            new = np.flatnonzero(~self._near(shapes, boxes).any(axis=1))
+            more = shapes.boxes[new[shapes.log_odds[new] >= p.shape_odds]]
+            boxes = np.concatenate([boxes, more])
+            distances = np.concatenate([distances, self._nearest(scene, more)])
         return (background, shape_state), Peaks(
             boxes=boxes,
-            scores=np.exp(-0.5 * (distances / p.likelihood_sigma) ** 2),
+            scores=self._likelihood(distances),
             samples=samples,
             sample_weights=(
                 np.exp(scores.max(axis=1) - scores.max()) if len(scores) else np.zeros(0)
@@ -157,21 +190,59 @@ class PeakFinder:
                 "foreground share": scene.foreground_share,
                 TRUST: float(self._appearance.trust.mean()),
             },
+            passed=passed,
         )
 
-    def _with_shapes(
+    def _passed(
         self,
         scene: Scene,
         found: Shapes,
-        boxes: Float[ndarray, "N 4"],
+        peaks: Float[ndarray, "N 4"],
         distances: Float[ndarray, " N"],
-    ) -> tuple[Float[ndarray, "M 4"], Float[ndarray, " M"]]:
-        """The peaks, and people found by shape where there is none, with their distances."""
+        person: Int[ndarray, " N"],
+    ) -> Passed:
+        """People by shape, surer where a peak is of the same, and peaks where there is no shape.
+
+        Of those ln (t Λ + 1 - t) tells what it means that nobody would take them for a person,
+        where t says how far the shapes are to be believed about whose colours they have.
+        """
+        s = self._shape_numbers
+        near = self._near(found, peaks)
+        alone = np.flatnonzero(~near.any(axis=0))
+        ratios = log_ratios(found.log_odds, s.even_odds, s.odds_weight, s.largest_ratio)
+        least = log_ratios(np.array(s.passed_odds), s.even_odds, s.odds_weight, s.largest_ratio)
+        told = self._by_shape[person[alone]]
+        return Passed(
+            np.concatenate([found.boxes, peaks[alone]]),
+            self._likelihood(np.concatenate([self._nearest(scene, found.boxes), distances[alone]])),
+            np.concatenate(
+                [
+                    shape_sigmas(found.boxes, self._half_extents, s),
+                    self.sigmas(peaks[alone]),
+                ]
+            ),
+            np.concatenate(
+                [
+                    ratios + COLOUR_RATIO * near.any(axis=1),
+                    np.log(told * np.exp(least) + 1.0 - told),
+                ]
+            ),
+        )
+
+    def _nearest(self, scene: Scene, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, " N"]:
+        """The distance of each box to the nearest template."""
+        if not len(boxes):
+            return np.zeros(0)
+        return np.asarray(self._appearance.distances(scene, boxes).min(axis=1))
+
+    def _likelihood(self, distances: Float[ndarray, " N"]) -> Float[ndarray, " N"]:
+        return np.asarray(np.exp(-0.5 * (distances / self._parameters.likelihood_sigma) ** 2))
+
+    @staticmethod
+    def _near(found: Shapes, boxes: Float[ndarray, "N 4"]) -> Bool[ndarray, "K N"]:
+        """Which of some boxes is at the place of each person by shape."""
         apart = (found.boxes[:, None, :2] - boxes[None, :, :2]) / found.sizes[:, None]
-        taken = (np.abs(apart) < SAME_PERSON).all(axis=2).any(axis=1)
-        new = found.boxes[~taken]
-        far = self._appearance.distances(scene, new).min(axis=1) if len(new) else np.zeros(0)
-        return np.concatenate([boxes, new]), np.concatenate([distances, far])
+        return np.asarray((np.abs(apart) < SAME_PERSON).all(axis=2))
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
         """Standard deviations of peaks: proportional to the box, and no more of a large one."""
@@ -260,9 +331,9 @@ class PeakFinder:
 
     def _accept(
         self, scene: Scene, shapes: Shapes | None, candidates: Float[ndarray, "M 4"]
-    ) -> tuple[Float[ndarray, "K 4"], Float[ndarray, " K"], dict[str, int]]:
-        """The peaks that look enough like a person, and their distances; one at each place.
-        How many others fell at which gate."""
+    ) -> tuple[Float[ndarray, "K 4"], Float[ndarray, " K"], Int[ndarray, " K"], dict[str, int]]:
+        """The peaks that look enough like a person, their distances, and like whom; one at each
+        place. How many others fell at which gate."""
         p = self._parameters
         scores, distances, inside = self._score(scene, shapes, candidates)
         best, nearest, person = scores.max(axis=1), distances.min(axis=1), scores.argmax(axis=1)
@@ -287,4 +358,4 @@ class PeakFinder:
             "shape": int((fell & by_shape).sum()),
             "another at its place": int(good.sum()) - len(kept),
         }
-        return candidates[kept], nearest[kept], dropped
+        return candidates[kept], nearest[kept], person[kept], dropped

@@ -1,13 +1,18 @@
-"""People by shape as measurements of the data association in one camera."""
+"""People by shape: tracked in one camera by data association, and passed on with their odds.
+
+[LBS93] Lerro, Bar-Shalom, "Interacting multiple model tracking with target amplitude feature",
+IEEE TAES 29(2), 1993.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
-from scipy.special import expit
+from scipy.special import expit, logit
 
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.parameters.groups.shapes import ShapesParams
@@ -15,30 +20,73 @@ from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.jpda import Jpda
 from tracker.single_view.jpda.measurements import Measured
-from tracker.single_view.protocol import CANDIDATES, DROPPED
+from tracker.single_view.jpda.method import JpdaState
+from tracker.single_view.protocol import CANDIDATES, DROPPED, ViewResult
 from tracker.single_view.shape.channels import ChannelState
+from tracker.single_view.shape.evidence import log_ratios, shape_sigmas
 from tracker.single_view.shape.finder import ShapeFinder
 
 if TYPE_CHECKING:
     from tracker.parameters import RunParameters
 
 
-def shapes(
-    sequence: Sequence, camera_index: int, parameters: RunParameters, reader: Pictures
-) -> Jpda:
-    """The method for one camera: :class:`~tracker.single_view.jpda.Jpda` over people by shape.
+class ShapesInCamera:
+    """:class:`~tracker.single_view.jpda.Jpda` over people by shape.
 
-    Raises:
-        ValueError: If the camera has no pictures.
+    To the fusion goes everything that looks like a person a little, with the logarithm of how
+    much likelier a person looks so than something else does ([LBS93]_),
+
+        ln Λ = min(a (ln o - ln o_0), ln Λ_max),
+
+    of the odds o that the shapes tell: what is little in one camera may be a person where
+    others agree.
     """
-    view = sequence.views[camera_index]
-    if not view.has_pictures:
-        raise ValueError(
-            f'camera "{view.camera.name}" of {sequence.name} has no pictures; give it a video '
-            "or images in sequence.toml"
+
+    def __init__(
+        self, sequence: Sequence, camera_index: int, parameters: RunParameters, reader: Pictures
+    ) -> None:
+        """Learn the background of one camera.
+
+        Raises:
+            ValueError: If the camera has no pictures.
+        """
+        view = sequence.views[camera_index]
+        if not view.has_pictures:
+            raise ValueError(
+                f'camera "{view.camera.name}" of {sequence.name} has no pictures; give it a video '
+                "or images in sequence.toml"
+            )
+        self._parameters = parameters.of(ShapesParams)
+        self._source = ShapeSource(sequence, camera_index, self._parameters, reader)
+        self._tracking = Jpda(sequence, camera_index, parameters, reader, source=self._source)
+
+    def start(self) -> JpdaState:
+        """Nobody is in the picture."""
+        return self._tracking.start()
+
+    def step(
+        self,
+        state: JpdaState,
+        frame: int,
+        picture: UInt8[ndarray, "h w 3"] | None,
+        rng: np.random.Generator,
+    ) -> tuple[JpdaState, ViewResult]:
+        """One step; without a picture nothing is measured."""
+        p = self._parameters
+        state, result = self._tracking.step(state, frame, picture, rng)
+        boxes, probabilities = result.measurements, result.measurement_scores
+        same = (boxes[:, None] == result.boxes[None]).all(axis=2)
+        labels = np.where(same, result.labels, -1).max(axis=1, initial=-1)
+        return state, replace(
+            result,
+            boxes=boxes,
+            weights=probabilities,
+            labels=labels,
+            sigmas=self._source.sigmas(boxes),
+            log_ratios=log_ratios(
+                logit(probabilities), p.even_odds, p.odds_weight, p.largest_ratio
+            ),
         )
-    source = ShapeSource(sequence, camera_index, parameters.of(ShapesParams), reader)
-    return Jpda(sequence, camera_index, parameters, reader, source=source)
 
 
 class ShapeSource:
@@ -56,8 +104,7 @@ class ShapeSource:
             reader: Of the pictures.
         """
         self._parameters = parameters
-        half = sequence.target_half_extents
-        self._extents = np.array([(half[0] + half[1]) / 2.0, half[2]])
+        self._half_extents = sequence.target_half_extents
         self._finder = ShapeFinder(sequence, camera_index, reader)
 
     def start(self) -> ChannelState | None:
@@ -76,22 +123,24 @@ class ShapeSource:
         if picture is None:
             return state, Measured.nothing()
         p = self._parameters
-        state, found = self._finder.find(state, picture, p.least_odds, p.overlap)
+        least = min(p.passed_odds, p.least_odds)
+        state, found = self._finder.find(state, picture, least, p.overlap)
         information = {
             CANDIDATES: float(len(found.boxes) + found.unlikely),
             DROPPED + "shape": float(found.unlikely),
         }
+        probabilities = expit(found.log_odds)
+        likely = np.flatnonzero(found.log_odds >= p.least_odds)
         return state, Measured(
-            found.boxes,
-            expit(found.log_odds),
-            self.sigmas(found.boxes),
-            found.boxes * [1.0, 1.0, p.cover, p.cover],
+            found.boxes[likely],
+            probabilities[likely],
+            self.sigmas(found.boxes[likely]),
+            found.boxes[likely] * [1.0, 1.0, p.cover, p.cover],
+            shown=found.boxes,
+            shown_scores=probabilities,
             information=information,
         )
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
-        """Measurement noise: the same in metres for who is near and far, and some pixels."""
-        p = self._parameters
-        half_sizes = np.maximum(boxes[:, 2:], 0.5)
-        centres = np.hypot(p.place_sigma * half_sizes / self._extents, p.pixel_sigma)
-        return np.concatenate([centres, p.size_sigma * half_sizes], axis=1)
+        """Measurement noise: see :func:`~tracker.single_view.shape.evidence.shape_sigmas`."""
+        return shape_sigmas(boxes, self._half_extents, self._parameters)

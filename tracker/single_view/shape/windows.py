@@ -52,21 +52,28 @@ class Windows:
 
     @staticmethod
     def at(
-        camera: Camera, crowns: Float[ndarray, "N 3"], half_extents: Float[ndarray, " 3"]
+        camera: Camera,
+        crowns: Float[ndarray, "N 3"],
+        half_extents: Float[ndarray, " 3"],
+        floor: float = -np.inf,
     ) -> tuple[Windows, ndarray]:
         """The windows of people whose crowns are there, and which of them can be seen.
+
+        A target that is a whole body reaches down to the floor however low the crown is: of
+        somebody who sits or bends the middle is half as high as the crown.
 
         Args:
             camera: The calibrated camera, upright.
             crowns: World metres.
             half_extents: Of the target, metres, whose top is the crown.
+            floor: Its height, metres.
         """
         middles = crowns - [0.0, 0.0, (BELOW - ABOVE) / 2.0]
         around = np.array([WIDTH / 2.0, WIDTH / 2.0, (ABOVE + BELOW) / 2.0])
         seen, inside = upright_boxes(camera, middles, around)
-        targets, whole = upright_boxes(
-            camera, crowns - [0.0, 0.0, float(half_extents[2])], half_extents
-        )
+        extents = np.tile(half_extents.astype(float), (len(crowns), 1))
+        extents[:, 2] = np.minimum(extents[:, 2], (crowns[:, 2] - floor) / 2.0)
+        targets, whole = upright_boxes(camera, crowns - extents * [0.0, 0.0, 1.0], extents)
         edges = np.concatenate([seen[:, :2] - seen[:, 2:], seen[:, :2] + seen[:, 2:]], axis=1)
         width, height = camera.image_size
         shown = np.clip(edges, -0.5, [width - 0.5, height - 0.5] * 2)
@@ -83,7 +90,7 @@ class Windows:
         floor = room.minimum[2]
         grid = np.meshgrid(*across, floor + np.array(CROWNS), indexing="ij")
         crowns = np.stack([axis.ravel() for axis in grid], axis=1)
-        found, there = Windows.at(camera, crowns, half_extents)
+        found, there = Windows.at(camera, crowns, half_extents, float(floor))
         found = found.take(np.flatnonzero(there))
         places = (found.edges[:, :2] + found.edges[:, 2:]) / 2.0
         spans = np.maximum(found.edges[:, 2:] - found.edges[:, :2], 1e-6)
