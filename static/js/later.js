@@ -9,6 +9,7 @@ import { mountTeach } from "./inspector/teach.js";
 import { mountKeep } from "./sheets/keep.js";
 import { mountSheets } from "./sheets/sheets.js";
 import { drawBraid } from "./timeline/braid.js";
+import { mountFingers } from "./timeline/fingers.js";
 import { mountHint } from "./timeline/hint.js";
 import { mountPlots } from "./timeline/plots.js";
 
@@ -24,6 +25,7 @@ export function mountLater(context, timeline) {
 	mountSheets(context);
 	mountKeep(context);
 	mountHint(timeline, store);
+	mountFingers(timeline.plot, store);
 	mountPlots(context, timeline);
 	mountCorrecting(context, timeline);
 	timeline.braid = drawBraid;

@@ -278,6 +278,23 @@ def test_the_world_of_a_first_camera_is_levelled(tmp_path: Path) -> None:
     assert heights.mean() == pytest.approx(settled.room.floor + HALF_EXTENTS[2], abs=0.15)
 
 
+def test_cameras_tell_what_is_level_where_no_boxes_do(tmp_path: Path) -> None:
+    first = cameras()[1]
+    tables = {
+        c.name: {
+            "K": c.intrinsics.tolist(),
+            "R": (c.rotation @ first.rotation.T).tolist(),
+            "t": (c.translation - c.rotation @ first.rotation.T @ first.translation).tolist(),
+        }
+        for c in cameras()
+    }
+    (tmp_path / "cams.json").write_text(json.dumps(tables))
+    videos(tmp_path, frames=3)
+    settled = settled_of(tmp_path)
+    turn = settled.views[1].camera.rotation.T @ first.rotation
+    assert np.degrees(np.arccos(turn[2, 2])) < 1e-3
+
+
 def test_a_level_world_is_left_as_it_is(tmp_path: Path) -> None:
     toml(tmp_path)
     detections(tmp_path)

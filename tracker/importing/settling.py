@@ -284,19 +284,19 @@ def _read(
     )
     enough = meaning is not None and meaning.best.consensus.agreeing >= 20
     if meaning is None or not enough:
-        reading = read_poses(raws)
+        reading = read_poses(raws, boxes=any(own is not None for own in boxes))
         why = "from where the cameras look; the boxes do not tell"
     else:
         reading = meaning.reading
         if convention.up is None:
-            reading = replace(reading, lean=lean_of(meaning))
-        if reading.lean != (0.0, 0.0):
-            degrees = np.degrees(np.arcsin(np.hypot(*reading.lean)))
-            found.append(("level", f"the world is turned by {degrees:.0f}° so that people stand"))
+            reading = replace(reading, lean=lean_of(meaning, raws))
         share = 100.0 * meaning.best.consensus.share
         why = f"since {share:.0f} % of the boxes meet so"
         if unknown:
             found.append(("boxes", f"{reading.layout}, {why}; --boxes"))
+    if reading.lean != (0.0, 0.0):
+        degrees = np.degrees(np.arcsin(np.hypot(*reading.lean)))
+        found.append(("level", f"the world is turned by {degrees:.0f}° so that people stand"))
     for name, known, flag in (
         ("direction", convention.direction, "pose"),
         ("axes", convention.axes, "axes"),

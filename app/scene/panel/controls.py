@@ -103,8 +103,6 @@ class Controls:
             hint="Takes a named set of values; Changes on the page saves one of your own.",
         )
         self._presets.on_update(self._take_preset)
-        for method in METHODS:
-            self._make_method(method)
         self._sought: Any = server.gui.add_text(
             "Find", "", hint="Words of a parameter's name, symbol, unit or help."
         )
@@ -128,6 +126,10 @@ class Controls:
         self._curves: Any = None
         if sensitivity is not None:
             self._offer_curves(sensitivity)
+        self._methods = server.gui.add_folder("Methods")
+        with self._methods:
+            for method in METHODS:
+                self._make_method(method)
         self._topics: dict[Topic, viser.GuiFolderHandle] = {}
         for topic in TOPICS:
             self._make_topic(topic)
@@ -376,7 +378,7 @@ class Controls:
             copies[-1].visible = looks and key in keys
             if len(copies) > 1:
                 copies[0].visible = not looks and key in shown
-        self._essentials.visible = not looks
+        self._essentials.visible = self._methods.visible = not looks
         self._found.visible = looks and bool(keys)
         self._nothing_found.visible = looks and not keys
         what = f"No parameter has “{html.escape(text)}”" if text else "Nothing is changed"

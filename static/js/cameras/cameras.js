@@ -62,6 +62,7 @@ export function mountCameras(root, { store, actions, playback }) {
 					ondblclick: () => clearTimeout(clicked),
 					onkeydown: (event) =>
 						event.key === "Enter" && (event.shiftKey ? through() : actions.chooseCamera(index)),
+					onpointerdown: (/** @type {PointerEvent} */ event) => point(index, event),
 					onpointermove: (event) => point(index, event),
 					onpointerleave: (/** @type {PointerEvent} */ { pointerType }) => {
 						if (pointerType !== "touch") store.set({ hover: null, pointed: null });

@@ -1,5 +1,6 @@
 /** The menu of corrections at a lane, a box or the selected person; with whom; and a name. */
 import { fill, h, icon, idTag, one } from "../elements/dom.js";
+import { whenHeld } from "../elements/held.js";
 import { resultOf } from "../state/events.js";
 import { commandOf, keyLabel, perform } from "../state/commands.js";
 import { clickOf, pixelOf } from "./feet.js";
@@ -189,20 +190,26 @@ export function mountMenu(context, timeline, does) {
 		open(what);
 	}
 	const shown = () => Math.max(0, store.get().shown);
-	timeline.plot.addEventListener("contextmenu", (event) => {
+	/** By the other button, or by a finger or a pen that is held. */
+	/** @param {HTMLElement} element @param {(event: MouseEvent) => void} ask */
+	function asked(element, ask) {
+		element.addEventListener("contextmenu", ask);
+		whenHeld(element, ask);
+	}
+	asked(timeline.plot, (event) => {
 		const { step, track } = timeline.at(/** @type {PointerEvent} */ (event));
 		if (!track) return;
 		context.playback.seek(step);
 		at(event, { track: track.id, step });
 	});
-	one(".lanes").addEventListener("contextmenu", (event) => {
+	asked(one(".lanes"), (event) => {
 		const label = /** @type {HTMLElement} */ (event.target).closest(".lane");
 		const id = Number(label?.querySelector(".id")?.textContent);
 		if (id) at(event, { track: id, step: shown() });
 	});
-	one(".mosaic").addEventListener("contextmenu", (event) => {
+	asked(one(".mosaic"), (event) => {
 		const click = pixelOf(event, store.get());
-		if (!click) return;
+		if (!click || one(".mosaic").classList.contains("drawing")) return;
 		const { hover } = store.get();
 		at(event, {
 			track: hover?.camera === click.index ? hover.id : null,

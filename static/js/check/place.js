@@ -4,7 +4,16 @@ import { all, fill, h, icon, idTag } from "../elements/dom.js";
 import { scoresOf } from "../state/events.js";
 import { commandOf, keyLabel, perform } from "../state/commands.js";
 import { drawCrop } from "./crops.js";
-import { camerasFor, filmSteps, isOfTwo, percent, proposed, standsFor } from "./words.js";
+import {
+	camerasFor,
+	filmSteps,
+	distinct,
+	isOfTwo,
+	percent,
+	proposed,
+	standsFor,
+	unbroken,
+} from "./words.js";
 
 /** People whose pictures are shown. */
 const ROWS = 2;
@@ -161,7 +170,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 			h(
 				"div",
 				{ class: "seg", role: "group", "aria-label": "Shown" },
-				chosen.alternatives.map(({ words, probability }, k) =>
+				distinct(chosen, other).map(([{ words, probability }, k]) =>
 					h(
 						"button",
 						{
@@ -192,7 +201,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 		why.title = chosen.why;
 		fill(
 			why,
-			`${chosen.why[0].toUpperCase()}${chosen.why.slice(1)}.`,
+			`${unbroken(chosen.why[0].toUpperCase() + chosen.why.slice(1))}.`,
 			h(
 				"span",
 				{ class: "q" },

@@ -2,7 +2,7 @@
 import { fill, h, icon, idTag, write } from "../elements/dom.js";
 import { commandOf, keyLabel } from "../state/commands.js";
 import { drawCrop } from "./crops.js";
-import { ICONS, camerasFor, clockOf, middleOf, percent, stepsOf } from "./words.js";
+import { ICONS, camerasFor, clockOf, middleOf, percent, stepsOf, unbroken } from "./words.js";
 import { palette } from "../draw/colours.js";
 
 /** Places that are listed. */
@@ -154,7 +154,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 					title: `${percent(doubt.doubt)} doubtful, ${doubt.stake} steps depend on it`,
 				}),
 			),
-			h("p", { title: doubt.why }, doubt.why),
+			h("p", { title: doubt.why }, unbroken(doubt.why)),
 		);
 		sight.observe(item);
 		return item;

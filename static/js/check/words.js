@@ -27,6 +27,23 @@ export const ICONS = {
 export const stepsOf = (first, last) =>
 	first === last ? `step ${first}` : `steps ${first} – ${last}`;
 
+/** A number and its unit stand on one line. @param {string} text */
+export const unbroken = (text) => text.replace(/(\d) (?=(?:m|s|px|%)(?!\w))/g, "$1\u00a0");
+
+/**
+ * The alternatives with words of their own, each with its place among all: of those that differ in
+ * the step alone the likeliest, or the one that is shown.
+ * @param {Doubt} doubt @param {number} shown
+ * @returns {[Doubt["alternatives"][number], number][]}
+ */
+export const distinct = ({ alternatives }, shown) =>
+	alternatives
+		.map((one, k) => /** @type {[typeof one, number]} */ ([one, k]))
+		.filter(([one, k]) => {
+			const same = alternatives.flatMap(({ words }, at) => (words === one.words ? [at] : []));
+			return k === (same.includes(shown) ? shown : same[0]);
+		});
+
 /** How sure, as whole percent. @param {number} share  0 … 1 */
 export const percent = (share) => `${Math.round(100 * share)} %`;
 

@@ -12,6 +12,9 @@ function softwareRenderer() {
 	return /swiftshader|llvmpipe|softpipe|software/i.test(name) ? name : "";
 }
 
+/** The 3D view waits no longer than this for the first pictures, milliseconds. */
+const LATEST = 3000;
+
 /** @type {Pane} */
 export function mountView3d(root, { store, actions, playback, retry, press }) {
 	const { views, frame, blank, trail } = parts(root);
@@ -20,10 +23,16 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 	let tries = 0;
 	/** @type {Timer} */
 	let timer;
+	/** Where it is slow, the first pictures do not wait for it. @type {Promise<void> | undefined} */
+	let painted;
 
 	if (softwareRenderer()) {
 		playback.slow3d();
 		drawing.willReadFrequently = true;
+		painted = new Promise((resolve) => {
+			playback.onPaint(() => resolve(undefined));
+			setTimeout(resolve, LATEST);
+		});
 		actions.note(
 			"info",
 			"The 3D view is drawn without a graphics card",
@@ -39,6 +48,7 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 	async function load() {
 		clearTimeout(timer);
 		if (!path) return;
+		await painted;
 		reachable = await fetch(path, { cache: "no-store" }).then(
 			({ ok }) => ok,
 			() => false,

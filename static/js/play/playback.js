@@ -250,8 +250,12 @@ export function createPlayback(store, sendSeek) {
 
 	return {
 		/** When the 3D view may draw again, having drawn at a time: the page's own clock, milliseconds. */
-		after3d: (/** @type {number} */ last) =>
-			store.get().playing ? last + wait : slow ? newsAt + LAST_3D : 0,
+		after3d(/** @type {number} */ last) {
+			const { playing, step, shown } = store.get();
+			if (playing) return last + wait;
+			// Pictures that are waited for come first.
+			return slow ? Math.max(newsAt + LAST_3D, step === shown ? 0 : last + SLOW_3D) : 0;
+		},
 		/** It is drawn without a graphics card: it begins by being left alone. */
 		slow3d() {
 			slow = true;

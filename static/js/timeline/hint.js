@@ -54,7 +54,9 @@ export function mountHint({ plot, at }, store) {
 	const card = h("div", { class: "card hint-card", hidden: true });
 	plot.append(card);
 	plot.addEventListener("pointermove", (event) => {
-		const lines = event.buttons ? [] : read(event);
+		// A finger or a pen has no other way to ask than to press.
+		const seeks = event.buttons && event.pointerType === "mouse";
+		const lines = seeks ? [] : read(event);
 		card.hidden = lines.length === 0;
 		if (card.hidden) return;
 		fill(

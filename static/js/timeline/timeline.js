@@ -110,11 +110,12 @@ export function mountTimeline(root, context) {
 	function writeScores() {
 		const { shown, selection, measure: name } = store.get();
 		const { series, reference } = scoresOf(store.get()) ?? {};
+		const unit = series?.unit ?? "";
 		const text = (/** @type {number | null | undefined} */ number) => number?.toFixed(2) ?? "–";
+		const whole = (/** @type {string} */ words) => (words === "–" ? words : `${words} ${unit}`);
 		const valueOf = (/** @type {Server.EvaluationSeries | null | undefined} */ of) =>
 			text(of?.[name][bucketOf(Math.max(0, shown), of)]);
-		const unit = series?.unit ?? "";
-		write(value, `${reference ? `A ${valueOf(reference)} · B ` : ""}${valueOf(series)} ${unit}`);
+		write(value, `${reference ? `A ${valueOf(reference)} · B ` : ""}${whole(valueOf(series))}`);
 		write(axis, `0–${Math.max(series?.axes[name] ?? 0, reference?.axes[name] ?? 0)}`);
 		write(measure, name.toUpperCase());
 		measure.dataset.tip = `${series?.cost ?? "not scored yet"}; press for ${name === "ospa" ? "GOSPA" : "OSPA"}`;
@@ -125,7 +126,13 @@ export function mountTimeline(root, context) {
 			(series && { first: series.first, values: series.mean_error, track: null });
 		write(
 			error,
-			`${text(course && series && course.values[bucketOf(Math.max(0, shown), { ...course, stride: series.stride })])} ${unit}`,
+			whole(
+				text(
+					course &&
+						series &&
+						course.values[bucketOf(Math.max(0, shown), { ...course, stride: series.stride })],
+				),
+			),
 		);
 		write(
 			whose,

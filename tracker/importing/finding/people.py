@@ -5,41 +5,52 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 
 from tracker.agreement.observed import Rays, rays_of
 from tracker.agreement.pace import WALKING, pace
 from tracker.camera import Camera
-from tracker.checks.reading import upright
+from tracker.checks.reading import pose, upright
 from tracker.checks.readings import Meaning
+from tracker.formats.pieces import RawCamera
+from tracker.importing.finding.geometry import LEVEL, horizon, leaning
 from tracker.importing.finding.times import USUAL_RATE
 from tracker.sequences.sequence import Detections
 
-LEVEL = 6.0
-"""Degrees: a world that leans less is taken to be level. Boxes tell no better: cameras that look
-down see the top of a head before its middle."""
 
-
-def lean_of(meaning: Meaning) -> tuple[float, float]:
+def lean_of(meaning: Meaning, cameras: Sequence[RawCamera]) -> tuple[float, float]:
     """How people stand in a world that is not level; 0, 0 where it is as level as can be told.
 
-    Two things must say the same: boxes stand along it, and where people were lies across it. The
-    second is what is taken, being the more exact one; boxes alone lean in cameras that are rolled.
+    Boxes alone lean in cameras that are rolled. So a second witness must say the same, and is
+    what is taken, being the more exact one: the plane in which people were, or the cameras' level.
     """
     agreed = meaning.best.consensus
     to_world = upright(meaning.reading.up)
     rise = to_world @ agreed.rise / agreed.height
-    middles = (agreed.feet + agreed.rises / 2.0) @ to_world.T
+    if rise[2] > np.cos(np.radians(LEVEL)):
+        return 0.0, 0.0
+    level = horizon([pose(camera, meaning.reading) for camera in cameras])
+    across = _across((agreed.feet + agreed.rises / 2.0) @ to_world.T, rise, agreed.height)
+    for witness in (across, None if level is None else to_world @ level):
+        if witness is not None and witness @ rise > np.cos(np.radians(2.0 * LEVEL)):
+            return leaning(witness)
+    return 0.0, 0.0
+
+
+def _across(
+    middles: Float[ndarray, "N 3"], rise: Float[ndarray, " 3"], height: float
+) -> Float[ndarray, " 3"] | None:
+    """The normal of the plane in which the middles of people lie; None where they lie in none."""
     for _ in range(5):
         centred = middles - np.median(middles, axis=0)
         _, lengths, axes = np.linalg.svd(centred, full_matrices=False)
         off = np.abs(centred @ axes[2])
         middles = middles[off <= 3.0 * np.median(off)]
-    normal = axes[2] * np.sign(axes[2] @ rise)
     spread = lengths / np.sqrt(len(centred))
-    is_floor = spread[1] > 0.3 * agreed.height and spread[1] > 4.0 * spread[2]
-    same = float(normal @ rise) > np.cos(np.radians(2.0 * LEVEL))
-    leans = max(normal[2], rise[2]) < np.cos(np.radians(LEVEL))
-    return (float(normal[0]), float(normal[1])) if is_floor and same and leans else (0.0, 0.0)
+    if spread[1] < 0.3 * height or spread[1] < 4.0 * spread[2]:
+        return None
+    return np.asarray(axes[2] * np.sign(axes[2] @ rise))
 
 
 def rate_of(
