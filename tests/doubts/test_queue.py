@@ -87,7 +87,7 @@ def test_who_is_who_is_asked_between_places_where_people_stand_clear() -> None:
     run = run_of(sequence([(0, one), (0, other)], 80))
     lanes = Lanes(run.tracks)
     track, third = (int(name) for name in lanes.ids)
-    clear = Clear(lanes, 1.0 / 25.0)
+    clear = Clear(lanes, 1.0 / 25.0, 0.25)
     apart = np.linalg.norm((one - other)[:, :2], axis=1)
     near = np.flatnonzero(apart < 1.0)
     before, after = clear.before(track, 40), clear.after(track, 40)
@@ -117,3 +117,19 @@ def test_none_of_those_who_are_told_may_be_said() -> None:
         if one.kind != "short":
             assert parted
             assert {pair for c in parted[-1].corrections for pair in c.apart} & told
+
+
+def test_who_says_that_it_is_as_it_is_changes_nothing() -> None:
+    for whole in (with_a_gap(), sequence(crossing(60), 60)):
+        plain = run_of(whole)
+        told = [
+            one.alternatives[0].corrections
+            for one in queue(plain).doubts
+            if any(c.pairs or c.apart for c in one.alternatives[0].corrections)
+        ]
+        assert told or len(set(plain.tracks.ids.tolist())) == 2
+        for corrections in told:
+            run = run_of(whole, said(corrections))
+            assert all(one.met for one in run.outcomes)
+            np.testing.assert_array_equal(run.tracks.ids, plain.tracks.ids)
+            np.testing.assert_array_equal(run.tracks.positions, plain.tracks.positions)

@@ -11,6 +11,12 @@ from tracker.corrections.kinds import REACH
 from tracker.doubts.doubt import Lanes
 from tracker.doubts.linking import Move, Piece
 
+_WIDTHS = 4.0
+"""Target widths from the nearest of others: a place said a little beside is still nearest."""
+
+_FARTHEST = 2.0 * REACH
+"""Metres beyond which nobody is clearer."""
+
 _LONGEST = 5.0
 """Seconds before and after a doubtful moment within which a clear place is looked for."""
 
@@ -23,14 +29,16 @@ class Clear:
     said by anybody who sees it, and holds for every run.
     """
 
-    def __init__(self, lanes: Lanes, step_time: float) -> None:
+    def __init__(self, lanes: Lanes, step_time: float, width: float) -> None:
         """See how far each row is from the nearest of others.
 
         Args:
             lanes: Of a run.
             step_time: Seconds.
+            width: Of a target, metres.
         """
         self._lanes, tracks = lanes, lanes.tracks
+        self._clear = min(_WIDTHS * width, _FARTHEST)
         self._longest = max(round(_LONGEST / step_time), 1)
         self._apart: Float[ndarray, " N"] = np.full(len(tracks), np.inf)
         for step in np.unique(tracks.frames).tolist():
@@ -49,7 +57,7 @@ class Clear:
         if not len(own):
             return self._lanes.place(track, step)
         apart = self._apart[own]
-        clear = np.flatnonzero(apart >= REACH)
+        clear = np.flatnonzero(apart >= self._clear)
         best = clear[-1] if len(clear) else len(own) - 1 - np.argmax(apart[::-1])
         return self._lanes.of_row(int(own[best]))
 
@@ -61,18 +69,18 @@ class Clear:
         if not len(own):
             return self._lanes.place(track, step, after=True)
         apart = self._apart[own]
-        clear = np.flatnonzero(apart >= REACH)
+        clear = np.flatnonzero(apart >= self._clear)
         return self._lanes.of_row(int(own[clear[0] if len(clear) else np.argmax(apart)]))
 
     def move(self, move: Move) -> Move:
         """The same move between clear places."""
         return Move(
             tuple(
-                Piece(one.track, one.begin, self.before(one.track, one.end.step))
+                Piece(one.track, one.begin, self.before(one.track, one.last), one.last)
                 for one in move.earlier
             ),
             tuple(
-                Piece(one.track, self.after(one.track, one.begin.step), one.end)
+                Piece(one.track, self.after(one.track, one.first), one.end, one.first)
                 for one in move.later
             ),
             move.kind,

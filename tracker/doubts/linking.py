@@ -16,6 +16,18 @@ class Piece:
     track: int
     begin: Place
     end: Place
+    moment: int = -1
+    """The step at which it begins or ends, where a place of it is said that lies elsewhere."""
+
+    @property
+    def last(self) -> int:
+        """The step up to which it is one person's, of one that goes on as another."""
+        return self.end.step if self.moment < 0 else self.moment
+
+    @property
+    def first(self) -> int:
+        """The step from which it is one person's, of one that others go on as."""
+        return self.begin.step if self.moment < 0 else self.moment
 
 
 @dataclass(frozen=True, slots=True)

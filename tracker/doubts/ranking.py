@@ -93,7 +93,8 @@ def _linked(run: Run, lanes: Lanes, backwards: Trajectories | None) -> Iterable[
     opinion = None if backwards is None else Opinion(run.tracks, backwards, step_time)
     if opinion is not None:
         every += opinion.moves()
-    clear = Clear(lanes, step_time)
+    width = 2.0 * float(run.sequence.target_half_extents[:2].mean())
+    clear = Clear(lanes, step_time, width)
     every = [clear.move(move) for move in every]
     if opinion is not None:
         every = [opinion.weighed(move) for move in every]
@@ -104,8 +105,8 @@ def _linked(run: Run, lanes: Lanes, backwards: Trajectories | None) -> Iterable[
     trust = Trust(
         lanes,
         (
-            (one.move.earlier[0].track, one.move.earlier[0].end.step,
-             one.move.later[0].begin.step, one.wrong)
+            (one.move.earlier[0].track, one.move.earlier[0].last,
+             one.move.later[0].first, one.wrong)
             for one in sites
             if not one.move.joins
         ),
@@ -158,8 +159,8 @@ def _doubt_of(run: Run, site: _Site, trust: Trust) -> Doubt | None:
     shares = np.array([one.probability for one in site.alternatives])
     stakes = [
         move.stake(
-            [trust.before(one.track, one.end.step) for one in move.earlier],
-            [trust.after(one.track, one.begin.step) for one in move.later],
+            [trust.before(one.track, one.last) for one in move.earlier],
+            [trust.after(one.track, one.first) for one in move.later],
         )
         for move in site.moves
     ]

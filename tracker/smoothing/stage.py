@@ -126,7 +126,7 @@ class Identities(Positions):
                 contested = pieces.contested(fitted.paths, shared.links)
             found = identities.settle(
                 smoother, fitted, shared, contested, existences == 1.0, names, p, looks,
-                corrections,
+                corrections if again == p.rounds - 1 else (),
             )  # fmt: skip
             check()
             paths, links, names = found.paths, found.links, found.names

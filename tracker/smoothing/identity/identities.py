@@ -17,6 +17,7 @@ from numpy import ndarray
 from tracker.assignment import names_by_majority
 from tracker.corrections import Correction
 from tracker.corrections.kinds import leeway as corrections_leeway
+from tracker.corrections.outcomes import outcomes
 from tracker.parameters import SmoothingParams
 from tracker.smoothing.identity import cutting, joining, odds, pieces
 from tracker.smoothing.identity import decisions as decided
@@ -60,6 +61,9 @@ def settle(
 ) -> Settled:
     """Cut and join.
 
+    Of what a person said of who is who only what does not hold by itself is made to hold, one
+    after another: who says that it is as it is changes nothing.
+
     Args:
         smoother: The models.
         fitted: The filter's tracks, or what was made of them before, fitted to their boxes.
@@ -71,7 +75,50 @@ def settle(
         looks: A unit vector for each box of each camera; None where there is none.
         corrections: What a person said of who is who.
     """
-    seeker = Seeker(fitted, corrections, corrections_leeway(smoother.model.step_time))
+    leeway = corrections_leeway(smoother.model.step_time)
+    waiting = [one for one in corrections if one.pairs or one.apart]
+    while True:
+        obeyed = [one for one in corrections if one not in waiting]
+        found = _settled(
+            smoother, fitted, shared, contested, had, names, parameters, looks, obeyed, leeway
+        )
+        unmet = _unmet(found.paths, waiting, leeway)
+        if not unmet:
+            return found
+        waiting = [one for one in waiting if one not in unmet]
+
+
+def _unmet(paths: Paths, waiting: Many[Correction], leeway: int) -> list[Correction]:
+    """Those that do not hold, but for what may hold once an earlier one at those steps does."""
+    if not waiting:
+        return []
+    told = outcomes(
+        paths.steps, paths.labels[paths.owners], paths.states[:, :3], waiting, leeway=leeway
+    )
+    found: list[Correction] = []
+    for one, outcome in zip(waiting, told, strict=True):
+        first, last = one.steps
+        if not outcome.met and all(
+            other.steps[1] + leeway < first or last + leeway < other.steps[0] for other in found
+        ):
+            found.append(one)
+    return found
+
+
+def _settled(
+    smoother: Smoother,
+    fitted: Fitted,
+    shared: Shared,
+    contested: Float[ndarray, " N"],
+    had: Bool[ndarray, " N"],
+    names: Int[ndarray, " N"],
+    parameters: SmoothingParams,
+    looks: Many[Float[ndarray, "B A"]] | None,
+    corrections: Many[Correction],
+    leeway: int,
+) -> Settled:
+    """Cut and join with all of some corrections."""
+    seeker = Seeker(fitted, corrections, leeway)
     cut, kept, reasons = cutting.cut(
         smoother, fitted, shared, contested, had, names, parameters, seeker
     )
