@@ -18,7 +18,7 @@ from tracker.sequences.reader import read_sequence
 from tracker.sequences.rendering import render_random
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
-from tracker.single_view.colour.trust import shape_trust
+from tracker.single_view.colour.trust import shapes_of_templates
 from tracker.single_view.shape.channels import Channels
 from tracker.single_view.shape.finder import Shapes, strongest
 from tracker.single_view.shape.windows import ABOVE, BELOW, WIDTH, Windows
@@ -161,7 +161,10 @@ def test_shape_is_believed_of_whose_template_shows_one(room: Sequence) -> None:
     unseen = replace(template, name="elsewhere", camera="none")
     taught = replace(room, templates=(template, nobody, unseen))
     with FrameReader(taught) as reader:
-        trust = shape_trust(taught, reader)
+        found = shapes_of_templates(taught, reader)
+    trust = found.trust
     assert trust[template.name] > 0.5
     assert trust["wall"] < 0.2
     assert trust["elsewhere"] == 0.0
+    # of the three the one shares most of its box with the person by shape, the others nothing
+    assert 0.3 / 3.0 < found.fit < 0.45
