@@ -102,7 +102,12 @@ class Track:
     ] = None
     """Method of stage 2."""
     smoothing_method: Annotated[
-        str | None, arg(name="smoothing", metavar="|".join(METHODS["smoothing_method"]))
+        str | None,
+        arg(
+            name="smoothing",
+            metavar="|".join(METHODS["smoothing_method"]),
+            help_behavior_hint=f"(default: {table.RunParameters().smoothing_method})",
+        ),
     ] = None
     """Method of stage 3."""
     preset: Annotated[
@@ -256,6 +261,7 @@ class Render:
             metavar="[NAME] FOLDER",
             help="A room (`sequences` lists the names; none with --random), and a folder that "
             "must not exist yet.",
+            help_behavior_hint="",
         ),
     ]
     random: Annotated[int | None, arg(metavar="SEED", help_behavior_hint="(optional)")] = None
@@ -274,7 +280,11 @@ class Benchmark:
 
     names: Annotated[
         Positional[tuple[str, ...]],
-        arg(metavar="[NAME …]", help="Which parts; all, if none is named."),
+        arg(
+            metavar="[NAME …]",
+            help="Which parts; all, if none is named.",
+            help_behavior_hint="",
+        ),
     ] = ()
     short: FlagCreatePairsOff[bool] = False
     """The shortened form that the checks run."""

@@ -9,9 +9,11 @@ from tests.corrections.test_runs import run_of, with_a_gap
 from tests.engine.synthetic import crossing, sequence, walk
 from tracker.corrections import Place
 from tracker.doubts import queue
+from tracker.doubts.clear import Clear
 from tracker.doubts.doubt import Lanes, said
 from tracker.doubts.linking import Move, Piece
 from tracker.doubts.opinion import Opinion
+from tracker.doubts.trust import Trust
 from tracker.trajectories import Trajectories, corrected
 
 
@@ -59,8 +61,7 @@ def test_the_other_run_weighs_a_move_by_who_is_who_there() -> None:
 
     swapped: Trajectories = corrected(tracks, unsaid("exchanged", places), 1.0 / 25.0)
     pieces = [
-        Piece(track, lanes.place(track, 30), lanes.place(track, 29), 30, 30)
-        for track in (one, other)
+        Piece(track, lanes.place(track, 30), lanes.place(track, 29)) for track in (one, other)
     ]
     move = Move((pieces[0], pieces[1]), (pieces[0], pieces[1]), "exchange", 0.0)
     assert Opinion(tracks, swapped, 1.0 / 25.0).weighed(move).odds > 0.0
@@ -78,3 +79,41 @@ def test_a_doubt_is_known_again_by_its_places() -> None:
     assert len(set(again)) == len(again)
     assert np.isfinite([one.weight for one in queue(run).doubts]).all()
     assert Place(3, 1.0, 2.0, 0.8).words == "(1.00, 2.00) at step 3"
+
+
+def test_who_is_who_is_asked_between_places_where_people_stand_clear() -> None:
+    one = walk((-1.1, 0.0, 1.0), (1.1, 0.0, 1.0), 80)
+    other = walk((0.0, -1.5, 1.0), (0.0, 1.5, 1.0), 80)
+    run = run_of(sequence([(0, one), (0, other)], 80))
+    lanes = Lanes(run.tracks)
+    track, third = (int(name) for name in lanes.ids)
+    clear = Clear(lanes, 1.0 / 25.0)
+    apart = np.linalg.norm((one - other)[:, :2], axis=1)
+    near = np.flatnonzero(apart < 1.0)
+    before, after = clear.before(track, 40), clear.after(track, 40)
+    assert abs(before.step - (near[0] - 1)) <= 2
+    assert abs(after.step - (near[-1] + 1)) <= 2
+    assert clear.before(third, 3).step == 3
+
+
+def test_what_hangs_on_a_moment_ends_where_the_next_mistake_may_be() -> None:
+    run = run_of(sequence([(0, walk((-1.1, 0.0, 1.0), (1.1, 0.0, 1.0), 60))], 60))
+    lanes = Lanes(run.tracks)
+    track = int(lanes.ids[0])
+    first, last = lanes.span(track)
+    whole = Trust(lanes, [])
+    assert whole.before(track, last) == whole.after(track, first) == last - first + 1
+    half = Trust(lanes, [(track, 19, 20, 0.5)])
+    assert half.before(track, 39) == pytest.approx(20 + 0.5 * (20 - first))
+    assert half.after(track, 10) == pytest.approx(10 + 0.5 * (last - 19))
+    assert half.after(track, 20) == last - 19
+
+
+def test_none_of_those_who_are_told_may_be_said() -> None:
+    run = run_of(with_a_gap())
+    for one in queue(run).doubts:
+        parted = [a for a in one.alternatives if all(c.kind == "different" for c in a.corrections)]
+        told = {pair for a in one.alternatives for c in a.corrections for pair in c.pairs}
+        if one.kind != "short":
+            assert parted
+            assert {pair for c in parted[-1].corrections for pair in c.apart} & told

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -16,6 +17,8 @@ from tests.formats.rig import FLIP, SIZE, assert_same, cameras, raw_cameras, rea
 from tracker.camera import Camera
 from tracker.formats.export import Form, save_calibration
 from tracker.formats.pieces import FormatError
+from tracker.formats.registry import recognise
+from tracker.formats.source import SourceFile
 
 
 def _storage(path: Path, values: dict[str, np.ndarray]) -> None:
@@ -331,7 +334,7 @@ def test_a_script_of_ones_own(tmp_path: Path) -> None:
     path = tmp_path / "cams.json"
     path.write_text(json.dumps(tables))
     name, _ = read(path)
-    assert name == "JSON or YAML with K, R, t"
+    assert name == "JSON, YAML or .npz with K, R, t"
     for raw, camera in zip(raw_cameras(path), cameras(), strict=True):
         assert raw.name == camera.name
         assert raw.convention.direction is None
@@ -355,3 +358,45 @@ def test_a_lens_that_cameras_do_not_have_is_refused_by_its_name(tmp_path: Path) 
     (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 0 1 a.jpg\n\n")
     with pytest.raises(FormatError, match=r"cameras\.txt.*THIN_PRISM_FISHEYE"):
         raw_cameras(tmp_path / "images.txt")
+
+
+def test_arrays_of_all_cameras(tmp_path: Path) -> None:
+    own = cameras()
+    np.savez(
+        tmp_path / "rig.npz",
+        K=[c.intrinsics for c in own],
+        R=[c.rotation for c in own],
+        t=[c.translation[:, None] for c in own],
+        dist=[c.distortion for c in own],
+        made_with=np.array(["a program"]),
+    )
+    for raw, camera in zip(raw_cameras(tmp_path / "rig.npz"), own, strict=True):
+        assert_same(raw, camera)
+
+
+def test_an_archive_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
+    np.savez_compressed(tmp_path / "rig.npz", K=np.zeros((2000, 1500)))
+    found, _, complaint = recognise(SourceFile(tmp_path / "rig.npz"))
+    assert found is None
+    assert "rig.npz: unpacks to more than 16 MB" in str(complaint)
+
+
+def test_a_lens_and_a_pose_in_a_text_each(tmp_path: Path) -> None:
+    camera = cameras(distortion=False)[0]
+    np.savetxt(tmp_path / "K.txt", camera.intrinsics)
+    pose = np.eye(4)
+    pose[:3] = np.column_stack([camera.rotation, camera.translation])
+    np.savetxt(tmp_path / "pose.txt", pose)
+    (lens,), (stands,) = raw_cameras(tmp_path / "K.txt"), raw_cameras(tmp_path / "pose.txt")
+    assert lens.rotation is None
+    assert stands.intrinsics is None
+    assert_same(replace(lens, rotation=stands.rotation, translation=stands.translation), camera)
+
+
+def test_a_size_by_its_sides(tmp_path: Path) -> None:
+    c = cameras()[0]
+    table = {"K": c.intrinsics.tolist(), "R": c.rotation.tolist(), "t": c.translation.tolist()}
+    size = {"width": SIZE[0], "height": SIZE[1]}
+    (tmp_path / "cams.json").write_text(json.dumps({"a": {**table, "resolution": size}}))
+    (raw,) = raw_cameras(tmp_path / "cams.json")
+    assert raw.image_size == SIZE

@@ -14,6 +14,8 @@ from tests.formats.rig import SIZE, boxes, cameras, read, walks
 from tracker.checks.reading import read_boxes
 from tracker.formats.detections.body import NOSE_HEIGHT, boxes_of
 from tracker.formats.pieces import DetectionPiece, FormatError, TruthPiece
+from tracker.formats.registry import recognise
+from tracker.formats.source import SourceFile
 
 CAMERA = cameras()[0]
 FRAMES, BOXES = boxes(CAMERA, walks())
@@ -331,3 +333,67 @@ def test_alphapose_with_the_joints_of_halpe(tmp_path: Path, count: int) -> None:
     piece = _detections(path)
     assert (piece.camera, piece.frames.tolist()) == ("cam1", [7])
     np.testing.assert_allclose(piece.boxes[0, 1] + piece.boxes[0, 3], 900.0, atol=1.0)
+
+
+def _rows(first: int = 0) -> list[list[float]]:
+    return [[f + first, *b] for f, b in zip(FRAMES.tolist(), BOXES.tolist(), strict=True)]
+
+
+def test_blanks_for_commas_and_a_header_that_is_a_comment(tmp_path: Path) -> None:
+    path = tmp_path / "cam1.txt"
+    lines = ["  ".join([f"{f:.0f}", "7", *map(repr, b), "0.5"]) for f, *b in _rows()]
+    path.write_text("\n".join(["# frame id x y w h score", *lines]))
+    piece = _detections(path)
+    assert piece.layout == "ltwh"
+    _assert_boxes(piece)
+    np.testing.assert_array_equal(piece.scores, 0.5)
+
+
+@pytest.mark.parametrize("sign", [",", " ", "; "])
+def test_five_numbers_without_a_header(tmp_path: Path, sign: str) -> None:
+    path = tmp_path / "cam1.csv"
+    path.write_text("\n".join(sign.join(map(repr, row)) for row in _rows()))
+    piece = _detections(path)
+    assert piece.layout is None
+    _assert_boxes(piece)
+
+
+@pytest.mark.parametrize(("name", "scale"), [("time", 1.0), ("timestamp_ms", 1000.0)])
+@pytest.mark.parametrize("fps", [2.0, 29.97])
+def test_times_in_place_of_frames(tmp_path: Path, name: str, scale: float, fps: float) -> None:
+    """Rounded to milliseconds, and nobody is seen for a while."""
+    path = tmp_path / "cam1.csv"
+    rows = [[round(f / fps, 3) * scale, *b] for f, *b in _rows()]
+    lines = [",".join(map(repr, row)) for row in rows]
+    path.write_text("\n".join([f"{name},left,top,width,height", *lines]))
+    piece = _detections(path)
+    assert piece.fps == pytest.approx(fps, rel=1e-3)
+    assert piece.first_index == 0
+    _assert_boxes(piece)
+
+
+def test_times_that_are_none_since_a_beginning(tmp_path: Path) -> None:
+    path = tmp_path / "cam1.csv"
+    path.write_text("time,left,top,width,height\n1.7e9,1,2,3,4\n1.7000001e9,1,2,3,4\n")
+    with pytest.raises(FormatError, match=r'cam1\.csv.*time.*since the beginning.*"frame"'):
+        _detections(path)
+
+
+def test_a_record_a_line(tmp_path: Path) -> None:
+    path = tmp_path / "boxes.jsonl"
+    by_frame: dict[int, list[dict[str, object]]] = {}
+    for frame, *box in _rows():
+        found = {"bbox": box, "score": 0.5, "label": "person"}
+        by_frame.setdefault(int(frame), []).append(found)
+    lines = [
+        json.dumps({"frame": frame, "camera": "cam1", "detections": found})
+        for frame, found in by_frame.items()
+    ]
+    path.write_text("\n".join(lines))
+    piece = _detections(path)
+    assert piece.camera == "cam1"
+    _assert_boxes(piece)
+    path.write_text("\n".join([*lines[:3], lines[3][:-9]]))
+    found, _, complaint = recognise(SourceFile(path))
+    assert found is None
+    assert "is not valid JSON" in str(complaint)

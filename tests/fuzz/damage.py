@@ -167,8 +167,8 @@ def _field(text: str, done: Damage) -> str:
     fields = [
         "fps", "frames", "time_offset", "timestamps", "video", "images", "detections", "K", "R",
         "t", "projection", "distortion", "lens", "image_size", "first_frame", "format",
-        "detections_first_frame", "detected_steps", "[room]", "[target]", "[[camera]]",
-        "[[template]]", "[ground_truth]",
+        "detections_first_frame", "detected_steps", "appearance", "[room]", "[target]",
+        "[[camera]]", "[[template]]", "[ground_truth]",
     ]  # fmt: skip
     return text[: found.start()] + fields[done.what % len(fields)] + text[found.end() :]
 

@@ -80,7 +80,8 @@ def test_a_camera_without_a_picture_is_blind_elsewhere_too(tmp_path: Path) -> No
     assert view.detections is not None
     chosen = looked_at[view.detections.frames] & (view.detections.frames > 5)
     every = view.detections
-    boxes = Detections(every.frames[chosen], every.boxes[chosen], every.scores[chosen])
+    looks = np.eye(5, dtype=np.float16)[np.arange(chosen.sum()) % 5]
+    boxes = Detections(every.frames[chosen], every.boxes[chosen], every.scores[chosen], looks)
     odd = replace(view, detections=boxes, looked_at=looked_at)
     path = tmp_path / "run.zip"
     result = kept(folder, tmp_path / "library.sqlite3")
@@ -90,6 +91,7 @@ def test_a_camera_without_a_picture_is_blind_elsewhere_too(tmp_path: Path) -> No
     np.testing.assert_array_equal(there[0].looked_at, looked_at)
     assert there[0].detections is not None
     np.testing.assert_array_equal(there[0].detections.frames, boxes.frames)
+    np.testing.assert_array_equal(there[0].detections.looks, looks)
     assert there[1].looked_at is None
 
 

@@ -21,7 +21,7 @@ class _Segments:
     """Tracks cut into segments, each followed by at most one."""
 
     def __init__(self, frames: ndarray, ids: ndarray, positions: ndarray, leeway: int) -> None:
-        self.frames = frames
+        self.frames, self.positions = frames, positions
         self.whereabouts = Whereabouts(frames, positions)
         self.leeway = leeway
         order = np.lexsort((frames, ids))
@@ -49,6 +49,39 @@ class _Segments:
         self.following.append(self.following[number])
         self.following[number] = new
         self.of_row[rows[place:]] = new
+
+    def nearest(self, one: int, other: int, after: int, until: int) -> int | None:
+        """The step after one and up to another at which two segments are nearest to each other;
+        None where they are not both there."""
+        mine, theirs = (
+            rows[(self.frames[rows] > after) & (self.frames[rows] <= until)]
+            for rows in (self.rows[one], self.rows[other])
+        )
+        steps, at, there = np.intersect1d(
+            self.frames[mine], self.frames[theirs], return_indices=True
+        )
+        if not len(steps):
+            return None
+        ground = self.positions[:, :2]
+        apart = np.hypot(*(ground[mine[at]] - ground[theirs[there]]).T)
+        return int(steps[np.argmin(apart)])
+
+    def longest_way(self, earlier: int, later: int) -> int:
+        """The row up to a later one of a segment before which it goes farthest in one step."""
+        rows = self.rows[self.of_row[later]]
+        frames = self.frames[rows]
+        own = rows[(frames >= self.frames[earlier]) & (frames <= self.frames[later])]
+        if len(own) < 2:
+            return later
+        way = np.hypot(*np.diff(self.positions[own, :2], axis=0).T)
+        return int(own[1 + np.argmax(way)])
+
+    def cut_from(self, number: int, step: int) -> int:
+        """The segment that begins at a step, cut off where it does not."""
+        rows = self.rows[number]
+        row = int(rows[np.searchsorted(self.frames[rows], step)])
+        self.cut(row)
+        return int(self.of_row[row])
 
     def before(self, number: int) -> int:
         """What a segment follows, -1 for nothing."""
@@ -129,24 +162,27 @@ def _tie(segments: _Segments, one: Correction) -> None:
     pairs: list[tuple[int, int]] = [(a, b) for a, b in found if a is not None and b is not None]
     if len({segments.of_row[b] for _, b in pairs}) < len(pairs):
         return  # both are the same one there
-    if one.kind == "exchanged":
-        for _, later in pairs:
-            segments.cut(later)
     ties = []
     for a, b in pairs:
-        if segments.of_row[b] in segments.chain(int(segments.of_row[a])):
+        earlier, later = int(segments.of_row[a]), int(segments.of_row[b])
+        if later in segments.chain(earlier):
             continue  # so it is
         if not segments.frames[a] < segments.frames[b]:
             return
-        # where both are there at once for a while, the later one is meant from its place on
-        mine, theirs = segments.rows[segments.of_row[a]], segments.rows[segments.of_row[b]]
-        first = max(int(segments.frames[theirs[0]]), int(segments.frames[a]) + 1)
-        for rows in (mine, theirs):
-            later = rows[segments.frames[rows] >= first]
-            if len(later):
-                segments.cut(int(later[0]))
-        ties.append((a, b))
-    for a, b in ties:
+        # where both are there at once for a while, they turn into each other where they meet
+        turn = segments.nearest(
+            earlier, later, int(segments.frames[[a for a, _ in pairs]].max()),
+            int(segments.frames[[b for _, b in pairs]].min()),
+        )  # fmt: skip
+        ties.append((a, b, turn))
+    for a, b, turn in ties:
+        if turn is not None:
+            for row in (a, b):
+                number = int(segments.of_row[row])
+                own = segments.frames[segments.rows[number]]
+                if own[0] < turn <= own[-1]:
+                    segments.cut_from(number, turn)
+    for a, b, _ in ties:
         earlier, later = int(segments.of_row[a]), int(segments.of_row[b])
         if later not in segments.chain(earlier):
             segments.tie(earlier, later)
@@ -158,7 +194,8 @@ def _part(segments: _Segments, one: Correction) -> None:
         return
     if segments.of_row[later] not in segments.chain(int(segments.of_row[earlier])):
         return
-    segments.cut(later)
+    if segments.of_row[earlier] == segments.of_row[later]:
+        segments.cut(segments.longest_way(earlier, later))
     segments.part(int(segments.of_row[later]))
 
 

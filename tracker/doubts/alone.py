@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from tracker.doubts.doubt import Alternative, Doubt, Lanes, unsaid
+from tracker.doubts.linking import Move, Piece
 from tracker.runs.run import Run
 
 _SHORT = 1.0
@@ -19,14 +20,22 @@ _UNSEEN = 1.0
 _CLOSE = 2.0
 """Target widths within which two people are close."""
 
+_ALONE = 1.5
+"""Log odds by which it is rarer that of two who meet one goes on as the other and he as nobody."""
+
 _FASTEST = 3.0
 """Metres a second that nobody in a room exceeds for long."""
 
 
 def of_tracks(run: Run, lanes: Lanes) -> Iterator[Doubt]:
-    """All of them."""
+    """Who may be nobody."""
     for track in lanes.ids.tolist():
         yield from _nobody(run, lanes, track)
+
+
+def moves(run: Run, lanes: Lanes) -> Iterator[Move]:
+    """Where a track may go on as another person: it was gone, or jumps, or met somebody."""
+    for track in lanes.ids.tolist():
         yield from _unseen(run, lanes, track)
         yield from _fast(run, lanes, track)
     yield from _close(run, lanes)
@@ -62,7 +71,7 @@ def _nobody(run: Run, lanes: Lanes, track: int) -> Iterator[Doubt]:
     )  # fmt: skip
 
 
-def _unseen(run: Run, lanes: Lanes, track: int) -> Iterator[Doubt]:
+def _unseen(run: Run, lanes: Lanes, track: int) -> Iterator[Move]:
     """Long misses within a life: who comes back may be somebody else."""
     rows, tracks = lanes.rows[track], run.tracks
     seen = np.flatnonzero(tracks.seen[rows].any(axis=1))
@@ -71,20 +80,13 @@ def _unseen(run: Run, lanes: Lanes, track: int) -> Iterator[Doubt]:
         seconds = (after.step - before.step) * run.sequence.step_time
         if seconds <= _UNSEEN:
             continue
-        wrong = float(0.4 * (1.0 - np.exp(-seconds / 5.0)))
-        stake = min(lanes.count(track, 0, before.step), lanes.count(track, after.step))
-        yield Doubt(
-            "gap", f"{track} is gone for {seconds:.1f} s",
-            f"no camera has it from step {before.step + 1} to {after.step - 1}",
-            before.step, after.step, (track,), (before, after), wrong, stake,
-            (
-                Alternative("as it is", 1.0 - wrong, unsaid("same", (before, after))),
-                Alternative("two people", wrong, unsaid("different", (before, after))),
-            ),
-        )  # fmt: skip
+        why = f"no camera has it from step {before.step + 1} to {after.step - 1}"
+        wrong = 0.4 * (1.0 - np.exp(-seconds / 5.0))
+        piece = Piece(track, after, before)
+        yield Move((piece,), (piece,), "gap", _odds(wrong), why)
 
 
-def _fast(run: Run, lanes: Lanes, track: int) -> Iterator[Doubt]:
+def _fast(run: Run, lanes: Lanes, track: int) -> Iterator[Move]:
     """Where it goes faster than anybody."""
     rows, tracks = lanes.rows[track], run.tracks
     frames, ground = tracks.frames[rows], tracks.positions[rows, :2]
@@ -93,19 +95,12 @@ def _fast(run: Run, lanes: Lanes, track: int) -> Iterator[Doubt]:
     fast = np.flatnonzero(speed > _FASTEST)
     for k in fast[np.diff(fast, prepend=-9) > 1].tolist():
         before, after = lanes.of_row(int(rows[k])), lanes.of_row(int(rows[k + 1]))
-        stake = min(k + 1, len(rows) - k - 1)
-        wrong = float(min(0.3 * speed[k] / _FASTEST, 0.9))
-        yield Doubt(
-            "fast", f"{track} jumps", f"{speed[k]:.1f} m/s at step {after.step}",
-            before.step, after.step, (track,), (before, after), wrong, stake,
-            (
-                Alternative("as it is", 1.0 - wrong, unsaid("same", (before, after))),
-                Alternative("two people", wrong, unsaid("different", (before, after))),
-            ),
-        )  # fmt: skip
+        piece = Piece(track, after, before)
+        why = f"{speed[k]:.1f} m/s at step {after.step}"
+        yield Move((piece,), (piece,), "fast", _odds(min(0.3 * speed[k] / _FASTEST, 0.9)), why)
 
 
-def _close(run: Run, lanes: Lanes) -> Iterator[Doubt]:
+def _close(run: Run, lanes: Lanes) -> Iterator[Move]:
     """Two people so near that they may have been exchanged: once for each time they meet."""
     tracks = run.tracks
     width = 2.0 * float(run.sequence.target_half_extents[:2].mean())
@@ -124,25 +119,16 @@ def _close(run: Run, lanes: Lanes) -> Iterator[Doubt]:
         for part in np.split(np.arange(len(met)), np.flatnonzero(np.diff(steps) > pause) + 1):
             nearest = min((met[k] for k in part.tolist()), key=lambda at: at[1])
             first, last = int(steps[part[0]]) - 1, int(steps[part[-1]]) + 1
-            before = [lanes.place(track, first) for track in (one, other)]
-            after = [lanes.place(track, last, after=True) for track in (one, other)]
-            if max(p.step for p in before) >= min(p.step for p in after):
-                continue
-            heads = [lanes.count(track, 0, first) for track in (one, other)]
-            tails = [lanes.count(track, last) for track in (one, other)]
-            if not min(heads) + min(tails):
-                continue
-            wrong = float(0.12 * np.exp(-nearest[1] / width))
-            told = unsaid("exchanged", (before[0], before[1], after[1], after[0]))
-            now = (
-                *unsaid("same", (before[0], after[0])), *unsaid("same", (before[1], after[1])),
-            )  # fmt: skip
-            if not told:
-                continue
-            yield Doubt(
-                "crossing", f"{one} and {other} pass closely",
-                f"{nearest[1]:.2f} m apart at step {nearest[0]}",
-                first, last, (one, other), (*before, *after), wrong,
-                min(sum(heads), sum(tails)),
-                (Alternative("as it is", 1.0 - wrong, now), Alternative("exchanged", wrong, told)),
-            )  # fmt: skip
+            mine, theirs = (
+                Piece(track, lanes.place(track, last, after=True), lanes.place(track, first))
+                for track in (one, other)
+            )
+            wrong = 0.12 * np.exp(-nearest[1] / width)
+            why = f"{nearest[1]:.2f} m apart at step {nearest[0]}"
+            for i, j in ((mine, theirs), (theirs, mine)):
+                yield Move((i, j), (i, j), "crossing", _odds(wrong), why)
+                yield Move((i,), (i, j), "crossing", _odds(wrong) - _ALONE, why)
+
+
+def _odds(probability: float) -> float:
+    return float(np.log(probability) - np.log1p(-probability))

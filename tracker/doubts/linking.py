@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence as Many
 from dataclasses import dataclass
 
 from tracker.corrections import Place
@@ -15,10 +16,6 @@ class Piece:
     track: int
     begin: Place
     end: Place
-    before: int
-    """Steps of the track up to its end."""
-    after: int
-    """Steps of the track from its begin on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,26 +31,31 @@ class Move:
     odds: float
     """log of how much likelier than what the run has."""
 
+    why: str = ""
+    """In one sentence, where it is not what the odds of joining say."""
+
     @property
-    def stake(self) -> int:
-        """Steps that another person's track would get."""
-        if self.kind == "join":
-            return min(self.earlier[0].before, self.later[0].after)
-        if self.kind == "cut":
-            return min(self.earlier[0].before, self.later[0].after)
-        heads = sum(piece.before for piece in self.earlier)
-        tails = sum(piece.after for piece in self.later)
-        return min(heads, tails)
+    def joins(self) -> bool:
+        """Whether it links what is linked to nothing."""
+        return self.kind == "join"
+
+    def stake(self, heads: Many[float], tails: Many[float]) -> float:
+        """Steps that another person's track would get.
+
+        Args:
+            heads: Steps that hang on each of the earlier.
+            tails: On each of the later.
+        """
+        return min(sum(heads), sum(tails))
 
     @property
     def alternative(self) -> Alternative:
         """What somebody says who makes it; its probability is still to be found."""
-        if self.kind == "cut":
-            (i,), (j,) = self.earlier, self.later
-            return Alternative("two people", 0.0, unsaid("different", (i.end, j.begin)))
-        if self.kind == "join":
+        if len(self.earlier) == 1 and len(self.later) == 1:
             i, j = self.earlier[0], self.later[0]
-            return Alternative(_joined(i, j), 0.0, unsaid("same", (i.end, j.begin)))
+            if self.joins:
+                return Alternative(_joined(i, j), 0.0, unsaid("same", (i.end, j.begin)))
+            return Alternative("two people", 0.0, unsaid("different", (i.end, j.begin)))
         if len(self.earlier) == 2 and len(self.later) == 2:
             (i, other), (j, after) = self.earlier, self.later
             told = unsaid("exchanged", (i.end, other.end, after.begin, j.begin))

@@ -52,17 +52,16 @@ def pieces_of(run: Run, lanes: Lanes) -> tuple[list[Piece | None], Joined | None
             found.append(None)
             continue
         first, last = int(joined.firsts[k]), int(joined.lasts[k])
-        before, after = lanes.count(track, 0, last), lanes.count(track, first)
         begin = Place(first, *joined.begins[k].tolist())
         end = Place(last, *joined.ends[k].tolist())
-        found.append(Piece(track, begin, end, before, after))
+        found.append(Piece(track, begin, end))
     return found, joined
 
 
 def _whole(lanes: Lanes, track: int) -> Piece:
     rows = lanes.rows[track]
     begin, end = lanes.of_row(int(rows[0])), lanes.of_row(int(rows[-1]))
-    return Piece(track, begin, end, len(rows), len(rows))
+    return Piece(track, begin, end)
 
 
 def of_joining(pieces: list[Piece | None], joined: Joined) -> Iterator[Move]:

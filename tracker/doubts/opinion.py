@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Int
@@ -76,12 +77,9 @@ class Opinion:
         earlier = [self.at(one.track, one.end, before=True) for one in move.earlier]
         later = [self.at(one.track, one.begin, before=False) for one in move.later]
         added = 0.0
-        if move.kind == "cut":
+        if len(earlier) == 1 and len(later) == 1:
             if min(earlier[0], later[0]) >= 0:
-                added = _FOR if earlier[0] != later[0] else _AGAINST
-        elif move.kind == "join":
-            if min(earlier[0], later[0]) >= 0:
-                added = _FOR if earlier[0] == later[0] else _AGAINST
+                added = _FOR if (earlier[0] == later[0]) == move.joins else _AGAINST
         else:
             now = [(earlier[0], later[0])]
             new = [(earlier[0], later[-1])] if len(later) == 2 else [(earlier[-1], later[0])]
@@ -95,7 +93,7 @@ class Opinion:
                 added += _FOR
             if differs and all(differs):
                 added += _AGAINST
-        return Move(move.earlier, move.later, move.kind, move.odds + added)
+        return replace(move, odds=move.odds + added)
 
     def moves(self) -> Iterator[Move]:
         """What the other run links otherwise, as moves of even odds for who had none."""
@@ -142,8 +140,4 @@ class Opinion:
                     merged.append(part.tolist())
             for own in merged:
                 begin, end = self._lanes.of_row(own[0]), self._lanes.of_row(own[-1])
-                piece = Piece(
-                    track, begin, end, self._lanes.count(track, 0, end.step),
-                    self._lanes.count(track, begin.step),
-                )  # fmt: skip
-                yield int(self.ids[own[0]]), piece
+                yield int(self.ids[own[0]]), Piece(track, begin, end)

@@ -10,11 +10,12 @@ import numpy as np
 
 from tracker.corrections import Correction, Place
 from tracker.corrections.kinds import leeway
-from tracker.doubts import moves
-from tracker.doubts.alone import of_tracks
+from tracker.doubts import alone, moves
+from tracker.doubts.clear import Clear
 from tracker.doubts.doubt import Alternative, Doubt, Lanes, unsaid
 from tracker.doubts.linking import Move
 from tracker.doubts.opinion import Opinion
+from tracker.doubts.trust import Trust
 from tracker.runs.run import Run
 from tracker.trajectories import Trajectories
 
@@ -22,7 +23,10 @@ MOST = 200
 """Doubtful places that are told; who has answered so many asks again."""
 
 _ALTERNATIVES = 4
-"""Told of each place, beside what the run has."""
+"""Told of each place, beside what the run has and what is never left out."""
+
+_HALF = 0.1
+"""Of the probability of an exchange, that only one of the two goes on as the other."""
 
 _LEAST = 0.5
 """Steps expected to be wrong, below which nobody needs to look."""
@@ -53,7 +57,7 @@ def queue(run: Run, backwards: Trajectories | None = None) -> Queue:
     lanes = Lanes(run.tracks)
     if not len(run.tracks):
         return Queue((), 0, "nobody is tracked")
-    found = [*_linked(run, lanes, backwards), *of_tracks(run, lanes)]
+    found = [*_linked(run, lanes, backwards), *alone.of_tracks(run, lanes)]
     ordered = sorted(found, key=lambda one: (-one.weight, one.first, one.id))
     seen: set[object] = set()
     told: list[Doubt] = []
@@ -84,52 +88,139 @@ def _linked(run: Run, lanes: Lanes, backwards: Trajectories | None) -> Iterable[
     every: list[Move] = [] if joined is None else list(moves.of_joining(pieces, joined))
     known = {(move.earlier[0].end, move.later[-1].begin) for move in every}
     every += moves.of_the_lost(run, lanes, known)
-    if backwards is not None:
-        opinion = Opinion(run.tracks, backwards, run.sequence.step_time)
-        every = [opinion.weighed(move) for move in [*every, *opinion.moves()]]
-    by_site: dict[tuple[str, Place], list[Move]] = {}
+    every += alone.moves(run, lanes)
+    step_time = run.sequence.step_time
+    opinion = None if backwards is None else Opinion(run.tracks, backwards, step_time)
+    if opinion is not None:
+        every += opinion.moves()
+    clear = Clear(lanes, step_time)
+    every = [clear.move(move) for move in every]
+    if opinion is not None:
+        every = [opinion.weighed(move) for move in every]
+    by_site: dict[tuple[int, Place], list[Move]] = {}
     for move in every:
-        for site in _sites(move):
-            by_site.setdefault(site, []).append(move)
-    for options in by_site.values():
-        options.sort(key=lambda move: -move.odds)
-        doubt = _doubt_of(run, options)
+        by_site.setdefault((move.earlier[0].track, move.earlier[0].end), []).append(move)
+    sites = [_Site.of(moves) for moves in by_site.values()]
+    trust = Trust(
+        lanes,
+        (
+            (one.move.earlier[0].track, one.move.earlier[0].end.step,
+             one.move.later[0].begin.step, one.wrong)
+            for one in sites
+            if not one.move.joins
+        ),
+    )  # fmt: skip
+    for one in sites:
+        doubt = _doubt_of(run, one, trust)
         if doubt is not None:
             yield doubt
 
 
-def _sites(move: Move) -> set[tuple[str, Place]]:
-    """The ends and begins that a move links otherwise."""
-    return {("end", move.earlier[0].end)}
+@dataclass(frozen=True, slots=True)
+class _Site:
+    """One moment of a track, and the ways in which it may be otherwise."""
+
+    moves: tuple[Move, ...]
+    """The most probable first, one for each thing that may be said."""
+    alternatives: tuple[Alternative, ...]
+    wrong: float
+    """Probability that it is otherwise."""
+
+    @property
+    def move(self) -> Move:
+        """The most probable one."""
+        return self.moves[0]
+
+    @staticmethod
+    def of(moves: list[Move]) -> _Site:
+        """What several sources say of one moment: of each way the one that thinks it likeliest."""
+        chosen: dict[object, Move] = {}
+        for move in sorted(moves, key=lambda move: -move.odds):
+            chosen.setdefault(move.alternative.corrections, move)
+        kept = tuple(chosen.values())
+        weights = np.exp(np.minimum([move.odds for move in kept], 50.0))
+        total = 1.0 + float(weights.sum())
+        told = tuple(
+            replace(move.alternative, probability=weight / total)
+            for move, weight in zip(kept, weights.tolist(), strict=True)
+        )
+        return _Site(kept, told, float(weights.sum()) / total)
 
 
-def _doubt_of(run: Run, options: list[Move]) -> Doubt | None:
-    odds = np.array([move.odds for move in options])
-    weights = np.exp(np.minimum(odds, 50.0))
-    total = 1.0 + float(weights.sum())
-    wrong = float(weights.sum()) / total
-    best = options[0]
-    others: list[Alternative] = []
-    for move, weight in zip(options, weights.tolist(), strict=True):
-        told = move.alternative
-        if told.corrections and all(told.corrections != one.corrections for one in others):
-            others.append(replace(told, probability=weight / total))
-        if len(others) == _ALTERNATIVES:
-            break
+def _doubt_of(run: Run, site: _Site, trust: Trust) -> Doubt | None:
+    best = site.move
+    now = Alternative("as it is", 1.0 - site.wrong, _as_it_is(best))
+    others = [one for one in site.alternatives if one.corrections][:_ALTERNATIVES]
+    others = [one for one in others if one.corrections != now.corrections]
     if not others:
         return None
-    stake = round(float((weights * [move.stake for move in options]).sum() / weights.sum()))
-    now = Alternative("as it is", 1.0 / total, _as_it_is(best))
+    others = _with_nobody_of_them(best, now, _with_halves(others))
+    shares = np.array([one.probability for one in site.alternatives])
+    stakes = [
+        move.stake(
+            [trust.before(one.track, one.end.step) for one in move.earlier],
+            [trust.after(one.track, one.begin.step) for one in move.later],
+        )
+        for move in site.moves
+    ]
+    stake = round(float((shares * stakes).sum() / shares.sum()))
     places = (*(p.end for p in best.earlier), *(p.begin for p in best.later))
     tracks = tuple(dict.fromkeys(p.track for p in (*best.earlier, *best.later)))
     first, last = min(p.step for p in places), max(p.step for p in places)
     title, why = _words(run, best, tracks)
-    return Doubt(best.kind, title, why, first, last, tracks, places, wrong, stake, (now, *others))
+    return Doubt(
+        best.kind, title, why, first, last, tracks, places, site.wrong, stake, (now, *others)
+    )
+
+
+def _with_halves(others: list[Alternative]) -> list[Alternative]:
+    """The likeliest exchange also as each of its halves: of two who met, one may have left."""
+    for place, one in enumerate(others):
+        if one.corrections[0].kind == "exchanged":
+            halves = [
+                Alternative(words, one.probability * _HALF, unsaid("same", pair))
+                for words, pair in zip(
+                    ("the first goes on as the second", "the second goes on as the first"),
+                    one.corrections[0].pairs,
+                    strict=True,
+                )
+            ]
+            whole = replace(one, probability=one.probability * (1.0 - 2.0 * _HALF))
+            known = [other.corrections for other in others]
+            halves = [half for half in halves if half.corrections not in known]
+            return [*others[:place], whole, *others[place + 1 :], *halves]
+    return others
+
+
+def _with_nobody_of_them(
+    move: Move, now: Alternative, others: list[Alternative]
+) -> list[Alternative]:
+    """Where people go on: that it is none of those who are told.
+
+    Who says so parts somebody from everybody he may have been.
+    """
+    first, last = move.earlier[0].end, move.later[0].begin
+    pairs = dict.fromkeys(
+        (a, b)
+        for one in (now, *others)
+        for told in one.corrections
+        for a, b in told.pairs
+        if a == first or b == last
+    )
+    apart = [one for pair in pairs for one in unsaid("different", pair)]
+    plain = [one for one in others if one.corrections and one.corrections[0].kind == "different"]
+    chance = plain[0].probability if plain else 0.0
+    rest = [one for one in others if one not in plain]
+    if not apart:
+        return others
+    words = "two people" if len(apart) == 1 else "none of these"
+    none = Alternative(words, chance, tuple(apart))
+    return sorted([*rest, none], key=lambda one: -one.probability)
 
 
 def _as_it_is(move: Move) -> tuple[Correction, ...]:
     """What somebody says who says that the run is right."""
-    if move.kind == "join":
+    if move.joins:
         return unsaid("different", (move.earlier[0].end, move.later[0].begin))
     if len(move.earlier) == 2 and len(move.later) == 1:
         return unsaid("same", (move.earlier[0].end, move.later[0].begin))
@@ -145,7 +236,13 @@ def _words(run: Run, move: Move, tracks: tuple[int, ...]) -> tuple[str, str]:
     seconds = (j.begin.step - i.end.step) * run.sequence.step_time
     apart = float(np.hypot(j.begin.x - i.end.x, j.begin.y - i.end.y))
     far = f"{apart:.1f} m away, {seconds:.1f} s later"
-    if move.kind == "join":
+    if move.kind == "gap":
+        return f"{i.track} is gone for {seconds:.1f} s", move.why
+    if move.kind == "fast":
+        return f"{i.track} jumps", move.why
+    if move.kind == "crossing":
+        return f"{i.track} and {j.track} pass closely", move.why
+    if move.joins:
         return (
             f"{i.track} goes on as {j.track}?",
             f"{i.track} ends and {j.track} begins {far}",

@@ -6,11 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Int
+from numpy import ndarray
 
 from tracker import pipeline
+from tracker.assignment import linear_sum_assignment
 from tracker.corrections import Correction, Place
 from tracker.doubts import Doubt, queue
-from tracker.doubts.doubt import said, unsaid
+from tracker.doubts.doubt import said
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.parameters import RunParameters
 from tracker.pipeline import Run
@@ -23,23 +26,39 @@ from tracker.without_truth.others import Given, Look, looked
 class Truthful:
     """Says what is true of a doubtful place, as somebody would who looks at the pictures."""
 
-    def __init__(self, truth: GroundTruth, gate: float) -> None:
-        """Know the truth.
+    def __init__(self, truth: GroundTruth, gate: float, tracks: Trajectories) -> None:
+        """Know the truth, and look at the tracks.
 
         Args:
             truth: Of the recording.
             gate: Metres within which a track is a person's.
+            tracks: That are shown: at each step each is one person's at most.
         """
-        self._truth, self._gate = truth, gate
+        self._truth, self._gate, self._tracks = truth, gate, tracks
+        self._people: dict[int, Int[ndarray, " K"]] = {}
 
     def who(self, place: Place) -> int | None:
-        """Who is at a place; None for nobody."""
-        own = self._truth.at(place.step)
+        """Whose the track at a place is; None for nobody's."""
+        own = self._tracks.at(place.step)
         if own.start == own.stop:
             return None
-        apart = np.hypot(*(self._truth.positions[own, :2] - [place.x, place.y]).T)
+        apart = np.hypot(*(self._tracks.positions[own, :2] - [place.x, place.y]).T)
         best = int(np.argmin(apart))
-        return int(self._truth.ids[own][best]) if apart[best] <= self._gate else None
+        person = int(self._at(place.step)[best])
+        return person if person >= 0 and apart[best] <= self._gate else None
+
+    def _at(self, step: int) -> Int[ndarray, " K"]:
+        """The person of each track at a step, -1 for none."""
+        if step not in self._people:
+            own, theirs = self._tracks.at(step), self._truth.at(step)
+            between = self._tracks.positions[own, None, :2] - self._truth.positions[theirs, :2]
+            apart = np.hypot(between[..., 0], between[..., 1])
+            rows, columns = linear_sum_assignment(np.minimum(apart, 10.0 * self._gate))
+            near = apart[rows, columns] <= self._gate
+            found = np.full(len(apart), -1, dtype=np.int64)
+            found[rows[near]] = self._truth.ids[theirs][columns[near]]
+            self._people[step] = found
+        return self._people[step]
 
     def holds(self, one: Correction) -> bool:
         """Whether something is true."""
@@ -58,18 +77,11 @@ class Truthful:
         return not (now and all(self.holds(one) for one in now))
 
     def answer(self, doubt: Doubt) -> tuple[Correction, ...]:
-        """What is true of a doubtful place; nothing where that cannot be said.
-
-        Where none of the alternatives is true, two who are not the same are parted.
-        """
+        """What is true of a doubtful place, of what is offered; nothing where that cannot be
+        said."""
         for one in doubt.alternatives:
             if one.corrections and all(self.holds(told) for told in one.corrections):
                 return said(one.corrections)
-        for told in doubt.alternatives[0].corrections:
-            for a, b in told.pairs:
-                who = self.who(a), self.who(b)
-                if None not in who and who[0] != who[1]:
-                    return said(unsaid("different", (a, b)))
         return ()
 
 
@@ -105,7 +117,6 @@ def session(
         backwards: Whether the recording was seen backwards in time too, once, before.
     """
     assert sequence.ground_truth is not None
-    person = Truthful(sequence.ground_truth, settings.effective_gate)
     cache = StageCache()
     run = pipeline.compute(sequence, parameters, cache=cache)
     other: Trajectories | None = None
@@ -120,6 +131,7 @@ def session(
         if not doubts:
             return
         doubt = doubts[0]
+        person = Truthful(sequence.ground_truth, settings.effective_gate, run.tracks)
         wrong, more = person.wrong(doubt), person.answer(doubt)
         skipped.add(doubt.id)
         if more:

@@ -125,7 +125,7 @@ def run(context: Context) -> Result:
         raise Unavailable(notes[0].removeprefix("Left out: ").removesuffix("."))
     notes.append(
         "The recording was seen backwards in time once before; an answer is one of the "
-        "alternatives that the program offers, or that two are not the same, or none."
+        "alternatives that the program offers, or none."
     )
     return Result(
         head=(

@@ -287,7 +287,9 @@ def _read(
         reading = read_poses(raws)
         why = "from where the cameras look; the boxes do not tell"
     else:
-        reading = replace(meaning.reading, lean=lean_of(meaning))
+        reading = meaning.reading
+        if convention.up is None:
+            reading = replace(reading, lean=lean_of(meaning))
         if reading.lean != (0.0, 0.0):
             degrees = np.degrees(np.arcsin(np.hypot(*reading.lean)))
             found.append(("level", f"the world is turned by {degrees:.0f}° so that people stand"))

@@ -46,7 +46,7 @@ _UNREADABLE = (
 
 _QUALITY = {"preset": "veryfast", "crf": "32"}
 _ANEW = ("video", "images", "first_frame", "background", "detections",
-         "detections_first_frame", "detected_steps", *CLOCK)  # fmt: skip
+         "detections_first_frame", "detected_steps", "appearance", *CLOCK)  # fmt: skip
 """Fields of a camera that are written anew, by steps; its calibration stays as it is."""
 
 
@@ -122,11 +122,16 @@ def _write_sequence(folder: Path, sequence: Sequence, videos: bool) -> None:
             camera["detections"] = f"camera{index + 1}.csv"
             boxes = view.detections
             rows = np.column_stack([boxes.frames, boxes.boxes, boxes.scores]).tolist()
+            looks = boxes.looks
             lines = [f"{int(row[0])}," + ",".join(f"{v:.9g}" for v in row[1:]) for row in rows]
             if view.looked_at is not None:  # a step without a picture is no step without people
                 camera["detected_steps"] = "listed"
                 nobody = np.setdiff1d(np.flatnonzero(view.looked_at), boxes.frames)
                 lines += [f"{step},,,,," for step in nobody.tolist()]
+                looks = np.pad(looks, ((0, len(nobody) if looks.shape[1] else 0), (0, 0)))
+            if looks.shape[1]:
+                camera["appearance"] = f"camera{index + 1}.npy"
+                np.save(folder / camera["appearance"], looks)
             _write_csv(folder / camera["detections"], "frame,left,top,width,height,score", lines)
         if videos and view.has_pictures:
             camera["video"] = f"camera{index + 1}.mp4"

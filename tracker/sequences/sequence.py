@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Float16, Int
 from numpy import ndarray
 
 from tracker.camera import Camera
@@ -82,6 +82,9 @@ class Detections:
     """left, top, width, height, pixels."""
     scores: Float[ndarray, " D"]
     """0 … 1; 1 where the file has none."""
+    looks: Float16[ndarray, "D A"] = field(default_factory=lambda: np.zeros((0, 0), np.float16))
+    """What each box looks like to an outside network, as a unit vector, 0 where it does not say;
+    (0, 0) where there is no file of it."""
 
     def at(self, frame: int) -> slice:
         """The rows of one step."""

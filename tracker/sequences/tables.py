@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Float16, Int
 from numpy import ndarray
 
+from tracker.sequences.appearance import read_appearance
 from tracker.sequences.clock import Clock
 from tracker.sequences.csv_columns import Columns, read_columns
 from tracker.sequences.fields import SMALLEST, Fields, shown
@@ -60,6 +61,8 @@ class BoxTable:
     """Whether only frames that have a row were looked at."""
     file_starts: int
     """Which frame of the camera's file the first picture is."""
+    looks: Float16[ndarray, "N A"]
+    """What each row's box looks like; (0, 0) where no file tells."""
 
     @property
     def steps(self) -> int:
@@ -119,7 +122,8 @@ class BoxTable:
                 f"step {step}; leave out those with low scores",
             )
         boxes: Float[ndarray, "D 4"] = columns.stacked(*BOX)[kept]
-        return Detections(of_row[kept], boxes, scores[kept]), looked_at
+        looks = self.looks[kept] if self.looks.shape[1] else self.looks
+        return Detections(of_row[kept], boxes, scores[kept], looks), looked_at
 
     def _looked_at(
         self, steps: int, clock: Clock | None, of_row: Int[ndarray, " N"]
@@ -151,12 +155,13 @@ def read_box_table(fields: Fields, reading: Reading, file_starts: int) -> BoxTab
         SequenceError: If it cannot be read.
     """
     if "detections" not in fields:
-        for name in ("detections_first_frame", "detected_steps"):
+        for name in ("detections_first_frame", "detected_steps", "appearance"):
             if name in fields:
                 raise fields.error(name, "has no meaning without detections; remove it")
         return None
+    path = locate(reading.folder, fields, "detections")
     columns = reading.columns(
-        locate(reading.folder, fields, "detections"),
+        path,
         needed=("frame", *BOX),
         optional={"score": 1.0},
         blank=(*BOX, "score"),
@@ -165,7 +170,12 @@ def read_box_table(fields: Fields, reading: Reading, file_starts: int) -> BoxTab
     if steps not in ("all", "listed"):
         raise fields.error("detected_steps", f'expected "all" or "listed", found "{steps}"')
     first = fields.integer("detections_first_frame", 0)
-    return BoxTable(columns, first, steps == "listed", file_starts)
+    looks = np.zeros((0, 0), dtype=np.float16)
+    if "appearance" in fields:
+        file = locate(reading.folder, fields, "appearance")
+        reading.files.append(file)
+        looks = read_appearance(file, fields, path.name, len(columns))
+    return BoxTable(columns, first, steps == "listed", file_starts, looks)
 
 
 def read_ground_truth(fields: Fields, reading: Reading, frames: int) -> GroundTruth | None:

@@ -28,7 +28,7 @@ from tracker.sequences.tables import BoxTable, Reading, read_box_table
 
 CAMERA = (
     "name", "image_size", "video", "images", "first_frame", *FIELDS, "background",
-    "detections", "detections_first_frame", "detected_steps", *POSE, "projection",
+    "detections", "detections_first_frame", "detected_steps", "appearance", *POSE, "projection",
 )  # fmt: skip
 """The fields of a camera."""
 
@@ -78,7 +78,23 @@ def read_sources(tables: Many[Fields], reading: Reading) -> tuple[Source, ...]:
         if name in [source.name for source in sources]:
             raise fields.error("name", "two cameras have this name; rename one of them")
         sources.append(_source(name, fields, reading))
+    _check_lengths(sources)
     return tuple(sources)
+
+
+def _check_lengths(sources: Many[Source]) -> None:
+    """One network looked into all cameras."""
+    known = [one for one in sources if one.table is not None and one.table.looks.shape[1]]
+    for one in known[1:]:
+        assert one.table is not None
+        assert known[0].table is not None
+        own, first = one.table.looks.shape[1], known[0].table.looks.shape[1]
+        if own != first:
+            raise one.fields.error(
+                "appearance",
+                f'expected vectors of {first:,} numbers as in camera "{known[0].name}", found '
+                f"{own:,}; use one network for all cameras",
+            )
 
 
 def _source(name: str, fields: Fields, reading: Reading) -> Source:

@@ -144,12 +144,14 @@ class DetectionPhd:
         labels = mixture.labels[chosen]
         if p.output == "estimates":
             boxes, box_weights, box_labels = estimates, weights, labels
+            looks = np.zeros((0, 0), np.float16)  # no single box is an estimate's
             sigmas = np.sqrt(np.diagonal(mixture.covariances[chosen], axis1=1, axis2=2))
         else:
             believed = updated.measurement_weights > BELIEVED
             taken = good[believed]
             boxes, sigmas = found.boxes[taken], found.sigmas[taken]
             box_weights = updated.measurement_weights[believed]
+            looks = found.looks_of(taken)
             box_labels = _labels_of_boxes(updated, len(good))[believed]
         return ViewResult(
             boxes=boxes,
@@ -167,6 +169,7 @@ class DetectionPhd:
                 "boxes outside the room": float((~found.plausible).sum()),
                 "cardinality": mixture.cardinality,
             },
+            looks=looks,
         )
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Float16, Int
 from numpy import ndarray
 
 from tracker.boxes import Boxes
@@ -25,6 +25,12 @@ class Detected:
     """Standard deviations of the same four numbers, pixels."""
     plausible: Bool[ndarray, " N"]
     """False where the box contradicts the room: it is clutter."""
+    looks: Float16[ndarray, "N A"] = field(default_factory=lambda: np.zeros((0, 0), np.float16))
+    """What each looks like, as a unit vector; (0, 0) where nobody told."""
+
+    def looks_of(self, chosen: Bool[ndarray, " N"] | Int[ndarray, " K"]) -> Float16[ndarray, "K A"]:
+        """The looks of some of them; (0, 0) where nobody told."""
+        return self.looks[chosen] if self.looks.shape[1] else self.looks
 
 
 class DetectorBoxes:
@@ -51,13 +57,18 @@ class DetectorBoxes:
             sequence, view.camera, all_boxes.boxes[above], all_boxes.scores[above], p
         )
         """Of all steps: the judgement of a box asks for no other."""
+        self._looks = all_boxes.looks[above] if all_boxes.looks.shape[1] else all_boxes.looks
 
     def at(self, frame: int) -> Detected:
         """The boxes of one step."""
         first, last = np.searchsorted(self._frames, [frame, frame + 1])
         rows, found = slice(int(first), int(last)), self._found
         return Detected(
-            found.boxes[rows], found.scores[rows], found.sigmas[rows], found.plausible[rows]
+            found.boxes[rows],
+            found.scores[rows],
+            found.sigmas[rows],
+            found.plausible[rows],
+            self._looks[rows] if self._looks.shape[1] else self._looks,
         )
 
 

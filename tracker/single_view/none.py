@@ -48,6 +48,7 @@ class DetectionBoxes:
         found = self._boxes.at(frame)
         good = found.plausible
         result = ViewResult.of_boxes(found.boxes[good], found.scores[good], found.sigmas[good])
+        result = replace(result, looks=found.looks_of(good))
         if good.all():
             return None, result
         return None, replace(

@@ -76,7 +76,8 @@ class ViewResult:
     method leaves it: :mod:`tracker.single_view.colour.likeness` tells it of all."""
     looks: Float16[ndarray, "N A"] = field(default_factory=lambda: np.zeros((0, 0), np.float16))
     """What each box looks like, as a unit vector: the root of its colour histogram where the
-    method is given pictures; (0, 0) where there is nothing to see of it."""
+    method is given pictures, an outside network's where its detections have such vectors; (0, 0)
+    where there is nothing to see of it."""
     log_ratios: Float[ndarray, " N"] = field(default_factory=lambda: np.zeros(0))
     """Logarithm of how much likelier somebody's box is to look as this one does than a false box,
     beside where it lies: log p(s | person) / p(s | clutter) of a score s, as a target's amplitude

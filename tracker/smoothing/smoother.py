@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Sequence as Many
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -30,9 +34,12 @@ from tracker.smoothing.calibration import (
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.recording import CameraBoxes
 
+_T = TypeVar("_T")
+
 START_SIGMA = 10.0
 """Metres: how little is known of a path's first place but by its boxes."""
 
+_MOST_THREADS = 4
 _LEAST = 0.01  # association probability of a pair worth keeping
 _SURE = 0.9  # association probability of a box that tells of its person's size
 _ODD = 0.4  # half heights: who is so far off is not standing
@@ -128,34 +135,15 @@ class Smoother:
             iterations: At least 1.
             learnt: Of the boxes; as stated, if none.
         """
-        motion, model, owners = self.model.motion, self.model, paths.owners
+        motion, owners = self.model.motion, paths.owners
         learnt = learnt or self.stated(paths)
         rule = passes.PathMotion(motion.transition, motion.noise, self.prior)
         for _ in range(iterations):
-            rows = len(paths.states)
+            told = self._each_camera(partial(self._told, paths, owners, links, learnt))
             information = evidence.BoxInformation(
-                np.zeros((rows, 3, 3)), np.zeros((rows, 3)), np.zeros(rows)
+                *(np.sum(parts, axis=0) for parts in zip(*told, strict=True))
             )
-            for c, camera in enumerate(self.cameras):
-                own = links.take(links.cameras == c)
-                seen = self._seen(
-                    c, paths.states[own.rows], paths.covariances[own.rows], owners[own.rows], learnt
-                )
-                # who stands behind the lens cannot have made the box
-                shares = np.where(seen.valid, own.shares, 0.0)
-                evidence.add_information(
-                    evidence.BoxLinks(own.rows, own.boxes, shares),
-                    paths.states,
-                    paths.covariances,
-                    seen.expected,
-                    learnt.measured(c, camera.measurements),
-                    information,
-                )
-                clutter = model.clutter[c] * camera.clutter_factors[own.boxes]
-                log_hit = np.log(self.parameters.detection_probability / clutter)
-                np.add.at(information.constants, own.rows, own.shares * log_hit)
-            pinned, told = self.pinned(paths)
-            for row, one in zip(pinned.tolist(), told, strict=True):
+            for row, one in zip(*self.pinned(paths), strict=True):
                 precision = float(one.accuracy or 1.0) ** -2
                 information.matrices[row] += precision * np.eye(3)
                 information.vectors[row] += precision * one.places[0].point
@@ -172,6 +160,43 @@ class Smoother:
             found.ahead_covariances,
             found.traces,
         )
+
+    def _each_camera(self, work: Callable[[int], _T]) -> list[_T]:
+        """What some work gives of each camera: the kernels let go of the interpreter."""
+        if len(self.cameras) < 2:
+            return [work(c) for c in range(len(self.cameras))]
+        with ThreadPoolExecutor(min(len(self.cameras), _MOST_THREADS)) as pool:
+            return list(pool.map(work, range(len(self.cameras))))
+
+    def _told(
+        self,
+        paths: Paths,
+        owners: Int[ndarray, " N"],
+        links: Links,
+        learnt: Calibration,
+        camera: int,
+    ) -> evidence.BoxInformation:
+        """What a camera's boxes say of the rows of paths."""
+        rows = len(paths.states)
+        found = evidence.BoxInformation(np.zeros((rows, 3, 3)), np.zeros((rows, 3)), np.zeros(rows))
+        own = links.take(links.cameras == camera)
+        seen = self._seen(
+            camera, paths.states[own.rows], paths.covariances[own.rows], owners[own.rows], learnt
+        )
+        # who stands behind the lens cannot have made the box
+        shares = np.where(seen.valid, own.shares, 0.0)
+        evidence.add_information(
+            evidence.BoxLinks(own.rows, own.boxes, shares),
+            paths.states,
+            paths.covariances,
+            seen.expected,
+            learnt.measured(camera, self.cameras[camera].measurements),
+            found,
+        )
+        clutter = self.model.clutter[camera] * self.cameras[camera].clutter_factors[own.boxes]
+        log_hit = np.log(self.parameters.detection_probability / clutter)
+        found.constants[:] += np.bincount(own.rows, own.shares * log_hit, rows)
+        return found
 
     def pinned(self, paths: Paths) -> tuple[Int[ndarray, " K"], list[Correction]]:
         """The rows of paths that somebody said is there, each of one correction at most: the
@@ -212,9 +237,10 @@ class Smoother:
             order,
             np.searchsorted(steps[order], np.arange(self.frames + 1)),
         )
-        links, shared = [], []
-        for c, camera in enumerate(self.cameras):
-            found = evidence.share_camera(
+
+        def of_camera(c: int) -> evidence.SharedCamera:
+            camera = self.cameras[c]
+            found: evidence.SharedCamera = evidence.share_camera(
                 rows,
                 evidence.CameraSteps(
                     camera.starts,
@@ -226,11 +252,16 @@ class Smoother:
                 self.model.cameras[c].calibration.image_size,
                 self._rule,
             )
-            which = np.full(len(found.links.rows), c, dtype=np.int64)
-            links.append(Links(which, *found.links))
-            shared.append(found)
+            return found
+
+        shared = self._each_camera(of_camera)
         return Shared(
-            Links.joined(links),
+            Links.joined(
+                [
+                    Links(np.full(len(one.links.rows), c, dtype=np.int64), *one.links)
+                    for c, one in enumerate(shared)
+                ]
+            ),
             np.array([one.detection_probabilities for one in shared]),
             np.array([one.missed for one in shared]),
             np.array([one.hidden_by for one in shared]),

@@ -15,10 +15,17 @@ class Import:
 
     sources: Annotated[
         Positional[tuple[Path, ...]],
-        arg(metavar="SOURCE …", help="Files, or a folder with all in it; `formats` lists kinds."),
+        arg(
+            metavar="SOURCE …",
+            help="Files, or a folder with all in it; `formats` lists kinds.",
+            help_behavior_hint="",
+        ),
     ]
-    output: Annotated[Path | None, arg(aliases=["-o"], metavar="FOLDER")] = None
-    """The folder to write; not needed with --dry-run."""
+    output: Annotated[
+        Path | None,
+        arg(aliases=["-o"], metavar="FOLDER", help_behavior_hint="(required without --dry-run)"),
+    ] = None
+    """The folder to write."""
     dry_run: FlagCreatePairsOff[bool] = False
     """Only print what each file is taken for and what was found out."""
     copy: FlagCreatePairsOff[bool] = False

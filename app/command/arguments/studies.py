@@ -147,6 +147,7 @@ class Batch(Where):
         arg(
             metavar="RECORDING …",
             help="Rendered rooms, folders, patterns of folders, or @FILE with one a line.",
+            help_behavior_hint="",
         ),
     ]
     preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: robust)")] = (
@@ -175,7 +176,7 @@ class Tune(Where, OfStudies):
 
     recordings: Annotated[
         Positional[tuple[str, ...]],
-        arg(metavar="RECORDING …", help="Rendered rooms, or folders."),
+        arg(metavar="RECORDING …", help="Rendered rooms, or folders.", help_behavior_hint=""),
     ]
     minutes: float = 5.0
     """How long it seeks."""

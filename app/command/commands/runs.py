@@ -24,6 +24,8 @@ from app.command.arguments.library import (
     StarRun,
 )
 from app.command.terminal import Bar, CommandError, print_json, print_table, say
+from tracker.evaluation.figures import DEFINITIONS, number
+from tracker.evaluation.settings import EvaluationSettings
 from tracker.folders import library_file
 from tracker.library import KEEP, repair
 from tracker.library.records import HEADLINES, KeptRun, Result
@@ -195,7 +197,7 @@ def _show(library: Library, command: ShowRun) -> None:
         "methods": f"{run.single_view} › {run.fusion_method}, seed {run.seed}",
         **{f"value {key}": str(value) for key, value in run.changes.items()},
         "tracks": str(run.targets),
-        **{key: _number(value) for key, value in result.figures.items()},
+        **{_named(key): _with_unit(key, value) for key, value in result.figures.items()},
         "star": "yes" if run.star else "no",
         "tags": ", ".join(run.tags),
         "note": run.note,
@@ -260,7 +262,7 @@ def _diff(library: Library, command: DiffRuns) -> None:
         ("what", a.run.title, b.run.title),
         [(key, str(first), str(second)) for key, (first, second) in told["values"].items()]
         + [
-            (key, _number(first), _number(second))
+            (_named(key), _with_unit(key, first), _with_unit(key, second))
             for key, (first, second) in told["figures"].items()
         ],
     )
@@ -288,6 +290,21 @@ def _flat(values: dict[str, Any]) -> dict[str, Any]:
         else:
             flat[group] = value
     return flat
+
+
+_FIGURES = {one.key: one for one in DEFINITIONS}
+
+
+def _named(key: str) -> str:
+    """A figure by its name; a count of the library by its own."""
+    return _FIGURES[key].name if key in _FIGURES else "Tracks" if key == "targets" else key
+
+
+def _with_unit(key: str, value: float | int | None) -> str:
+    if key not in _FIGURES or value is None:
+        return _number(value)
+    figure = _FIGURES[key]
+    return f"{number(value, figure.digits)} {figure.unit_for(EvaluationSettings())}".rstrip()
 
 
 def _number(value: float | int | None) -> str:

@@ -14,7 +14,7 @@ from tracker.filters.models import Motion
 from tracker.kernels.smoothing import passes
 from tracker.parameters import with_values
 from tracker.pipeline import Run
-from tracker.smoothing.identity.exchanges import exchange_breaks
+from tracker.smoothing.identity.exchanges import exchange_breaks, turn
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Fitted
 
@@ -55,6 +55,14 @@ def two(steps: int, turn: int) -> list[ndarray]:
 def test_both_are_cut_where_they_turned_into_each_other(turn: int) -> None:
     found = exchange_breaks(fitted(two(20, turn)), reach=2.5, least=0.0, apart=4)
     assert np.flatnonzero(found).tolist() == [turn, 20 + turn]
+
+
+@pytest.mark.parametrize("crossed", [6, 10, 14])
+def test_who_is_said_to_be_the_other_later_turned_where_both_lives_fit(crossed: int) -> None:
+    paths = fitted(two(20, crossed))
+    assert turn(paths, 0, 1, crossed - 5, crossed + 4) == [crossed, 20 + crossed]
+    assert turn(paths, 0, 1, 18, 30) == [19, 39]
+    assert turn(paths, 0, 1, 19, 30) == []
 
 
 def test_who_goes_straight_on_is_not_cut() -> None:

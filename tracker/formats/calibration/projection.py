@@ -1,7 +1,8 @@
-"""3×4 projection matrices, or poses [R | t], as text or ``.npy``.
+"""3×4 projection matrices, poses [R | t] or lenses K, as text or ``.npy``.
 
 Text: twelve numbers a camera, in three lines or in one, with or without a name before them
-(KITTI's ``P0: …``). A left part that is a rotation makes it a pose without a lens.
+(KITTI's ``P0: …``). A left part that is a rotation makes it a pose without a lens; nine numbers
+that are a K make a lens without a pose.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from numpy import ndarray
 from tracker.formats.pieces import CalibrationPiece, Convention, Piece, RawCamera
 from tracker.formats.protocol import Certainty, Kind
 from tracker.formats.source import SourceFile
-from tracker.formats.values import is_rotation
+from tracker.formats.values import intrinsics, is_rotation
 
-NAME = "3×4 projection matrices"
+NAME = "matrices P, [R | t] or K"
 KIND: Kind = "calibration"
 SERIES = False
 
@@ -33,7 +34,7 @@ _ROW = re.compile(
 
 
 def recognise(file: SourceFile) -> Certainty:
-    """A NumPy array of 3×4 or 4×4 matrices, or a text of nothing but rows of them."""
+    """A NumPy array of 3×4, 4×4 or K matrices, or a text of nothing but rows of them."""
     if file.head.startswith(_NPY):
         return Certainty.LIKELY if _shape(file) else Certainty.NO
     if file.size > 2**20 or not file.is_text:
@@ -52,13 +53,24 @@ def read(file: SourceFile) -> Iterator[Piece]:
     yield CalibrationPiece(file.path, NAME, tuple(_camera(file, *item) for item in found))
 
 
-def _camera(file: SourceFile, name: str, matrix: Float[ndarray, "3 4"]) -> RawCamera:
+def _camera(file: SourceFile, name: str, matrix: Float[ndarray, "3 n"]) -> RawCamera:
     if not np.isfinite(matrix).all():
         raise file.error("expected finite numbers", f"camera {name}")
+    if matrix.shape == (3, 3):
+        return RawCamera(name, intrinsics=intrinsics(file, f"camera {name}".strip(), matrix))
     if is_rotation(matrix[:, :3]):
         return RawCamera(name, rotation=matrix[:, :3], translation=matrix[:, 3])
     convention = Convention(direction="world-to-camera", axes="opencv")
     return RawCamera(name, projection=matrix, convention=convention)
+
+
+def _is_lens(matrix: Float[ndarray, "3 3"]) -> bool:
+    """Whether it is upper triangular with focal lengths of some pixels, as no rotation is."""
+    return (
+        bool(np.abs(matrix[[1, 2, 2], [0, 0, 1]]).max() < 1e-9)
+        and matrix[2, 2] == 1.0
+        and bool((np.diag(matrix)[:2] > 10.0).all())
+    )
 
 
 def _shape(file: SourceFile) -> tuple[int, ...] | None:
@@ -74,11 +86,11 @@ def _shape(file: SourceFile) -> tuple[int, ...] | None:
         shape, _, kind = reader(stream)
     except ValueError:
         return None
-    fits = len(shape) in (2, 3) and shape[-2:] in ((3, 4), (4, 4)) and kind.kind in "fiu"
+    fits = len(shape) in (2, 3) and shape[-2:] in ((3, 3), (3, 4), (4, 4)) and kind.kind in "fiu"
     return shape if fits and (len(shape) == 2 or shape[0] <= MOST_CAMERAS) else None
 
 
-def _blocks(text: str) -> list[tuple[str, Float[ndarray, "3 4"]]] | None:
+def _blocks(text: str) -> list[tuple[str, Float[ndarray, "3 n"]]] | None:
     """Name and matrix of every camera; None where the text has anything else."""
     rows: list[tuple[str, list[float]]] = []
     for line in text.splitlines():
@@ -93,6 +105,9 @@ def _blocks(text: str) -> list[tuple[str, Float[ndarray, "3 4"]]] | None:
     if lengths == {12}:
         names = [name or (str(n) if len(rows) > 1 else "") for n, (name, _) in enumerate(rows)]
         return [(n, np.reshape(v, (3, 4))) for n, (_, v) in zip(names, rows, strict=True)]
+    if lengths == {3} and len(rows) == 3:
+        lens = np.array([values for _, values in rows])
+        return [("", lens)] if _is_lens(lens) else None
     if lengths != {4}:
         return None
     table = np.array([values for _, values in rows])

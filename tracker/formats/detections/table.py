@@ -28,6 +28,11 @@ KIND: Kind = "detections"
 SERIES = True
 
 
+_FIVE = ["frame", "1", "2", "3", "4"]
+"""The header that five columns are given which have none: the four numbers of a box, meant
+somehow."""
+
+
 def recognise(file: SourceFile) -> Certainty:
     """A header, or records, with the names of a box or of a person's place."""
     start = file.head_text.lstrip()[:1]
@@ -40,6 +45,8 @@ def recognise(file: SourceFile) -> Certainty:
         return Certainty.LIKELY if has_box or is_table(names) else Certainty.NO
     lines = _data_lines(file.head_text)
     names = _cells(lines[0], _delimiter(lines[0])) if lines else []
+    if names == _FIVE:
+        return Certainty.POSSIBLE
     return Certainty.LIKELY if len(names) > 3 and is_table(_flat_names(names)) else Certainty.NO
 
 
@@ -105,6 +112,8 @@ def _columns(file: SourceFile) -> tuple[dict[str, Column], list[int] | None]:
                 f"row {line}: expected {len(names)} columns as in the header, found {len(row)}"
             )
     cells = list(zip(*rows[1:], strict=True)) or [()] * len(names)
+    if names == _FIVE:
+        return {"frame": cells[0], "box": list(zip(*cells[1:], strict=True))}, None
     return _with_boxes(dict(zip(names, cells, strict=True))), None
 
 
@@ -186,8 +195,17 @@ def _data_lines(text: str) -> list[str]:
         lines[first - 1], first = header, first - 1
     lines = lines[first:]
     if lines and not any(sign in lines[0] for sign in ",;\t"):
-        return [",".join(line.split()) for line in lines]
-    return lines
+        lines = [",".join(line.split()) for line in lines]
+    return [_delimiter(lines[0]).join(_FIVE), *lines] if lines and _is_five(lines[0]) else lines
+
+
+def _is_five(line: str) -> bool:
+    """Whether a line is the whole number of a frame and four numbers of pixels."""
+    try:
+        frame, *four = [float(cell) for cell in re.split("[,;\t]", line)]
+    except ValueError:
+        return False
+    return len(four) == 4 and frame == round(frame) and max(four) > 1.5
 
 
 def _delimiter(line: str) -> str:

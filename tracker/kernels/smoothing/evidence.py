@@ -14,7 +14,7 @@ from tracker.kernels.compilation import kernel
 from tracker.kernels.gating import Measurements
 from tracker.kernels.kalman import Expected
 from tracker.kernels.labelled.camera_update import CameraRule
-from tracker.kernels.linear_algebra import factorise, solve
+from tracker.kernels.linear_algebra import factorise
 from tracker.kernels.measurement import ExpectedBoxes
 
 _NO_SHARE = 1e-6
@@ -30,8 +30,8 @@ class _Room(NamedTuple):
     """(m, m)."""
     column: ndarray
     """(m,)."""
-    solved: ndarray
-    """(m,)."""
+    whitened: ndarray
+    """(m,), L⁻¹ column of the spread L Lᵀ."""
 
 
 @kernel
@@ -53,15 +53,26 @@ def _add_spread(jacobian: ndarray, covariance: ndarray, spread: ndarray) -> None
 
 
 @kernel
+def _whiten(lower: ndarray, right: ndarray, whitened: ndarray) -> float:
+    """L⁻¹ b for a Cholesky factor L, and its squared length."""
+    length = 0.0
+    for p in range(len(right)):
+        value = right[p]
+        for r in range(p):
+            value -= lower[p, r] * whitened[r]
+        value /= lower[p, p]
+        whitened[p] = value
+        length += value * value
+    return length
+
+
+@kernel
 def _log_density(room: _Room) -> float:
-    """log N(column; 0, spread), and spread⁻¹ column in ``solved``."""
+    """log N(column; 0, spread), and the whitened column."""
     size = len(room.column)
     log_determinant = factorise(room.spread, room.lower)
-    solve(room.lower, room.column, room.solved)
-    total = size * math.log(2.0 * math.pi) + log_determinant
-    for p in range(size):
-        total += room.column[p] * room.solved[p]
-    return -0.5 * total
+    length = _whiten(room.lower, room.column, room.whitened)
+    return -0.5 * (size * math.log(2.0 * math.pi) + log_determinant + length)
 
 
 class BoxInformation(NamedTuple):
@@ -202,15 +213,19 @@ def add_information(
             information.constants[k] += a_share * _log_density(room)
             for a in range(3):
                 for p in range(size):
-                    information.vectors[k, a] += a_share * h[p, a] * room.solved[p]
-            for a in range(3):
-                for p in range(size):
                     room.column[p] = h[p, a]
-                solve(room.lower, room.column, halves[a])
-            for a in range(3):
-                for b in range(3):
+                _whiten(room.lower, room.column, halves[a])
+                told = 0.0
+                for p in range(size):
+                    told += halves[a, p] * room.whitened[p]
+                information.vectors[k, a] += a_share * told
+                for b in range(a + 1):
+                    told = 0.0
                     for p in range(size):
-                        information.matrices[k, a, b] += a_share * h[p, a] * halves[b, p]
+                        told += halves[a, p] * halves[b, p]
+                    information.matrices[k, a, b] += a_share * told
+                    if b < a:
+                        information.matrices[k, b, a] += a_share * told
 
 
 @kernel
@@ -302,7 +317,7 @@ def share_camera(
                     log_density = _log_density(room)
                     length = 0.0
                     for p in range(size):
-                        length += room.column[p] * room.solved[p]
+                        length += room.whitened[p] * room.whitened[p]
                     if length > gate:
                         continue
                     detected[i, j] += weights[i] * chances_here[i] * share * math.exp(log_density)

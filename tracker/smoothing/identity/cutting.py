@@ -68,9 +68,6 @@ def cut(
     breaks |= begins
     clear &= ~between
     cut, kept = pieces.cut(paths, clear, breaks)
-    if len(more := seeker.overlaps(cut, kept)):
-        breaks[more] = True
-        cut, kept = pieces.cut(paths, clear, breaks)
     # a short piece says little of who it is; where it is all there is it stays
     lengths = np.diff(cut.starts)
     of = owners[kept[cut.starts[:-1]]]

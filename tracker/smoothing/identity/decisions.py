@@ -7,7 +7,6 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Int
 from numpy import ndarray
-from scipy.special import logsumexp
 
 from tracker.smoothing.identity.pieces import Pairs, same_label
 from tracker.smoothing.paths import Paths
@@ -76,9 +75,10 @@ def joins(
                 found.append(Decision("joined", step, label, name, 1.0, 0.0, "a person said so"))
                 continue
             every = np.array([*by_later[j], anew])
-            chances = np.exp(every - logsumexp(every))
-            own = float(np.exp(gain[i, j] - logsumexp(every)))
-            rest = np.delete(chances, int(np.argmin(np.abs(every - gain[i, j]))))
+            weights = np.exp(every - every.max())
+            chances = weights / weights.sum()
+            which = int(np.argmin(np.abs(every - gain[i, j])))
+            own, rest = float(chances[which]), np.delete(chances, which)
             found.append(
                 Decision(
                     "joined",

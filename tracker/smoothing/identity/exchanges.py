@@ -18,19 +18,13 @@ def exchange_breaks(
 ) -> Bool[ndarray, " N"]:
     """The rows before which two paths are cut, so that each may go on as the other.
 
-    With a_i, A_i what the rows of path i before step k say of it, and Λ_i, η_i the information of
-    its rows from k on, the paths i and j exchanged at k gain
-
-        g = ℓ(a_i, A_i; η_j, Λ_j) + ℓ(a_j, A_j; η_i, Λ_i) − ℓ(a_i, A_i; η_i, Λ_i)
-            − ℓ(a_j, A_j; η_j, Λ_j),    ℓ = log ∫ N(x; a, A) e^{ηᵀx − ½ xᵀΛx} dx
-
     A filter that took the wrong turn where two passed has no row that was near a draw: only
     both lives as a whole tell.
 
     Args:
         fitted: Of the paths.
         reach: Metres on the ground within which two are compared.
-        least: Log odds g from which both are cut: whether they are exchanged is for the joining.
+        least: Log odds from which both are cut: whether they are exchanged is for the joining.
         apart: Steps within which the same two are cut once, where they gain most.
     """
     paths = fitted.paths
@@ -38,6 +32,25 @@ def exchange_breaks(
     one, other = _pairs(fitted, reach)
     if not len(one):
         return breaks
+    gains = gains_of(fitted, one, other)
+    for chosen in _best(paths.owners[one], paths.owners[other], paths.steps[one], gains, apart):
+        if gains[chosen] > least:
+            breaks[[one[chosen], other[chosen]]] = True
+    return breaks
+
+
+def gains_of(
+    fitted: Fitted, one: Int[ndarray, " P"], other: Int[ndarray, " P"]
+) -> Float[ndarray, " P"]:
+    """The log odds of pairs of rows of one step, each path going on as the other from there on.
+
+    With a_i, A_i what the rows of path i before step k say of it, and Λ_i, η_i the information of
+    its rows from k on, the paths i and j exchanged at k gain
+
+        g = ℓ(a_i, A_i; η_j, Λ_j) + ℓ(a_j, A_j; η_i, Λ_i) − ℓ(a_i, A_i; η_i, Λ_i)
+            − ℓ(a_j, A_j; η_j, Λ_j),    ℓ = log ∫ N(x; a, A) e^{ηᵀx − ½ xᵀΛx} dx
+    """
+    paths = fitted.paths
     rows, place = np.unique(np.concatenate([one, other]), return_inverse=True)
     i, j = place[: len(one)], place[len(one) :]
     a, spread = fitted.ahead[rows], fitted.ahead_covariances[rows]
@@ -48,11 +61,30 @@ def exchange_breaks(
     own = log_integral(a, spread, information, vectors)
     gains = log_integral(a[i], spread[i], information[j], vectors[j])
     gains += log_integral(a[j], spread[j], information[i], vectors[i])
-    gains -= own[i] + own[j]
-    for chosen in _best(paths.owners[one], paths.owners[other], paths.steps[one], gains, apart):
-        if gains[chosen] > least:
-            breaks[[one[chosen], other[chosen]]] = True
-    return breaks
+    return np.asarray(gains - own[i] - own[j])
+
+
+def turn(fitted: Fitted, one: int, other: int, after: int, until: int) -> list[int]:
+    """The rows before which two paths are cut so that the one goes on as the other: at the step
+    at which that fits both lives best.
+
+    Args:
+        fitted: Of the paths.
+        one: The path.
+        other: The path that it goes on as.
+        after: The step at which it is still the one.
+        until: The step at which it is the other.
+    """
+    paths = fitted.paths
+    first = max(after + 1, int(paths.firsts[one]) + 1, int(paths.firsts[other]))
+    last = min(until, int(paths.lasts[one]), int(paths.lasts[other]))
+    if last < first:
+        return []  # the one is gone when the other comes
+    steps = np.arange(first, last + 1)
+    own = int(paths.starts[one]) + steps - int(paths.firsts[one])
+    theirs = int(paths.starts[other]) + steps - int(paths.firsts[other])
+    best = int(np.argmax(gains_of(fitted, own, theirs)))
+    return [int(own[best]), int(theirs[best])]
 
 
 def _pairs(fitted: Fitted, reach: float) -> tuple[Int[ndarray, " P"], Int[ndarray, " P"]]:

@@ -71,7 +71,7 @@ def settle(
         looks: A unit vector for each box of each camera; None where there is none.
         corrections: What a person said of who is who.
     """
-    seeker = Seeker(fitted.paths, corrections, corrections_leeway(smoother.model.step_time))
+    seeker = Seeker(fitted, corrections, corrections_leeway(smoother.model.step_time))
     cut, kept, reasons = cutting.cut(
         smoother, fitted, shared, contested, had, names, parameters, seeker
     )

@@ -15,7 +15,9 @@ from numpy import ndarray
 
 from tracker.corrections import Correction, Place
 from tracker.corrections.seeking import Whereabouts, mostly_inside
+from tracker.smoothing.identity.exchanges import turn
 from tracker.smoothing.paths import Paths
+from tracker.smoothing.smoother import Fitted
 
 _EVER = int(np.iinfo(np.int64).max)
 
@@ -112,15 +114,17 @@ class Said(NamedTuple):
 class Seeker:
     """Finds whom corrections mean, among uncut paths and then among their pieces."""
 
-    def __init__(self, paths: Paths, corrections: Many[Correction], leeway: int) -> None:
+    def __init__(self, fitted: Fitted, corrections: Many[Correction], leeway: int) -> None:
         """Look where everybody is.
 
         Args:
-            paths: Before they are cut.
+            fitted: The paths before they are cut.
             corrections: In their order.
             leeway: Steps within which somebody counts who is not there at the very step.
         """
-        self._paths, self._corrections, self._leeway = paths, corrections, leeway
+        paths = fitted.paths
+        self._fitted, self._corrections, self._leeway = fitted, corrections, leeway
+        self._jumps = fitted.jumps if any(one.kind == "different" for one in corrections) else None
         self._steps, self._owners = paths.steps, paths.owners
         self._whereabouts = Whereabouts(self._steps, paths.states[:, :3])
         self._rows = {
@@ -134,15 +138,14 @@ class Seeker:
         }
 
     def breaks(self) -> Bool[ndarray, " N"]:
-        """The rows before which a correction cuts its path."""
+        """The rows before which a correction cuts its path.
+
+        What a person says of two moments says nothing of when between them it happened: that is
+        where it fits the lives before and after best.
+        """
         found = np.zeros(len(self._steps), dtype=bool)
         for one in self._corrections:
-            if one.kind in ("different", "exchanged"):
-                later = one.places[1:] if one.kind == "different" else one.places[2:]
-                for place in later:
-                    if (row := self._rows[place]) is not None:
-                        found[row] = True
-            elif one.kind == "came" and (row := self._rows[one.places[0]]) is not None:
+            if one.kind == "came" and (row := self._rows[one.places[0]]) is not None:
                 found[row] = True
             elif one.kind == "left" and (row := self._rows[one.places[0]]) is not None:
                 if row + 1 < len(found) and self._owners[row + 1] == self._owners[row]:
@@ -154,23 +157,36 @@ class Seeker:
                     found[rows[0]] = True
                     if rows[-1] + 1 < len(found):
                         found[rows[-1] + 1] = True
+            else:
+                found[self._turns(one)] = True
         return found
 
-    def overlaps(self, cut: Paths, kept: Int[ndarray, " M"]) -> Int[ndarray, " K"]:
-        """More rows to cut before: where two pieces of one person are there at once for a while,
-        the later one is meant from its first step on."""
+    def _turns(self, one: Correction) -> list[int]:
+        """Where somebody goes on as somebody else who is not the same for the paths, and where
+        somebody does not go on who is."""
         found: list[int] = []
-        for one in self._corrections:
-            for a, b in one.pairs:
-                i, j = self._piece(a, cut, kept, before=True), self._piece(b, cut, kept)
-                if i == j or min(i, j) < 0 or cut.lasts[i] < cut.firsts[j]:
-                    continue
-                step = max(int(cut.firsts[j]), min(a.step + 1, b.step))
-                for piece in (i, j):
-                    offset = step - int(cut.firsts[piece])
-                    if 0 < offset <= cut.lasts[piece] - cut.firsts[piece]:
-                        found.append(int(kept[cut.starts[piece] + offset]))
-        return np.array(sorted(set(found)), dtype=np.int64)
+        for a, b in one.pairs:
+            earlier, later = self._rows[a], self._rows[b]
+            if earlier is None or later is None or self._owners[earlier] == self._owners[later]:
+                continue
+            before, after = [earlier], [later]
+            if one.kind == "exchanged":  # both turn at once
+                before, after = (
+                    [row for place in some if (row := self._rows[place]) is not None]
+                    for some in (one.places[:2], one.places[2:])
+                )
+            found += turn(
+                self._fitted, int(self._owners[earlier]), int(self._owners[later]),
+                int(self._steps[before].max()), int(self._steps[after].min()),
+            )  # fmt: skip
+        for a, b in one.apart:
+            earlier, later = self._rows[a], self._rows[b]
+            if earlier is None or later is None or earlier >= later or self._jumps is None:
+                continue
+            if one.kind == "different" and self._owners[earlier] == self._owners[later]:
+                between = slice(earlier + 1, later + 1)
+                found.append(earlier + 1 + int(np.argmax(self._jumps[between])))
+        return found
 
     def meant(self, cut: Paths, kept: Int[ndarray, " M"]) -> set[int]:
         """The pieces that a correction speaks of."""
