@@ -21,16 +21,12 @@ from app.command import supervision
 from app.command.arguments.corrections import Corrections
 from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
 from app.command.arguments.library import Bundle, LibraryCommand, OpenRun, Runs
+from app.command.arguments.rooms import Benchmark, Experiment, Parameters, Render, Sequences
 from app.command.arguments.studies import Batch, Study, Tune
 from app.command.flags import (
     Arguments,
-    Benchmark,
     Detect,
     Evaluate,
-    Experiment,
-    Parameters,
-    Render,
-    Sequences,
     Serve,
     Track,
     parse,

@@ -150,13 +150,10 @@ def _size(path: Path) -> int:
         return 0
 
 
-UNKNOWN = "no format that is read (`multiview-phd formats` lists them); it is left out"
-
-
 def _recognise(file: SourceFile) -> tuple[Format | None, Certainty, str]:
     try:
         found, certainty, complaint = recognise(file)
-        return found, certainty, str(complaint or ("" if found else UNKNOWN))
+        return found, certainty, "" if complaint is None else str(complaint)
     except (FormatError, OSError) as error:
         return None, Certainty.NO, str(error)
 

@@ -6,7 +6,7 @@ import sys
 import time
 from pathlib import Path
 
-from app.command.flags import Experiment as Command
+from app.command.arguments.rooms import Experiment as Command
 from app.command.terminal import Bar, CommandError, check_data, print_table, say
 from tracker.experiments import (
     EXPERIMENTS,

@@ -46,7 +46,12 @@ def _import(command: Import) -> int:
     )
     print_table(
         ("file", "taken for", "note"),
-        [(one.label, one.format if one.pieces else "–", one.complaint) for one in taken],
+        [
+            (one.label, one.format, one.complaint)
+            if one.pieces
+            else (one.label, "–", one.complaint or "no format that is read; it is not used")
+            for one in taken
+        ],
     )
     settled = settle(taken, options)
     print()

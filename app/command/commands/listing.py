@@ -6,7 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from app.command.flags import Benchmark, Render, Sequences, describe_range, show
+from app.command.arguments.rooms import Benchmark, Render, Sequences
+from app.command.flags import describe_range, show
 from app.command.terminal import Bar, CommandError, check_data, check_seed, print_table, say
 from tracker import parameters as table
 from tracker.parameters import ParameterError

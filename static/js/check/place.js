@@ -183,6 +183,9 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 				),
 			),
 		);
+		head
+			.querySelector(".seg [aria-pressed=true]")
+			?.scrollIntoView({ block: "nearest", inline: "nearest" });
 		words();
 		buttons();
 	}

@@ -126,7 +126,7 @@ export function mountLibrary(root, { store, actions }) {
 					`Open ${recording.name}`,
 				),
 			);
-		table.show(matching, chosen, focused);
+		table.show(matching, chosen, focused, recording);
 		gone.show(recording);
 		bar.show();
 	}

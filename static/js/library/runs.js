@@ -1,7 +1,7 @@
 /** The table of a recording's runs. */
 import { fill, h, icon } from "../elements/dom.js";
 import { grid } from "../elements/grid.js";
-import { figure, partsOf, when } from "./words.js";
+import { figure, livesAMinute, partsOf, when } from "./words.js";
 
 /** Figures with a bar: what the bar is from and to, and which end is the better. */
 const FIGURES = /** @type {const} */ ([
@@ -10,6 +10,9 @@ const FIGURES = /** @type {const} */ ([
 	["hota", "HOTA", 0.6, 1, 1],
 	["ospa", "OSPA m", 0.2, 0, -1],
 ]);
+
+/** Tracks that begin in a minute, where nothing can be scored. */
+const LIVES = "Tracks/min";
 
 const PILLS = 3;
 
@@ -67,6 +70,8 @@ function keep(hidden) {
 export function runsTable(on) {
 	/** @type {Set<number>} */
 	let ticked = new Set();
+	/** Of the recording, and whether it has a truth. */
+	let [fps, scored] = [0, true];
 	/** @type {Record<string, number | null>} the best of each column */
 	const best = {};
 
@@ -129,6 +134,12 @@ export function runsTable(on) {
 				];
 			},
 		})),
+		{
+			word: LIVES,
+			kind: "num",
+			by: (run) => livesAMinute(run, fps) ?? Infinity,
+			cell: (run) => figure(livesAMinute(run, fps), 1),
+		},
 		{ word: "Tracks", kind: "num", by: (run) => run.targets, cell: (run) => run.targets },
 		{
 			word: "Steps/s",
@@ -151,7 +162,12 @@ export function runsTable(on) {
 	const hidden = new Set(recall());
 	const hide = () => {
 		for (const row of table.element.querySelectorAll("tr"))
-			[...row.cells].forEach((cell, k) => (cell.hidden = hidden.has(columns[k]?.word)));
+			[...row.cells].forEach((cell, k) => {
+				const word = columns[k]?.word;
+				// Figures need a truth; what they are replaced by needs none.
+				const wrong = scored ? word === LIVES : FIGURES.some(([, one]) => one === word);
+				cell.hidden = wrong || hidden.has(word);
+			});
 	};
 	const menu = h("div", { class: "menu plots", popover: "auto", "aria-label": "Columns" });
 	fill(
@@ -195,9 +211,11 @@ export function runsTable(on) {
 		 * @param {Server.KeptRunInfo[]} runs
 		 * @param {Set<number>} chosen
 		 * @param {number | null} focused
+		 * @param {Server.RecordingInfo | null} recording  whose runs they are
 		 */
-		show(runs, chosen, focused) {
+		show(runs, chosen, focused, recording) {
 			ticked = chosen;
+			[fps, scored] = [recording?.fps ?? 0, recording?.people !== null];
 			for (const [key, , , , sign] of FIGURES) {
 				const values = runs.map((run) => run[key]).filter((value) => value !== null);
 				best[key] = values.length > 1 ? sign * Math.max(...values.map((v) => sign * v)) : null;

@@ -11,6 +11,7 @@ const KINDS = /** @type {const} */ ([
 /** @param {Server.RecordingInfo} one */
 function picture(one) {
 	const kept = one.id !== null;
+	if (one.boxes_only) return icon("i-boxes", "l");
 	if (one.missing || (kept && !one.has_thumbnail)) return icon("i-folder");
 	const src = kept
 		? `/api/library/thumbnail/${one.id}.jpg`

@@ -31,6 +31,15 @@ export const size = (bytes) =>
 /** @param {number | null} value @param {number} [digits] */
 export const figure = (value, digits = 3) => (value === null ? "–" : value.toFixed(digits));
 
+/**
+ * How many tracks begin in a minute of the recording: where there is no truth, a run that needs
+ * fewer for the same people breaks them up less.
+ * @param {Pick<Server.KeptRunInfo, "targets" | "steps">} run
+ * @param {number} fps  0 where it is not known
+ */
+export const livesAMinute = ({ targets, steps }, fps) =>
+	fps && steps ? (60 * targets * fps) / steps : null;
+
 /** @param {Server.KeptRunInfo} run */
 export const titleOf = (run) => run.name || `Run ${run.id}`;
 

@@ -208,6 +208,10 @@ export function mountOpening({ store, actions }) {
 		close: () => dialog.close(),
 		files: () => choose(false),
 		folder: () => choose(true),
+		library() {
+			dialog.close();
+			location.hash = "#library";
+		},
 		recording,
 		path: () =>
 			void attempt(async () => {

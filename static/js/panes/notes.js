@@ -18,6 +18,8 @@ export function mountNotes(root, { store, actions, retry }) {
 			h("span", { class: "group" }, buttons),
 			text && h("p", {}, text),
 		);
+	/** A sentence begins with a capital, unless it begins with a name of its own. @param {string} text */
+	const sentence = (text) => text.replace(/^[a-z](?=[a-z]* )/, (letter) => letter.toUpperCase());
 	const button = (/** @type {string} */ word, /** @type {() => void} */ onclick) =>
 		h("button", { class: "btn box", onclick }, word);
 	const close = (/** @type {() => void} */ onclick) =>
@@ -53,7 +55,7 @@ export function mountNotes(root, { store, actions, retry }) {
 				note(
 					"bad",
 					`The run stopped at step ${run.done}`,
-					`${(run.error ?? "The terminal says more").replace(/\.$/, "")}. ${next}`,
+					`${sentence(run.error ?? "The terminal says more").replace(/\.$/, "")}. ${next}`,
 					[
 						server?.changed.length ? button("Reset all parameters", () => actions.reset()) : null,
 						button("Try again", actions.runAgain),

@@ -18,7 +18,8 @@ from tracker.sequences.reader import read_sequence
 from tracker.sequences.rendering import render_random
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
-from tracker.single_view.colour.trust import shape_trust
+from tracker.single_view.colour.trust import shapes_of_templates
+from tracker.single_view.protocol import ViewResult
 from tracker.single_view.shape.channels import Channels
 from tracker.single_view.shape.finder import Shapes, strongest
 from tracker.single_view.shape.windows import ABOVE, BELOW, WIDTH, Windows
@@ -161,7 +162,27 @@ def test_shape_is_believed_of_whose_template_shows_one(room: Sequence) -> None:
     unseen = replace(template, name="elsewhere", camera="none")
     taught = replace(room, templates=(template, nobody, unseen))
     with FrameReader(taught) as reader:
-        trust = shape_trust(taught, reader)
+        found = shapes_of_templates(taught, reader)
+    trust = found.trust
     assert trust[template.name] > 0.5
     assert trust["wall"] < 0.2
     assert trust["elsewhere"] == 0.0
+    # of the three the one shares most of its box with the person by shape, the others nothing
+    assert 0.3 / 3.0 < found.fit < 0.45
+
+
+def test_where_shapes_fit_the_templates_they_place_whom_colours_find(room: Sequence) -> None:
+    def seen(shapes: str) -> list[ViewResult]:
+        chosen = with_values(RunParameters(), {"single_view": "colour_phd"})
+        chosen = with_values(chosen, {"colour_phd.shapes": shapes})
+        run = pipeline.compute(room, chosen, steps=20)
+        return [view for step in run.views for view in step]
+
+    alone, both = seen("never"), seen("fitting")
+    assert not any(len(view.log_ratios) for view in alone)
+    assert all(len(view.log_ratios) == len(view.boxes) for view in both)
+    best = [view for view in both if view.log_ratios.max(initial=-np.inf) > 0.0]
+    assert len(best) > len(both) / 4
+    for view in best:
+        surest = int(view.log_ratios.argmax())
+        assert view.sigmas[surest, 0] < view.boxes[surest, 2], "placed by shape, not by colour"

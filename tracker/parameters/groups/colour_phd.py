@@ -57,14 +57,18 @@ class ColourPeakParams(Params):
     """Whether a camera without a template of a person gets one from where the others' templates
     and the calibration say that the person is."""
 
-    shapes: Annotated[Literal["never", "unsure", "always"], ui("S_h", published="never")] = "unsure"
-    """Whether people found by shape are peaks as well, whatever their colours, and shape judges
-    whom the foreground does not see: where it is not to be believed about somebody, or always."""
+    shapes: Annotated[
+        Literal["never", "unsure", "fitting", "always"], ui("S_h", published="never")
+    ] = "unsure"
+    """Whether people found by shape count as well: where the foreground is not to be believed
+    about somebody; also where they lie where the templates are; or always."""
 
     shape_odds: Annotated[
-        float, Field(ge=-6.0, le=10.0), ui("ln o", step=0.1, when={"shapes": ("unsure", "always")})
+        float,
+        Field(ge=-6.0, le=10.0),
+        ui("ln o", step=0.1, when={"shapes": ("unsure", "fitting", "always")}),
     ] = 2.0
-    """Logarithm of the odds from which somebody found by shape is taken."""
+    """Logarithm of the odds from which somebody found by shape is a peak."""
 
     samples: Annotated[int, Field(ge=20, le=5000), ui("S", unit="1/(camera·step)", log=True)] = 400
     """Boxes that are compared with the templates."""

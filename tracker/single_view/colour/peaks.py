@@ -22,7 +22,7 @@ from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.appearance import Appearance, Scene
-from tracker.single_view.colour.trust import shape_trust, template_trust
+from tracker.single_view.colour.trust import shapes_of_templates, template_trust
 from tracker.single_view.protocol import CANDIDATES, DROPPED, TRUST
 from tracker.single_view.shape.evidence import log_ratios, shape_sigmas
 from tracker.single_view.shape.finder import SAME_PERSON, ShapeFinder, Shapes
@@ -32,6 +32,10 @@ LEAST_LIKELY = 0.02
 
 BELIEVED = 0.9
 """A foreground that is trusted less than this about somebody is helped by shapes."""
+
+FITTING = 0.25
+"""Mean intersection over union with the templates from which people by shape are where the
+templates say: boxes drawn by hand around heads and trunks share 0.4 to 0.5, around bodies 0.6."""
 
 SHAPE_OVERLAP = 0.3
 """Windows of the shapes that share more than this of what both cover are of one person."""
@@ -109,13 +113,19 @@ class PeakFinder:
             carry_templates=p.carry_templates,
         )
         wanted = p.shapes == "always"
-        if p.shapes == "unsure" and p.asks_foreground:
+        self._fits = False
+        """Whether people by shape lie where the templates are."""
+        if p.shapes in ("unsure", "fitting") and p.asks_foreground:
             # who is doubted in one camera is sought by shape in all: one alone tells no place
             wanted = any(
                 trust < BELIEVED
                 for camera in range(len(sequence.views))
                 for trust in template_trust(sequence, camera, reader, foreground).values()
             )
+        if p.shapes == "fitting" or wanted:
+            by_shape = shapes_of_templates(sequence, reader)
+            self._fits = by_shape.fit >= FITTING
+            wanted = wanted or self._fits
         self._shapes = ShapeFinder(sequence, camera_index, reader) if wanted else None
         self._instead = np.zeros(len(self._appearance.model.names))
         """How far the shape stands in for the foreground about each person, 0 … 1."""
@@ -123,9 +133,8 @@ class PeakFinder:
         self._by_shape = np.zeros(len(self._appearance.model.names))
         """How far the shapes are to be believed about each person, 0 … 1."""
         if self._shapes is not None:
-            by_shape = shape_trust(sequence, reader)
             names = self._appearance.model.names
-            self._by_shape = np.array([by_shape[name] for name in names])
+            self._by_shape = np.array([by_shape.trust[name] for name in names])
             self._instead = (1.0 - self._appearance.trust) * self._by_shape
 
     @property
@@ -161,16 +170,16 @@ class PeakFinder:
         background, scene = self._appearance.look(background, picture)
         shapes: Shapes | None = None
         if self._shapes is not None:
-            shape_state, shapes = self._shapes.find(
-                shape_state, picture, min(s.passed_odds, p.shape_odds), SHAPE_OVERLAP
-            )
+            least = min(s.passed_odds, p.shape_odds) if self._fits else p.shape_odds
+            shape_state, shapes = self._shapes.find(shape_state, picture, least, SHAPE_OVERLAP)
         samples = self._sample(intensity, scene, rng)
         scores, _, _ = self._score(scene, shapes, samples)
         candidates = self._climb(samples, scores)
         boxes, distances, person, dropped = self._accept(scene, shapes, candidates)
         passed = None
         if shapes is not None:
-            passed = self._passed(scene, shapes, boxes, distances, person)
+            if self._fits:
+                passed = self._passed(scene, shapes, boxes, distances, person)
             new = np.flatnonzero(~self._near(shapes, boxes).any(axis=1))
             more = shapes.boxes[new[shapes.log_odds[new] >= p.shape_odds]]
             boxes = np.concatenate([boxes, more])
@@ -209,9 +218,13 @@ class PeakFinder:
         s = self._shape_numbers
         near = self._near(found, peaks)
         alone = np.flatnonzero(~near.any(axis=0))
+        seen = self._trusted(person)  # by the foreground, which took each peak for somebody
         ratios = log_ratios(found.log_odds, s.even_odds, s.odds_weight, s.largest_ratio)
+        ratios = ratios + COLOUR_RATIO * near.any(axis=1)
+        ratios = _at_least(ratios, np.where(near, seen, 0.0).max(axis=1, initial=0.0))
         least = log_ratios(np.array(s.passed_odds), s.even_odds, s.odds_weight, s.largest_ratio)
         told = self._by_shape[person[alone]]
+        of_alone = _at_least(np.log(told * np.exp(least) + 1.0 - told), seen[alone])
         return Passed(
             np.concatenate([found.boxes, peaks[alone]]),
             self._likelihood(np.concatenate([self._nearest(scene, found.boxes), distances[alone]])),
@@ -221,12 +234,7 @@ class PeakFinder:
                     self.sigmas(peaks[alone]),
                 ]
             ),
-            np.concatenate(
-                [
-                    ratios + COLOUR_RATIO * near.any(axis=1),
-                    np.log(told * np.exp(least) + 1.0 - told),
-                ]
-            ),
+            np.concatenate([ratios, of_alone]),
         )
 
     def _nearest(self, scene: Scene, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, " N"]:
@@ -359,3 +367,12 @@ class PeakFinder:
             "another at its place": int(good.sum()) - len(kept),
         }
         return candidates[kept], nearest[kept], person[kept], dropped
+
+
+def _at_least(
+    log_ratios: Float[ndarray, " N"], share: Float[ndarray, " N"]
+) -> Float[ndarray, " N"]:
+    """ln (t + (1 - t) Λ) of the likelihood ratios Λ below 1: with probability t what somebody
+    looks like does not speak against him."""
+    mixed = np.log(share + (1.0 - share) * np.exp(np.minimum(log_ratios, 0.0)))
+    return np.asarray(np.where(log_ratios < 0.0, mixed, log_ratios))

@@ -8,6 +8,8 @@ not found by shape.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
@@ -22,6 +24,12 @@ from tracker.single_view.shape.finder import ShapeFinder
 
 PICTURES_BEFORE = 8
 """Before a template's, that are looked at for what moves."""
+
+TEMPLATES_BY_SHAPE = 2
+"""Of each person, that are looked at: each takes a moment before the first step."""
+
+PASSED, OVERLAP = -1.5, 0.3
+"""Log odds from which somebody is there by shape, and what two people there share at most."""
 
 NOTHING, ENOUGH = 0.1, 0.3
 """Shares of foreground in a template's box: below the first the foreground knows nothing of the
@@ -66,43 +74,72 @@ def template_trust(
     return trust
 
 
-def shape_trust(sequence: Sequence, reader: Pictures) -> dict[str, float]:
-    """Trust in the shapes about each person with templates, 0 … 1.
+@dataclass(frozen=True, slots=True)
+class ShapesOfTemplates:
+    """What people by shape are at the templates, which are proof of a person."""
 
-    It is the probability of a person by shape at the likeliest of their templates.
+    trust: dict[str, float]
+    """Of each person with templates, the probability by shape at the likeliest of them."""
+    fit: float
+    """Mean intersection over union of a template and the person by shape there, 0 … 1."""
+
+
+def shapes_of_templates(sequence: Sequence, reader: Pictures) -> ShapesOfTemplates:
+    """How far shapes are to be believed: whether they see who is there, and where he is.
+
+    Who lies, or whose template nobody would take for a person, is not seen by shape. A target
+    that is no head or body, or a floor that is not where the room begins, puts them elsewhere.
 
     Args:
         sequence: Its templates, as stage 1 sees its pictures.
         reader: Of the pictures.
     """
     trust: dict[str, float] = {}
-    for template in sequence.templates:
-        found = _likelihood(sequence, template, reader)
-        trust[template.name] = max(trust.get(template.name, 0.0), found)
-    return trust
+    fits = []
+    for name in dict.fromkeys(template.name for template in sequence.templates):
+        own = [template for template in sequence.templates if template.name == name]
+        for template in own[:TEMPLATES_BY_SHAPE]:
+            likelihood, fit = _by_shape(sequence, template, reader)
+            trust[name] = max(trust.get(name, 0.0), likelihood)
+            fits.append(fit)
+    return ShapesOfTemplates(trust, float(np.mean(fits)) if fits else 0.0)
 
 
-def _likelihood(sequence: Sequence, template: Template, reader: Pictures) -> float:
-    """The probability of a person by shape in a template's box; 0 where nothing can be said."""
+def _by_shape(sequence: Sequence, template: Template, reader: Pictures) -> tuple[float, float]:
+    """The probability of a person by shape in a template's box, and how much of it they share;
+    0 where nothing can be said."""
     names = [view.camera.name for view in sequence.views]
     if template.camera not in names:
-        return 0.0
+        return 0.0, 0.0
     camera = names.index(template.camera)
     what = (template.camera, template.frame, template.box.tobytes())
 
-    def look() -> float:
-        finder = ShapeFinder(sequence, camera, reader)
-        state, odds = finder.start(), -np.inf
-        box = Boxes.from_left_top(template.box[None]).centred
+    def look() -> tuple[float, float]:
+        finder = reader.once(
+            ("shape finder", camera), lambda: ShapeFinder(sequence, camera, reader)
+        )
+        state, seen = finder.start(), (0.0, 0.0)
+        box = Boxes.from_left_top(template.box[None])
         # the pictures before show what moves
         for step in range(max(0, template.frame - PICTURES_BEFORE), template.frame + 1):
             picture = reader.picture(camera, step)
-            if picture is not None:
-                state, found = finder.find(state, picture, np.inf, 1.0)
-                odds = float(found.support(box)[0]) if step == template.frame else -np.inf
-        return float(expit(odds))
+            if picture is None:
+                continue
+            state, found = finder.find(state, picture, PASSED, OVERLAP)
+            if step == template.frame:
+                shared = _overlaps(Boxes(found.boxes), box).max(initial=0.0)
+                seen = float(expit(found.support(box.centred)[0])), float(shared)
+        return seen
 
     return reader.once(("template by shape", what), look)
+
+
+def _overlaps(boxes: Boxes, one: Boxes) -> Float[ndarray, " N"]:
+    """Intersection over union of some boxes with one."""
+    sides = np.maximum(np.minimum(boxes.high, one.high) - np.maximum(boxes.low, one.low), 0.0)
+    shared = sides.prod(axis=1)
+    areas = 4.0 * (boxes.half_sizes.prod(axis=1) + one.half_sizes.prod(axis=1))
+    return np.asarray(shared / np.maximum(areas - shared, 1e-9))
 
 
 def _share(

@@ -98,16 +98,29 @@ def _lists(known: Recordings, open_as: Sequence[str]) -> Markup:
     rooms = [card for card in known.recordings if card.kind == "rendered"]
     return element(
         "section",
-        _cards("Recent", "" if own else "what you open is found here again", own, open_as),
+        _cards(
+            "Recent",
+            "" if own else "what you open is found here again",
+            own,
+            open_as,
+            GROW,
+            button("All in the library", "library", "end"),
+        ),
         _cards("Rendered rooms", "made here in a minute, with truth", rooms, open_as),
         class_="open-list",
         aria_label="Recordings",
     )
 
 
-def _cards(words: str, note: str, cards: Sequence[RecordingCard], open_as: Sequence[str]) -> Markup:
+def _cards(
+    words: str,
+    note: str,
+    cards: Sequence[RecordingCard],
+    open_as: Sequence[str],
+    *beside: Markup,
+) -> Markup:
     found = element("div", [_card(card, open_as) for card in cards], class_="cards")
-    return joined(heading(words, small(note)), found)
+    return joined(heading(words, small(note), *beside), found)
 
 
 def _card(card: RecordingCard, open_as: Sequence[str]) -> Markup:
@@ -120,7 +133,9 @@ def _card(card: RecordingCard, open_as: Sequence[str]) -> Markup:
         or (f"{card.frames} steps" if card.frames else "")
     )
     cameras = f"{card.cameras} camera{'s' if card.cameras > 1 else ''}"
-    blank = element("span", icon("folder", "l"), class_="blank")
+    # under its picture; what was opened and has none has boxes alone
+    sign = "boxes" if card.opened else "folder"
+    blank = element("span", icon(sign, "l"), class_="blank")
     picture = element("img", src=card.picture, alt="", loading="lazy") if card.picture else None
     return element(
         "button",

@@ -1,0 +1,99 @@
+"""Arguments of the commands that need no recording: what there is, rooms that are drawn, claims
+and measurements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg
+
+
+@dataclass
+class Experiment:
+    """Run a claim of the papers again; without a name, list them."""
+
+    name: Annotated[
+        Positional[str | None],
+        arg(metavar="NAME", help="Which one.", help_behavior_hint="(optional)"),
+    ] = None
+    all: FlagCreatePairsOff[bool] = False
+    """Run every one."""
+    quick: FlagCreatePairsOff[bool] = False
+    """Shortened to what shows the direction of each claim."""
+    seeds: Annotated[int | None, arg(help_behavior_hint="(default: each experiment's own)")] = None
+    """How many seeds each case is run with, where chance plays a part."""
+    count: int = 20
+    """Of `rooms`: how many random rooms."""
+    first: int = 0
+    """Of `rooms`: seed of the first; the others follow."""
+    method: Annotated[
+        UseAppendAction[tuple[str, ...]],
+        arg(metavar="NAME", help_behavior_hint="(repeatable; default: all)"),
+    ] = ()
+    """Of `rooms`: only this single-view method."""
+    keep_rooms: FlagCreatePairsOff[bool] = False
+    """Of `rooms`: leave the rendered rooms in the output folder, about 15 MB each."""
+    output: Annotated[Path, arg(metavar="DIR")] = Path("experiment-results")
+    """Folder for the figures (PNG) and numbers (JSON)."""
+    data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None
+    """Folder that holds the real recordings, for the experiments that need one."""
+
+
+@dataclass
+class Sequences:
+    """List the sequences that can be opened by name."""
+
+    data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None
+    """Folder whose folders are sequences too."""
+
+
+@dataclass
+class Render:
+    """Render a built-in room, or with --random a room of any kind, as an ordinary sequence."""
+
+    places: Annotated[
+        Positional[tuple[str, ...]],
+        arg(
+            metavar="[NAME] FOLDER",
+            help="A room (`sequences` lists the names; none with --random), and a folder that "
+            "must not exist yet.",
+            help_behavior_hint="",
+        ),
+    ]
+    random: Annotated[int | None, arg(metavar="SEED", help_behavior_hint="(optional)")] = None
+    """Draw the room by this seed: cameras, lenses, people, light and what disturbs."""
+    detections: FlagCreatePairsOff[bool] = False
+    """With --random: write the boxes too that a detector would find."""
+    cameras: int = 2
+    """Of a built-in room: two as in the paper, or three."""
+    seed: int = 0
+    """Of a built-in room: seed of the noise."""
+
+
+@dataclass
+class Benchmark:
+    """Measure this machine: kernels, filters, pipeline, growth and server. From a checkout only."""
+
+    names: Annotated[
+        Positional[tuple[str, ...]],
+        arg(
+            metavar="[NAME …]",
+            help="Which parts; all, if none is named.",
+            help_behavior_hint="",
+        ),
+    ] = ()
+    short: FlagCreatePairsOff[bool] = False
+    """The shortened form that the checks run."""
+    json: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
+    """Write the figures to this file as well, with the machine and the versions."""
+    record: FlagCreatePairsOff[bool] = False
+    """Append the figures to the record of speed and accuracy over the commits."""
+    chart: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
+    """Measure nothing, but draw that record as one HTML page."""
+
+
+@dataclass
+class Parameters:
+    """List every parameter with its range, unit, default and meaning."""
