@@ -83,6 +83,17 @@ class Move:
         (i,), (_, after) = self.earlier, self.later
         return Alternative(_joined(i, after), 0.0, unsaid("same", (i.end, after.begin)))
 
+    @property
+    def halves(self) -> tuple[Alternative, ...]:
+        """Of an exchange what somebody says who makes only one of its two links."""
+        if len(self.earlier) < 2 or len(self.later) < 2:
+            return ()
+        (i, other), (j, after) = self.earlier, self.later
+        return tuple(
+            Alternative(_joined(a, b), 0.0, unsaid("same", (a.end, b.begin)))
+            for a, b in ((i, after), (other, j))
+        )
+
 
 def _joined(i: Piece, j: Piece) -> str:
     return f"{i.track} goes on as {j.track}" if i.track != j.track else f"{i.track} goes on"

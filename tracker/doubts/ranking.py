@@ -155,7 +155,7 @@ def _doubt_of(run: Run, site: _Site, trust: Trust) -> Doubt | None:
     others = [one for one in others if one.corrections != now.corrections]
     if not others:
         return None
-    others = _with_nobody_of_them(best, now, _with_halves(others))
+    others = _with_nobody_of_them(best, now, _with_halves(site.moves, others))
     shares = np.array([one.probability for one in site.alternatives])
     stakes = [
         move.stake(
@@ -174,21 +174,18 @@ def _doubt_of(run: Run, site: _Site, trust: Trust) -> Doubt | None:
     )
 
 
-def _with_halves(others: list[Alternative]) -> list[Alternative]:
+def _with_halves(moves: Iterable[Move], others: list[Alternative]) -> list[Alternative]:
     """The likeliest exchange also as each of its halves: of two who met, one may have left."""
+    words = {move.alternative.corrections: move.halves for move in moves}
     for place, one in enumerate(others):
         if one.corrections[0].kind == "exchanged":
-            halves = [
-                Alternative(words, one.probability * _HALF, unsaid("same", pair))
-                for words, pair in zip(
-                    ("the first goes on as the second", "the second goes on as the first"),
-                    one.corrections[0].pairs,
-                    strict=True,
-                )
-            ]
-            whole = replace(one, probability=one.probability * (1.0 - 2.0 * _HALF))
             known = [other.corrections for other in others]
-            halves = [half for half in halves if half.corrections not in known]
+            halves = [
+                replace(half, probability=one.probability * _HALF)
+                for half in words[one.corrections]
+                if half.corrections and half.corrections not in known
+            ]
+            whole = replace(one, probability=one.probability * (1.0 - _HALF * len(halves)))
             return [*others[:place], whole, *others[place + 1 :], *halves]
     return others
 
