@@ -253,7 +253,9 @@ def _words(run: Run, move: Move, tracks: tuple[int, ...]) -> tuple[str, str]:
     if len(tracks) > 1:
         return (
             f"{tracks[0]} and {tracks[1]} exchanged?",
-            f"{j.track} begins where {i.track} may go on, {far}",
+            f"a piece of {i.track} fits its end as well, {far}"
+            if i.track == j.track
+            else f"{j.track} begins where {i.track} may go on, {far}",
         )
     return f"{i.track} goes on elsewhere?", f"another piece of it fits, {far}"
 
