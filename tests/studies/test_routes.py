@@ -130,6 +130,15 @@ def test_what_is_not_there_is_told(client: TestClient) -> None:
         assert "expected an address as tcp://10.0.0.1:8786" in answer.json()["error"]
 
 
+def test_no_more_workers_than_the_machine_can_bear(client: TestClient) -> None:
+    before = client.get("/api/studies").json()
+    for body in ({"workers": 1024}, {"workers": 1000, "minutes": 1}):
+        answer = client.post("/api/studies/tune", json=body)
+        assert answer.status_code == 409
+        assert "workers: expected 1 to " in answer.json()["detail"]
+    assert client.get("/api/studies").json() == before
+
+
 @pytest.mark.full
 def test_a_process_of_its_own_runs_it_and_is_stopped(client: TestClient) -> None:
     define(client, trials=500)

@@ -21,6 +21,7 @@ from tracker.studies.errors import StudyError
 from tracker.studies.kept.records import Trial
 from tracker.studies.kept.store import FILE, Store, create, find, stores
 from tracker.studies.told.summary import Summary, summary_of
+from tracker.studies.work.local import how_many
 
 logger = logging.getLogger("app")
 
@@ -86,12 +87,23 @@ class StudyDesk:
             )
         return create(definition, self.folder)
 
+    def check_place(self, workers: int | None, scheduler: str | None) -> None:
+        """Whether a study can run there.
+
+        Raises:
+            StudyError: If there would be more workers than this machine can bear.
+        """
+        if scheduler is None:
+            how_many(workers)
+
     def start(self, name: str, workers: int | None, scheduler: str | None) -> Store:
         """Have a process run a study, or go on with it.
 
         Raises:
-            StudyError: If it runs already, or no process can be started.
+            StudyError: If it runs already, no process can be started, or there would be more
+                workers than this machine can bear.
         """
+        self.check_place(workers, scheduler)
         store = self.store(name)
         if store.is_running():
             raise StudyError(f'the study "{name}" runs already')

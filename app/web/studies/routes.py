@@ -227,6 +227,7 @@ def tune(wish: models.TuneWish, desk: Desk, bench: Bench) -> models.Study:
     if snapshot.sequence is None:
         raise nothing_open()
     try:
+        desk.check_place(wish.workers, wish.scheduler)
         definition = tuning(
             _free_name(desk, f"tune {snapshot.sequence.name}"),
             [views.place_of(snapshot)],

@@ -25,6 +25,7 @@ from tracker.kernels import compilation
 from tracker.studies.errors import StudyError
 from tracker.studies.work import recordings, working
 from tracker.studies.work.jobs import Job, Outcome
+from tracker.studies.work.local import how_many
 from tracker.visible import visible
 
 ADDRESS = "DASK_SCHEDULER_ADDRESS"
@@ -186,7 +187,9 @@ class DaskCrew:
         self._cluster: Any = None
         self._closed = False
         if scheduler is None:
-            self._cluster = self._start(workers or cores(), processes, tell)
+            self._cluster = self._start(
+                how_many(workers) if processes else workers or cores(), processes, tell
+            )
         else:
             _check_address(scheduler)
         target = scheduler if scheduler is not None else self._cluster
