@@ -129,8 +129,12 @@ class _Site:
 
     @property
     def move(self) -> Move:
-        """The most probable one."""
-        return self.moves[0]
+        """The one by which the moment is told: the most probable, but where that only says that a
+        track is two people, the exchange that would explain it."""
+        best = self.moves[0]
+        if best.kind != "cut":
+            return best
+        return next((move for move in self.moves if move.kind == "exchange"), best)
 
     @staticmethod
     def of(moves: list[Move]) -> _Site:
