@@ -21,6 +21,7 @@ from tracker.single_view.protocol import ViewResult
 from tracker.smoothing import lifetimes, reading
 from tracker.smoothing.calibration import Calibration
 from tracker.smoothing.identity import identities, pieces
+from tracker.smoothing.identity.cutting import Tracked
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.result import Decision, Joined, Smoothed
 from tracker.smoothing.smoother import Fitted, Shared, Smoother
@@ -124,10 +125,9 @@ class Identities(Positions):
                     smoother, paths, existences, links, p, learnt, check, turns=1
                 )
                 contested = pieces.contested(fitted.paths, shared.links)
-            found = identities.settle(
-                smoother, fitted, shared, contested, existences == 1.0, names, p, looks,
-                corrections if again == p.rounds - 1 else (),
-            )  # fmt: skip
+            tracked = Tracked(smoother, fitted, shared, contested, existences == 1.0, names)
+            said = corrections if again == p.rounds - 1 else ()
+            found = identities.settle(tracked, p, looks, said)
             check()
             paths, links, names = found.paths, found.links, found.names
             learnt = learnt.of_people(found.origins)

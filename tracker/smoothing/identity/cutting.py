@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -27,18 +27,30 @@ _SHORTEST = 0.4
 """Seconds of a piece that stands for itself; a shorter one, beside longer ones, is left out."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracked:
+    """Tracks whose people are to be settled, and what is known of their N rows."""
+
+    smoother: Smoother
+    """The models."""
+    fitted: Fitted
+    """The filter's tracks, or what was made of them before, fitted to their boxes."""
+    shared: Shared
+    """Whose box each is."""
+    contested: Float[ndarray, " N"]
+    """By which share each row's boxes were as well another's."""
+    had: Bool[ndarray, " N"]
+    """At which rows there was a track before."""
+    names: Int[ndarray, " N"]
+    """The filter's label of each row, -1 where it had nobody."""
+
+
 def cut(
-    smoother: Smoother,
-    fitted: Fitted,
-    shared: Shared,
-    contested: Float[ndarray, " N"],
-    had: Bool[ndarray, " N"],
-    names: Int[ndarray, " N"],
-    p: SmoothingParams,
-    seeker: Seeker,
+    tracked: Tracked, p: SmoothingParams, seeker: Seeker
 ) -> tuple[Paths, Int[ndarray, " M"], Int[ndarray, " N"]]:
     """The pieces under the filter's labels, the row that each of their rows was, and why each row
     was left out: 0 for not, 1 contested, 2 jump, 3 away or not seen."""
+    smoother, fitted, shared = tracked.smoother, tracked.fitted, tracked.shared
     step_time, paths = smoother.model.step_time, fitted.paths
     rows = len(paths.states)
     there, _ = lifetimes(smoother, paths, shared, p)
@@ -47,7 +59,7 @@ def cut(
     fed[smoother.pinned(paths)[0]] = True
     too_long = round(p.gap / step_time)
     away = _long_gaps(paths, fed, too_long) | (there < 0.5)
-    reasons[away | _not_bridged(paths, had, away, too_long)] = 3
+    reasons[away | _not_bridged(paths, tracked.had, away, too_long)] = 3
     around = round(_AROUND / step_time)
     # where boxes err alike for a while, past and future contradict each other by less than it seems
     jumps = np.flatnonzero(fitted.jumps * independence(step_time, p.memory) > p.jump)
@@ -56,7 +68,7 @@ def cut(
         near = np.clip(jumps + offset, 0, rows - 1)
         near = near[owners[near] == owners[jumps]]
         reasons[near] = 2
-    reasons[contested >= p.doubt] = 1
+    reasons[tracked.contested >= p.doubt] = 1
     breaks = np.zeros(rows, dtype=bool)
     breaks[jumps] = True
     breaks |= exchange_breaks(
@@ -64,7 +76,7 @@ def cut(
     )
     breaks |= seeker.breaks()
     clear = _between(paths, fed & (reasons == 0)) & (reasons == 0)
-    begins, between = _of_two(paths, names)
+    begins, between = _of_two(paths, tracked.names)
     breaks |= begins
     clear &= ~between
     cut, kept = pieces.cut(paths, clear, breaks)
@@ -78,7 +90,7 @@ def cut(
     short[list(seeker.meant(cut, kept))] = False
     clear[kept[np.repeat(short, lengths)]] = False
     cut, kept = pieces.cut(paths, clear, breaks)
-    return replace(cut, labels=_named(cut, names[kept])), kept, reasons
+    return replace(cut, labels=_named(cut, tracked.names[kept])), kept, reasons
 
 
 def _of_two(

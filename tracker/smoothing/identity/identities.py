@@ -21,10 +21,11 @@ from tracker.corrections.outcomes import outcomes
 from tracker.parameters import SmoothingParams
 from tracker.smoothing.identity import cutting, joining, odds, pieces
 from tracker.smoothing.identity import decisions as decided
+from tracker.smoothing.identity.cutting import Tracked
 from tracker.smoothing.identity.ties import Seeker, Ties
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.result import Decision, Joined
-from tracker.smoothing.smoother import Fitted, Shared, Smoother
+from tracker.smoothing.smoother import Shared
 
 _SURE = 1e6
 """Log odds of chains that were found somebody's already."""
@@ -49,12 +50,7 @@ class Settled:
 
 
 def settle(
-    smoother: Smoother,
-    fitted: Fitted,
-    shared: Shared,
-    contested: Float[ndarray, " N"],
-    had: Bool[ndarray, " N"],
-    names: Int[ndarray, " N"],
+    tracked: Tracked,
     parameters: SmoothingParams,
     looks: Many[Float[ndarray, "B A"]] | None,
     corrections: Many[Correction] = (),
@@ -65,23 +61,16 @@ def settle(
     after another: who says that it is as it is changes nothing.
 
     Args:
-        smoother: The models.
-        fitted: The filter's tracks, or what was made of them before, fitted to their boxes.
-        shared: Whose box each is.
-        contested: By which share each row's boxes were as well another's.
-        had: At which rows there was a track before.
-        names: The filter's label of each row, -1 where it had nobody.
+        tracked: By the filter, or as settled before.
         parameters: When to cut, and what holds together.
         looks: A unit vector for each box of each camera; None where there is none.
         corrections: What a person said of who is who.
     """
-    leeway = corrections_leeway(smoother.model.step_time)
+    leeway = corrections_leeway(tracked.smoother.model.step_time)
     waiting = [one for one in corrections if one.pairs or one.apart]
     while True:
         obeyed = [one for one in corrections if one not in waiting]
-        found = _settled(
-            smoother, fitted, shared, contested, had, names, parameters, looks, obeyed, leeway
-        )
+        found = _settled(tracked, parameters, looks, obeyed, leeway)
         unmet = _unmet(found.paths, waiting, leeway)
         if not unmet:
             return found
@@ -106,22 +95,16 @@ def _unmet(paths: Paths, waiting: Many[Correction], leeway: int) -> list[Correct
 
 
 def _settled(
-    smoother: Smoother,
-    fitted: Fitted,
-    shared: Shared,
-    contested: Float[ndarray, " N"],
-    had: Bool[ndarray, " N"],
-    names: Int[ndarray, " N"],
+    tracked: Tracked,
     parameters: SmoothingParams,
     looks: Many[Float[ndarray, "B A"]] | None,
     corrections: Many[Correction],
     leeway: int,
 ) -> Settled:
     """Cut and join with all of some corrections."""
+    smoother, fitted, shared = tracked.smoother, tracked.fitted, tracked.shared
     seeker = Seeker(fitted, corrections, leeway)
-    cut, kept, reasons = cutting.cut(
-        smoother, fitted, shared, contested, had, names, parameters, seeker
-    )
+    cut, kept, reasons = cutting.cut(tracked, parameters, seeker)
     ties = seeker.ties(cut, kept)
     links = pieces.moved(shared.links, kept, len(fitted.paths.states))
     refitted = smoother.fit(cut, links)
@@ -164,7 +147,7 @@ def _settled(
     of_piece = np.zeros(len(paths.states), dtype=bool)
     of_piece[rows[rows >= 0]] = True
     names_of = np.full(len(paths.states), -1, dtype=np.int64)
-    names_of[rows[rows >= 0]] = names[kept[rows >= 0]]
+    names_of[rows[rows >= 0]] = tracked.names[kept[rows >= 0]]
     of_pieces = np.full(len(cut.labels), -1, dtype=np.int64)
     for chain, label in zip(chains, labels, strict=True):
         of_pieces[chain] = label
