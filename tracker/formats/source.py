@@ -156,6 +156,26 @@ class SourceFile:
             raise self.error(f"is not a JSON file of data ({error})") from None
 
     @cached_property
+    def json_lines(self) -> list[Any] | None:
+        """The values of a file that has a JSON table on each line; None where it is no such file.
+
+        Raises:
+            FormatError: If a line is not JSON, or it is too large or too deep.
+        """
+        first, *rest = self.head_text.lstrip().split("\n", 1)
+        if not rest or not (first.startswith("{") and first.rstrip().endswith("}")):
+            return None
+        values = []
+        for number, line in enumerate(self.text(MOST_TREE_BYTES).splitlines(), 1):
+            try:
+                values += [json.loads(line)] if line.strip() else []
+            except RecursionError:
+                raise self._too_deep() from None
+            except ValueError:
+                raise self.error(f"line {number}: is not valid JSON, expected a record") from None
+        return values
+
+    @cached_property
     def xml(self) -> ElementTree.Element:
         """The root of an XML file. Entities, which can make a small file endless, are refused.
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 import ast
 import csv
 import io
-import json
 import re
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -20,7 +19,7 @@ from typing import Any
 from tracker.formats.columns import Column, is_table, layout_of, meanings, number_in, read_table
 from tracker.formats.pieces import FormatError, Piece
 from tracker.formats.protocol import Certainty, Kind
-from tracker.formats.source import MOST_TREE_BYTES, SourceFile
+from tracker.formats.source import SourceFile
 from tracker.formats.values import is_list_of_tables
 
 NAME = "table of boxes or places (CSV, JSON)"
@@ -134,7 +133,7 @@ def _with_boxes(columns: dict[str, Column]) -> dict[str, Column]:
 
 def _records(file: SourceFile) -> list[tuple[int | None, dict[str, Any]]]:
     """Records with their frame, where they are in a list a frame."""
-    values = _lines_of_json(file) or file.json
+    values = file.json if file.json_lines is None else _of_lines(file.json_lines)
     if isinstance(values, dict):  # one list under some name
         lists = [value for value in values.values() if is_list_of_tables(value) and value]
         values = lists[0] if len(lists) == 1 else []
@@ -150,26 +149,18 @@ def _records(file: SourceFile) -> list[tuple[int | None, dict[str, Any]]]:
     return [(None, record) for record in values if isinstance(record, dict)]
 
 
-def _lines_of_json(file: SourceFile) -> list[dict[str, Any]]:
-    """The records of a file that has one a line, those of a list among a record's fields each with
-    the record's other fields; empty where it is no such file."""
-    first = file.head_text.lstrip().split("\n", 1)
-    if len(first) == 1 or not (first[0].startswith("{") and first[0].rstrip().endswith("}")):
-        return []
+def _of_lines(values: list[Any]) -> list[dict[str, Any]]:
+    """The records of lines; those of a list among a line's fields each with its other fields."""
     records: list[dict[str, Any]] = []
-    for number, line in enumerate(file.text(MOST_TREE_BYTES).splitlines(), 1):
-        try:
-            record = json.loads(line) if line.strip() else None
-        except (ValueError, RecursionError):
-            raise file.error(f"line {number}: is not valid JSON, expected a record") from None
-        if not isinstance(record, dict):
+    for line in values:
+        if not isinstance(line, dict):
             continue
-        several = [key for key, value in record.items() if is_list_of_tables(value)]
+        several = [key for key, value in line.items() if is_list_of_tables(value)]
         if len(several) == 1:
-            shared = {key: value for key, value in record.items() if key != several[0]}
-            records += [{**shared, **own} for own in record[several[0]]]
+            shared = {key: value for key, value in line.items() if key != several[0]}
+            records += [{**shared, **own} for own in line[several[0]]]
         else:
-            records.append(record)
+            records.append(line)
     return records
 
 
