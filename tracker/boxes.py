@@ -67,3 +67,19 @@ class Boxes:
     def left_top(self) -> Float[ndarray, "*N 4"]:
         """``left, top, width, height``."""
         return np.concatenate([self.low, 2.0 * self.half_sizes], axis=-1)
+
+
+def box_overlaps(
+    first: Float[ndarray, "M 4"], second: Float[ndarray, "N 4"]
+) -> Float[ndarray, "M N"]:
+    """Intersection over union of every box of one set with every box of the other.
+
+    Args:
+        first: left, top, width, height; 0 is shared by boxes without any area.
+        second: The same.
+    """
+    low = np.maximum(first[:, None, :2], second[None, :, :2])
+    high = np.minimum((first[:, :2] + first[:, 2:])[:, None], (second[:, :2] + second[:, 2:])[None])
+    shared = np.maximum(high - low, 0.0).prod(axis=2)
+    areas = first[:, 2:].prod(axis=1)[:, None] + second[:, 2:].prod(axis=1)
+    return np.asarray(shared / np.maximum(areas - shared, np.finfo(float).tiny))

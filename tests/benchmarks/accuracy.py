@@ -13,15 +13,12 @@ from tests.benchmarks.pipeline import DATA
 from tests.golden.pieces import PIECES, Piece
 from tracker import pipeline
 from tracker.evaluation import Evaluation, evaluate_sequence
-from tracker.evaluation.figures import DEFINITIONS
+from tracker.evaluation.figures import BY_KEY
 
 TOLERANCES = {"mota": 0.01, "idf1": 0.02, "ospa": 0.01, "found_share": 0.01}
 """By how much a figure may be worse than the last one on record: MOTA, IDF1 and the share of
 people found as they are, OSPA in metres. One exchange of two ids in a piece, which the last bits
 of a processor may decide, is within it in none but the shortest."""
-
-
-_DEFINITIONS = {definition.key: definition for definition in DEFINITIONS}
 
 
 def run(short: bool) -> Iterator[Measurement]:
@@ -43,7 +40,7 @@ def tracked(piece: Piece) -> Evaluation:
 def _of(piece: Piece) -> Iterator[Measurement]:
     found = tracked(piece)
     for key, tolerance in TOLERANCES.items():
-        value, definition = found[key], _DEFINITIONS[key]
+        value, definition = found[key], BY_KEY[key]
         assert value is not None
         yield Measurement(
             f"{piece.name}, {piece.long_steps} steps: {definition.name}",

@@ -196,6 +196,8 @@ DEFINITIONS: tuple[Definition, ...] = (
         "Share of the true boxes in the pictures that have a pair, all cameras together.",
     ),
 )  # fmt: skip
+
+BY_KEY = {definition.key: definition for definition in DEFINITIONS}
 """All figures, in the order in which tables show them."""
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from tracker.boxes import box_overlaps
 from tracker.camera import Camera
 from tracker.evaluation.measures.matching import Comparison, Rows, assign
 
@@ -58,22 +59,6 @@ class CameraScore:
     def false_per_picture(self) -> float | None:
         """Reprojected boxes without a pair, a picture; None without steps."""
         return (self.estimates - len(self.errors)) / self.steps if self.steps else None
-
-
-def box_overlaps(
-    first: Float[ndarray, "M 4"], second: Float[ndarray, "N 4"]
-) -> Float[ndarray, "M N"]:
-    """Intersection over union of every box of one set with every box of the other.
-
-    Args:
-        first: left, top, width, height; width and height above 0.
-        second: The same.
-    """
-    low = np.maximum(first[:, None, :2], second[None, :, :2])
-    high = np.minimum((first[:, :2] + first[:, 2:])[:, None], (second[:, :2] + second[:, 2:])[None])
-    shared = np.maximum(high - low, 0.0).prod(axis=2)
-    areas = first[:, 2:].prod(axis=1)[:, None] + second[:, 2:].prod(axis=1)
-    return np.asarray(shared / (areas - shared))
 
 
 def _seen(

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
+from tracker.boxes import box_overlaps
 from tracker.evaluation.figures import number
 from tracker.evaluation.measures.matching import assign
-from tracker.evaluation.pixels import box_overlaps
 from tracker.experiments.fig1 import QUICK_STEPS, ROOM
 from tracker.experiments.laboratory import runs
 from tracker.experiments.laboratory.experiment import Context, Experiment, Finding, Result

@@ -136,6 +136,22 @@ class View:
         """Whether there is a video or a list of images."""
         return self.video is not None or bool(self.images)
 
+    def need_pictures(self, sequence: str, instead: str = "") -> None:
+        """Make sure that there are pictures.
+
+        Args:
+            sequence: The name of the sequence, for the sentence.
+            instead: What else can be done, as the sentence's end.
+
+        Raises:
+            ValueError: If there are none.
+        """
+        if not self.has_pictures:
+            raise ValueError(
+                f'camera "{self.camera.name}" of {sequence} has no pictures; give it a video '
+                f"or images in sequence.toml{instead}"
+            )
+
     def frame_at(self, step: int) -> int:
         """The frame of the video or image list that a step shows, -1 for none."""
         if self.clock is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Float16, Int
@@ -28,7 +28,16 @@ class Detected:
     looks: Float16[ndarray, "N A"] = field(default_factory=lambda: np.zeros((0, 0), np.float16))
     """What each looks like, as a unit vector; (0, 0) where nobody told."""
 
-    def looks_of(self, chosen: Bool[ndarray, " N"] | Int[ndarray, " K"]) -> Float16[ndarray, "K A"]:
+    def take(self, rows: slice) -> Detected:
+        """Some of them."""
+        looks = self.looks_of(rows)
+        return Detected(
+            self.boxes[rows], self.scores[rows], self.sigmas[rows], self.plausible[rows], looks
+        )
+
+    def looks_of(
+        self, chosen: slice | Bool[ndarray, " N"] | Int[ndarray, " K"]
+    ) -> Float16[ndarray, "K A"]:
         """The looks of some of them; (0, 0) where nobody told."""
         return self.looks[chosen] if self.looks.shape[1] else self.looks
 
@@ -53,23 +62,15 @@ class DetectorBoxes:
         p, all_boxes = parameters, view.detections
         above = all_boxes.scores >= p.score_threshold
         self._frames = all_boxes.frames[above]
-        self._found = judged(
-            sequence, view.camera, all_boxes.boxes[above], all_boxes.scores[above], p
-        )
+        found = judged(sequence, view.camera, all_boxes.boxes[above], all_boxes.scores[above], p)
+        looks = all_boxes.looks[above] if all_boxes.looks.shape[1] else all_boxes.looks
+        self._found = replace(found, looks=looks)
         """Of all steps: the judgement of a box asks for no other."""
-        self._looks = all_boxes.looks[above] if all_boxes.looks.shape[1] else all_boxes.looks
 
     def at(self, frame: int) -> Detected:
         """The boxes of one step."""
         first, last = np.searchsorted(self._frames, [frame, frame + 1])
-        rows, found = slice(int(first), int(last)), self._found
-        return Detected(
-            found.boxes[rows],
-            found.scores[rows],
-            found.sigmas[rows],
-            found.plausible[rows],
-            self._looks[rows] if self._looks.shape[1] else self._looks,
-        )
+        return self._found.take(slice(int(first), int(last)))
 
 
 def judged(

@@ -24,7 +24,7 @@ from app.command.arguments.library import (
     StarRun,
 )
 from app.command.terminal import Bar, CommandError, print_json, print_table, say
-from tracker.evaluation.figures import DEFINITIONS, number
+from tracker.evaluation.figures import BY_KEY, number
 from tracker.evaluation.settings import EvaluationSettings
 from tracker.folders import library_file
 from tracker.library import KEEP, repair
@@ -292,18 +292,15 @@ def _flat(values: dict[str, Any]) -> dict[str, Any]:
     return flat
 
 
-_FIGURES = {one.key: one for one in DEFINITIONS}
-
-
 def _named(key: str) -> str:
     """A figure by its name; a count of the library by its own."""
-    return _FIGURES[key].name if key in _FIGURES else "Tracks" if key == "targets" else key
+    return BY_KEY[key].name if key in BY_KEY else "Tracks" if key == "targets" else key
 
 
 def _with_unit(key: str, value: float | int | None) -> str:
-    if key not in _FIGURES or value is None:
+    if key not in BY_KEY or value is None:
         return _number(value)
-    figure = _FIGURES[key]
+    figure = BY_KEY[key]
     return f"{number(value, figure.digits)} {figure.unit_for(EvaluationSettings())}".rstrip()
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 from numpy import ndarray
 
 from app import models
-from tracker.boxes import Boxes
+from tracker.boxes import Boxes, box_overlaps
 from tracker.fusion.target_model import TargetModel
 from tracker.pipeline import Run
 from tracker.sequences.sequence import Sequence
@@ -46,7 +46,7 @@ def tell_owners(message: models.Step, sequence: Sequence, run: Run, step: int) -
         if not len(view.measurements):
             continue
         feeding = [(t.id, t.fed_by.box) for t in camera.tracks if t.fed_by is not None]
-        shares = _overlaps(
+        shares = box_overlaps(
             Boxes(view.measurements).left_top, np.array([b for _, b in feeding]).reshape(-1, 4)
         )
         best = shares.argmax(axis=1) if feeding else np.zeros(len(shares), dtype=np.int64)
@@ -79,12 +79,3 @@ def _as_boxes(view: ViewResult, rows: Int[ndarray, " F"]) -> ViewResult:
     boxes = view.measurements[rows]
     sigmas = boxes[:, [2, 3, 2, 3]] * 0.1 if usual is None else np.repeat(usual, len(boxes), axis=0)
     return ViewResult.of_boxes(boxes, view.measurement_scores[rows], sigmas)
-
-
-def _overlaps(a: Float[ndarray, "N 4"], b: Float[ndarray, "M 4"]) -> Float[ndarray, "N M"]:
-    """Intersection over union of boxes ``left, top, width, height``."""
-    low = np.maximum(a[:, None, :2], b[None, :, :2])
-    high = np.minimum(a[:, None, :2] + a[:, None, 2:], b[None, :, :2] + b[None, :, 2:])
-    both = np.maximum(0.0, high - low).prod(axis=-1)
-    union = a[:, 2:].prod(axis=-1)[:, None] + b[:, 2:].prod(axis=-1)[None] - both
-    return np.asarray(both / np.maximum(union, 1e-12))

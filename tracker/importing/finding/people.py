@@ -70,6 +70,7 @@ def rate_of(
 
 
 def rays_of_all(cameras: Sequence[Camera], detections: Sequence[Detections | None]) -> list[Rays]:
+    """The rays of every camera's boxes, none of a camera that has no boxes."""
     nothing = Detections(np.zeros(0, dtype=np.int64), np.zeros((0, 4)), np.zeros(0))
     return [
         rays_of((own or nothing).frames, (own or nothing).boxes, camera)

@@ -71,11 +71,7 @@ class AssociationMatrix:
             ValueError: If the camera has no pictures.
         """
         view = sequence.views[camera_index]
-        if not view.has_pictures:
-            raise ValueError(
-                f'camera "{view.camera.name}" of {sequence.name} has no pictures; give it a video '
-                "or images in sequence.toml, or choose single_view none to use its detections"
-            )
+        view.need_pictures(sequence.name, ", or choose single_view none to use its detections")
         self._parameters = parameters.of(AssociationMatrixParams)
         foreground = parameters.foreground
         self._minimum_area = foreground.minimum_area

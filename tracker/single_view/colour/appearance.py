@@ -78,11 +78,7 @@ class Appearance:
             ValueError: If there are no pictures or templates, or a template cannot be read.
         """
         view = sequence.views[camera_index]
-        if not view.has_pictures:
-            raise ValueError(
-                f'camera "{view.camera.name}" of {sequence.name} has no pictures; give it a video '
-                "or images in sequence.toml, or choose single_view none to use its detections"
-            )
+        view.need_pictures(sequence.name, ", or choose single_view none to use its detections")
         if carry_templates:
             sequence = with_carried(sequence, colour_space, histogram_kernel, reader)
         self.model = read_templates(sequence, colour_space, histogram_kernel, reader)

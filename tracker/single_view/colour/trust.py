@@ -15,7 +15,7 @@ from jaxtyping import Float
 from numpy import ndarray
 from scipy.special import expit
 
-from tracker.boxes import Boxes
+from tracker.boxes import Boxes, box_overlaps
 from tracker.foreground import box_shares, integral, learn
 from tracker.parameters import ForegroundParams
 from tracker.sequences.pictures.frames import Pictures
@@ -127,19 +127,12 @@ def _by_shape(sequence: Sequence, template: Template, reader: Pictures) -> tuple
                 continue
             state, found = finder.find(state, picture, PASSED, OVERLAP)
             if step == template.frame:
-                shared = _overlaps(Boxes(found.boxes), box).max(initial=0.0)
+                there = Boxes(found.boxes).left_top
+                shared = box_overlaps(there, template.box[None]).max(initial=0.0)
                 seen = float(expit(found.support(box.centred)[0])), float(shared)
         return seen
 
     return reader.once(("template by shape", what), look)
-
-
-def _overlaps(boxes: Boxes, one: Boxes) -> Float[ndarray, " N"]:
-    """Intersection over union of some boxes with one."""
-    sides = np.maximum(np.minimum(boxes.high, one.high) - np.maximum(boxes.low, one.low), 0.0)
-    shared = sides.prod(axis=1)
-    areas = 4.0 * (boxes.half_sizes.prod(axis=1) + one.half_sizes.prod(axis=1))
-    return np.asarray(shared / np.maximum(areas - shared, 1e-9))
 
 
 def _share(

@@ -107,11 +107,7 @@ def source_of(
     if p.measurements == "colour" and sequence.templates:
         return _Colours(sequence, camera_index, parameters, reader)
     view = sequence.views[camera_index]
-    if not view.has_pictures:
-        raise ValueError(
-            f'camera "{view.camera.name}" of {sequence.name} has no pictures; give it a video '
-            "or images in sequence.toml, or set jpda.measurements to detections"
-        )
+    view.need_pictures(sequence.name, ", or set jpda.measurements to detections")
     return _Foreground(sequence, camera_index, p, parameters.foreground, reader)
 
 

@@ -51,11 +51,7 @@ class ShapesInCamera:
             ValueError: If the camera has no pictures.
         """
         view = sequence.views[camera_index]
-        if not view.has_pictures:
-            raise ValueError(
-                f'camera "{view.camera.name}" of {sequence.name} has no pictures; give it a video '
-                "or images in sequence.toml"
-            )
+        view.need_pictures(sequence.name)
         self._parameters = parameters.of(ShapesParams)
         self._source = ShapeSource(sequence, camera_index, self._parameters, reader)
         self._tracking = Jpda(sequence, camera_index, parameters, reader, source=self._source)

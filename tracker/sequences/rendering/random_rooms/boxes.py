@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
+from tracker.boxes import box_overlaps
 from tracker.camera import Camera
 from tracker.sequences.rendering.random_rooms.choices import Choices
 from tracker.sequences.rendering.writing import Marked
@@ -117,7 +118,7 @@ def write_detections(path: Path, choices: Choices, number: int, camera: Camera, 
             likely = 0.97 * np.clip((share - 0.1) / (_FOUND - 0.1), 0.0, 1.0)
             if not np.isfinite(box).all() or rng.random() > likely:
                 continue
-            if any(_overlap(box, other) > 0.7 for other in kept):
+            if any(box_overlaps(box[None], other[None])[0, 0] > 0.7 for other in kept):
                 continue
             kept.append(box)
             noisy = box + rng.normal(0.0, 0.03, 4) * np.tile(box[2:], 2)
@@ -133,10 +134,3 @@ def write_detections(path: Path, choices: Choices, number: int, camera: Camera, 
         table.writerow(["frame", "left", "top", "width", "height", "score"])
         for step, box, score in rows:
             table.writerow([step, *(f"{value:.1f}" for value in box), f"{score:.3f}"])
-
-
-def _overlap(first: ndarray, second: ndarray) -> float:
-    low = np.maximum(first[:2], second[:2])
-    high = np.minimum(first[:2] + first[2:], second[:2] + second[2:])
-    common = float(np.prod(np.maximum(high - low, 0.0)))
-    return common / float(np.prod(first[2:]) + np.prod(second[2:]) - common)
