@@ -8,10 +8,8 @@ from importlib.metadata import entry_points
 
 from tracker.formats.calibration import (
     camera_tables,
-    colmap,
     kalibr,
     matlab,
-    nerfstudio,
     opencv,
     panoptic,
     plain,
@@ -20,6 +18,7 @@ from tracker.formats.calibration import (
     ros,
     tsai,
 )
+from tracker.formats.calibration.reconstruction import colmap, nerfstudio
 from tracker.formats.detections import coco, cvat, motchallenge, openpose, table, yolo
 from tracker.formats.pictures import images, times, video
 from tracker.formats.pieces import FormatError

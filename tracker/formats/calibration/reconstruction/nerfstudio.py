@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath
 from typing import Any
 
-from tracker.formats.calibration.colmap import MODELS, MOST_IMAGES, model_lens
+from tracker.formats.calibration.reconstruction.colmap import MODELS, MOST_IMAGES, model_lens
 from tracker.formats.pieces import CalibrationPiece, Convention, Piece, RawCamera
 from tracker.formats.protocol import Certainty, Kind
 from tracker.formats.source import SourceFile
