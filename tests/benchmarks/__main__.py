@@ -14,6 +14,7 @@ from pathlib import Path
 from tests.benchmarks import (
     accuracy,
     cold,
+    full_hd,
     growth,
     jpda,
     kept,
@@ -41,6 +42,7 @@ SUITES = {
     "growth": growth.run,
     "live": live.run,
     "stage_one": stage_one.run,
+    "full_hd": full_hd.run,
     "server": server.run,
     "page": page.run,
     "library": library.run,
