@@ -20,7 +20,7 @@ from tracker.formats.calibration import (
     ros,
     tsai,
 )
-from tracker.formats.detections import coco, cvat, motchallenge, openpose, table, yolo
+from tracker.formats.detections import coco, cvat, motchallenge, nested, openpose, table, yolo
 from tracker.formats.pictures import images, times, video
 from tracker.formats.pieces import FormatError
 from tracker.formats.protocol import Certainty, Format
@@ -49,6 +49,7 @@ FORMATS: tuple[Format, ...] = (
     yolo,
     openpose,
     cvat,
+    nested,
     table,
     wildtrack,
     trc,
