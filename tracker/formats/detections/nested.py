@@ -54,8 +54,9 @@ Key = str | int
 class _Row(NamedTuple):
     path: tuple[Key, ...]
     """The levels that lead to it, without its place among the boxes there."""
-    fields: Mapping[str, Any] | None
-    """None where there is an empty list."""
+    fields: Mapping[str, Any]
+    """Of an empty list only what holds for all that it could hold."""
+    empty: bool = False
     named: bool = False
     """Whether it is a table of named fields."""
     among: bool = False
@@ -74,7 +75,7 @@ def recognise(file: SourceFile) -> Certainty:
     if file.head_text.lstrip()[:1] not in ("[", "{") or file.json_lines is not None:
         return Certainty.NO
     rows = list(islice(_rows(file.json, (), {}), _LOOKED_AT))
-    boxes = [row for row in rows if row.fields is not None]
+    boxes = [row for row in rows if not row.empty]
     levels = _levels(rows)
     if not boxes or levels is None:
         return Certainty.NO
@@ -124,11 +125,11 @@ def _records(
     """The boxes of a file with camera and frame; and every camera's frames that are in it, and
     whether they are told by the file's name."""
     rows = list(_rows(file.json, (), {}))
-    if all(row.fields is None for row in rows):
+    if all(row.empty for row in rows):
         return [], [] if number is None else [("", number, True)]
     levels = _levels(rows)
     if levels is not None:  # an empty list elsewhere is none of boxes
-        depth = len(next(row.path for row in rows if row.fields is not None))
+        depth = len(next(row.path for row in rows if not row.empty))
         rows = [row for row in rows if len(row.path) == depth]
     else:
         raise file.error("expected every box as many levels deep as the others")
@@ -137,14 +138,17 @@ def _records(
     records: list[dict[str, Any]] = []
     looked_at: list[tuple[str, int, bool]] = []
     for row in rows:
-        fields = dict(row.fields or {})
+        fields = dict(row.fields)
         found = meanings(list(fields))
         if levels.camera is not None and "camera" not in found:
             fields["camera"] = str(row.path[levels.camera])
         elif levels.frame is not None and "camera" not in found:
             own_camera = camera_of(str(row.path[levels.frame]))
             fields |= {"camera": own_camera} if several else {}
-        if not {"frame", "time"} & found.keys():
+        if "frame" in found:
+            own = _frame(str(fields[found["frame"]]))
+            looked_at += [] if own is None else [(str(fields.get("camera", "")), own, False)]
+        elif "time" not in found:
             own = number if levels.frame is None else _frame(row.path[levels.frame])
             if own is None:
                 raise file.error(
@@ -153,7 +157,7 @@ def _records(
                 )
             fields["frame"] = own
             looked_at.append((str(fields.get("camera", "")), own, levels.frame is None))
-        if row.fields is not None:
+        if not row.empty:
             records.append(fields)
     return records, looked_at
 
@@ -173,7 +177,7 @@ def _rows(value: Any, path: tuple[Key, ...], shared: Mapping[str, Any]) -> Itera
             numbers = record.get(known.get("box", ""))
             if numbers is None or isinstance(numbers, list):
                 kept = {record_name: record[record_name] for record_name in known.values()}
-                yield _Row(path, {**shared, **kept}, True)
+                yield _Row(path, {**shared, **kept}, named=True)
                 return
         own = {
             key: item
@@ -189,7 +193,7 @@ def _rows(value: Any, path: tuple[Key, ...], shared: Mapping[str, Any]) -> Itera
             yield _Row(path, {**shared, "box": value})
             return
         if not value:
-            yield _Row(path, None)
+            yield _Row(path, shared, empty=True)
             return
         is_row = [isinstance(item, dict) or _is_box(item) for item in value[:3]]
         for place, item in enumerate(value):
@@ -242,13 +246,13 @@ def _frame(key: Key) -> int | None:
 
 def _levels(rows: Sequence[_Row]) -> _Levels | None:
     """Which level holds the frames and which the cameras; None where boxes lie at several."""
-    boxes = [row for row in rows if row.fields is not None]
+    boxes = [row for row in rows if not row.empty]
     depths = Counter(len(row.path) for row in boxes)
     if len(depths) != 1:
         return None
     depth = next(iter(depths))
     keys = [{row.path[level] for row in rows if len(row.path) == depth} for level in range(depth)]
-    own = meanings(list(boxes[0].fields or {}))
+    own = meanings(list(boxes[0].fields))
     frame = None
     if not {"frame", "time"} & own.keys():
         numbered = [
@@ -262,7 +266,11 @@ def _levels(rows: Sequence[_Row]) -> _Levels | None:
     if "camera" in own:
         return _Levels(frame, None)
     for level, names in enumerate(keys):
-        if level == frame or (frame is not None and _are_people(rows, keys, level, frame)):
+        if (
+            level == frame
+            or (frame is None and not all(isinstance(n, str) for n in names))
+            or (frame is not None and _are_people(rows, keys, level, frame))
+        ):
             continue
         name = str(next(iter(names)))
         if len(names) > 1 or (isinstance(next(iter(names)), str) and _is_camera(name)):

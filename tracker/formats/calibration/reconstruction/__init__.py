@@ -1,0 +1,1 @@
+"""Cameras as structure from motion writes them: scale and up are arbitrary."""
