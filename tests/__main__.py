@@ -40,9 +40,11 @@ STAMP = ENVIRONMENT / "installed-from"
 PASSED = ENVIRONMENT / "passed"
 """A digest of the files on which the short form has passed."""
 
-WORKERS = min(4, 1 + (os.cpu_count() or 1))
-"""Processes that run tests side by side, one more than there are cores, since many wait for what
-another process does; each takes up to a gigabyte."""
+CORES = min(4, os.cpu_count() or 1)
+WORKERS = CORES + 1
+"""Processes that run the short form's tests side by side, one more than there are cores, since
+many wait for what another process does; each takes up to a gigabyte. The full form's have a core
+each: a browser and its server keep one busy."""
 
 SHORT = "not full and not long"
 FULL = "full or long"
@@ -159,16 +161,16 @@ def code_checks() -> list[Check]:
 
 def test_runs(arguments: list[str]) -> dict[str, Check]:
     """The tests: the short form, and what it leaves out."""
-    line = (PYTHON, "-m", "pytest", "-n", str(WORKERS), "--dist", "worksteal")
+    line = (PYTHON, "-m", "pytest", "--dist", "worksteal")
     return {
-        name: Check(name, ((*line, "-m", marked, *arguments),))
-        for name, marked in (("tests", SHORT), ("full tests", FULL))
+        name: Check(name, ((*line, "-n", str(workers), "-m", marked, *arguments),))
+        for name, workers, marked in (("tests", WORKERS, SHORT), ("full tests", CORES, FULL))
     }
 
 
 def fuzzing(minutes: float, *how: str) -> tuple[str, ...]:
     """Damaged recordings for some minutes, other ones each time."""
-    return (PYTHON, "-m", "tests.fuzz", f"{minutes:g}", "--workers", str(WORKERS), *how)
+    return (PYTHON, "-m", "tests.fuzz", f"{minutes:g}", "--workers", str(CORES), *how)
 
 
 def digest() -> str:

@@ -96,6 +96,11 @@ without any. With ``--use-angle=swiftshader`` the page too would be put together
 card, which takes some 100 ms of processor time a frame and is nothing that a person has."""
 
 
+PATIENCE = 90.0
+"""Seconds that a browser's test waits for what it expects: the software renderer takes its time
+where other tests work too. How fast the page is, the benchmarks say."""
+
+
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     """Debian's Chromium, headless: one for all tests, since Playwright runs one loop a thread."""
@@ -104,5 +109,6 @@ def browser() -> Iterator[Browser]:
         pytest.skip("no Chromium on this machine: install it (Debian: apt-get install chromium)")
     with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(executable_path=path, args=CHROMIUM_FLAGS)
+        chromium.on("context", lambda context: context.set_default_timeout(1000 * PATIENCE))
         yield chromium
         chromium.close()

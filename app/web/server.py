@@ -343,7 +343,7 @@ class _Room:
     def open(self, entrance: Entrance) -> None:
         """Start viser behind its entrance and build scene and sliders in it."""
         from app.scene.panel.controls import Controls
-        from app.scene.room_editing import RoomEditing
+        from app.scene.room.editing import RoomEditing
         from app.scene.scene import Scene
 
         server = start_viser(entrance)

@@ -12,8 +12,9 @@ from playwright.sync_api import Browser, Page, expect
 from tests.browser.looking import ask
 from tests.browser.serving import Server
 from tests.browser.walkers import write_walkers
+from tests.conftest import PATIENCE
 
-expect.set_options(timeout=30_000)  # the software renderer takes its time where others work too
+expect.set_options(timeout=1000 * PATIENCE)
 
 
 @pytest.hookimpl(tryfirst=True)  # the settings that all tests share ask for this mark
@@ -55,7 +56,6 @@ def opened(browser: Browser, server: Server, *, flat: bool = False) -> Iterator[
     """The page of the server in a window of its own, with a finished run."""
     server.wait_for_run()
     context = browser.new_context(viewport={"width": 1440, "height": 900})
-    context.set_default_timeout(60_000)
     if flat:
         context.route("**/viser/**", lambda route: route.abort())
     # what is said once to a new person covers nothing, but moves the panes

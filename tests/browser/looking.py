@@ -13,22 +13,23 @@ from numpy import ndarray
 from playwright.sync_api import FloatRect, Frame, Page
 
 from tests.browser.serving import Server
+from tests.conftest import PATIENCE
 from tests.synthetic import number_in
 
 
 def viser(page: Page) -> Frame:
     """The 3D view inside the page, once it is connected."""
     page.wait_for_selector("iframe")
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         for frame in page.frames:
             if "/viser/" in frame.url and frame.query_selector(".mvp-status[data-step]"):
                 return frame
         page.wait_for_timeout(100)
-    raise AssertionError("the 3D view did not connect within 60 s")
+    raise AssertionError(f"the 3D view did not connect within {PATIENCE} s")
 
 
-def until(page: Page, condition: Callable[[], bool], what: str, seconds: float = 30.0) -> None:
+def until(page: Page, condition: Callable[[], bool], what: str, seconds: float = PATIENCE) -> None:
     """Wait for an end state: the software renderer draws a few frames a second."""
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
@@ -55,8 +56,10 @@ def until_still(page: Page, box: FloatRect) -> None:
 def painted(page: Page) -> list[ndarray]:
     """The cameras' canvases as they are, pictures and overlays."""
     pictures = []
-    for canvas in page.query_selector_all(".cam canvas"):
-        url = canvas.evaluate("canvas => canvas.toDataURL('image/png')")
+    # all at one moment
+    for url in page.locator(".cam canvas").evaluate_all(
+        "all => all.map(canvas => canvas.toDataURL('image/png'))"
+    ):
         data = np.frombuffer(base64.b64decode(url.partition(",")[2]), dtype=np.uint8)
         picture = cv2.imdecode(data, cv2.IMREAD_COLOR)
         assert picture is not None
@@ -72,7 +75,10 @@ def numbers_in_pictures(page: Page) -> list[int]:
 
 def overlay_steps(page: Page) -> list[str | None]:
     """The step whose results are drawn over each picture."""
-    return [cam.get_attribute("data-overlay") for cam in page.query_selector_all(".cam")]
+    steps: list[str | None] = page.locator(".cam").evaluate_all(
+        "all => all.map(cam => cam.getAttribute('data-overlay'))"
+    )
+    return steps
 
 
 def clear_overlays(page: Page) -> None:

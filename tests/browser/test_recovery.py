@@ -18,11 +18,11 @@ def test_the_page_and_the_3d_view_recover_where_they_were(page: Page, server: Se
     expect(page.get_by_text("No connection since")).to_be_visible(timeout=20_000)
     expect(page.get_by_text("3D view lost")).to_be_visible()
     server.start()
-    server.wait_for_run(120.0)
+    server.wait_for_run()
     expect(page.get_by_text("No connection since")).to_be_hidden(timeout=30_000)
-    until(page, lambda: readout(page) == "20", "the page is where it was", 60.0)
+    until(page, lambda: readout(page) == "20", "the page is where it was")
     scene = viser(page)
-    until(page, lambda: shown_in_3d(scene) == "20", "so is the 3D view", 60.0)
+    until(page, lambda: shown_in_3d(scene) == "20", "so is the 3D view")
 
 
 def test_a_new_start_takes_up_where_this_browser_was(page: Page, server: Server) -> None:
@@ -37,13 +37,13 @@ def test_a_new_start_takes_up_where_this_browser_was(page: Page, server: Server)
     page.goto(f"{server.address}static/icon.svg")
     server.stop()
     server.start()
-    server.wait_for_run(120.0)
+    server.wait_for_run()
     assert server.get("/api/state").json()["changed"] == []
     page.goto(server.address)
-    until(page, lambda: readout(page) == "30", "the step", 60.0)
+    until(page, lambda: readout(page) == "30", "the step")
     server.wait(lambda state: state["parameters"]["fusion.detection_probability"] == 0.8)
     expect(page.get_by_role("tab", name="Runs")).to_have_attribute("aria-selected", "true")
     # somebody who goes elsewhere on purpose is not taken back
     page.goto(f"{server.address}?step=4")
-    until(page, lambda: readout(page) == "4", "the address wins", 60.0)
+    until(page, lambda: readout(page) == "4", "the address wins")
     ask(server, "POST", "parameters/reset", {})

@@ -16,9 +16,8 @@ from typing import Any, cast
 
 import viser
 
-from app.scene import style
 from app.scene.keys import hotkeys
-from app.scene.panel import curves, finding
+from app.scene.panel import curves, finding, style
 from app.scene.panel.sliders import (
     Scale,
     hint_text,

@@ -14,9 +14,9 @@ from playwright.sync_api import Browser, Page, expect
 from tests.browser.looking import as_at_first, ask, readout, until
 from tests.browser.serving import Server
 
-SIZES = {"720p": (1280, 720), "laptop": (1440, 900), "4k": (3840, 2160)}
+SIZES = {"720p": (1280, 720), "laptop": (1440, 900), "wide": (2560, 1440)}
 
-OTHERS = [("720p", "light"), ("laptop", "dark"), ("4k", "dark"), ("4k", "light")]
+OTHERS = [("720p", "light"), ("laptop", "dark"), ("wide", "dark"), ("wide", "light")]
 
 OUTSIDE = """() => {
   // what is shown and reaches out of the window or is cut off by its own pane
@@ -88,7 +88,7 @@ def test_everything_is_inside_the_window(
         head.scroll_into_view_if_needed()
         expect(head).to_be_in_viewport()
     keep(page, screenshots, f"{size}-{theme}-tracks", tmp_path)
-    if size != "4k":
+    if size != "wide":
         for tab in ("Step", "Changes", "Compare", "Runs"):
             page.get_by_role("tab", name=tab).click()
             expect(page.locator(f"#panel-{tab.lower()} [data-fill] > *").first).to_be_visible()

@@ -134,7 +134,7 @@ def test_a_slider_moved_twenty_times_in_a_second_ends_in_one_run(
         if len(steps := run.tracks.frames[run.tracks.ids == track])
     }
     rows = page.locator("#panel-tracks tbody tr")
-    expect(rows).to_have_count(len(lives), timeout=20_000)
+    expect(rows).to_have_count(len(lives))
     for row in rows.all():
         track, _, born, died = (cell.inner_text() for cell in row.locator("td").all()[:4])
         first, last = lives[int(track)]

@@ -57,7 +57,7 @@ def by_3d(page: Page, server: Server, track: int) -> None:
     x = canvas["x"] + canvas["width"] / 2 + (left + width / 2 - 96) * scale
     y = canvas["y"] + canvas["height"] / 2 + (top + height / 2 - 72) * scale
     page.mouse.click(x, y)
-    server.wait(lambda state: state["selection"] is not None, 20.0)
+    server.wait(lambda state: state["selection"] is not None)
     page.get_by_role("button", name="free", exact=True).click()
     server.wait(lambda state: state["view"] is None)
 

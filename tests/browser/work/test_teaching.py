@@ -48,7 +48,7 @@ def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(
     # which the page says above the pictures: they have moved when it is there
     expect(page.get_by_text("The run stopped at step")).to_be_visible(timeout=20_000)
     page.keyboard.press("c")
-    expect(page.locator(".mosaic")).to_have_class(re.compile("drawing"), timeout=20_000)
+    expect(page.locator(".mosaic")).to_have_class(re.compile("drawing"))
     expect(page.get_by_text("Drag a box around a person.")).to_be_visible(timeout=20_000)
     picture = page.locator(".cam").first.bounding_box()
     assert picture is not None
@@ -67,7 +67,7 @@ def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(
         lambda state: state["run"]["state"] == "done" and state["teaching"]["unsaved"] == 1
     )
     assert state["sequence"]["templates"] == 1
-    expect(page.locator("#panel-teach img")).to_have_count(2, timeout=20_000)
+    expect(page.locator("#panel-teach img")).to_have_count(2)
     expect(page.get_by_text("1 change not saved")).to_be_visible(timeout=20_000)
     expect(page.get_by_text("template Anna added")).to_be_visible(timeout=20_000)
     natural = "images => images.every((i) => i.complete && i.naturalWidth > 0)"
@@ -200,7 +200,7 @@ def test_a_face_is_dragged_in_3d_saved_and_reopened(page: Page, server: Server) 
     middle = (room.minimum + room.maximum) / 2.0
     arrow = [float(room.minimum[0]) - 0.3, float(middle[1]), float(middle[2])]
     drag(page, on_screen(arrow), on_screen([arrow[0] + 0.6, arrow[1], arrow[2]]), pause=400)
-    state = server.wait(lambda state: state["sequence"]["room"]["min"][0] != before[0], 20.0)
+    state = server.wait(lambda state: state["sequence"]["room"]["min"][0] != before[0])
     wide = state["sequence"]["room"]["min"][0]
     assert wide == pytest.approx(before[0] + 0.6, abs=0.15)
     assert state["sequence"]["room"]["min"][1:] == before[1:]

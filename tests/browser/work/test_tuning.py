@@ -26,7 +26,7 @@ def test_a_pinned_run_is_compared_with_the_engines_figures(flat_page: Page, serv
     ask(server, "PATCH", "parameters", {"changes": {P_D: 0.15}})
     server.wait_for_run()
     differing = page.get_by_role("table", name="Parameters that differ")
-    expect(differing.locator("tbody tr")).to_have_count(1, timeout=20_000)
+    expect(differing.locator("tbody tr")).to_have_count(1)
     expect(differing).to_contain_text("0.15")
     page.get_by_role("button", name="All figures").click()
 

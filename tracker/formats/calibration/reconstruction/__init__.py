@@ -1,1 +1,1 @@
-"""Cameras as structure from motion writes them: scale and up are arbitrary."""
+"""Cameras as programs that reconstruct a scene from its pictures write them."""
