@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 from tests.benchmarks import record, studies
-from tests.benchmarks.engine import accuracy, growth, jpda, kernels, pipeline, stage_one
+from tests.benchmarks.engine import accuracy, full_hd, growth, jpda, kernels, pipeline, stage_one
 from tests.benchmarks.measure import Measurement, machine
 from tests.benchmarks.plane import targets
 from tests.benchmarks.record import chart
@@ -28,6 +28,7 @@ SUITES = {
     "growth": growth.run,
     "live": live.run,
     "stage_one": stage_one.run,
+    "full_hd": full_hd.run,
     "server": server.run,
     "page": page.run,
     "library": library.run,

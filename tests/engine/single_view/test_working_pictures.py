@@ -197,3 +197,21 @@ def test_methods_that_look_at_no_pictures_get_the_recording_as_it_is(tmp_path: P
         working = Working.of(sequence, parameters, reader)
         assert working.sequence is sequence
         assert working.reader is reader
+
+
+@pytest.mark.parametrize("factor", [1.3, 2.0, 2.25, 2.9, 3.4, 4.5])
+def test_a_reduced_picture_averages_and_stays_in_its_place(factor: float) -> None:
+    camera = replace(CAMERAS[1], image_size=(round(640 * factor), round(480 * factor)))
+    intrinsics = camera.intrinsics * np.array([[factor], [factor], [1.0]])
+    view = seen(replace(camera, intrinsics=intrinsics), lines=480, target_height=2000)
+    width, height = camera.image_size
+    x, y = np.meshgrid(np.arange(width), np.arange(height))
+    ramp = np.stack([20 + 200 * x / width, 20 + 200 * y / height, 0 * x], axis=2)
+    small = view.picture(np.rint(ramp).astype(np.uint8))
+    middle = view.points_back(np.array([[0.0, 0.0], [311.0, 207.0], [639.0, 479.0]]))
+    for place, at in zip([(0, 0), (207, 311), (479, 639)], middle, strict=True):
+        expected = 20.0 + 200.0 * at / [width, height]
+        np.testing.assert_allclose(small[place][:2], expected, atol=1.0)
+    noise = np.random.default_rng(0).normal(128.0, 30.0, (height, width, 3))
+    calm = view.picture(np.clip(noise, 0, 255).astype(np.uint8))
+    assert calm.astype(float).std() < 1.1 * noise.std() / factor  # as of independent pixels

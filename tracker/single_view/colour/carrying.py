@@ -20,6 +20,7 @@ from tracker.pictures.colour import ColourSpaceName, KernelName
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template
 from tracker.single_view.box_sizes import upright_boxes
+from tracker.single_view.colour.templates import template_picture
 
 DEPTHS = 400
 """Places along a template's ray, a hundredth of the distance apart."""
@@ -127,7 +128,7 @@ def _carried(
         bins = {}
         for camera in (names.index(template.camera), *lacking):
             reader.check()
-            picture = reader.picture(camera, template.frame)
+            picture = template_picture(reader, camera, template.frame)
             if picture is not None:
                 bins[camera] = colour.bin_map(picture, space)
         own = names.index(template.camera)

@@ -7,7 +7,7 @@ import numpy as np
 from tracker.boxes import Boxes
 from tracker.pictures import colour
 from tracker.pictures.colour import ColourModel, ColourSpaceName, KernelName
-from tracker.sequences.pictures.frames import Pictures
+from tracker.sequences.pictures.frames import Picture, Pictures
 from tracker.sequences.sequence import Sequence, SequenceError
 
 
@@ -36,6 +36,17 @@ def read_templates(
     )
 
 
+def template_picture(reader: Pictures, camera: int, step: int) -> Picture | None:
+    """The picture of a template, read once: in a video it is far from all that is read otherwise.
+
+    Args:
+        reader: Of the pictures.
+        camera: Its index.
+        step: Of the template.
+    """
+    return reader.once(("template picture", camera, step), lambda: reader.picture(camera, step))
+
+
 def _read(
     sequence: Sequence, space: ColourSpaceName, kernel: KernelName, reader: Pictures
 ) -> ColourModel:
@@ -48,7 +59,7 @@ def _read(
         )
         if template.camera not in names:
             raise SequenceError(f"{place}: there is no such camera; expected {', '.join(names)}")
-        picture = reader.picture(names.index(template.camera), template.frame)
+        picture = template_picture(reader, names.index(template.camera), template.frame)
         if picture is None:
             raise SequenceError(f"{place}: its picture cannot be read; choose another frame")
         box = Boxes.from_left_top(template.box[None]).centred

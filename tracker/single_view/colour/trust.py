@@ -20,6 +20,7 @@ from tracker.parameters import ForegroundParams
 from tracker.pictures.foreground import box_shares, integral, learn
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template
+from tracker.single_view.colour.templates import template_picture
 from tracker.single_view.shape.finder import ShapeFinder
 
 PICTURES_BEFORE = 8
@@ -146,7 +147,7 @@ def _share(
     what = (template.camera, template.frame, template.box.tobytes())
 
     def look() -> float | None:
-        picture = reader.picture(camera, template.frame)
+        picture = template_picture(reader, camera, template.frame)
         model = learn(sequence, camera, reader, parameters)
         if picture is None or model is None:
             return None

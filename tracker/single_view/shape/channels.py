@@ -89,9 +89,9 @@ class Channels:
     ) -> tuple[ChannelState, Int32[ndarray, "h1 w1 C"]]:
         """The integral images of a picture's channels."""
         empty = self._background.picture
-        shown = cv2.LUT(empty, tone_curve(empty, picture))
+        shown = cv2.LUT(empty, square_roots(tone_curve(empty, picture)))
         roots = self._reduced(square_roots(picture))
-        difference = _largest(cv2.absdiff(roots, self._reduced(square_roots(shown))))
+        difference = _largest(cv2.absdiff(roots, self._reduced(shown)))
         smooth = cv2.GaussianBlur(roots, (0, 0), BLUR)
         before = (*state.before, smooth)
         motion = _moved(before[0], smooth)

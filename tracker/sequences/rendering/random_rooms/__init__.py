@@ -6,6 +6,11 @@ They are for finding out where a method fails, and why: every room says what is 
 from __future__ import annotations
 
 from tracker.sequences.rendering.random_rooms.choices import Choices, choose
-from tracker.sequences.rendering.random_rooms.film import LABELS_FILE, VERSION, render_random
+from tracker.sequences.rendering.random_rooms.film import (
+    LABELS_FILE,
+    VERSION,
+    render_chosen,
+    render_random,
+)
 
-__all__ = ["LABELS_FILE", "VERSION", "Choices", "choose", "render_random"]
+__all__ = ["LABELS_FILE", "VERSION", "Choices", "choose", "render_chosen", "render_random"]

@@ -99,19 +99,51 @@ def render_random(
         RenderCancelled: If ``cancelled`` said so.
     """
     choices = choose(seed)
+    render_chosen(
+        choices, folder,
+        detections=detections, frames=frames, progress=progress, cancelled=cancelled,
+    )  # fmt: skip
+    return choices
+
+
+def render_chosen(
+    choices: Choices,
+    folder: Path,
+    *,
+    detections: bool = False,
+    frames: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> None:
+    """Render a room of which somebody chose some, else as :func:`render_random` does.
+
+    Args:
+        choices: What is in it; what is not chosen follows from its seed.
+        folder: As there, and so the rest.
+        detections: Write detections.
+        frames: Number of steps.
+        progress: Called with steps.
+        cancelled: Asked.
+
+    Raises:
+        ValueError: If the room has not so many steps.
+        FileExistsError: If ``folder`` exists and is not a sequence folder.
+        RenderCancelled: If ``cancelled`` said so.
+    """
     count = choices.steps if frames is None else frames
     if not 1 <= count <= choices.steps:
-        raise ValueError(f"frames must be 1 … {choices.steps} in random room {seed}, got {frames}")
+        raise ValueError(
+            f"frames must be 1 … {choices.steps} in random room {choices.seed}, got {frames}"
+        )
     asked = cancelled or (lambda: False)
     with whole_folder(folder) as work:
         if progress is not None:
             progress(0, count)
         if asked():
-            raise RenderCancelled(f"random room {seed}")
+            raise RenderCancelled(f"random room {choices.seed}")
         filmed = prepare(choices)
         corners, visible = _shoot(filmed, work, count, progress, asked)
         _write(filmed, work, corners, visible, detections)
-    return choices
 
 
 def prepare(choices: Choices) -> Set:
