@@ -37,7 +37,7 @@ ROOM_MARGIN = 1.0
 PERSON = 1.70
 """Metres: the usual stature, by which a reconstruction without a unit is scaled."""
 
-_WITHOUT_UNIT = ("COLMAP", "nerfstudio")
+_WITHOUT_UNIT = ("COLMAP", "nerfstudio", "Metashape", "OpenMVG")
 """Formats whose unit is arbitrary."""
 
 
