@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from tests.benchmarks.growth import ring, walkers
+from tests.benchmarks.engine.growth import ring, walkers
 from tests.engine import synthetic
 from tests.synthetic import write_lines
 

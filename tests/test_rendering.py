@@ -18,7 +18,7 @@ from tracker.sequences.rendering import (
 )
 from tracker.sequences.rendering.avi import AviWriter, compress
 from tracker.sequences.rendering.cast.paths import FASTEST, FRAMES_PER_SECOND, walk
-from tracker.sequences.rendering.raster import floor_shadows
+from tracker.sequences.rendering.lighting import floor_shadows
 from tracker.sequences.rendering.rooms import CAMERAS, TARGET_HALF_EXTENTS
 from tracker.sequences.rendering.scene import Scene, script
 from tracker.sequences.rendering.studio import Studio, studio_of

@@ -17,10 +17,10 @@ from jaxtyping import UInt8
 from app.colours import PALETTES, Theme
 from app.scene import geometry
 from app.scene.geometry import Pose
-from app.scene.ghosts import GhostNodes
-from app.scene.people import PeopleNodes
-from app.scene.reference import ReferenceNodes
-from app.scene.room import FrustumNodes, RoomNodes, entrance_edges, grid_cell, pose_through
+from app.scene.room.standing import FrustumNodes, RoomNodes, entrance_edges, grid_cell, pose_through
+from app.scene.tracks.ghosts import GhostNodes
+from app.scene.tracks.people import PeopleNodes
+from app.scene.tracks.reference import ReferenceNodes
 from app.scene.views import Views
 from app.scene.worker import LatestWorker
 from app.state.snapshot import Change, Snapshot, View

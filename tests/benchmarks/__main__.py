@@ -11,26 +11,12 @@ import json
 import sys
 from pathlib import Path
 
-from tests.benchmarks import (
-    accuracy,
-    cold,
-    full_hd,
-    growth,
-    jpda,
-    kept,
-    kernels,
-    library,
-    live,
-    page,
-    pipeline,
-    record,
-    server,
-    stage_one,
-    studies,
-)
+from tests.benchmarks import record, studies
+from tests.benchmarks.engine import accuracy, full_hd, growth, jpda, kernels, pipeline, stage_one
 from tests.benchmarks.measure import Measurement, machine
 from tests.benchmarks.plane import targets
 from tests.benchmarks.record import chart
+from tests.benchmarks.workbench import cold, kept, library, live, page, server
 
 SUITES = {
     "accuracy": accuracy.run,

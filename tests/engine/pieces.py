@@ -7,8 +7,8 @@ from collections.abc import Sequence as Many
 import numpy as np
 from numpy import ndarray
 
-from tracker.blobs import Blobs, blobs
 from tracker.parameters import AssociationMatrixParams
+from tracker.pictures.blobs import Blobs, blobs
 from tracker.single_view.association_matrix.following import object_histograms
 from tracker.single_view.association_matrix.handing_over import advance
 from tracker.single_view.association_matrix.moving_objects import Situation

@@ -39,9 +39,3 @@ def test_it_finds_what_it_claims(data_folder: Path) -> None:
     # the two scores of the best published filter, and ours against the paper on each recording
     assert len(result.findings) == len(BEST_PUBLISHED) + len(GATES)
     assert [finding.verdict for finding in result.findings][1:] == ["better"] * 4
-
-
-@pytest.mark.data
-def test_a_short_form_shows_the_direction(data_folder: Path) -> None:
-    result = EXPERIMENTS["cmc"].run(Context(data=data_folder, quick=True))
-    assert all(recording["steps"] == 100 for recording in result.numbers["recordings"].values())

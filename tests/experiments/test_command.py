@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from app.command import main as cli
-from tests.conftest import DATA
 from tracker.experiments import EXPERIMENTS, Context, Experiment, Finding, Result, Unavailable
 
 
@@ -96,35 +91,3 @@ def test_wrong_usage(
     err = capsys.readouterr().err
     assert words in err
     assert err.count("\n") == 1
-
-
-@pytest.mark.full
-def test_all_in_short_show_the_direction_of_each_claim(tmp_path: Path) -> None:
-    data = ["--data", str(DATA)] if DATA.is_dir() else []
-    done = subprocess.run(
-        [sys.executable, "-m", "app", "experiment", "--all", "--quick", "--output", str(tmp_path),
-         *data],
-        cwd=Path(__file__).parents[2],
-        env={**os.environ, "PYTHONWARNINGS": "error"},
-        capture_output=True,
-        text=True,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    numbers: dict[str, Any] = {
-        path.stem: json.loads(path.read_text(encoding="utf-8"))["numbers"]
-        for path in tmp_path.glob("*.json")
-    }
-    for name in numbers:
-        assert (tmp_path / f"{name}.png").stat().st_size > 10_000
-    for person in numbers["fig1"]["people"].values():
-        assert person["found_share"] > 0.7
-        assert person["armchair_error"] < 0.3
-    assert numbers["fig2"]["mean_overlap"] > 0.5
-    groups = numbers["fig3"]["groups"]
-    assert groups["without occlusion"]["scheme"] < 0.6 * groups["without occlusion"]["single"]
-    assert groups["with occlusion"]["scheme"] < groups["with occlusion"]["single"]
-    assert numbers["sequences"]["sequences"]["room44-3p"]["mota"] > 0.7
-    if data:
-        by_count = numbers["cameras"]["by_count"]
-        assert by_count["3"]["ospa"] < by_count["2"]["ospa"] < by_count["1"]["ospa"]
-        assert by_count["3"]["position_error"] < 0.44 * by_count["1"]["position_error"]

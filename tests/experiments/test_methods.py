@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tracker.experiments import EXPERIMENTS, Context, cameras, methods
+from tracker.experiments import Context, cameras, methods
 from tracker.experiments.methods import BOXES_RECORDING, ON_BOXES, ON_PICTURES
 from tracker.parameters import METHODS
 from tracker.sequences.reader import read_sequence
@@ -59,13 +59,3 @@ def test_boxes_are_fused_by_the_method_that_needs_them(data_folder: Path) -> Non
     assert found["steps"] == 60
     assert found["mota"] > 0.9
     assert not read_sequence(data_folder / cameras.RECORDING).has_detections
-
-
-@pytest.mark.long
-def test_the_short_form_shows_that_each_method_follows_people() -> None:
-    result = EXPERIMENTS["methods"].run(Context(quick=True))
-    assert len(result.rows) == len(ON_PICTURES)
-    assert {len(row) for row in result.rows} == {len(result.head)}
-    (measured,) = result.numbers["sequences"].values()
-    assert measured["colour_phd"]["found_share"] > 0.8
-    assert measured["association_matrix"]["found_share"] > 0.7

@@ -397,3 +397,118 @@ def test_a_record_a_line(tmp_path: Path) -> None:
     found, _, complaint = recognise(SourceFile(path))
     assert found is None
     assert "is not valid JSON" in str(complaint)
+
+
+def _by_frame(rows: list[list[float]]) -> dict[str, list[list[float]]]:
+    """Frame → lists, also of the frames in which nobody is."""
+    table: dict[str, list[list[float]]] = {str(frame): [] for frame in range(len(walks()))}
+    for frame, row in zip(FRAMES.tolist(), rows, strict=True):
+        table[str(frame)].append(row)
+    return table
+
+
+WITH_SCORE = [[*_corners(box), 0.75] for box in BOXES]
+BY_FRAME = _by_frame(WITH_SCORE)
+NAMED = ("x1", "y1", "x2", "y2", "score")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"cam1": BY_FRAME, "cam2": BY_FRAME},
+        {f: {"cam1": rows, "cam2": rows} for f, rows in BY_FRAME.items()},
+        {"results": {"cam1": list(BY_FRAME.values()), "cam2": list(BY_FRAME.values())}},
+        [{"cam1": rows, "cam2": rows} for rows in BY_FRAME.values()],
+        {
+            camera: {
+                f"frame_{int(f):06d}": [dict(zip(NAMED, row, strict=True)) for row in rows]
+                for f, rows in BY_FRAME.items()
+            }
+            for camera in ("cam1", "cam2")
+        },
+        {
+            camera: {
+                f: {"bboxes": [r[:4] for r in rows], "scores": [r[4] for r in rows]}
+                for f, rows in BY_FRAME.items()
+            }
+            for camera in ("cam1", "cam2")
+        },
+        {
+            f"{camera}/{int(f):08d}.jpg": [[*row, 0] for row in rows]
+            for camera in ("cam1", "cam2")
+            for f, rows in BY_FRAME.items()
+        },
+        {
+            camera: [
+                {"frame": int(f), "bbox": row[:4], "score": row[4]}
+                for f, rows in BY_FRAME.items()
+                for row in rows
+            ]
+            for camera in ("cam1", "cam2")
+        },
+    ],
+    ids=[
+        "camera, frame", "frame, camera", "lists of frames", "list of tables", "named fields",
+        "lists beside each other", "pictures", "records",
+    ],
+)  # fmt: skip
+def test_boxes_by_camera_and_frame(tmp_path: Path, content: object) -> None:
+    path = tmp_path / "boxes.json"
+    path.write_text(json.dumps(content))
+    name, pieces = read(path)
+    assert name == "boxes by camera and frame (JSON)"
+    first, second = (piece for piece in pieces if isinstance(piece, DetectionPiece))
+    assert (first.camera, second.camera) == ("cam1", "cam2")
+    for piece in (first, second):
+        order = np.argsort(piece.frames, kind="stable")
+        np.testing.assert_array_equal(piece.frames[order], FRAMES)
+        found = read_boxes(piece.boxes[order], "xyxy", None)
+        np.testing.assert_allclose(found, BOXES, atol=1e-9)
+        np.testing.assert_array_equal(piece.scores, 0.75)
+
+
+def test_boxes_by_frame_are_a_camera_a_file_or_a_frame_a_file(tmp_path: Path) -> None:
+    files = [tmp_path / f"cam{number}.json" for number in (1, 2)]
+    for path in files:
+        path.write_text(json.dumps(BY_FRAME))
+    pieces = read(files[0], *files)[1]
+    assert [piece.source for piece in pieces] == files  # type: ignore[union-attr]
+    frames = [tmp_path / f"{int(frame):06d}.json" for frame in BY_FRAME]
+    for path, rows in zip(frames, BY_FRAME.values(), strict=True):
+        lists = {"labels": [0] * len(rows), "scores": [r[4] for r in rows]}
+        path.write_text(json.dumps({**lists, "bboxes": [r[:4] for r in rows]}))
+    piece = _detections(frames[0], *frames)
+    np.testing.assert_array_equal(piece.frames, FRAMES)
+    assert (piece.last_frame, piece.first_index) == (len(walks()) - 1, 0)
+
+
+def test_people_by_number_are_no_cameras(tmp_path: Path) -> None:
+    path = tmp_path / "tracks.json"
+    people = {f: {str(n): row[:4] for n, row in enumerate(rows)} for f, rows in BY_FRAME.items()}
+    path.write_text(json.dumps(people))
+    piece = _detections(path)
+    assert (piece.camera, len(piece.frames)) == ("", len(FRAMES))
+
+
+def test_other_classes_in_lists_of_six_are_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "boxes.json"
+    rows = {f: [[*row, kind] for row in rows for kind in (0, 56)] for f, rows in BY_FRAME.items()}
+    path.write_text(json.dumps(rows))
+    np.testing.assert_array_equal(_detections(path).frames, FRAMES)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"cam1": {"R": [[1, 0, 0, 2], [0, 1, 0, 3], [0, 0, 1, 4]], "size": [640, 480]}},
+        {"0": {"q": [0.1, 0.2, 0.3, 0.4]}, "1": {"q": [0.1, 0.2, 0.3, 0.4]}},
+        {"cam1": [[1, 2, 3, 4], [1, 2, 3, 4]], "cam2": [[1, 2, 3, 4]]},
+        {"0": [[1, 2, 3], [4, 5, 6]]},
+    ],
+    ids=["poses", "rotations", "no frames", "points"],
+)
+def test_lists_of_something_else_are_no_boxes(tmp_path: Path, content: object) -> None:
+    path = tmp_path / "something.json"
+    path.write_text(json.dumps(content))
+    found, _, _ = recognise(SourceFile(path))
+    assert found is None or found.KIND != "detections"

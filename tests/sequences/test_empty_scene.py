@@ -13,9 +13,9 @@ import pytest
 
 from tests.engine.rooms import empty_room, person_mask, photograph, with_person
 from tests.synthetic import camera_toml, head_toml, write_sequence
-from tracker.foreground import BackgroundModel, learn, learn_background
 from tracker.library import bundle
 from tracker.parameters import ForegroundParams, RunParameters
+from tracker.pictures.foreground import BackgroundModel, learn, learn_background
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence, SequenceError

@@ -6,6 +6,7 @@ import copy
 import os
 import tomllib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -330,6 +331,16 @@ def test_a_copy_is_whole_and_its_own(tmp_path: Path, container: Any) -> None:
     (copied.folder / "cam1.csv").write_text("changed", encoding="utf-8")
     assert {path: path.stat().st_mtime_ns for path in source.rglob("*")} == before
     assert [p.name for p in (tmp_path / "new").iterdir()] == ["mine"]
+
+
+def test_a_copy_is_copied_while_its_pictures_are_read_where_they_were(tmp_path: Path) -> None:
+    opened = read_sequence(write_sequence(tmp_path / "room", frames=8, detections=True))
+    first = saving.save_copy(opened, opened, tmp_path / "first")
+    shown = replace(opened, name=first.name, folder=first.folder)
+    second = saving.save_copy(taught(shown, add), shown, tmp_path / "second")
+    assert taught_values(second) == taught_values(taught(opened, add))
+    videos = [view.video for view in second.views]
+    assert all(video is not None and video.parent == second.folder for video in videos)
 
 
 def test_a_copy_goes_into_new_or_empty_folders_only(tmp_path: Path, opened: Sequence) -> None:

@@ -11,9 +11,9 @@ import numpy as np
 from numpy import ndarray
 
 from tracker import parameters as table
-from tracker.foreground import learn_background
 from tracker.kernels.pictures.channels import cell_means
 from tracker.parameters import RunParameters
+from tracker.pictures.foreground import learn_background
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.rendering.random_rooms.figures import HALF_EXTENTS

@@ -37,7 +37,8 @@ _WORTH = -7.0
 
 
 def pieces_of(run: Run, lanes: Lanes) -> tuple[list[Piece | None], Joined | None]:
-    """The pieces that the run's tracks were joined of; where it joined none, its tracks.
+    """The pieces that the run's tracks were joined of; where it joined none, its tracks. So it is
+    while they are still the filter's, or those of another run that are shown meanwhile.
 
     A piece of somebody who is not reported is None.
     """
@@ -45,6 +46,8 @@ def pieces_of(run: Run, lanes: Lanes) -> tuple[list[Piece | None], Joined | None
     if joined is None or run.smoothed is None:
         return [_whole(lanes, int(track)) for track in lanes.ids], None
     names = names_of(run.smoothed, run.tracks)
+    if not names:
+        return [_whole(lanes, int(track)) for track in lanes.ids], None
     found: list[Piece | None] = []
     for k, label in enumerate(joined.labels.tolist()):
         track = names.get(label)

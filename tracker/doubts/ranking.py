@@ -54,6 +54,7 @@ def queue(run: Run, backwards: Trajectories | None = None) -> Queue:
         run: With all its steps, or as far as it is.
         backwards: The tracks of the recording seen backwards in time, where that was made.
     """
+    run = run.still()
     lanes = Lanes(run.tracks)
     if not len(run.tracks):
         return Queue((), 0, "nobody is tracked")

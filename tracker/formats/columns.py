@@ -38,7 +38,8 @@ WORDS: dict[str, tuple[str, ...]] = {
     "cx": ("cx", "xcenter", "xcentre", "xc", "centerx", "centrex"),
     "cy": ("cy", "ycenter", "ycentre", "yc", "centery", "centrey"),
     "box": ("bbox", "box", "xyxy", "xywh", "tlwh", "ltwh", "boundingbox"),
-    "score": ("score", "confidence", "conf", "prob", "probability", "detectionscore"),
+    "score": ("score", "confidence", "conf", "prob", "probability", "detectionscore",
+              "bboxscore"),
     "class": ("class", "classname", "label", "name", "category", "classid", "categoryid",
               "prediction"),
     "id": ("id", "trackid", "trackerid", "personid", "objectid", "identity", "targetid", "person",
@@ -60,6 +61,9 @@ _OURS = "existence"
 
 _LONGEST = 1e6
 """Seconds: larger numbers are not times since a recording began."""
+
+_LONGEST_BOX = 8
+"""Numbers of a box that is a list: the four, a score, a class, a track, and one to spare."""
 
 Column = Sequence[Any]
 
@@ -140,7 +144,9 @@ def read_table(
         frames = _frames(file, found["frame"], columns[found["frame"]])
     form = layout_of(found)
     if form is None and "box" in found:
-        values = _table(file, found["box"], columns[found["box"]])
+        values, more = _fours(file, found["box"], columns[found["box"]], frames)
+        new = {meaning: cells for meaning, cells in more.items() if meaning not in found}
+        columns, found = {**columns, **new}, {**{meaning: meaning for meaning in new}, **found}
         yield from _detections(file, name, columns, found, frames, values, boxes_layout, fps)
     elif form is not None:
         layout, parts = form
@@ -323,14 +329,35 @@ def _numbers(
         raise
 
 
-def _table(file: SourceFile, name: str, cells: Column) -> Float[ndarray, "D 4"]:
+def _fours(
+    file: SourceFile, name: str, cells: Column, frames: Int[ndarray, " D"]
+) -> tuple[Float[ndarray, "D 4"], dict[str, Column]]:
+    """Boxes that are lists of four numbers; and the score and class that may follow these.
+
+    A whole number that two rows of a frame share is no person's, so it is a class; of what
+    follows, the first column that is not whole is the score.
+    """
+    lengths = {len(cell) if isinstance(cell, list | tuple) else 0 for cell in cells}
+    lists: Column = cells
+    if lengths == {1}:  # [[left, top, …]], as mmpose writes them
+        lists = [cell[0] for cell in cells]
     try:
-        values = np.asarray(list(cells), dtype=float).reshape(-1, 4)
+        values = np.asarray(list(lists), dtype=float)
     except (ValueError, TypeError):
         raise file.error("expected lists of four numbers", name) from None
-    if len(values) != len(cells):
-        raise file.error("expected lists of four numbers", name)
-    return values
+    if not len(values):
+        return np.zeros((0, 4)), {}
+    if values.ndim != 2 or not 4 <= values.shape[1] <= _LONGEST_BOX:
+        raise file.error("expected lists of four numbers, or with score and class", name)
+    more: dict[str, Column] = {}
+    for column in values[:, 4:].T:
+        parts = bool(((column >= 0.0) & (column <= 1.0)).all())
+        if "score" not in more and parts and (values.shape[1] == 5 or (column % 1.0).any()):
+            more["score"] = column
+        elif "score" in more and not (column % 1.0).any():
+            if len(np.unique(np.stack([frames, column]), axis=1).T) < len(column):
+                more.setdefault("class", column)
+    return values[:, :4], more
 
 
 def _whole_or_names(cells: Column) -> Int[ndarray, " G"]:

@@ -8,10 +8,8 @@ from importlib.metadata import entry_points
 
 from tracker.formats.calibration import (
     camera_tables,
-    colmap,
     kalibr,
     matlab,
-    nerfstudio,
     opencv,
     panoptic,
     plain,
@@ -19,11 +17,26 @@ from tracker.formats.calibration import (
     qualisys,
     ros,
     tsai,
+    voxelpose,
 )
-from tracker.formats.detections import coco, cvat, motchallenge, openpose, table, yolo
+from tracker.formats.calibration.reconstruction import colmap, metashape, nerfstudio, openmvg
+from tracker.formats.detections import (
+    coco,
+    cvat,
+    label_studio,
+    labelme,
+    motchallenge,
+    nested,
+    openpose,
+    parquet,
+    table,
+    voc,
+    yolo,
+)
 from tracker.formats.pictures import images, times, video
 from tracker.formats.pieces import FormatError
 from tracker.formats.protocol import Certainty, Format
+from tracker.formats.refused import refusal
 from tracker.formats.source import SourceFile
 from tracker.formats.truth import panoptic as panoptic_skeletons
 from tracker.formats.truth import trc, wildtrack
@@ -37,10 +50,13 @@ FORMATS: tuple[Format, ...] = (
     qualisys,
     colmap,
     nerfstudio,
+    metashape,
+    openmvg,
     kalibr,
     ros,
     panoptic,
     tsai,
+    voxelpose,
     projection,
     matlab,
     plain,
@@ -49,7 +65,12 @@ FORMATS: tuple[Format, ...] = (
     yolo,
     openpose,
     cvat,
+    labelme,
+    label_studio,
+    voc,
+    nested,
     table,
+    parquet,
     wildtrack,
     trc,
     panoptic_skeletons,
@@ -98,4 +119,6 @@ def recognise(
             continue
         if certainty > Certainty.NO and certainty >= best[1]:
             best = (one, certainty)
-    return *best, complaint if best[0] is None else None
+    if best[0] is not None:
+        return *best, None
+    return *best, refusal(file) or complaint

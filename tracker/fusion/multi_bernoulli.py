@@ -18,13 +18,14 @@ from numpy import ndarray
 from tracker.camera import stacked
 from tracker.filters import gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion import memory, reidentification, sight
+from tracker.fusion import sight
+from tracker.fusion.labels import memory, reidentification
+from tracker.fusion.labels.memory import Memory
+from tracker.fusion.labels.reidentification import Identities
 from tracker.fusion.measurement_births import Evidence, Newborns
-from tracker.fusion.memory import Memory
 from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import WORTH_TELLING, Record, summed
-from tracker.fusion.reidentification import Identities
 from tracker.fusion.sight import Recent
 from tracker.fusion.told import Told, obey
 from tracker.kernels.gating import Measurements

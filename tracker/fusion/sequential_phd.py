@@ -16,9 +16,10 @@ from numpy import ndarray
 
 from tracker.filters import gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion import memory, one_person, sight
+from tracker.fusion import sight
+from tracker.fusion.labels import memory, one_person
+from tracker.fusion.labels.memory import Memory
 from tracker.fusion.measurement_births import Evidence
-from tracker.fusion.memory import Memory
 from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import Ledger, Record

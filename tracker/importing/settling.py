@@ -14,6 +14,7 @@ from tracker.camera import Camera
 from tracker.checks.reading import Reading, read_boxes, to_camera
 from tracker.checks.readings import Open, Seen, find_meaning
 from tracker.formats.pieces import FormatError, Layout, RawCamera
+from tracker.importing.arriving import short_videos
 from tracker.importing.finding.calibrations import camera_sets
 from tracker.importing.finding.geometry import read_poses
 from tracker.importing.finding.matching import MatchedCamera, match_all
@@ -37,7 +38,7 @@ ROOM_MARGIN = 1.0
 PERSON = 1.70
 """Metres: the usual stature, by which a reconstruction without a unit is scaled."""
 
-_WITHOUT_UNIT = ("COLMAP", "nerfstudio")
+_WITHOUT_UNIT = ("COLMAP", "nerfstudio", "Metashape", "OpenMVG")
 """Formats whose unit is arbitrary."""
 
 
@@ -85,7 +86,7 @@ def settle(taken: Sequence[Taken], options: ImportOptions | None = None) -> Sett
     options = options or ImportOptions()
     sets, told = camera_sets(taken)
     matched = match_all(taken, sets, options)
-    told += matched.told
+    told += matched.told + short_videos(taken)
     found: list[tuple[str, str]] = []
     cameras = matched.cameras
     for way in sorted({how for camera in cameras for how in camera.how.values()} - {"name"}):

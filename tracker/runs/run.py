@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
 from dataclasses import dataclass, field
@@ -104,6 +105,11 @@ class Run:
     def complete(self) -> bool:
         """Whether every step is there."""
         return self.done == self.sequence.frames
+
+    def still(self) -> Run:
+        """The run as it is now, for those who look at its people more than once: what computes it
+        may put the smoothed ones in their place meanwhile."""
+        return copy.copy(self)
 
 
 _OBEYED_BY: dict[Stage, tuple[Kind, ...]] = {

@@ -17,9 +17,9 @@ from numpy import ndarray
 
 from tracker.filters import gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.foreground import pack
 from tracker.kernels.kalman import Expected
 from tracker.parameters import ColourPhdParams
+from tracker.pictures.foreground import pack
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import entrance_boxes

@@ -57,11 +57,11 @@ def tracks_of(
 
 
 def names_of(smoothed: Smoothed, tracks: Trajectories) -> dict[int, int]:
-    """The id of each label that is reported.
+    """The id of each label that is reported; of a track that was not made of this, none.
 
     Args:
-        smoothed: What the tracks were made of.
-        tracks: By :func:`tracks_of`.
+        smoothed: Stage 3 of a run.
+        tracks: By :func:`tracks_of`; as long as the run goes on they may be others.
     """
     place = {
         (frame, *mean): label
@@ -73,10 +73,8 @@ def names_of(smoothed: Smoothed, tracks: Trajectories) -> dict[int, int]:
         )
     }
     ids, rows = np.unique(tracks.ids, return_index=True)
-    return {
-        place[int(tracks.frames[row]), *tracks.positions[row].tolist()]: int(name)
-        for name, row in zip(ids, rows, strict=True)
-    }
+    found = (place.get((int(tracks.frames[row]), *tracks.positions[row].tolist())) for row in rows)
+    return {label: int(name) for name, label in zip(ids, found, strict=True) if label is not None}
 
 
 def _components(

@@ -34,16 +34,24 @@ def _import(command: Import) -> int:
     if not command.sources:
         raise ParameterError("SOURCE", "expected files or a folder to import, got none")
     options = _options(command)
-    from tracker.importing.gathering import gather
+    from tracker.importing.arriving import gather_whole
     from tracker.importing.settling import settle
     from tracker.importing.writing import FILE, write
     from tracker.sequences import library
 
     if command.output is not None and (command.output / FILE).exists():
         raise CommandError(f"{command.output}: holds a {FILE} already; name another folder")
-    taken = gather(
-        [*command.sources, *_not_inside((path for _, path in options.cameras), command.sources)]
-    )
+    sources = [*command.sources]
+    sources += _not_inside((path for _, path in options.cameras), command.sources)
+    waited: list[str] = []
+
+    def wait_for(sentence: str) -> None:
+        file = sentence.split(" is ")[0]
+        if file not in waited:
+            say(f"{sentence}; Ctrl+C gives up")
+            waited.append(file)
+
+    taken, _ = gather_whole(sources, wait_for)
     print_table(
         ("file", "taken for", "note"),
         [

@@ -1,28 +1,21 @@
 """The sliders in viser's panel, made from the definitions in :mod:`tracker.parameters`.
 
-One edit goes one way round: browser → workbench → every other face. What the server
-writes into a slider comes back to it without a client and is ignored; and it writes
-into a slider only when that stands elsewhere than the store's value and nobody is
-just moving it.
+One edit goes one way round: browser → workbench → every other face.
 """
 
 from __future__ import annotations
 
 import html
-import threading
-from collections.abc import Mapping, Set
+from collections.abc import Set
 from functools import partial
-from typing import Any, cast
+from typing import Any
 
 import viser
 
-from app.scene import style
 from app.scene.keys import hotkeys
-from app.scene.panel import curves, finding
+from app.scene.panel import curves, finding, style
+from app.scene.panel.inputs import METHODS, Inputs
 from app.scene.panel.sliders import (
-    Scale,
-    hint_text,
-    label_text,
     manual_places,
     number_text,
     symbol_parts,
@@ -33,7 +26,7 @@ from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
 from app.state.workers.sensitivity import Sensitivity
 from tracker import parameters as table
-from tracker.parameters import MethodKey, Parameter, ParameterError, RunParameters
+from tracker.parameters import Parameter, ParameterError, RunParameters
 
 ORIGIN = "viser"
 PANEL_WIDTH = 276
@@ -42,25 +35,8 @@ PANEL_WIDTH = 276
 OWN_VALUES = "own values"
 """What the values are while they are no preset's, as on the page."""
 
-METHODS: dict[MethodKey, str] = {
-    "single_view": "Single view",
-    "fusion_method": "Fusion",
-    "smoothing_method": "Smoothing",
-}
-"""The words of the choices of a method."""
-
 MOST_CURVES = 12
 """Computed at one request."""
-
-UNFIT = " · not here"
-"""Behind the name of a method that cannot work on the open sequence, as on the page."""
-
-Input = (
-    viser.GuiInputHandle[float]
-    | viser.GuiInputHandle[int]
-    | viser.GuiInputHandle[bool]
-    | viser.GuiInputHandle[str]
-)
 
 
 class Controls:
@@ -82,16 +58,8 @@ class Controls:
         self._sensitivity = sensitivity
         self._server = server
         self._workbench = workbench
-        self._inputs: dict[str, Any] = {}
-        self._scales: dict[str, Scale] = {}
-        self._blocks: list[tuple[viser.GuiFolderHandle, frozenset[str]]] = []
-        """Folders without a name of their own, and the keys of what is in each."""
+        self._inputs = Inputs(server, lambda: self._worker.ask("edit"))
         self._resets: dict[Topic, viser.GuiButtonHandle] = {}
-        self._lock = threading.Lock()
-        self._moved: dict[str, Any] = {}
-        """Edits of browsers that are not yet in the workbench: the input that was moved, by key."""
-        self._copies: dict[str, list[Any]] = {}
-        """The same parameters among the essentials and among what is found."""
         self._worker = LatestWorker("controls", self._work)
         server.gui.main_panel.dock_right()
         server.gui.main_panel.set_width(PANEL_WIDTH)
@@ -119,21 +87,17 @@ class Controls:
                 # what all methods share comes first
                 for parameter in sorted(table.PARAMETERS.values(), key=_is_of_one_method):
                     if wanted or parameter.essential:
-                        handle = self._input_of(parameter)
-                        handle.visible = False
-                        self._copies.setdefault(parameter.key, []).append(handle)
-                        self._hear(parameter.key, handle)
+                        self._inputs.add_copy(parameter)
         self._curves: Any = None
         if sensitivity is not None:
             self._offer_curves(sensitivity)
         self._methods = server.gui.add_folder("Methods")
         with self._methods:
             for method in METHODS:
-                self._make_method(method)
+                self._inputs.add_method(method)
         self._topics: dict[Topic, viser.GuiFolderHandle] = {}
         for topic in TOPICS:
             self._make_topic(topic)
-        every = [*self._inputs.items(), *((k, h) for k, hs in self._copies.items() for h in hs)]
         server.gui.add_html(
             style.symbols(
                 {
@@ -141,8 +105,8 @@ class Controls:
                         symbol_parts(table.PARAMETERS[key].symbol)[1],
                         table.PARAMETERS[key].unit,
                     )
-                    for key, handle in every
-                    if key in table.PARAMETERS
+                    for key in table.PARAMETERS
+                    for handle in self._inputs.of(key)
                 }
             )
         )
@@ -151,7 +115,7 @@ class Controls:
         )
         self._reset_all.on_click(lambda _: self._reset(None))
         server.gui.add_html(
-            manual_places({key: handle._impl.uuid for key, handle in self._inputs.items()})
+            manual_places({key: handle._impl.uuid for key, handle in self._inputs.by_key.items()})
         )
         for hotkey in hotkeys():
             command = server.gui.add_command(
@@ -160,7 +124,7 @@ class Controls:
             command.on_trigger(partial(self._relay, hotkey.name))
         self._changed: set[str] = set()
         """The inputs whose labels are marked as changed."""
-        self._shown: set[str] = set(self._inputs)
+        self._shown: set[str] = set(self._inputs.by_key)
         """The inputs that are visible."""
         self._refresh(workbench.snapshot())
         self._unsubscribe = workbench.subscribe(self._note)
@@ -197,7 +161,7 @@ class Controls:
 
     def _ask_curves(self, copy: int, _: object) -> None:
         assert self._sensitivity is not None
-        keys = [key for key, copies in self._copies.items() if copies[copy].visible]
+        keys = [key for key, copies in self._inputs.copies.items() if copies[copy].visible]
         self._sensitivity.ask(keys[:MOST_CURVES])
 
     def _show_curves(self, parameters: RunParameters) -> None:
@@ -207,7 +171,7 @@ class Controls:
             (
                 curve,
                 table.value(parameters, key),
-                [h._impl.uuid for h in (self._inputs[key], *self._copies.get(key, ()))],
+                [h._impl.uuid for h in self._inputs.of(key)],
             )
             for key, curve in self._sensitivity.curves().items()
         )
@@ -219,78 +183,10 @@ class Controls:
         folder = self._topics[topic] = self._server.gui.add_folder(topic, expand_by_default=False)
         with folder:
             for group in dict.fromkeys(p.group for p in parameters):
-                self._make_group([p for p in parameters if p.group == group])
+                self._inputs.add_group([p for p in parameters if p.group == group])
             reset = self._server.gui.add_button(f"Reset {topic.lower()}", visible=False)
             reset.on_click(lambda _: self._reset(topic))
             self._resets[topic] = reset
-
-    def _make_method(self, method: MethodKey) -> None:
-        field = RunParameters.model_fields[method]
-        chooser = self._server.gui.add_dropdown(
-            METHODS[method],
-            table.METHODS[method],
-            initial_value=table.METHODS[method][0],
-            hint=field.description,
-        )
-        self._follow(method, chooser)
-
-    def _make_group(self, parameters: list[Parameter]) -> None:
-        """The parameters of one group that are about one thing, the advanced ones folded away."""
-        group = parameters[0].group
-        folder = self._server.gui.add_folder(None)
-        self._blocks.append((folder, frozenset(p.key for p in parameters)))
-        with folder:
-            whose = "all cameras" if parameters[0].stage != "single_view" else "each camera"
-            self._server.gui.add_html(
-                f'<div class="mvp-group">{whose} · {group.replace("_", " ")}</div>'
-            )
-            for parameter in parameters:
-                if not parameter.advanced:
-                    self._make_input(parameter)
-            advanced = [p for p in parameters if p.advanced]
-            if advanced:
-                more = self._server.gui.add_folder("Advanced", expand_by_default=False)
-                self._blocks.append((more, frozenset(p.key for p in advanced)))
-                with more:
-                    for parameter in advanced:
-                        self._make_input(parameter)
-
-    def _make_input(self, parameter: Parameter) -> None:
-        self._follow(parameter.key, self._input_of(parameter))
-
-    def _input_of(self, parameter: Parameter) -> Input:
-        gui = self._server.gui
-        label, hint = label_text(parameter, changed=False), hint_text(parameter)
-        handle: Input
-        if parameter.kind == "bool":
-            handle = gui.add_checkbox(label, bool(parameter.default), hint=hint)
-        elif parameter.kind == "choice":
-            handle = gui.add_dropdown(
-                label, parameter.choices, initial_value=parameter.default, hint=hint
-            )
-        else:
-            scale = self._scales[parameter.key] = Scale(parameter)
-            handle = gui.add_slider(
-                label,
-                min=scale.minimum,
-                max=scale.maximum,
-                step=scale.step,
-                initial_value=scale.place(parameter.default),
-                hint=hint,
-            )
-        return handle
-
-    def _follow(self, key: str, handle: Any) -> None:
-        self._inputs[key] = handle
-        self._hear(key, handle)
-
-    def _hear(self, key: str, handle: Any) -> None:
-        @handle.on_update  # type: ignore[untyped-decorator]
-        def _(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is not None:  # else it is our own writing
-                with self._lock:
-                    self._moved[key] = handle
-                self._worker.ask("edit")
 
     # what happens: these return at once
 
@@ -321,45 +217,28 @@ class Controls:
         self._refresh(self._workbench.snapshot())
 
     def _take_edits(self) -> None:
-        with self._lock:
-            moved, self._moved = self._moved, {}
-        edits = {key: self._value_of(key, handle) for key, handle in moved.items()}
         try:
-            self._workbench.set_parameters(edits, ORIGIN)
+            self._workbench.set_parameters(self._inputs.take_moved(), ORIGIN)
         except ParameterError as error:
             self._workbench.notify("error", str(error))
 
-    def _value_of(self, key: str, handle: Any) -> Any:
-        place = handle.value
-        if key in METHODS:
-            return place.removesuffix(UNFIT)
-        return self._scales[key].value(place) if key in self._scales else place
-
     def _refresh(self, snapshot: Snapshot) -> None:
-        parameters = snapshot.parameters
-        changed = self._inputs.keys() & table.changed(parameters, snapshot.defaults).keys()
-        shown = self._inputs.keys() & self._shown_keys(parameters)
+        parameters, inputs = snapshot.parameters, self._inputs.by_key
+        changed = inputs.keys() & table.changed(parameters, snapshot.defaults).keys()
+        shown = inputs.keys() & self._shown_keys(parameters)
         with self._server.atomic():
-            for key, handle in self._inputs.items():
-                if key not in METHODS:
-                    for input_ in (handle, *self._copies.get(key, ())):
-                        self._write(key, input_, table.value(parameters, key))
+            for key in inputs.keys() - METHODS.keys():
+                self._inputs.write(key, table.value(parameters, key))
             for method, unfit in snapshot.unfit.items():
-                self._write_method(method, getattr(parameters, method), unfit)
+                self._inputs.write_method(method, getattr(parameters, method), unfit)
             # only what differs is written: the interpreter is wanted by the run
             for key in changed ^ self._changed:
-                if key in table.PARAMETERS:
-                    label = label_text(table.PARAMETERS[key], changed=key in changed)
-                else:
-                    words = METHODS[cast(MethodKey, key)]
-                    label = f"• {words}" if key in changed else words
-                for input_ in (self._inputs[key], *self._copies.get(key, ())):
-                    input_.label = label
+                self._inputs.label(key, changed=key in changed)
             for key in shown ^ self._shown:
-                self._inputs[key].visible = key in shown
+                inputs[key].visible = key in shown
             self._changed, self._shown = changed, shown
             self._show_found(shown, changed)
-            for folder, keys in self._blocks:
+            for folder, keys in self._inputs.blocks:
                 folder.visible = bool(keys & shown)
             for topic, reset in self._resets.items():
                 reset.visible = bool(_about(topic, changed & shown))
@@ -374,7 +253,7 @@ class Controls:
         text, only_changed = self._sought.value.strip(), self._only_changed.value
         looks = bool(text or only_changed)
         keys = finding.found(shown, changed, text, only_changed=only_changed)
-        for key, copies in self._copies.items():
+        for key, copies in self._inputs.copies.items():
             copies[-1].visible = looks and key in keys
             if len(copies) > 1:
                 copies[0].visible = not looks and key in shown
@@ -383,7 +262,9 @@ class Controls:
         self._nothing_found.visible = looks and not keys
         what = f"No parameter has “{html.escape(text)}”" if text else "Nothing is changed"
         self._nothing_found.content = f'<div class="mvp-status">{what}.</div>'
-        essential = {key for key in shown if key in self._copies and len(self._copies[key]) > 1}
+        essential = {
+            key for key in shown if key in self._inputs.copies and len(self._inputs.copies[key]) > 1
+        }
         self._essentials.label = finding.title(
             "Essentials", len(essential), len(essential & changed)
         )
@@ -401,32 +282,6 @@ class Controls:
             self._presets.options = options
         self._presets.value = snapshot.preset or OWN_VALUES
 
-    def _write(self, key: str, handle: Any, value: Any) -> None:
-        scale = self._scales.get(key)
-        with self._lock:
-            if key in self._moved:  # somebody is moving it; the edit comes next
-                return
-            if scale is None:
-                if handle.value != value:
-                    handle.value = value
-            elif not scale.stands_at(handle.value, value):
-                handle.value = scale.place(value)
-
-    def _write_method(self, key: MethodKey, name: str, unfit: Mapping[str, str]) -> None:
-        """The methods, marked where one cannot work here; of the chosen one the hint says why."""
-        handle = self._inputs[key]
-        marked = {name: f"{name}{UNFIT}" if name in unfit else name for name in table.METHODS[key]}
-        with self._lock:
-            if key in self._moved:
-                return
-            if handle.options != tuple(marked.values()):
-                handle.options = tuple(marked.values())
-            if handle.value != marked[name]:
-                handle.value = marked[name]
-            hint = unfit.get(name, RunParameters.model_fields[key].description)
-            if handle.hint != hint:
-                handle.hint = hint
-
     def _shown_keys(self, parameters: RunParameters) -> set[str]:
         """The choices of the methods, and what has an effect with what is chosen."""
         return set(table.shown_keys(parameters))
@@ -435,15 +290,11 @@ class Controls:
         """The readable numbers of logarithmic sliders, and stronger ink for changed labels."""
         numbers = {
             handle._impl.uuid: number_text(table.value(parameters, key))
-            for key, scale in self._scales.items()
+            for key, scale in self._inputs.scales.items()
             if scale.parameter.log
-            for handle in (self._inputs[key], *self._copies.get(key, ()))
+            for handle in self._inputs.of(key)
         }
-        marked = [
-            handle._impl.uuid
-            for key in sorted(changed)
-            for handle in (self._inputs[key], *self._copies.get(key, ()))
-        ]
+        marked = [handle._impl.uuid for key in sorted(changed) for handle in self._inputs.of(key)]
         return style.values(numbers, marked)
 
 

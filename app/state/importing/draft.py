@@ -25,6 +25,7 @@ from tracker.sequences.reader import FILE
 
 if TYPE_CHECKING:
     from app.state.importing.looking import Looked
+    from tracker.importing.arriving import Footprint
     from tracker.importing.gathering import Taken
     from tracker.importing.settling import Settled, SettledView
 
@@ -54,6 +55,8 @@ class Known:
     looked: Looked | None = None
     busy: bool = False
     """Whether something is being looked into."""
+    waiting: str = ""
+    """What is waited for before anything is read: a file that is still being copied there."""
     error: str = ""
     folder: Path | None = None
     """Where it was written."""
@@ -87,6 +90,7 @@ class Draft:
         self._lock = threading.RLock()
         self._known = Known("uploading" if source is None else "reading", Wish(name=name))
         self._gathered = False
+        self._read: Footprint = {}
         self._stop = threading.Event()
         self._given_up = False
         self._pictures: dict[Path, bytes | None] = {}
@@ -158,7 +162,7 @@ class Draft:
         self._stop.set()
         stop = self._stop = threading.Event()
         phase: Phase = "settled" if self._gathered and self._known.settled else "reading"
-        self._tell(phase=phase, busy=True, error="")
+        self._tell(phase=phase, busy=True, error="", waiting="")
         threading.Thread(target=self._look, args=(stop,), name="importing", daemon=True).start()
 
     def _look(self, stop: threading.Event) -> None:
@@ -170,17 +174,22 @@ class Draft:
 
         # the readers of all formats: a server starts without them
         from app.state.importing.looking import look_into
-        from tracker.importing.gathering import gather
+        from tracker.importing.arriving import gather_whole
         from tracker.importing.settling import settle
+
+        def sleep(seconds: float) -> None:
+            if stop.wait(seconds):
+                raise Cancelled
 
         try:
             with self._lock:
                 wish, taken, gathered = self._known.wish, self._known.taken, self._gathered
             if not gathered:
-                taken = tuple(gather([self.source]))
+                found, read = gather_whole([self.source], lambda t: tell(waiting=t), sleep)
+                taken = tuple(found)
                 with self._lock:
-                    tell(taken=taken)
-                    self._gathered = True
+                    tell(taken=taken, waiting="")
+                    self._gathered, self._read = True, read
             settled = settle(taken, options_of(wish, taken))
             tell(settled=settled, phase="settled", error="")
             for looked in look_into(settled, wish.name, stop.is_set):
@@ -229,11 +238,29 @@ class Draft:
             place = self.home / folder_name(known.wish.name)
             if place.exists():
                 raise FormatError(f"there is a recording {place.name} already; choose another name")
+            self._check_unchanged()
             self._stop.set()
             began = time.monotonic()
             self._tell(phase="writing", busy=False, error="", copied=0, copying_since=began)
         arguments = (known.taken, known.wish, place, then)
         threading.Thread(target=self._write, args=arguments, name="import", daemon=True).start()
+
+    def _check_unchanged(self) -> None:
+        """What was looked at is what is written.
+
+        Raises:
+            FormatError: If files came or were written to since; they are looked at again.
+        """
+        from tracker.importing.arriving import changed_since
+
+        changed = changed_since([self.source], self._read)
+        if changed:
+            self._gathered = False
+            self._look_again()
+            raise FormatError(
+                f"{changed[0].name} came or was changed after the files were read; they are read "
+                "again: import when they are"
+            )
 
     def _write(
         self, taken: tuple[Taken, ...], wish: Wish, place: Path, then: Callable[[Path], object]

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from app.state.entrances import entrances_of
 from app.state.importing.plan import Plan, draw_plan
+from app.state.teaching.entrances import entrances_of
 from tracker.agreement.consensus import Consensus
 from tracker.agreement.entrances import Door
 from tracker.checks import Check

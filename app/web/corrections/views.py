@@ -105,8 +105,8 @@ def _doubt(one: Doubt) -> DoubtInfo:
 
 def preview_of(snapshot: Snapshot, doubt: Doubt, alternative: int) -> AlternativePreview:
     """The tracks as they would be if an alternative were true: at once, by their rows alone."""
-    run = snapshot.run
-    assert run is not None
+    assert snapshot.run is not None
+    run = snapshot.run.still()
     after = _after(run, doubt, alternative)
     first, last = _around(run, doubt)
     spans = _spans(run.tracks, after)
@@ -118,8 +118,8 @@ def preview_of(snapshot: Snapshot, doubt: Doubt, alternative: int) -> Alternativ
 
 def ghosts_of(snapshot: Snapshot, doubt: Doubt, alternative: int) -> Ghosts:
     """The same for the 3D view."""
-    run = snapshot.run
-    assert run is not None
+    assert snapshot.run is not None
+    run = snapshot.run.still()
     after = _after(run, doubt, alternative)
     first, last = _around(run, doubt)
     touched = _touched(doubt, _spans(run.tracks, after))

@@ -74,7 +74,7 @@ def _info(draft: Draft) -> ImportInfo:
         version=known.version,
         phase=known.phase,
         busy=known.busy,
-        under_way=looked.under_way if looked is not None and known.busy else "",
+        under_way=known.waiting or (looked.under_way if looked is not None and known.busy else ""),
         error=known.error,
         wish=_wish_info(known.wish),
         received=draft.size if upload is None else upload.received,

@@ -13,8 +13,8 @@ from numpy import ndarray
 from app.errors import sentence
 from app.state.snapshot import Snapshot
 from app.web.pictures import address
-from tracker.colour import ColourModel
 from tracker.parameters import ColourPhdParams
+from tracker.pictures.colour import ColourModel
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes

@@ -99,9 +99,10 @@ def _truth(
         for i in range(len(ids))
     ]
     if run is not None and step < run.done:
-        pairs = pairs_at(truth, run.tracks, step)
-        tracks = run.tracks.ids[run.tracks.at(step)][pairs.estimates]
-        for person, track, error in zip(pairs.people, tracks, pairs.errors, strict=True):
+        tracks = run.tracks
+        pairs = pairs_at(truth, tracks, step)
+        found = tracks.ids[tracks.at(step)][pairs.estimates]
+        for person, track, error in zip(pairs.people, found, pairs.errors, strict=True):
             told[person].track, told[person].error = int(track), round(float(error), 4)
     return told
 

@@ -26,7 +26,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.typing import Origin, Subprotocol
 
 from app.command import main as cli
-from app.web.server import Settings, _say_failure, build_routes, create_app
+from app.web.server import Settings, build_routes, create_app
+from app.web.server.running import say_failure
 from tests.app.conftest import wait_until
 from tests.app.folders import write_crossing
 from tracker.pipeline import Cancelled
@@ -307,6 +308,6 @@ def test_no_route_is_built_while_other_threads_may_warn(monkeypatch: pytest.Monk
 def test_an_opening_that_the_end_cut_short_is_no_failure(caplog: pytest.LogCaptureFixture) -> None:
     for error in (Cancelled("the end"), ValueError("no such folder")):
         future: Future[None] = Future()
-        future.add_done_callback(_say_failure("crossing"))
+        future.add_done_callback(say_failure("crossing"))
         future.set_exception(error)
     assert [r.getMessage() for r in caplog.records] == ["crossing cannot be opened: no such folder"]

@@ -51,7 +51,7 @@ def panel(shared_server: viser.ViserServer, workbench: Workbench) -> Iterator[Co
 
 def move(panel: Controls, key: str, place: Any) -> None:
     """What viser does when a browser moves an input: any value, then the callbacks."""
-    handle = panel._inputs[key]
+    handle = panel._inputs.by_key[key]
     handle._impl.value = place
     for callback in handle._impl.update_cb:
         callback(viser.GuiEvent(None, 1, handle))  # type: ignore[arg-type]
@@ -143,7 +143,7 @@ def test_label_and_hint_say_what_it_is(parameter: table.Parameter) -> None:
 
 
 def visible_copies(panel: Controls) -> set[str]:
-    return {key for key, copies in panel._copies.items() if any(h.visible for h in copies)}
+    return {key for key, copies in panel._inputs.copies.items() if any(h.visible for h in copies)}
 
 
 def test_the_essentials_come_first_and_move_the_same_parameter(
@@ -154,13 +154,13 @@ def test_the_essentials_come_first_and_move_the_same_parameter(
     assert shown == essential & set(panel._shown)
     assert {P_D, "fusion.survival_probability", "fusion.extraction_threshold"} <= shown
     assert panel._essentials.label == f"Essentials · {len(shown)}"
-    handle = panel._copies[P_D][0]
+    handle = panel._inputs.copies[P_D][0]
     handle._impl.value = 0.6
     for callback in handle._impl.update_cb:
         callback(viser.GuiEvent(None, 1, handle))  # type: ignore[arg-type]
     assert panel.wait(SECONDS)
     assert value(workbench, P_D) == 0.6
-    assert panel._inputs[P_D].value == 0.6
+    assert panel._inputs.by_key[P_D].value == 0.6
     assert panel._essentials.label.endswith(", 1 changed")
     assert panel._topics["Detection"].label.endswith(", 1 changed")
     assert not panel._topics["Birth"].label.endswith("changed")
@@ -210,12 +210,12 @@ def test_every_parameter_is_about_one_thing_and_none_of_them_about_nothing(
         ("Extraction", "fusion.extraction_threshold"),
     ):
         assert key in about[topic]  # type: ignore[index]
-    held = [key for _, keys in panel._blocks for key in keys if not PARAMETERS[key].advanced]
+    held = [key for _, keys in panel._inputs.blocks for key in keys if not PARAMETERS[key].advanced]
     assert len(held) == len(set(held))
 
 
 def test_every_parameter_and_method_has_one_input(panel: Controls) -> None:
-    assert set(panel._inputs) == {*PARAMETERS, *table.METHODS}
+    assert set(panel._inputs.by_key) == {*PARAMETERS, *table.METHODS}
     kinds = {
         "float": viser.GuiSliderHandle,
         "int": viser.GuiSliderHandle,
@@ -223,7 +223,7 @@ def test_every_parameter_and_method_has_one_input(panel: Controls) -> None:
         "choice": viser.GuiDropdownHandle,
     }
     for key, parameter in PARAMETERS.items():
-        assert isinstance(panel._inputs[key], kinds[parameter.kind])
+        assert isinstance(panel._inputs.by_key[key], kinds[parameter.kind])
 
 
 def test_an_edit_reaches_the_workbench(panel: Controls, workbench: Workbench) -> None:
@@ -253,8 +253,8 @@ def test_a_change_elsewhere_moves_the_slider_without_an_echo(
         {"fusion.pruning_threshold": 3.3e-5, "fusion.misses": "per_person"}, "page"
     )
     assert panel.wait(SECONDS)
-    assert 10.0 ** panel._inputs["fusion.pruning_threshold"].value == pytest.approx(3.3e-5)
-    assert panel._inputs["fusion.misses"].value == "per_person"
+    assert 10.0 ** panel._inputs.by_key["fusion.pruning_threshold"].value == pytest.approx(3.3e-5)
+    assert panel._inputs.by_key["fusion.misses"].value == "per_person"
     assert news == ["parameters"]
     assert workbench.snapshot().parameters_origin == "page"
     assert 'content: "3.3e-5"' in panel._values.content
@@ -262,10 +262,10 @@ def test_a_change_elsewhere_moves_the_slider_without_an_echo(
 
 def test_a_slider_that_is_being_moved_is_not_written(panel: Controls, workbench: Workbench) -> None:
     key = "fusion.pruning_threshold"
-    handle = panel._inputs[key]
+    handle = panel._inputs.by_key[key]
     handle._impl.value = -2.505  # further on than what the store knows
-    with panel._lock:
-        panel._moved[key] = handle
+    with panel._inputs._lock:
+        panel._inputs._moved[key] = handle
     workbench.set_parameters({key: 1e-6}, "page")
     assert panel.wait(SECONDS)
     assert handle.value == -2.505
@@ -281,14 +281,14 @@ def test_what_is_out_of_range_is_clamped_and_written_back(
     move(panel, "fusion.survival_probability", 7.0)
     assert panel.wait(SECONDS)
     assert value(workbench, "fusion.survival_probability") == 1.0
-    assert panel._inputs["fusion.survival_probability"].value == 1.0
+    assert panel._inputs.by_key["fusion.survival_probability"].value == 1.0
 
 
 def test_only_what_the_methods_read_is_shown(panel: Controls, workbench: Workbench) -> None:
     def shown() -> set[str]:
         return {
             PARAMETERS[key].group
-            for folder, keys in panel._blocks
+            for folder, keys in panel._inputs.blocks
             for key in keys
             if folder.visible
         }
@@ -306,8 +306,8 @@ def test_of_a_shared_group_only_the_numbers_that_are_read_are_shown(
     panel: Controls, workbench: Workbench
 ) -> None:
     def shown(key: str) -> bool:
-        blocks = [folder for folder, keys in panel._blocks if key in keys]
-        return bool(panel._inputs[key].visible) and all(folder.visible for folder in blocks)
+        blocks = [folder for folder, keys in panel._inputs.blocks if key in keys]
+        return bool(panel._inputs.by_key[key].visible) and all(folder.visible for folder in blocks)
 
     assert not shown("jpda.gate_probability")
     move(panel, "single_view", "jpda")
@@ -331,7 +331,7 @@ def test_changed_values_are_marked_and_can_be_reset(panel: Controls, workbench: 
     move(panel, key, 0.9)
     move(panel, "fusion.extraction_threshold", 0.6)
     assert panel.wait(SECONDS)
-    assert panel._inputs[key].label.startswith("• ")
+    assert panel._inputs.by_key[key].label.startswith("• ")
     assert panel._resets["Motion"].visible
     assert panel._resets["Extraction"].visible
     assert panel._reset_all.visible
@@ -339,7 +339,7 @@ def test_changed_values_are_marked_and_can_be_reset(panel: Controls, workbench: 
     assert panel.wait(SECONDS)
     assert value(workbench, key) == PARAMETERS[key].default
     assert value(workbench, "fusion.extraction_threshold") == 0.6
-    assert not panel._inputs[key].label.startswith("• ")
+    assert not panel._inputs.by_key[key].label.startswith("• ")
     assert not panel._resets["Motion"].visible
     panel._reset(None)
     assert panel.wait(SECONDS)
@@ -371,8 +371,8 @@ def test_a_preset_moves_the_sliders(panel: Controls, workbench: Workbench) -> No
     assert panel.wait(SECONDS)
     for key, wanted in table.PRESETS["published"].items():
         assert value(workbench, key) == wanted
-        at = panel._inputs[key].value
-        assert at == wanted or panel._scales[key].stands_at(at, wanted)
+        at = panel._inputs.by_key[key].value
+        assert at == wanted or panel._inputs.scales[key].stands_at(at, wanted)
 
 
 def test_keys_of_the_3d_view_are_those_of_the_page() -> None:

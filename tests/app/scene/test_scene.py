@@ -16,7 +16,7 @@ from app.colours import PALETTES
 from app.scene import geometry, scene
 from app.scene.geometry import mass_radius
 from app.scene.nodes import linear
-from app.scene.room import entrance_edges
+from app.scene.room.standing import entrance_edges
 from app.scene.scene import Scene
 from app.scene.worker import LatestWorker
 from app.state.snapshot import Ghosts

@@ -16,8 +16,8 @@ from app import colours
 from app.scene import geometry
 from app.scene.geometry import dashes, ellipsoids, icosphere, mass_radius, overview, quaternions
 from app.scene.nodes import linear
-from app.scene.pictures import StraightView
-from app.scene.room import pose_through
+from app.scene.room.pictures import StraightView
+from app.scene.room.standing import pose_through
 from app.scene.views import between
 from tests.app.scene import scene_case
 

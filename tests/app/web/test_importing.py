@@ -169,6 +169,32 @@ def test_a_folder_of_the_disk_is_not_copied(client: TestClient, files: Path, dat
     assert again == {"draft": None, "first": 0, "recording": str(data / "walk-2")}
 
 
+def test_a_folder_that_is_still_being_copied_is_waited_for(
+    client: TestClient, files: Path, data: Path
+) -> None:
+    inside = files.rename(data / "walk")
+    videos(inside, (128, 72), frames=60)
+    video = inside / "cam2.avi"
+    content = video.read_bytes()
+    video.write_bytes(content[: len(content) // 2])
+    begun = client.post("/api/import/path", json={"path": "walk"}).json()["draft"]
+    address = f"/api/import/{begun['key']}"
+    wait_until(lambda: "cam2.avi is not complete" in client.get(address).json()["sheet"])
+    assert client.get(address).json()["phase"] == "reading"
+    assert client.post(f"{address}/write", json={"open": False}).status_code == 422
+    video.write_bytes(content)
+    info = _settled(client, begun["key"])
+    assert {camera["frames"] for camera in info["cameras"]} == {60}
+    # and what comes after it was read is read, too, before anything is written
+    video.write_bytes(content + b"more")
+    answer = client.post(f"{address}/write", json={"open": False})
+    assert answer.status_code == 422
+    assert "Cam2.avi came or was changed" in answer.text
+    _settled(client, begun["key"])
+    assert client.post(f"{address}/write", json={"open": False}).status_code == 200
+    wait_until(lambda: (data / "walk-2").exists())
+
+
 def test_entrances_and_methods_are_chosen_on_the_sheet(
     client: TestClient, files: Path, data: Path
 ) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.benchmarks import record
-from tests.benchmarks.accuracy import TOLERANCES
+from tests.benchmarks.engine.accuracy import TOLERANCES
 from tests.benchmarks.measure import Measurement, machine
 from tests.benchmarks.record import Entry, chart
 

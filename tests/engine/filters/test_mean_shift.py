@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
 
-from tracker import mean_shift
 from tracker.kernels.pictures import images
+from tracker.pictures import mean_shift
 
 CENTRES = np.array([[60.0, 50.0, 10.0, 15.0], [110.0, 52.0, 12.0, 16.0], [62.0, 140.0, 8.0, 12.0]])
 

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
 
-from tracker import particles
 from tracker.kernels import particles as particle_kernels
-from tracker.particles import Clusters, clusters
+from tracker.pictures import particles
+from tracker.pictures.particles import Clusters, clusters
 
 CENTRES = np.array([[60.0, 50.0, 10.0, 15.0], [110.0, 52.0, 12.0, 16.0], [62.0, 140.0, 8.0, 12.0]])
 

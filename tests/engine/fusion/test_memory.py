@@ -8,7 +8,7 @@ from numpy import ndarray
 
 from tests.engine.standing import RECOMMENDED, empty_room
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion.memory import Memory, recall
+from tracker.fusion.labels.memory import Memory, recall
 from tracker.fusion.model import FusionModel
 
 MODEL = FusionModel(empty_room(10.0), RECOMMENDED)

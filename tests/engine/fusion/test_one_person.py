@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tracker.filters import phd
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.filters.phd import PhdUpdate
-from tracker.fusion import one_person
+from tracker.fusion.labels import one_person
 from tracker.kernels.kalman import Expected
 
 R = 0.04 * np.eye(2)

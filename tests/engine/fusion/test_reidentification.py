@@ -12,9 +12,9 @@ from numpy import ndarray
 
 from tests.engine.standing import RECOMMENDED, fuse, ids_of, line, watch
 from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.fusion.labels.reidentification import Identities, reidentify
 from tracker.fusion.multi_bernoulli import MultiBernoulli
 from tracker.fusion.protocol import Associations
-from tracker.fusion.reidentification import Identities, reidentify
 from tracker.single_view.protocol import ViewResult
 
 NOBODY = np.zeros(0, dtype=np.int64)

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from numpy import ndarray
 
 from tests.engine.rooms import SKIN, clip, empty_room, person_mask, photograph, with_person
-from tracker.foreground import AdaptiveForeground, first_background
-from tracker.foreground.adaptive import AdaptiveState, choose_iteration, clean, cluster
 from tracker.kernels.pictures.foreground import above, update_background
 from tracker.parameters import ForegroundParams
+from tracker.pictures.foreground import AdaptiveForeground, first_background
+from tracker.pictures.foreground.adaptive import AdaptiveState, choose_iteration, clean, cluster
 
 PUBLISHED = ForegroundParams(
     model="adaptive", least_threshold=0.0, follow_exposure=False, drop_shadows=False

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy import ndarray
 from numpy.testing import assert_array_equal
 
-from tracker.blobs import blobs, foreground_boxes
+from tracker.pictures.blobs import blobs, foreground_boxes
 
 
 def flood(mask: ndarray) -> list[set[tuple[int, int]]]:

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
 
-from tracker import colour
-from tracker.colour import BINS, ColourModel, ColourSpaceName, KernelName
+from tracker.pictures import colour
+from tracker.pictures.colour import BINS, ColourModel, ColourSpaceName, KernelName
 
 SPACES: tuple[ColourSpaceName, ...] = ("hue_saturation", "rgb", "hsi")
 KERNELS: tuple[KernelName, ...] = ("epanechnikov", "flat")

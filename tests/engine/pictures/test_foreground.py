@@ -12,11 +12,11 @@ from numpy import ndarray
 from numpy.testing import assert_array_equal
 
 from tests.engine.rooms import SKIN, clip, empty_room, person_mask, photograph, with_person
-from tracker import foreground
-from tracker.foreground import BackgroundModel, LearntForeground, tone_curve
 from tracker.kernels.pictures import images
 from tracker.kernels.pictures.foreground import level_medians, upper_medians
 from tracker.parameters import ForegroundParams
+from tracker.pictures import foreground
+from tracker.pictures.foreground import BackgroundModel, LearntForeground, tone_curve
 
 PLAIN = ForegroundParams(threshold=24.0)
 

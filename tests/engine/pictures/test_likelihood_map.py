@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.engine.painted import GREEN, RED, painted_sequence, true_boxes
-from tracker import colour
+from tracker.pictures import colour
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes

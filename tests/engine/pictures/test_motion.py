@@ -8,8 +8,8 @@ import pytest
 from numpy import ndarray
 
 from tests.engine.rooms import SKIN, clip, empty_room, photograph
-from tracker.foreground import BackgroundModel, MovingForeground
 from tracker.parameters import ForegroundParams
+from tracker.pictures.foreground import BackgroundModel, MovingForeground
 
 SECONDS = 0.04
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from numpy import ndarray
 
 from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, ROOM
-from tracker.blobs import blobs
 from tracker.parameters import AssociationMatrixParams
+from tracker.pictures.blobs import blobs
 from tracker.single_view.association_matrix.joining import join
 from tracker.single_view.association_matrix.silhouettes import Fits, Silhouettes
 from tracker.single_view.box_sizes import BoxSizes, upright_boxes

@@ -9,8 +9,8 @@ from numpy import ndarray
 
 from tests.golden.pieces import cut
 from tracker import pipeline
-from tracker.foreground import BackgroundModel
 from tracker.parameters import ForegroundParams, RunParameters, with_values
+from tracker.pictures.foreground import BackgroundModel
 from tracker.runs.gates import notices
 from tracker.sequences.library import open_sequence
 from tracker.sequences.pictures.frames import FrameReader, Picture

@@ -15,8 +15,8 @@ from tests.engine.painted import GREEN, RED, painted_sequence, true_boxes
 from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, walk
 from tracker import pipeline, single_view
 from tracker.experiments.clips.clip import Actor, Clip, constant_size, through, wall, write
-from tracker.foreground import unpack
 from tracker.parameters import PRESETS, RunParameters, with_values
+from tracker.pictures.foreground import unpack
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, View
 from tracker.single_view.association_matrix.method import AssociationMatrixState

@@ -11,8 +11,8 @@ import pytest
 from scipy.special import logit
 
 from tracker import pipeline
-from tracker.foreground import BackgroundModel
 from tracker.parameters import RunParameters, with_values
+from tracker.pictures.foreground import BackgroundModel
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.rendering import render_random

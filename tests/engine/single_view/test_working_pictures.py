@@ -18,9 +18,9 @@ from tests.engine.synthetic import CAMERAS as SMALL
 from tests.engine.synthetic import HALF_EXTENTS as HEAD
 from tests.engine.synthetic import ROOM as SMALL_ROOM
 from tracker.camera import Camera
-from tracker.foreground import pack, unpack
 from tracker.parameters import RunParameters, with_values
 from tracker.parameters.groups.pictures import PictureParams
+from tracker.pictures.foreground import pack, unpack
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, Template, View
 from tracker.single_view.box_sizes import upright_boxes

@@ -13,8 +13,8 @@ from tracker.evaluation.figures import number
 from tracker.experiments.clips.association import FULL_LIGHT, coming_and_going, light, true_mask
 from tracker.experiments.laboratory.experiment import Context, Finding
 from tracker.experiments.laboratory.pool import Desk, spread
-from tracker.foreground import AdaptiveForeground, first_background
 from tracker.parameters import ForegroundParams
+from tracker.pictures.foreground import AdaptiveForeground, first_background
 from tracker.pipeline import Cancelled
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,15 +23,18 @@ from tracker.formats.values import (
     lens,
     matrix,
     number,
+    numbers,
     rotation,
     vector,
 )
 
 MEANINGS: dict[str, tuple[str, ...]] = {
     "K": ("k", "m", "mtx", "cameramatrix", "cammatrix", "intrinsicmatrix", "intrinsics",
-          "intrinsic", "matrix", "intri"),
+          "intrinsic", "matrix", "intri", "calibrationmatrix"),
     "D": ("d", "dist", "distortion", "distortions", "distortioncoefficients", "distcoeffs",
           "distcoeff", "distcoef", "distcoefs", "distortioncoeffs", "kc", "distortionvector"),
+    "radial": ("rdistort", "radialdistortion"),
+    "tangential": ("tdistort", "tangentialdistortion"),
     "R": ("r", "rot", "rotation", "rotationmatrix", "rvec", "rotationvector", "rotvec",
           "rodrigues", "rmat", "rmatrix"),
     "T": ("t", "tvec", "translation", "translationvector", "trans", "tvecs"),
@@ -108,15 +112,24 @@ def camera(
     elif "width" in fields and "height" in fields:
         both = [number(file, at(side), fields[side]) for side in ("width", "height")]
         size = image_size(file, at("size"), both)
-    k = intrinsics(file, at("K"), fields["K"]) if _length(fields.get("K")) == 9 else None
+    transposed = _is_transposed(fields.get("K"))
+    k = None
+    if _length(fields.get("K")) == 9:
+        given = matrix(file, at("K"), fields["K"], 3, 3)
+        k = intrinsics(file, at("K"), given.T if transposed else given)
     if size is not None and k is not None and "size" in fields:
         size = _width_first(size, k)
     distortion, model = lens(
-        file, at("distortion"), fields.get("D"), fisheye=_is_set(fields.get("fisheye"))
+        file,
+        at("distortion"),
+        _distortion(file, name, fields),
+        fisheye=_is_set(fields.get("fisheye")),
     )
     turned = translation = projection = None
     if "R" in fields and "T" in fields:
         turned = rotation(file, at("R"), fields["R"])
+        if transposed and _length(fields["R"]) == 9:
+            turned = turned.T
         translation = vector(file, at("T"), fields["T"], 3, "x y z")
     elif "RT" in fields:
         rows = 4 if _length(fields["RT"]) == 16 else 3
@@ -138,6 +151,31 @@ def camera(
     )
 
 
+def _is_transposed(k: Any) -> bool:
+    """Whether K is written for points in rows, as MATLAB, DANNCE and JARVIS have it; R is then."""
+    if _length(k) != 9:
+        return False
+    given = np.asarray(k if not isinstance(k, str) else k.replace(",", " ").split(), dtype=float)
+    found = given.reshape(3, 3)
+    return bool(found[2, :2].any() and not found[:2, 2].any())
+
+
+def _distortion(file: SourceFile, name: str, fields: Mapping[str, Any]) -> Any:
+    """The lens in OpenCV's order, also where radial and tangential parts stand by themselves."""
+    if "D" in fields or "radial" not in fields:
+        return fields.get("D")
+    radial = numbers(file, f"{name} radial", fields["radial"])
+    tangential = numbers(file, f"{name} tangential", fields.get("tangential", [0.0, 0.0]))
+    if len(radial) > 3 or len(tangential) != 2:
+        raise file.error(
+            f"expected up to 3 radial and 2 tangential numbers, found {len(radial)} and "
+            f"{len(tangential)}",
+            f"{name} distortion".strip(),
+        )
+    padded = [*radial, 0.0, 0.0][:3]
+    return [*padded[:2], *tangential, padded[2]]
+
+
 def _width_first(size: tuple[int, int], k: Float[ndarray, "3 3"]) -> tuple[int, int]:
     """A size as width and height: MATLAB and NumPy count rows first, which a principal point far
     from the middle of the one and near that of the other tells."""
@@ -152,8 +190,17 @@ def _width_first(size: tuple[int, int], k: Float[ndarray, "3 3"]) -> tuple[int, 
 
 def cameras(file: SourceFile, values: Any, convention: Convention) -> Iterator[RawCamera]:
     """Every camera of a tree of tables and lists: flat with suffixes, or a table a camera."""
-    for name, fields in _tables(values, "", 0):
-        yield camera(file, name, fields, convention)
+    found = [camera(file, name, fields, convention) for name, fields in _tables(values, "", 0)]
+    lenses = {one.name: one for one in found if one.rotation is None and one.projection is None}
+    poses = {one.name: one for one in found if one.rotation is not None and one.intrinsics is None}
+    if lenses.keys() == poses.keys() and len(lenses) + len(poses) == len(found):
+        # one table of the lenses and one of the poses
+        yield from (
+            replace(lenses[name], rotation=pose.rotation, translation=pose.translation)
+            for name, pose in poses.items()
+        )
+    else:
+        yield from found
 
 
 def has_cameras(values: Any) -> bool:

@@ -59,12 +59,12 @@ def read(file: SourceFile) -> Iterator[Piece]:
     for record in records:
         image = images.get(record.get("image_id"), {})
         name = str(image.get("file_name", record.get("image_id")))
-        by_camera.setdefault(_camera(name), []).append((name, image, record))
+        by_camera.setdefault(camera_of(name), []).append((name, image, record))
     for camera, rows in (by_camera or {"": []}).items():
         yield _piece(file, camera, rows, classes)
 
 
-def _camera(name: str) -> str:
+def camera_of(name: str) -> str:
     """The folder of an image, or what is before the frame's number in its name."""
     path = PurePosixPath(name.replace("\\", "/"))
     if path.parent.name:

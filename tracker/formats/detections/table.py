@@ -39,7 +39,7 @@ def recognise(file: SourceFile) -> Certainty:
         if not any(word in file.head_text for word in ("box", "x_min", "xmin", "x1", "left")):
             return Certainty.NO
         records = _records(file)
-        names = list(_flat(records[0][1])) if records else []
+        names = list(flat(records[0][1])) if records else []
         has_box = "box" in meanings(names) or layout_of(meanings(names)) is not None
         return Certainty.LIKELY if has_box or is_table(names) else Certainty.NO
     lines = _data_lines(file.head_text)
@@ -89,7 +89,7 @@ def _name(columns: Mapping[str, Column]) -> str:
 def _columns(file: SourceFile) -> tuple[dict[str, Column], list[int] | None]:
     """Cells by column; and of a list of lists the frame of each row."""
     if file.head_text.lstrip()[:1] in ("[", "{"):
-        records = [(frame, _flat(record)) for frame, record in _records(file)]
+        records = [(frame, flat(record)) for frame, record in _records(file)]
         names = list(dict.fromkeys(name for _, record in records for name in record))
         columns: dict[str, Column] = {
             name: [record.get(name, "") for _, record in records] for name in names
@@ -164,7 +164,7 @@ def _of_lines(values: list[Any]) -> list[dict[str, Any]]:
     return records
 
 
-def _flat(record: Mapping[str, Any]) -> dict[str, Any]:
+def flat(record: Mapping[str, Any]) -> dict[str, Any]:
     """A record with the fields of its box as its own."""
     flat = {key: value for key, value in record.items() if not isinstance(value, dict)}
     for key in ("box", "bbox", "bounding_box"):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy import ndarray
 
-from tracker.sequences.rendering.raster import kernel
+from tracker.sequences.rendering.compiling import kernel
 
 BOX, BALL, CYLINDER = 0, 1, 2
 """Kinds of solids: the cube, ball and upright cylinder of half size 1 in their own axes."""

@@ -26,7 +26,7 @@ from tracker.sequences.rendering.cast.gait import (
 )
 from tracker.sequences.rendering.cast.paths import Path, walk
 from tracker.sequences.rendering.cast.people import Body, build
-from tracker.sequences.rendering.raster import Placed, Skeleton, Surface, place_bodies
+from tracker.sequences.rendering.lighting import Placed, Skeleton, Surface, place_bodies
 from tracker.sequences.rendering.rooms import (
     TARGET_HALF_EXTENTS,
     VOLUME_MAXIMUM,

@@ -15,13 +15,13 @@ from numpy import ndarray
 from scipy.ndimage import gaussian_filter
 
 from tracker.camera import Camera
+from tracker.sequences.rendering.lighting import floor_shadows
 from tracker.sequences.rendering.raster import (
     Backdrop,
     Figures,
     Mesh,
     Sensor,
     draw,
-    floor_shadows,
 )
 from tracker.sequences.rendering.rooms import CAMERAS, TARGET_HALF_EXTENTS, RoomSpec
 from tracker.sequences.rendering.scene import Scene, script, shadow_balls

@@ -96,7 +96,8 @@ def save_copy(sequence: Sequence, saved: Sequence, folder: Path) -> Sequence:
             building.mkdir()
             text = (source / FILE).read_bytes().decode("utf-8-sig")
             text = rewritten(text, saved, sequence, f"{source.name}/{FILE}", name=folder.name)
-            for path in _files(sequence, tomllib.loads(text)):
+            # of a copy that was just saved the pictures are still read where they were before
+            for path in _files(read_sequence(source), tomllib.loads(text)):
                 place = building / path.relative_to(source)
                 place.parent.mkdir(parents=True, exist_ok=True)
                 _copy(path, place, link=path.suffix.lower() != ".csv")

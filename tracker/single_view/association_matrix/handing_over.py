@@ -14,8 +14,8 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from tracker.assignment import linear_sum_assignment
-from tracker.blobs import Blobs
 from tracker.parameters import AssociationMatrixParams
+from tracker.pictures.blobs import Blobs
 from tracker.single_view.association_matrix import decision_matrices
 from tracker.single_view.association_matrix.following import coefficients
 from tracker.single_view.association_matrix.moving_objects import MovingObject, Situation, Track

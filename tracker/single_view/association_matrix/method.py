@@ -13,11 +13,11 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
 from numpy import ndarray
 
-from tracker import colour
-from tracker.blobs import Blobs, blobs
-from tracker.colour import BINS
-from tracker.foreground import ForegroundModel, learn, pack
 from tracker.parameters import AssociationMatrixParams
+from tracker.pictures import colour
+from tracker.pictures.blobs import Blobs, blobs
+from tracker.pictures.colour import BINS
+from tracker.pictures.foreground import ForegroundModel, learn, pack
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.association_matrix.following import follow, object_histograms

@@ -14,12 +14,12 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
-from tracker.blobs import Blobs
 from tracker.camera import Camera
-from tracker.foreground import integral, shape_scores
 from tracker.kernels.pictures import silhouettes
 from tracker.kernels.pictures.silhouettes import Acceptance, SizeTable
 from tracker.parameters import AssociationMatrixParams
+from tracker.pictures.blobs import Blobs
+from tracker.pictures.foreground import integral, shape_scores
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BoxSizes
 

@@ -12,10 +12,10 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
 from numpy import ndarray
 
-from tracker import colour
-from tracker.colour import ColourSpaceName, KernelName
-from tracker.foreground import ForegroundModel, integral, learn, shape_scores
 from tracker.parameters import ForegroundParams
+from tracker.pictures import colour
+from tracker.pictures.colour import ColourSpaceName, KernelName
+from tracker.pictures.foreground import ForegroundModel, integral, learn, shape_scores
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
@@ -135,7 +135,7 @@ class Appearance:
     ) -> tuple[Float[ndarray, " N"], Float[ndarray, " N"]]:
         """What the foreground says of each box: log factors of the likelihood, and shares inside.
 
-        As :func:`tracker.foreground.shape_scores`; without a foreground model the factors
+        As :func:`tracker.pictures.foreground.shape_scores`; without a foreground model the factors
         are 0 and the shares 1.
 
         Args:

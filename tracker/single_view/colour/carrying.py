@@ -13,10 +13,10 @@ import numpy as np
 from jaxtyping import Float, UInt16
 from numpy import ndarray
 
-from tracker import colour
 from tracker.boxes import Boxes
 from tracker.camera import Camera
-from tracker.colour import ColourSpaceName, KernelName
+from tracker.pictures import colour
+from tracker.pictures.colour import ColourSpaceName, KernelName
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template
 from tracker.single_view.box_sizes import upright_boxes

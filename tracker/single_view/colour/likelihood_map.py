@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
-from tracker import colour
-from tracker.colour import ColourModel
+from tracker.pictures import colour
+from tracker.pictures.colour import ColourModel
 from tracker.single_view.box_sizes import BoxSizes
 
 COLUMNS = 72

@@ -14,10 +14,10 @@ from jaxtyping import Bool, Float, Int, UInt8
 from numpy import ndarray
 from scipy.special import expit
 
-from tracker import mean_shift
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.parameters import ColourPeakParams, ForegroundParams
 from tracker.parameters.groups.shapes import ShapesParams
+from tracker.pictures import mean_shift
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes

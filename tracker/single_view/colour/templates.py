@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracker import colour
 from tracker.boxes import Boxes
-from tracker.colour import ColourModel, ColourSpaceName, KernelName
+from tracker.pictures import colour
+from tracker.pictures.colour import ColourModel, ColourSpaceName, KernelName
 from tracker.sequences.pictures.frames import Picture, Pictures
 from tracker.sequences.sequence import Sequence, SequenceError
 

@@ -16,8 +16,8 @@ from numpy import ndarray
 from scipy.special import expit
 
 from tracker.boxes import Boxes, box_overlaps
-from tracker.foreground import box_shares, integral, learn
 from tracker.parameters import ForegroundParams
+from tracker.pictures.foreground import box_shares, integral, learn
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template
 from tracker.single_view.colour.templates import template_picture

@@ -21,10 +21,10 @@ from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 from scipy.ndimage import minimum_filter1d
 
-from tracker.blobs import Blobs, blobs
 from tracker.camera import Camera
-from tracker.foreground import integral, shape_shares
 from tracker.parameters import JpdaParams
+from tracker.pictures.blobs import Blobs, blobs
+from tracker.pictures.foreground import integral, shape_shares
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BELOW_FLOOR, BoxSizes
 

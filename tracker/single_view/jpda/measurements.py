@@ -12,15 +12,21 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
-from tracker.blobs import blobs
 from tracker.boxes import Boxes
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.foreground import ForegroundModel, MovingForeground, box_shares, integral, learn
 from tracker.parameters import (
     ColourPhdParams,
     DetectionBoxParams,
     ForegroundParams,
     JpdaParams,
+)
+from tracker.pictures.blobs import blobs
+from tracker.pictures.foreground import (
+    ForegroundModel,
+    MovingForeground,
+    box_shares,
+    integral,
+    learn,
 )
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence

@@ -15,8 +15,8 @@ from numpy import ndarray
 
 from tracker.association import validation_matrix
 from tracker.filters.gaussian_mixture import gate_distance
-from tracker.foreground import pack
 from tracker.parameters import JpdaParams
+from tracker.pictures.foreground import pack
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.jpda.association import associate

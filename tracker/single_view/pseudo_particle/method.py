@@ -13,9 +13,9 @@ from jaxtyping import Float, Float32, Int, UInt8
 from numpy import ndarray
 from scipy.special import expit
 
-from tracker import particles as particle_set
-from tracker.foreground import pack
 from tracker.parameters import PseudoParticleParams
+from tracker.pictures import particles as particle_set
+from tracker.pictures.foreground import pack
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.appearance import Scene

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
-from tracker import particles as particle_set
 from tracker.parameters import ForegroundParams, PseudoParticleParams
+from tracker.pictures import particles as particle_set
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.appearance import Appearance, Scene

@@ -12,9 +12,9 @@ import numpy as np
 from jaxtyping import Float32, Int32, UInt8
 from numpy import ndarray
 
-from tracker.foreground import BackgroundModel, tone_curve
-from tracker.foreground.exposure import square_roots
 from tracker.kernels.pictures.channels import channel_sums, gradients
+from tracker.pictures.foreground import BackgroundModel, tone_curve
+from tracker.pictures.foreground.exposure import square_roots
 
 LAG = 0.12
 """Seconds between two pictures that are compared: a moving hand leaves its place."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from tracker.boxes import Boxes
-from tracker.foreground import pack, unpack
+from tracker.pictures.foreground import pack, unpack
 from tracker.sequences.pictures.frames import Picture, Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult

@@ -77,7 +77,7 @@ def _foot(info: ImportInfo) -> Markup:
     things = f"{odd} thing{'' if odd == 1 else 's'} to decide" if odd else "nothing to decide"
     words = {
         "uploading": "Uploading",
-        "reading": "Reading the files",
+        "reading": info.under_way or "Reading the files",
         "writing": f"Writing the recording{_copying(info)}",
         "copying": f"It is open{_copying(info)}; until then the files are links",
     }.get(

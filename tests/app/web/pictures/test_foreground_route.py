@@ -14,7 +14,7 @@ from starlette.testclient import TestClient
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tracker import pipeline
-from tracker.foreground import unpack
+from tracker.pictures.foreground import unpack
 from tracker.pipeline import Run
 from tracker.sequences.reader import read_sequence
 

@@ -8,6 +8,9 @@ from app.web.views.decisions import decided, words_of
 from app.web.views.timeline import Timelines, Window
 from tests.engine.synthetic import crossing, sequence
 from tracker import pipeline
+from tracker.doubts import queue
+from tracker.doubts.doubt import Lanes
+from tracker.doubts.moves import pieces_of
 from tracker.parameters import RunParameters
 from tracker.smoothing import Decision, names_of
 
@@ -35,6 +38,24 @@ def test_a_decision_is_an_event_of_the_track_that_it_happened_to() -> None:
     assert [(d.step, d.track, d.kind, d.words) for d in told.decisions] == [
         (7, names[label], "joined", words)
     ]
+
+
+def test_tracks_that_are_not_the_smoothed_ones_yet_have_no_names() -> None:
+    # while a run goes on it has stage 3 already, and still the filter's people
+    whole = sequence(crossing(STEPS), STEPS)
+    run = pipeline.compute(whole, RunParameters(single_view="none"))
+    assert run.smoothed is not None
+    assert run.smoothed.joined is not None
+    assert names_of(run.smoothed, run.tracks)
+    run.tracks = run.filtered
+    assert names_of(run.smoothed, run.tracks) == {}
+    pieces, joined = pieces_of(run, Lanes(run.tracks))
+    assert joined is None
+    assert {piece.track for piece in pieces if piece} == set(run.tracks.ids.tolist())
+    queue(run)
+    # or those of another run, until its own are there
+    run.tracks = run.filtered.take(run.filtered.frames < STEPS // 2)
+    assert {one.track for one in decided(run)} <= set(run.filtered.ids.tolist())
 
 
 def test_the_filter_alone_decides_nothing_afterwards() -> None:

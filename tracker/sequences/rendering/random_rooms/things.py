@@ -9,9 +9,9 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from tracker.sequences.rendering.cast.people import Body
+from tracker.sequences.rendering.lighting import Placed, Skeleton, place_bodies
 from tracker.sequences.rendering.random_rooms.choices import Choices, generator
 from tracker.sequences.rendering.random_rooms.shell import Furnished
-from tracker.sequences.rendering.raster import Placed, Skeleton, place_bodies
 from tracker.sequences.rendering.scene import Figure, Thing, surface
 from tracker.sequences.rendering.walls.background import AMBIENT
 from tracker.sequences.rendering.walls.textures import TILE, linear

@@ -12,7 +12,7 @@ from tracker import fusion, pipeline
 from tracker.parameters import PRESETS, RunParameters, with_values
 from tracker.sequences.reader import read_sequence
 
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
+DATA = Path(__file__).resolve().parents[4] / "shared" / "data"
 
 
 def run(short: bool) -> Iterator[Measurement]:

@@ -12,7 +12,9 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath
 from typing import Any
 
-from tracker.formats.calibration.colmap import MODELS, MOST_IMAGES, model_lens
+import numpy as np
+
+from tracker.formats.calibration.reconstruction.colmap import MODELS, MOST_IMAGES, model_lens
 from tracker.formats.pieces import CalibrationPiece, Convention, Piece, RawCamera
 from tracker.formats.protocol import Certainty, Kind
 from tracker.formats.source import SourceFile
@@ -51,7 +53,14 @@ def _camera(file: SourceFile, place: int, frame: Any) -> RawCamera:
     where = f"frames {place}"
     need(file, frame, ("transform_matrix",), where)
     values: dict[str, Any] = {**file.json, **frame}
-    need(file, values, ("fl_x", "cx", "cy", "w", "h"), where)
+    need(file, values, ("w", "h"), where)  # Blender's scenes for NeRF have to be given these
+    if "camera_angle_x" in values:
+        angle = number(file, f"{where}, camera_angle_x", values["camera_angle_x"])
+        width, height = image_size(file, where, [values["w"], values["h"]])
+        values.setdefault("fl_x", width / 2.0 / np.tan(angle / 2.0))
+        values.setdefault("cx", width / 2.0)
+        values.setdefault("cy", height / 2.0)
+    need(file, values, ("fl_x", "cx", "cy"), where)
     model = str(values.get("camera_model", "OPENCV"))
     names = {"fx": "fl_x", "fy": "fl_y"}
     values.setdefault("fl_y", values["fl_x"])

@@ -17,10 +17,10 @@ import numpy as np
 from jaxtyping import UInt8
 from numpy import ndarray
 
-from tracker.foreground.segmentation import Segmentation
 from tracker.kernels.pictures import images
 from tracker.kernels.pictures.foreground import level_medians, upper_medians
 from tracker.parameters.groups.foreground import ForegroundParams
+from tracker.pictures.foreground.segmentation import Segmentation
 
 LEVELS = 16
 """Levels of the source at which a tone curve is measured; between them it is interpolated."""

@@ -1,4 +1,4 @@
-"""How well J stands for IDF1: ``python3 -m tests.benchmarks.without_truth``.
+"""How well J stands for IDF1: ``python3 -m tests.benchmarks.engine.without_truth``.
 
 Every recording of boxes and some random rooms are tracked with random settings; of each the
 estimate J and the true IDF1 are kept in ``tracker/without_truth/calibration.json``, from which

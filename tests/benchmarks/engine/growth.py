@@ -116,7 +116,7 @@ def _stamps(times: list[float]) -> Callable[[], bool]:
 
 _ALONE = """
 import resource, sys
-from tests.benchmarks.growth import PEOPLE, ring, walkers
+from tests.benchmarks.engine.growth import PEOPLE, ring, walkers
 from tests.engine import synthetic
 from tracker import pipeline
 count = int(sys.argv[1])

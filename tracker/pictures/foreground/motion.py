@@ -15,9 +15,9 @@ import numpy as np
 from jaxtyping import UInt8
 from numpy import ndarray
 
-from tracker.foreground.exposure import BackgroundModel, square_roots
-from tracker.foreground.segmentation import Segmentation
 from tracker.parameters.groups.foreground import ForegroundParams
+from tracker.pictures.foreground.exposure import BackgroundModel, square_roots
+from tracker.pictures.foreground.segmentation import Segmentation
 
 LAG = 0.1
 """Seconds between two pictures that are compared: within it a moving hand leaves its place."""

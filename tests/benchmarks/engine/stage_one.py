@@ -16,8 +16,8 @@ from websockets.sync.client import connect
 
 from app.state.workbench import Workbench
 from app.state.workers.jobs import Jobs
+from tests.benchmarks.engine.pipeline import DATA
 from tests.benchmarks.measure import Measurement
-from tests.benchmarks.pipeline import DATA
 from tests.browser.serving import Server
 from tests.synthetic import write_sequence
 from tracker import pipeline

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from tests.benchmarks.engine.pipeline import DATA
 from tests.benchmarks.measure import Measurement
-from tests.benchmarks.pipeline import DATA
 from tests.golden.pieces import PIECES, Piece
 from tracker import pipeline
 from tracker.evaluation import Evaluation, evaluate_sequence

@@ -14,7 +14,7 @@ from app.colours import Palette
 from app.scene import geometry
 from app.scene.geometry import Pose
 from app.scene.nodes import Lines, Meshes, Tag, Tags
-from app.scene.pictures import StraightView
+from app.scene.room.pictures import StraightView
 from tracker.camera import Camera
 from tracker.sequences.sequence import Room
 

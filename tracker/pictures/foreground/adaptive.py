@@ -14,12 +14,6 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
 from numpy import ndarray
 
-from tracker.foreground.exposure import (
-    BackgroundModel,
-    median,
-    tone_curve,
-)
-from tracker.foreground.segmentation import Segmentation
 from tracker.kernels.pictures.foreground import (
     above,
     clear_shadows,
@@ -27,6 +21,12 @@ from tracker.kernels.pictures.foreground import (
     update_background,
 )
 from tracker.parameters.groups.foreground import ForegroundParams
+from tracker.pictures.foreground.exposure import (
+    BackgroundModel,
+    median,
+    tone_curve,
+)
+from tracker.pictures.foreground.segmentation import Segmentation
 
 ITERATIONS = 20
 """Of the c-means at most; the thresholds usually come to rest well before."""

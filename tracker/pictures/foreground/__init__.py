@@ -1,9 +1,9 @@
 """What in a picture is not the background.
 
 Two models, exchangeable behind :class:`ForegroundModel`: one learnt once from the clip
-(:mod:`~tracker.foreground.exposure`), with a memory of motion where people stay
-(:mod:`~tracker.foreground.motion`), and one whose thresholds and background follow the
-pictures (:mod:`~tracker.foreground.adaptive`).
+(:mod:`~tracker.pictures.foreground.exposure`), with a memory of motion where people stay
+(:mod:`~tracker.pictures.foreground.motion`), and one whose thresholds and background follow the
+pictures (:mod:`~tracker.pictures.foreground.adaptive`).
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import numpy as np
 from jaxtyping import UInt8
 from numpy import ndarray
 
-from tracker.foreground.adaptive import AdaptiveForeground, first_background
-from tracker.foreground.exposure import BackgroundModel, LearntForeground, tone_curve
-from tracker.foreground.motion import MovingForeground
-from tracker.foreground.segmentation import ForegroundModel, Segmentation, pack, unpack
-from tracker.foreground.shares import box_shares, integral, shape_scores, shape_shares
 from tracker.parameters.groups.foreground import ForegroundParams
+from tracker.pictures.foreground.adaptive import AdaptiveForeground, first_background
+from tracker.pictures.foreground.exposure import BackgroundModel, LearntForeground, tone_curve
+from tracker.pictures.foreground.motion import MovingForeground
+from tracker.pictures.foreground.segmentation import ForegroundModel, Segmentation, pack, unpack
+from tracker.pictures.foreground.shares import box_shares, integral, shape_scores, shape_shares
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 

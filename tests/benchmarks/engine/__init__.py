@@ -1,0 +1,1 @@
+"""The engine's benchmarks: how fast and how well people are found."""

@@ -1,0 +1,1 @@
+"""The workbench's benchmarks: how long somebody waits before it."""

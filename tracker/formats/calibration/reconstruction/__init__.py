@@ -1,0 +1,1 @@
+"""Cameras as programs that reconstruct a scene from its pictures write them."""

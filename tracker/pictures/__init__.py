@@ -1,0 +1,1 @@
+"""What is found in pictures: colours, what is not the background and its pieces, sets of boxes."""
