@@ -112,7 +112,12 @@ class Steadying:
         if len(self.corners) < LEAST_CORNERS:
             return None
         found, there, _ = cv2.calcOpticalFlowPyrLK(
-            self.scene, evened, self.corners, None, winSize=(_WINDOW, _WINDOW), maxLevel=3
+            self.scene,
+            evened,
+            self.corners,
+            self.corners.copy(),
+            winSize=(_WINDOW, _WINDOW),
+            maxLevel=3,
         )
         followed = there.ravel() > 0
         height, width = self.scene.shape
@@ -192,7 +197,7 @@ def _evened(picture: UInt8[ndarray, "h w 3"], reduction: float) -> UInt8[ndarray
     level = grey.astype(np.float32)
     size = (2 * _SMOOTH + 1, 2 * _SMOOTH + 1)
     mean = cv2.blur(level, size)
-    spread = cv2.sqrt(cv2.max(cv2.blur(level * level, size) - mean * mean, 0.0))
+    spread = np.sqrt(np.maximum(cv2.blur(level * level, size) - mean * mean, 0.0))
     evened = 128.0 + 42.0 * (level - mean) / (spread + _CONTRAST)
     return np.asarray(np.clip(evened, 0.0, 255.0), dtype=np.uint8)
 
