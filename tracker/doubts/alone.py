@@ -1,4 +1,4 @@
-"""Doubts about one track by itself, and about two people who come close."""
+"""Doubts about one track by itself."""
 
 from __future__ import annotations
 
@@ -14,14 +14,11 @@ from tracker.runs.run import Run
 _SHORT = 1.0
 """Seconds of a track that may be nobody."""
 
+_LONG = 5.0
+"""Seconds after which few sights make nobody of it any more: so long clutter does not last."""
+
 _UNSEEN = 1.0
 """Seconds for which no camera has somebody: a long miss."""
-
-_CLOSE = 2.0
-"""Target widths within which two people are close."""
-
-_ALONE = 1.5
-"""Log odds by which it is rarer that of two who meet one goes on as the other and he as nobody."""
 
 _FASTEST = 3.0
 """Metres a second that nobody in a room exceeds for long."""
@@ -34,11 +31,10 @@ def of_tracks(run: Run, lanes: Lanes) -> Iterator[Doubt]:
 
 
 def moves(run: Run, lanes: Lanes) -> Iterator[Move]:
-    """Where a track may go on as another person: it was gone, or jumps, or met somebody."""
+    """Where a track may go on as another person: it was gone, or jumps."""
     for track in lanes.ids.tolist():
         yield from _unseen(run, lanes, track)
         yield from _fast(run, lanes, track)
-    yield from _close(run, lanes)
 
 
 def _nobody(run: Run, lanes: Lanes, track: int) -> Iterator[Doubt]:
@@ -50,7 +46,7 @@ def _nobody(run: Run, lanes: Lanes, track: int) -> Iterator[Doubt]:
     existence = float(tracks.existences[rows].mean())
     seen = float((sights > 0).mean())
     one_alone = cameras == 1 and tracks.seen.shape[1] > 1
-    wrong = (1.0 - min(existence, 1.0) * seen) * 0.6
+    wrong = (1.0 - min(existence, 1.0) * seen) * 0.6 * np.exp(-life / _LONG)
     wrong += 0.3 * np.exp(-life / _SHORT) + (0.2 if one_alone else 0.0)
     if wrong < 0.05:
         return
@@ -98,36 +94,6 @@ def _fast(run: Run, lanes: Lanes, track: int) -> Iterator[Move]:
         piece = Piece(track, after, before)
         why = f"{speed[k]:.1f} m/s at step {after.step}"
         yield Move((piece,), (piece,), "fast", _odds(min(0.3 * speed[k] / _FASTEST, 0.9)), why)
-
-
-def _close(run: Run, lanes: Lanes) -> Iterator[Move]:
-    """Two people so near that they may have been exchanged: once for each time they meet."""
-    tracks = run.tracks
-    width = 2.0 * float(run.sequence.target_half_extents[:2].mean())
-    reach = _CLOSE * width
-    meetings: dict[tuple[int, int], list[tuple[int, float]]] = {}
-    for step in np.unique(tracks.frames).tolist():
-        own = tracks.at(step)
-        ids, ground = tracks.ids[own], tracks.positions[own, :2]
-        apart = np.linalg.norm(ground[:, None] - ground[None], axis=2)
-        for a, b in np.argwhere(np.triu(apart < reach, 1)).tolist():
-            pair = (int(ids[a]), int(ids[b]))
-            meetings.setdefault(pair, []).append((step, float(apart[a, b])))
-    pause = max(round(1.0 / run.sequence.step_time), 2)
-    for (one, other), met in meetings.items():
-        steps = np.array([step for step, _ in met])
-        for part in np.split(np.arange(len(met)), np.flatnonzero(np.diff(steps) > pause) + 1):
-            nearest = min((met[k] for k in part.tolist()), key=lambda at: at[1])
-            first, last = int(steps[part[0]]) - 1, int(steps[part[-1]]) + 1
-            mine, theirs = (
-                Piece(track, lanes.place(track, last, after=True), lanes.place(track, first))
-                for track in (one, other)
-            )
-            wrong = 0.12 * np.exp(-nearest[1] / width)
-            why = f"{nearest[1]:.2f} m apart at step {nearest[0]}"
-            for i, j in ((mine, theirs), (theirs, mine)):
-                yield Move((i, j), (i, j), "crossing", _odds(wrong), why)
-                yield Move((i,), (i, j), "crossing", _odds(wrong) - _ALONE, why)
 
 
 def _odds(probability: float) -> float:

@@ -152,8 +152,7 @@ def of_the_lost(run: Run, lanes: Lanes, known: set[tuple[Place, Place]]) -> Iter
         known: Pairs of places that have odds already.
     """
     sequence = run.sequence
-    low, high = sequence.room.minimum, sequence.room.maximum
-    area = float(np.prod((high - low)[:2]))
+    area = float(np.prod((sequence.room.maximum - sequence.room.minimum)[:2]))
     whole = [_whole(lanes, int(track)) for track in lanes.ids]
     ends = [one for one in whole if one.end.step < sequence.frames - 1]
     begins = [one for one in whole if one.begin.step > 0]
@@ -170,8 +169,8 @@ def of_the_lost(run: Run, lanes: Lanes, known: set[tuple[Place, Place]]) -> Iter
     density = np.exp(-0.5 * apart**2 / spread) / (2.0 * np.pi * spread)
     density = np.where(possible, density, 0.0)
     density *= np.exp(-np.maximum(seconds, 0.0) / _LONGEST)
-    leaves = np.array([_ends_there(one.end, low, high, run) for one in ends])[:, None]
-    comes = np.array([_ends_there(one.begin, low, high, run) for one in begins])[None, :]
+    leaves = np.array([ends_there(one.end, run) for one in ends])[:, None]
+    comes = np.array([ends_there(one.begin, run) for one in begins])[None, :]
     left = (1.0 - leaves) * density
     forward = left / (leaves / area + left.sum(axis=1, keepdims=True) - left + 1e-12)
     came = (1.0 - comes) * density
@@ -182,9 +181,9 @@ def of_the_lost(run: Run, lanes: Lanes, known: set[tuple[Place, Place]]) -> Iter
             yield Move((ends[i],), (begins[j],), "join", float(odds[i, j]))
 
 
-def _ends_there(place: Place, low: np.ndarray, high: np.ndarray, run: Run) -> float:
+def ends_there(place: Place, run: Run) -> float:
     """How probable it is that people leave, or come, at a place."""
-    point = place.point
+    point, low, high = place.point, run.sequence.room.minimum, run.sequence.room.maximum
     margin = float(np.minimum(point - low, high - point)[:2].min())
     entrances = run.sequence.room.entrances
     at_door = any(

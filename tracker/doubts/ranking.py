@@ -13,9 +13,12 @@ from tracker.corrections.kinds import leeway
 from tracker.doubts import alone, moves
 from tracker.doubts.clear import Clear
 from tracker.doubts.doubt import Alternative, Doubt, Lanes, unsaid
+from tracker.doubts.edges import of_edges
 from tracker.doubts.linking import Move
+from tracker.doubts.meetings import meetings
 from tracker.doubts.opinion import Opinion
 from tracker.doubts.trust import Trust
+from tracker.doubts.words import words_of
 from tracker.runs.run import Run
 from tracker.trajectories import Trajectories
 
@@ -28,8 +31,11 @@ _ALTERNATIVES = 4
 _HALF = 0.1
 """Of the probability of an exchange, that only one of the two goes on as the other."""
 
-_LEAST = 0.5
-"""Steps expected to be wrong, below which nobody needs to look."""
+LEAST = 1.0
+"""Steps expected to be wrong, below which a place is not told: nobody needs to look."""
+
+_SAME_MOMENT = 1.0
+"""Seconds within which what is asked of the same two people is one place."""
 
 _NEAR = 0.5
 """Metres on the ground within which a place that was answered is the same."""
@@ -58,17 +64,14 @@ def queue(run: Run, backwards: Trajectories | None = None) -> Queue:
     lanes = Lanes(run.tracks)
     if not len(run.tracks):
         return Queue((), 0, "nobody is tracked")
-    found = [*_linked(run, lanes, backwards), *alone.of_tracks(run, lanes)]
+    linked = list(_linked(run, lanes, backwards))
+    asked = {place for one in linked for place in one.places}
+    found = [*linked, *alone.of_tracks(run, lanes), *of_edges(run, lanes, asked)]
     ordered = sorted(found, key=lambda one: (-one.weight, one.first, one.id))
-    seen: set[object] = set()
+    steps = leeway(run.sequence.step_time)
     told: list[Doubt] = []
     answered = 0
-    steps = leeway(run.sequence.step_time)
-    for one in ordered:
-        same = frozenset(pair for told in one.alternatives[1].corrections for pair in told.pairs)
-        if one.weight < _LEAST or one.id in seen or (same and same in seen):
-            continue  # an exchange is found from either side
-        seen |= {one.id, same}
+    for one in once_each(ordered, round(_SAME_MOMENT / run.sequence.step_time)):
         if settled(one, run.corrections, steps):
             answered += 1
         elif len(told) < MOST:
@@ -76,7 +79,31 @@ def queue(run: Run, backwards: Trajectories | None = None) -> Queue:
     how = "the odds of joining pieces" if _joins(run) else "where tracks end and begin"
     if backwards is not None:
         how += ", and what the recording says seen backwards in time"
+    how += f"; less than {LEAST:.0f} step expected to be wrong is left out"
     return Queue(tuple(told), answered, how)
+
+
+def once_each(ordered: Iterable[Doubt], pause: int) -> Iterable[Doubt]:
+    """What is worth a look, each place once: an exchange is found from either side.
+
+    Args:
+        ordered: The most at stake first.
+        pause: Steps within which two moments of the same two people are one.
+    """
+    known: set[object] = set()
+    moments: dict[frozenset[int], list[tuple[int, int]]] = {}
+    for one in ordered:
+        same = frozenset(pair for told in one.alternatives[1].corrections for pair in told.pairs)
+        if one.weight < LEAST or one.id in known or (same and same in known):
+            continue
+        if len(one.tracks) == 2:
+            of_both = moments.setdefault(frozenset(one.tracks), [])
+            if any(one.first <= last + pause and first <= one.last + pause
+                   for first, last in of_both):  # fmt: skip
+                continue
+            of_both.append((one.first, one.last))
+        known |= {one.id, same}
+        yield one
 
 
 def _joins(run: Run) -> bool:
@@ -90,6 +117,7 @@ def _linked(run: Run, lanes: Lanes, backwards: Trajectories | None) -> Iterable[
     known = {(move.earlier[0].end, move.later[-1].begin) for move in every}
     every += moves.of_the_lost(run, lanes, known)
     every += alone.moves(run, lanes)
+    every += meetings(run, lanes)
     step_time = run.sequence.step_time
     opinion = None if backwards is None else Opinion(run.tracks, backwards, step_time)
     if opinion is not None:
@@ -172,8 +200,9 @@ def _doubt_of(run: Run, site: _Site, trust: Trust) -> Doubt | None:
     stake = round(float((shares * stakes).sum() / shares.sum()))
     places = (*(p.end for p in best.earlier), *(p.begin for p in best.later))
     tracks = tuple(dict.fromkeys(p.track for p in (*best.earlier, *best.later)))
-    first, last = min(p.step for p in places), max(p.step for p in places)
-    title, why = _words(run, best, tracks)
+    moments = (*(one.last for one in best.earlier), *(one.first for one in best.later))
+    first, last = min(moments), max(moments)
+    title, why = words_of(run, best)
     return Doubt(
         best.kind, title, why, first, last, tracks, places, site.wrong, stake, (now, *others)
     )
@@ -232,37 +261,6 @@ def _as_it_is(move: Move) -> tuple[Correction, ...]:
         for i, j in zip(move.earlier, move.later, strict=False)
         for one in unsaid("same", (i.end, j.begin))
     )
-
-
-def _words(run: Run, move: Move, tracks: tuple[int, ...]) -> tuple[str, str]:
-    i, j = move.earlier[0], move.later[-1]
-    seconds = (j.begin.step - i.end.step) * run.sequence.step_time
-    apart = float(np.hypot(j.begin.x - i.end.x, j.begin.y - i.end.y))
-    far = f"{apart:.1f} m away, {seconds:.1f} s later"
-    if move.kind == "gap":
-        return f"{i.track} is gone for {seconds:.1f} s", move.why
-    if move.kind == "fast":
-        return f"{i.track} jumps", move.why
-    if move.kind == "crossing":
-        return f"{i.track} and {j.track} pass closely", move.why
-    if move.joins:
-        return (
-            f"{i.track} goes on as {j.track}?",
-            f"{i.track} ends and {j.track} begins {far}",
-        )
-    if move.kind == "cut":
-        return (
-            f"{i.track} is two people?",
-            f"before and after step {i.end.step} fit {apart:.1f} m apart over {seconds:.1f} s",
-        )
-    if len(tracks) > 1:
-        return (
-            f"{tracks[0]} and {tracks[1]} exchanged?",
-            f"a piece of {i.track} fits its end as well, {far}"
-            if i.track == j.track
-            else f"{j.track} begins where {i.track} may go on, {far}",
-        )
-    return f"{i.track} goes on elsewhere?", f"another piece of it fits, {far}"
 
 
 def settled(doubt: Doubt, corrections: Many[Correction], steps: int) -> bool:

@@ -12,6 +12,7 @@ from numpy import ndarray
 from tracker import pipeline
 from tracker.assignment import linear_sum_assignment
 from tracker.corrections import Correction, Place
+from tracker.corrections.kinds import leeway
 from tracker.doubts import Doubt, queue
 from tracker.doubts.doubt import said
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
@@ -26,15 +27,19 @@ from tracker.without_truth.others import Given, Look, looked
 class Truthful:
     """Says what is true of a doubtful place, as somebody would who looks at the pictures."""
 
-    def __init__(self, truth: GroundTruth, gate: float, tracks: Trajectories) -> None:
+    def __init__(
+        self, truth: GroundTruth, gate: float, tracks: Trajectories, step_time: float
+    ) -> None:
         """Know the truth, and look at the tracks.
 
         Args:
             truth: Of the recording.
             gate: Metres within which a track is a person's.
             tracks: That are shown: at each step each is one person's at most.
+            step_time: Seconds.
         """
         self._truth, self._gate, self._tracks = truth, gate, tracks
+        self._moment = leeway(step_time) + 1
         self._people: dict[int, Int[ndarray, " K"]] = {}
 
     def who(self, place: Place) -> int | None:
@@ -46,6 +51,19 @@ class Truthful:
         best = int(np.argmin(apart))
         person = int(self._at(place.step)[best])
         return person if person >= 0 and apart[best] <= self._gate else None
+
+    def untracked(self, place: Place) -> bool:
+        """Whether somebody is at a place whom no track has."""
+        theirs = self._truth.at(place.step)
+        apart = np.hypot(*(self._truth.positions[theirs, :2] - [place.x, place.y]).T)
+        missing = ~np.isin(self._truth.ids[theirs], self._at(place.step))
+        return bool((missing & (apart <= self._gate)).any())
+
+    def _at_an_end(self, place: Place, *, before: bool) -> bool:
+        """Whether whom a track has at a place was not there a moment before, or is not after."""
+        step = place.step + (-self._moment if before else self._moment)
+        person = self.who(place)
+        return person is not None and person not in self._truth.ids[self._truth.at(step)]
 
     def _at(self, step: int) -> Int[ndarray, " K"]:
         """The person of each track at a step, -1 for none."""
@@ -63,7 +81,14 @@ class Truthful:
     def holds(self, one: Correction) -> bool:
         """Whether something is true."""
         if one.kind == "nobody":
-            return 2 * sum(self.who(place) is None for place in one.places) > len(one.places)
+            empty = sum(
+                self.who(place) is None and not self.untracked(place) for place in one.places
+            )
+            return 2 * empty > len(one.places)
+        if one.kind == "here":
+            return self.untracked(one.places[0])
+        if one.kind in ("came", "left"):
+            return self._at_an_end(one.places[0], before=one.kind == "came")
         who = {place: self.who(place) for place in one.places}
         if None in who.values():
             return False
@@ -131,7 +156,9 @@ def session(
         if not doubts:
             return
         doubt = doubts[0]
-        person = Truthful(sequence.ground_truth, settings.effective_gate, run.tracks)
+        person = Truthful(
+            sequence.ground_truth, settings.effective_gate, run.tracks, sequence.step_time
+        )
         wrong, more = person.wrong(doubt), person.answer(doubt)
         skipped.add(doubt.id)
         if more:

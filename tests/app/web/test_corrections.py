@@ -165,8 +165,8 @@ def test_the_queue_is_answered_previewed_and_skipped(
 ) -> None:
     assert desk.get(f"{PLACE}/queue").json()["doubts"] == [], "all is clear here"
     # so that what is hardly doubtful is told, too: who passes metres apart
-    monkeypatch.setattr("tracker.doubts.ranking._LEAST", 0.0)
-    monkeypatch.setattr("tracker.doubts.alone._CLOSE", 8.0)
+    monkeypatch.setattr("tracker.doubts.ranking.LEAST", 0.0)
+    monkeypatch.setattr("tracker.doubts.meetings._CLOSE", 8.0)
     desk.patch("/api/parameters", json={"changes": {"fusion.survival_probability": 0.97}})
     settled(desk)
     queue = desk.get(f"{PLACE}/queue").json()
