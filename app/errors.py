@@ -11,9 +11,9 @@ from typing import Any, Literal
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
-from pydantic import BaseModel, ConfigDict
 from starlette.exceptions import HTTPException
 
+from app.described import Described
 from tracker.parameters import ParameterError
 
 logger = logging.getLogger("app")
@@ -22,10 +22,8 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """What a system says that has no room for a file."""
 
 
-class ErrorDetail(BaseModel):
+class ErrorDetail(Described):
     """One failure."""
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
 
     code: str
     """A word for programs."""
@@ -37,10 +35,8 @@ class ErrorDetail(BaseModel):
     """What to do about it."""
 
 
-class Problem(BaseModel):
+class Problem(Described):
     """The body of every answer that is not a success (RFC 9457)."""
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
 
     type: Literal["about:blank"]
     """That the status says which kind of failure it is, and ``code`` which one."""

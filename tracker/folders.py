@@ -87,3 +87,17 @@ def library_file() -> Path:
     if own:
         return Path(own).expanduser().absolute()
     return data_folder() / "library.sqlite3"
+
+
+def files_matching(folder: Path, pattern: str) -> list[Path]:
+    """The files below a folder whose path in it is as a pattern says, sorted.
+
+    Raises:
+        ValueError: With the reason, if it is no pattern of paths below a folder.
+    """
+    if not Path(pattern).parts:  # "." names the folder itself, for which `glob` has no word
+        raise ValueError("it names no file")
+    try:
+        return sorted(path for path in folder.glob(pattern) if path.is_file())
+    except NotImplementedError as error:
+        raise ValueError(str(error)) from None

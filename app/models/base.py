@@ -6,15 +6,16 @@ import os
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
+from app.described import Described
 
-class Model(BaseModel):
+
+class Model(Described):
     """A message; attribute docstrings become the descriptions of the OpenAPI page."""
 
     model_config = ConfigDict(
-        use_attribute_docstrings=True,
         extra="forbid",
         json_schema_serialization_defaults_required=True,  # an answer has all of its fields
     )

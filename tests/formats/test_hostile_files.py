@@ -47,6 +47,15 @@ HOSTILE: dict[str, bytes] = {
     "short.csv": b"frame,left,top,width,height\n0,1,2\n",
     "fake.mp4": b"\0\0\0\x18ftypisom" + b"\0" * 500,
     "fake.mat": b"MATLAB 5.0 MAT-file" + b" " * 200,
+    "open.npy": b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order': False, "
+    b"'shape': (3, 4" + b" " * 58 + b"\n",
+    "long.toml": b"[cam_1]\nmatrix = [[" + b"9" * 5000 + b"]]\n",
+    "long.json": b'{"boxes": [{"frame": 1, "box": [1, 2, ' + b"9" * 400 + b", 4]}]}",
+    "returns.csv": b'frame,time\n0,0.0\r\r0,"1\r1.0\n',
+    "0.txt": b"0 0.5 0.5 0.1 0.2\n0 0.50.5 0.1 0.2 0.3\n0 0.5 0.5 0.1 0.2\n",
+    "huge.json": b'{"sfm_data_version": "0.3", "views": [], "intrinsics": [], "extrinsics": '
+    b'[{"key": 0, "value": {"rotation": [[1e308, 1e308, 0], [1e308, 1, 0], [0, 0, 1]], '
+    b'"center": [0, 0, 1]}}]}',
     "empty.json": b"",
     "empty.xml": b"",
 }

@@ -53,3 +53,15 @@ def test_every_format_has_a_name_of_its_own() -> None:
     names = [one.NAME for one in registry.FORMATS]
     assert len(set(names)) == len(names)
     assert all(one.recognise.__doc__ and one.read.__doc__ for one in registry.FORMATS)
+
+
+def test_a_reader_that_stumbles_says_only_that_the_file_is_not_its_own(tmp_path: Path) -> None:
+    def stumble(file: SourceFile) -> Certainty:
+        raise ZeroDivisionError("division by zero")
+
+    lab = SimpleNamespace(NAME="a lab's own", KIND="detections", SERIES=False, recognise=stumble)
+    (tmp_path / "a.lab").write_bytes(b"lab 1")
+    found, _, complaint = registry.recognise(SourceFile(tmp_path / "a.lab"), [lab])
+    assert found is None
+    assert "a.lab: expected what a lab's own has, found" in str(complaint)
+    assert "division by zero" in str(complaint)

@@ -187,8 +187,10 @@ def _detections(
 ) -> Iterator[Piece]:
     scores = np.ones(len(frames))
     if "score" in found:
-        scores = to_unit(_numbers(file, found["score"], columns[found["score"]], blank=1.0))
-    keep = np.isfinite(boxes).all(axis=1)
+        scores = _numbers(file, found["score"], columns[found["score"]], blank=1.0)
+    keep = np.isfinite(boxes).all(axis=1) & np.isfinite(scores)
+    if "score" in found:
+        scores = to_unit(np.where(np.isfinite(scores), scores, 0.0))
     if "class" in found:
         keep &= people([str(cell) for cell in columns[found["class"]]])
     cameras = np.array(

@@ -100,6 +100,15 @@ def all_formats() -> tuple[Format, ...]:
     return tuple(found)
 
 
+def unforeseen(file: SourceFile, format_: Format, error: Exception) -> FormatError:
+    """What is said of a file over which a format's reader stumbled."""
+    words = " ".join(str(error).split()) or type(error).__name__
+    return file.error(
+        f"expected what {format_.NAME} has, found a value that cannot be read ({words[:200]}); "
+        "it may be spoilt: get the file again"
+    )
+
+
 def recognise(
     file: SourceFile, formats: Sequence[Format] | None = None
 ) -> tuple[Format | None, Certainty, FormatError | None]:
@@ -116,6 +125,11 @@ def recognise(
             certainty = one.recognise(file)
         except FormatError as error:
             complaint = complaint or error
+            continue
+        except Exception as error:
+            # whatever a reader, of this program or another package, does not foresee in a file
+            # says no more than that the file is not one of its own
+            complaint = complaint or unforeseen(file, one, error)
             continue
         if certainty > Certainty.NO and certainty >= best[1]:
             best = (one, certainty)

@@ -224,6 +224,8 @@ class SourceFile:
             raise self.error(f"is not valid TOML ({error})") from None
         except RecursionError:
             raise self._too_deep() from None
+        except ValueError as error:  # a number of thousands of digits
+            raise self.error(f"is not a TOML file of data ({error})") from None
 
     @cached_property
     def yaml(self) -> Any:

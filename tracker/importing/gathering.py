@@ -8,9 +8,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from tracker.formats.pieces import FormatError, Piece
 from tracker.formats.protocol import Certainty, Format
-from tracker.formats.registry import recognise
+from tracker.formats.registry import recognise, unforeseen
 from tracker.formats.source import SourceFile
 
 MOST_FILES = 200_000
@@ -152,7 +154,8 @@ def _size(path: Path) -> int:
 
 def _recognise(file: SourceFile) -> tuple[Format | None, Certainty, str]:
     try:
-        found, certainty, complaint = recognise(file)
+        with np.errstate(all="ignore"):
+            found, certainty, complaint = recognise(file)
         return found, certainty, "" if complaint is None else str(complaint)
     except (FormatError, OSError) as error:
         return None, Certainty.NO, str(error)
@@ -160,16 +163,9 @@ def _recognise(file: SourceFile) -> tuple[Format | None, Certainty, str]:
 
 def _pieces(found: Format, certainty: Certainty, file: SourceFile, label: str) -> Taken:
     try:
-        pieces = tuple(found.read(file))
-    except FormatError as error:
-        return Taken(label, found.NAME, certainty, complaint=str(error), files=file.series)
-    except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
-        # a field of a kind that the reader does not foresee
-        return Taken(
-            label,
-            found.NAME,
-            certainty,
-            complaint=f"{file.where}: is not as {found.NAME} must be ({error})",
-            files=file.series,
-        )
+        with np.errstate(all="ignore"):  # what overflows is infinite, and refused by its reader
+            pieces = tuple(found.read(file))
+    except Exception as error:  # or a field of a kind that the reader does not foresee
+        told = error if isinstance(error, FormatError) else unforeseen(file, found, error)
+        return Taken(label, found.NAME, certainty, complaint=str(told), files=file.series)
     return Taken(label, found.NAME, certainty, pieces, files=file.series)

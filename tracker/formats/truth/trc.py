@@ -23,6 +23,9 @@ SERIES = False
 
 HIPS = {"rhip", "lhip", "hip", "midhip", "pelvis", "rasis", "lasis", "rpsis", "lpsis"}
 
+_MOST_FRAMES = 1e9
+"""Of one file: a year at 30 a second."""
+
 _UNITS: dict[str, Unit] = {"m": "m", "cm": "cm", "mm": "mm"}
 
 
@@ -53,7 +56,8 @@ def read(file: SourceFile) -> Iterator[Piece]:
         table[place, : len(values)] = values
     joints = table[:, 2:].reshape(len(rows), len(names), 3)
     place_of = _middle(joints, [name.strip().lower() for name in names])
-    good = np.isfinite(place_of).all(axis=1) & np.isfinite(table[:, 0])
+    # of a number that is no frame's nothing is known
+    good = np.isfinite(place_of).all(axis=1) & (np.abs(table[:, 0]) < _MOST_FRAMES)
     try:
         rate = float(facts.get("DataRate", "nan"))
     except ValueError:

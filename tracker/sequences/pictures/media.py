@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Bool
 from numpy import ndarray
 
+from tracker.folders import files_matching
 from tracker.sequences.fields import LONGEST_NAME, Fields, did_you_mean, listed
 from tracker.sequences.pictures.numbering import whole_row
 from tracker.sequences.pictures.video import VideoError, index_video, read_image
@@ -47,8 +48,8 @@ def find_images(folder: Path, fields: Fields) -> tuple[tuple[Path, ...], Bool[nd
     pattern = fields.text("images")
     _inside(folder, pattern, fields, "images")
     try:
-        images = sorted(path for path in folder.glob(pattern) if path.is_file())
-    except (ValueError, NotImplementedError) as error:
+        images = files_matching(folder, pattern)
+    except ValueError as error:
         raise fields.error("images", f'"{pattern}" is not a file pattern ({error})') from None
     if not images:
         raise fields.error(

@@ -10,7 +10,7 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
-from tracker.folders import cache_folder
+from tracker.folders import cache_folder, files_matching
 from tracker.placing import filling, write_whole
 from tracker.sequences.library import open_sequence
 from tracker.sequences.reader import FILE
@@ -30,8 +30,8 @@ def files_of(folder: Path) -> list[Path]:
     text = (folder / FILE).read_text(encoding="utf-8")
     for word in _words(tomllib.loads(text)):
         try:
-            found |= {path for path in folder.glob(word) if path.is_file()}
-        except (ValueError, NotImplementedError, OSError):  # no path that could be one
+            found |= set(files_matching(folder, word))
+        except (ValueError, OSError):  # no path that could be one
             continue
     return sorted(found)
 
