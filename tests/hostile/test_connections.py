@@ -87,6 +87,7 @@ def running(data: Path) -> Iterator[Running]:
         patch.setattr(listening, "_Server", Stoppable)
         running = Running(server.Settings(sequence="crossing", data=data))
         wait_until(lambda: httpx.get(f"{running.address}/viser/").status_code == 200)
+        wait_until(lambda: httpx.get(f"{running.address}/api/state").json()["sequence"] is not None)
         yield running
         assert Stoppable.newest is not None
         Stoppable.newest.should_exit = True
