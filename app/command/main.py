@@ -188,7 +188,7 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     from app.web.access.security import is_loopback
     from app.web.access.tokens import PARAMETER, Keys, new_token, own_token
     from tracker.library.records import Result
-    from tracker.sequences import library, rendering
+    from tracker.sequences import library
 
     gc.freeze()
     gc.enable()
@@ -201,7 +201,7 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     new = new_token() if life is None else life.token
     keys = Keys(own_token(os.environ) or new) if command.token else None
     place = locate(command.sequence, command.data)
-    if place not in rendering.ROOMS:
+    if not library.is_room(place):
         library.open_sequence(place)  # what cannot be read is told here, before a page is open
     if command.detector is not None:
         from tracker.single_view.onnx.network import Network, Settings

@@ -16,7 +16,7 @@ from tests.benchmarks.engine import accuracy, full_hd, growth, jpda, kernels, pi
 from tests.benchmarks.measure import Measurement, machine
 from tests.benchmarks.plane import targets
 from tests.benchmarks.record import chart
-from tests.benchmarks.workbench import cold, kept, library, live, page, server
+from tests.benchmarks.workbench import cold, kept, library, live, opening, page, server
 
 SUITES = {
     "accuracy": accuracy.run,
@@ -31,6 +31,7 @@ SUITES = {
     "full_hd": full_hd.run,
     "server": server.run,
     "page": page.run,
+    "opening": opening.run,
     "library": library.run,
     "kept": kept.run,
     "studies": studies.run,

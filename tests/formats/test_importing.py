@@ -301,3 +301,32 @@ def test_a_level_world_is_left_as_it_is(tmp_path: Path) -> None:
     settled = settled_of(tmp_path)
     assert settled.reading.lean == (0.0, 0.0)
     assert "level" not in dict(settled.found)
+
+
+def test_boxes_in_one_json_settle_as_others(
+    tmp_path: Path,
+) -> None:
+    toml(tmp_path)
+    content: dict[str, dict[str, list[list[float]]]] = {}
+    for camera in cameras():
+        frames, found = boxes(camera, PLACES)
+        own = content.setdefault(camera.name, {str(f): [] for f in range(len(PLACES))})
+        for frame, (x, y, w, h) in zip(frames.tolist(), found.tolist(), strict=True):
+            own[str(frame)].append([x, y, x + w, y + h, 0.9])
+    (tmp_path / "boxes.json").write_text(json.dumps(content))
+    settled = settled_of(tmp_path)
+    _assert_cameras(settled)
+    assert settled.frames == len(PLACES)
+    assert settled.room.people > 50
+    assert all(view.detections is not None for view in settled.views)
+
+
+def test_what_is_missing_is_told(tmp_path: Path) -> None:
+    toml(tmp_path)
+    with pytest.raises(FormatError, match="a calibration alone has no steps; add them"):
+        settled_of(tmp_path)
+    (tmp_path / "calibration.toml").unlink()
+    detections(tmp_path)
+    (tmp_path / "calibration.pickle").write_bytes(b"\x80\x04K\x01.")
+    with pytest.raises(FormatError, match=r"no calibration was found: .*is a Python pickle"):
+        settled_of(tmp_path)

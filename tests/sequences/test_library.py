@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -197,7 +198,7 @@ def test_an_unknown_name_is_told_what_there_is(tmp_path: Path) -> None:
         library.open_sequence("rom44-3p")
     assert str(caught.value) == (
         'there is no sequence "rom44-3p": expected one of the rendered rooms room24-2p, '
-        "room35-2p and room44-3p, or the path of a folder with a sequence.toml; "
+        "room35-2p, room44-3p and random-SEED, or the path of a folder with a sequence.toml; "
         'did you mean "room44-3p"?'
     )
     with pytest.raises(SequenceError, match="there is no such folder"):
@@ -236,3 +237,25 @@ def test_where_the_cache_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> 
     monkeypatch.setenv("XDG_CACHE_HOME", "relative is not allowed")
     monkeypatch.setenv("HOME", str(tmp_path))
     assert cache_folder() == tmp_path / ".cache" / "multiview-phd"
+
+
+def test_a_room_of_a_seed_is_rendered_once_and_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    render_random = rendering.render_random
+    seeds = []
+
+    def short(seed: int, folder: Path, **others: Any) -> object:
+        seeds.append(seed)
+        return render_random(seed, folder, frames=2, **others)
+
+    monkeypatch.setattr(rendering, "render_random", short)
+    assert library.next_random(library.available()) == "random-1"
+    for _ in range(2):
+        sequence = library.open_sequence("random-6")
+        assert sequence.has_detections
+        assert sequence.ground_truth is not None
+    assert seeds == [6]
+    entries = library.available()
+    (entry,) = (one for one in entries if one.name == "random-6")
+    assert (entry.kind, entry.ready, entry.frames) == ("rendered", True, 2)
+    assert library.next_random(entries) == "random-7"
+    assert not library.is_room("random-x")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tracker.runs.run import Run
-from tracker.single_view.protocol import CANDIDATES, DOUBT, DROPPED, TRUST, ViewResult
+from tracker.single_view.protocol import CANDIDATES, DOUBT, DROPPED, SHAKE, TRUST, ViewResult
 
 _HALF = 0.5
 """A foreground that is trusted less than this is not what finds people."""
@@ -92,6 +92,13 @@ def notices(run: Run) -> list[str]:
             "much that moves never leaves: what moved lately counts as foreground; whoever keeps "
             "still is found with a template"
         )
+    for number, view in enumerate(run.sequence.views):
+        shake = max((step[number].information.get(SHAKE, 0.0) for step in run.views), default=0.0)
+        if shake > 0.0:
+            told.append(
+                f'camera "{view.camera.name}" shakes by {shake:.1f} pixels: its pictures are held '
+                "still"
+            )
     nobody = not len(run.tracks.ids)
     told += [str(one) for one in gates if nobody or one.passed == 0.0]
     return told

@@ -14,7 +14,7 @@ from tracker import single_view
 from tracker.runs.run import Cancelled, Run
 from tracker.sequences.pictures.frames import Picture, Pictures
 from tracker.single_view.colour.likeness import Likeness, looks_of
-from tracker.single_view.protocol import SingleViewMethod, ViewResult
+from tracker.single_view.protocol import SHAKE, SingleViewMethod, ViewResult
 from tracker.single_view.working.sequence import Working
 
 BLOCK = 5
@@ -121,6 +121,7 @@ class _CameraWorker:
         self._seed = run.seed
         self._stopped = stopped
         looks = _looks_at_pictures(run)
+        self._shake = working.shake(camera) if looks else 0.0
         self._pictures = working.reader.iterate(camera, self._frame) if looks else None
         self._likeness = Likeness.of(working.sequence, working.reader) if looks else None
 
@@ -142,6 +143,8 @@ class _CameraWorker:
                 result = replace(result, likenesses=likenesses)
             if picture is not None:
                 result = replace(result, looks=looks_of(picture, result.boxes))
+            if self._shake > 0.0:
+                result = replace(result, information={**result.information, SHAKE: self._shake})
             done.append((self._working.back(self._camera, result), self._state))
             self._frame += 1
         return done

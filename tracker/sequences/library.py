@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,6 +19,9 @@ from tracker.sequences.sequence import DetectorFile, Sequence, SequenceError
 
 DEFAULT_CAMERAS = 2
 """Cameras of a rendered room that is opened by its name."""
+
+_RANDOM = re.compile(r"random-(\d{1,9})")
+"""A random room by its seed."""
 
 Told = Callable[[int, int], None]
 """Called with the steps rendered so far and their number."""
@@ -43,7 +47,7 @@ class SequenceEntry:
 
 
 def available(data: Path | None = None) -> list[SequenceEntry]:
-    """The rendered rooms, then the sequence folders under ``data`` by name.
+    """The rendered rooms, those of seeds that were rendered, then the folders under ``data``.
 
     Only heads of files are read: what else is wrong with a folder shows on opening it.
     """
@@ -61,6 +65,7 @@ def available(data: Path | None = None) -> list[SequenceEntry]:
         )
         for name, room in ROOMS.items()
     ]
+    entries += [_entry(folder, "rendered") for folder in _folders(_random_rooms())]
     if data is not None and data.is_dir():
         entries += [_entry(folder) for folder in _folders(data)]
     return entries
@@ -76,7 +81,7 @@ def _folders(data: Path) -> list[Path]:
     return [data / name for name in names if os.path.lexists(data / name / FILE)]
 
 
-def _entry(folder: Path) -> SequenceEntry:
+def _entry(folder: Path, kind: Literal["rendered", "folder"] = "folder") -> SequenceEntry:
     description, cameras, frames, error = "", 0, 0, None
     try:
         summary = read_summary(folder)
@@ -88,7 +93,7 @@ def _entry(folder: Path) -> SequenceEntry:
     return SequenceEntry(
         name=folder.name,
         description=description,
-        kind="folder",
+        kind=kind,
         cameras=cameras,
         frames=frames,
         ready=error is None,
@@ -99,9 +104,31 @@ def _entry(folder: Path) -> SequenceEntry:
 
 def rendered_folder(name: str, cameras: int = DEFAULT_CAMERAS) -> Path:
     """Where a rendered room is kept; another version of the renderer has another place."""
+    return _rooms() / f"{name}-{cameras}-cameras"
+
+
+def _rooms() -> Path:
     from tracker.sequences.rendering import VERSION
 
-    return cache_folder() / "rooms" / f"version-{VERSION}" / f"{name}-{cameras}-cameras"
+    return cache_folder() / "rooms" / f"version-{VERSION}"
+
+
+def _random_rooms() -> Path:
+    """Where those of seeds are."""
+    return _rooms() / "random"
+
+
+def is_room(name: str) -> bool:
+    """Whether a name is that of a rendered room: a built-in one, or ``random-SEED``."""
+    from tracker.sequences.rendering import ROOMS
+
+    return name in ROOMS or _RANDOM.fullmatch(name) is not None
+
+
+def next_random(entries: list[SequenceEntry]) -> str:
+    """The name of a random room that was not rendered yet."""
+    seeds = [int(match[1]) for one in entries if (match := _RANDOM.fullmatch(one.name))]
+    return f"random-{max(seeds, default=0) + 1}"
 
 
 def open_sequence(
@@ -117,7 +144,7 @@ def open_sequence(
     name as a room is opened by a path with a separator, for instance ``./room44-3p``.
 
     Args:
-        name_or_folder: Name of a room, or path of a folder.
+        name_or_folder: Name of a room, ``random-SEED`` for a room of any kind, or path of a folder.
         progress: Called while rendering.
         cancelled: Asked while rendering.
         cameras: Of a rendered room.
@@ -129,14 +156,14 @@ def open_sequence(
     from tracker.sequences.rendering import ROOMS
 
     name = str(name_or_folder)
-    if name in ROOMS:
+    if is_room(name):
         return _open_room(name, progress, cancelled, cameras)
     folder = given_folder(name_or_folder)
     if not folder.exists() and len(folder.parts) <= 1:
         hint = did_you_mean(name, ROOMS)
         raise SequenceError(
             f'there is no sequence "{name}": expected one of the rendered rooms '
-            f"{listed(ROOMS)}, or the path of a folder with a {FILE}{hint}"
+            f"{listed([*ROOMS, 'random-SEED'])}, or the path of a folder with a {FILE}{hint}"
         )
     return read_sequence(folder)
 
@@ -166,15 +193,21 @@ def with_detector(sequence: Sequence, path: Path | None) -> Sequence:
 def _open_room(
     name: str, progress: Told | None, cancelled: Callable[[], bool] | None, cameras: int
 ) -> Sequence:
-    from tracker.sequences.rendering import render
+    from tracker.sequences.rendering import render, render_random
     from tracker.sequences.rendering.writing import is_whole
 
-    folder = rendered_folder(name, cameras)
+    random = _RANDOM.fullmatch(name)
+    folder = _random_rooms() / name if random else rendered_folder(name, cameras)
     if is_whole(folder):
         with contextlib.suppress(SequenceError):
             return read_sequence(folder)
     if folder.exists():  # somebody spoilt it; it can always be rendered again
         shutil.rmtree(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
-    render(name, folder, cameras=cameras, progress=progress, cancelled=cancelled)
+    if random:
+        render_random(
+            int(random[1]), folder, detections=True, progress=progress, cancelled=cancelled
+        )
+    else:
+        render(name, folder, cameras=cameras, progress=progress, cancelled=cancelled)
     return read_sequence(folder)

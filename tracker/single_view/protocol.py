@@ -21,6 +21,9 @@ TRUST, DOUBT = "trust in the foreground", "doubt in the background"
 """And how far the foreground was believed about people with templates, and how little the
 background, 0 … 1."""
 
+SHAKE = "shake, pixels"
+"""And the standard deviation of a shake of the camera that is undone."""
+
 EventKind = Literal["new", "vanished", "returned", "occluded", "merged", "split"]
 
 

@@ -50,13 +50,13 @@ def places_of(names: Sequence[str]) -> list[str]:
     Raises:
         StudyError: If one stands for nothing.
     """
-    from tracker.sequences.rendering import ROOMS
+    from tracker.sequences.library import is_room
 
     found: list[str] = []
     for name in names:
         if name.startswith("@"):
             found += places_of(_listed(Path(name[1:])))
-        elif name in ROOMS:
+        elif is_room(name):
             found.append(name)
         elif Path(name).exists():
             found.append(str(Path(name).absolute()))

@@ -84,13 +84,14 @@ def recordings(request: Request, desk: AtDesk, bench: Bench) -> Recordings:
         for number, one in enumerate(recents.all())
     ]  # fmt: skip
     listed = {card.opens for card in cards}
+    entries = library.available(data)
     cards += [
         RecordingCard(
             name=entry.name, opens=entry.name, kind=entry.kind, description=entry.description,
             cameras=entry.cameras, frames=entry.frames, fps=0.0, opened=0.0,
             picture=f"/api/recordings/picture?name={quote(entry.name)}" if entry.ready else "",
         )
-        for entry in library.available(data)
+        for entry in entries
         if str(entry.folder.absolute()) not in listed and entry.error is None
     ]  # fmt: skip
     snapshot = bench.snapshot()
@@ -100,7 +101,9 @@ def recordings(request: Request, desk: AtDesk, bench: Bench) -> Recordings:
     known = Recordings(
         recordings=cards, folders=desk.folders(), data=str(desk.home), free=desk.free(), sheet=""
     )
-    return known.model_copy(update={"sheet": start_sheet(known, open_as)})
+    return known.model_copy(
+        update={"sheet": start_sheet(known, open_as, library.next_random(entries))}
+    )
 
 
 @router.get(

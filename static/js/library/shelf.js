@@ -7,6 +7,15 @@ const KINDS = /** @type {const} */ ([
 	["Rendered rooms", "rendered"],
 ]);
 
+/** What recordings are sorted by; as they come they are by when they were opened. */
+/** @type {Record<string, (a: Server.RecordingInfo, b: Server.RecordingInfo) => number>} */
+const ORDERS = {
+	"last opened": () => 0,
+	name: (a, b) => a.name.localeCompare(b.name, undefined, { numeric: true }),
+	"most runs": (a, b) => b.runs - a.runs,
+	longest: (a, b) => b.frames - a.frames,
+};
+
 /** Its own, once it was opened; else one of the list of what can be opened, if it has any. */
 /** @param {Server.RecordingInfo} one */
 function picture(one) {
@@ -31,10 +40,16 @@ function picture(one) {
 export function shelf(on) {
 	const find = h("input", {
 		type: "search",
-		placeholder: "find a recording, run or note",
+		placeholder: "find",
+		title: "A recording, a run or a note",
 		"aria-label": "Find",
 		oninput: () => on.find(),
 	});
+	const order = h(
+		"select",
+		{ "aria-label": "Sort recordings by", onchange: () => on.find() },
+		Object.keys(ORDERS).map((word) => h("option", {}, word)),
+	);
 	const list = h("div", { class: "scroll list", role: "listbox", "aria-label": "Recordings" });
 	const foot = h("div", { class: "foot" });
 	const element = h(
@@ -47,7 +62,7 @@ export function shelf(on) {
 			h("span", { class: "grow" }),
 			h("button", { class: "btn", "data-key": "Ctrl O", onclick: on.add }, "Open…"),
 		),
-		h("div", { class: "lib-find" }, icon("i-search", "s"), find),
+		h("div", { class: "lib-find" }, icon("i-search", "s"), find, order),
 		list,
 		foot,
 	);
@@ -111,11 +126,13 @@ export function shelf(on) {
 			fill(
 				list,
 				KINDS.flatMap(([word, kind]) => {
-					const found = library.recordings.filter(
-						(one) =>
-							one.kind === kind &&
-							(!text || has(text, [one.name, one.place]) || one.place === recording?.place),
-					);
+					const found = library.recordings
+						.toSorted(ORDERS[order.value] ?? (() => 0))
+						.filter(
+							(one) =>
+								one.kind === kind &&
+								(!text || has(text, [one.name, one.place]) || one.place === recording?.place),
+						);
 					const head = h("div", { class: "cap" }, h("span", {}, word), h("span", {}, "runs"));
 					const items = found.map((one) => item(one, one.place === recording?.place));
 					return found.length ? [head, ...items] : [];

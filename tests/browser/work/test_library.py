@@ -78,6 +78,14 @@ def test_keys_choose_star_name_and_delete(library: Page, server: Server) -> None
     expect(library.locator("main")).to_be_visible()
 
 
+def test_the_last_runs_of_a_recording_are_taken_back(library: Page) -> None:
+    library.keyboard.press("Control+a")
+    library.get_by_role("button", name="Delete").click()
+    expect(library.get_by_role("heading", name="Nothing kept yet")).to_be_visible()
+    library.get_by_role("button", name="Undo").click(timeout=10_000)
+    expect(library.locator("tr[data-run]")).to_have_count(2)
+
+
 def test_finding_leaves_what_matches(library: Page) -> None:
     library.keyboard.press("/")
     library.keyboard.type("no such run")

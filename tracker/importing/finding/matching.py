@@ -71,7 +71,9 @@ def match_all(taken: Sequence[Taken], sets: Sequence[CameraSet], options: Import
     """
     told: list[str] = []
     videos, detections, truths = _by_kind(taken)
-    chosen = _choose(sets, [label for label, _ in videos] or [label for label, _ in detections])
+    complaints = [one.complaint for one in taken if one.complaint and not one.pieces]
+    labels = [label for label, _ in videos] or [label for label, _ in detections]
+    chosen = _choose(sets, labels, complaints)
     for other in sets:
         if other is not chosen:
             told.append(f"{other.label}: is another calibration; it is not used")
@@ -122,13 +124,19 @@ def _own_label(one: Taken, source: Path, label: str) -> str:
     return f"{label.rsplit('/', 1)[0]}/{source.stem}" if "/" in label else source.stem
 
 
-def _choose(sets: Sequence[CameraSet], labels: Sequence[str]) -> CameraSet:
-    """The calibration whose cameras have most of the files; the larger of two."""
+def _choose(
+    sets: Sequence[CameraSet], labels: Sequence[str], complaints: Sequence[str]
+) -> CameraSet:
+    """The calibration whose cameras have most of the files; the larger of two.
+
+    Raises:
+        FormatError: If there is none; with why a file that could have been one is not read.
+    """
     if not sets:
         raise FormatError(
             "no calibration was found: expected one of OpenCV, Pose2Sim, Anipose, Caliscope, "
             "Qualisys, COLMAP … (`multiview-phd formats` lists them) with lens and pose of every "
-            "camera"
+            f"camera{''.join(f'; {complaint}' for complaint in complaints[:1])}"
         )
 
     def fitting(one: CameraSet) -> int:

@@ -90,6 +90,11 @@ def settle_times(
         ]
         frames = max(lasts, default=-1) + 1
         found.append(("frames", f"{frames}, up to the last that the boxes name"))
+    if not frames and all(c.detections is None for c in cameras):
+        raise FormatError(
+            "neither videos, pictures nor boxes of these cameras were found, and a calibration "
+            "alone has no steps; add them"
+        )
     if not 0 < frames <= MOST_FRAMES:
         raise FormatError(
             f"expected 1 to {MOST_FRAMES:,} steps in videos, pictures or boxes, found {frames}"

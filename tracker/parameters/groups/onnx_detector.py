@@ -38,10 +38,12 @@ class OnnxDetectorParams(DetectionBoxParams):
     """What the network takes: 0 … 1 (YOLO, RT-DETR), ImageNet's (DETR), −1 … 1, or 0 … 255."""
 
 
+_PICTURES = Reads("pictures", without=frozenset({"steady_from"}))  # it knows no background
+
 METHOD = Method(
     name="onnx_detector",
     help="The boxes of a detection network of your own (ONNX), without a filter in the picture.",
     made_by="tracker.single_view.onnx.method:OnnxDetector",
-    uses=Uses(pictures=True, detector=True, reads=(Reads("onnx_detector"), Reads("pictures"))),
+    uses=Uses(pictures=True, detector=True, reads=(Reads("onnx_detector"), _PICTURES)),
     parameters=OnnxDetectorParams,
 )

@@ -27,3 +27,8 @@ class PictureParams(Params):
         float, Field(ge=0.0, le=3.2), ui("θ_l", unit="rad", step=0.01, advanced=True)
     ] = 0.15
     """The picture of a camera that is rolled further than this is turned until people stand."""
+
+    steady_from: Annotated[
+        float, Field(ge=0.0, le=100.0), ui("σ_s", unit="px", step=0.05, advanced=True)
+    ] = 0.25
+    """The pictures of a camera that shakes by more than this, once reduced, are held still."""

@@ -38,6 +38,7 @@ __all__ = [
     "pack",
     "shape_scores",
     "shape_shares",
+    "spread_steps",
     "tone_curve",
     "unpack",
 ]
@@ -127,8 +128,13 @@ def _spread(
     sequence: Sequence, camera_index: int, reader: Pictures, among: range | None = None
 ) -> list[UInt8[ndarray, "h w 3"]]:
     """Pictures spread over the clip, or over some of its steps."""
-    among = range(sequence.frames) if among is None else among
-    count = min(BACKGROUND_PICTURES, len(among))
-    steps = np.linspace(among[0], among[-1], count).astype(int)
-    found = (reader.picture(camera_index, int(step)) for step in steps)
+    steps = spread_steps(range(sequence.frames) if among is None else among)
+    found = (reader.picture(camera_index, step) for step in steps)
     return [picture for picture in found if picture is not None]
+
+
+def spread_steps(among: range) -> list[int]:
+    """The steps whose pictures a background is learnt from."""
+    count = min(BACKGROUND_PICTURES, len(among))
+    steps: list[int] = np.linspace(among[0], among[-1], count).astype(int).tolist()
+    return steps

@@ -13,6 +13,7 @@ from tracker.pictures.foreground import pack, unpack
 from tracker.sequences.pictures.frames import Picture, Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
+from tracker.single_view.working.steadying import SteadyReader
 from tracker.single_view.working.view import WorkingView, working_view
 
 if TYPE_CHECKING:
@@ -43,16 +44,27 @@ class Working:
         """
         views: tuple[WorkingView | None, ...] = (None,) * len(sequence.views)
         used = parameters.method("single_view").used(parameters)
-        if used.pictures and any(part.group == "pictures" for part in used.reads):
+        if not used.pictures:
+            return Working(sequence, reader, views)
+        if used.reads_number("pictures", "lines"):
             views = tuple(
                 working_view(
                     camera, sequence.room, sequence.target_half_extents, parameters.pictures
                 )
                 for camera in sequence.cameras
             )
-        if all(view is None for view in views):
-            return Working(sequence, reader, views)
-        return Working(_reduced(sequence, views), _WorkingReader(reader, views), views)
+        if any(view is not None for view in views):
+            sequence, reader = _reduced(sequence, views), _WorkingReader(reader, views)
+        if used.reads_number("pictures", "steady_from"):
+            reader = SteadyReader(sequence, reader, views, parameters.pictures.steady_from)
+        return Working(sequence, reader, views)
+
+    def shake(self, camera: int) -> float:
+        """Standard deviation in the camera's own pixels of a shake that is undone, else 0."""
+        if not isinstance(self.reader, SteadyReader):
+            return 0.0
+        view = self.views[camera]
+        return self.reader.shake(camera) / (1.0 if view is None else view.scale)
 
     def back(self, camera: int, result: ViewResult) -> ViewResult:
         """A result in working pixels as one in the camera's own."""

@@ -62,6 +62,16 @@ class WorkingView:
             reduced = cv2.warpAffine(reduced, self.turn, self.camera.image_size)
         return np.asarray(reduced, dtype=np.uint8)
 
+    @property
+    def shown(self) -> UInt8[ndarray, "h2 w2"] | None:
+        """1 where the working picture shows what the camera sees; None for everywhere."""
+        if self.turn is None:
+            return None
+        width, height = self._reduced_size
+        whole = np.ones((height, width), dtype=np.uint8)
+        flags = cv2.INTER_NEAREST
+        return np.asarray(cv2.warpAffine(whole, self.turn, self.camera.image_size, flags=flags))
+
     def mask(self, working: UInt8[ndarray, "h2 w2"]) -> UInt8[ndarray, "h1 w1"]:
         """A mask of the working picture as one of the camera's own, reduced."""
         if self.turn is None:

@@ -105,11 +105,12 @@ def definition_of(found: Mapping[str, Any], *, where: str, folder: Path) -> Defi
 
 
 def _recordings(fields: _Fields, folder: Path) -> tuple[str, ...]:
+    from tracker.sequences.library import is_room
     from tracker.sequences.rendering import ROOMS
 
     found: list[str] = []
     for name in fields.texts("recordings", None):
-        if name in ROOMS:
+        if is_room(name):
             found.append(name)
             continue
         pattern = str(folder / Path(name).expanduser())

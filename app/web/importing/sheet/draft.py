@@ -34,7 +34,8 @@ def draft_sheet(info: ImportInfo) -> str:
 
 def _head(info: ImportInfo) -> Markup:
     used = sum(bool(one.format) for one in info.files)
-    facts = f"{len(info.files)} files" if info.files else ""
+    count = len(info.files)
+    facts = f"{count} file{'' if count == 1 else 's'}" if count else ""
     if info.frames:
         facts = (
             f"{len(info.cameras)} cameras · {info.fps:g} Hz · {info.frames} steps · "

@@ -23,19 +23,24 @@ UNDERSTOOD = (
     ("Video", "mp4, mov, avi, mkv; folders of numbered pictures"),
     (
         "Calibration",
-        "OpenCV, Pose2Sim, Caliscope, Anipose, Qualisys, COLMAP, Kalibr, ROS, projections",
+        "OpenCV, Pose2Sim, Caliscope, Anipose, Qualisys, COLMAP, Metashape, Kalibr, ROS, "
+        "projections",
     ),
-    ("Detections", "MOTChallenge, YOLO, COCO, OpenPose, CVAT, CSV; none is fine too"),
+    (
+        "Detections",
+        "MOTChallenge, YOLO, COCO, OpenPose, CVAT, LabelMe, JSON, CSV; none is fine too",
+    ),
 )
 DAY = 86400.0
 
 
-def start_sheet(known: Recordings, open_as: Sequence[str]) -> str:
+def start_sheet(known: Recordings, open_as: Sequence[str], another: str) -> str:
     """All of it.
 
     Args:
         known: What can be opened.
         open_as: Names and folders of what is open.
+        another: Name of a random room that was not rendered yet.
     """
     head = element(
         "header",
@@ -48,7 +53,7 @@ def start_sheet(known: Recordings, open_as: Sequence[str]) -> str:
         CLOSE,
         class_="s-head",
     )  # fmt: skip
-    body = element("div", _files(known), _lists(known, open_as), class_="open-body")
+    body = element("div", _files(known), _lists(known, open_as, another), class_="open-body")
     return joined(head, body).html
 
 
@@ -93,7 +98,7 @@ def _files(known: Recordings) -> Markup:
     )  # fmt: skip
 
 
-def _lists(known: Recordings, open_as: Sequence[str]) -> Markup:
+def _lists(known: Recordings, open_as: Sequence[str], another: str) -> Markup:
     own = [card for card in known.recordings if card.kind != "rendered"]
     rooms = [card for card in known.recordings if card.kind == "rendered"]
     return element(
@@ -106,7 +111,20 @@ def _lists(known: Recordings, open_as: Sequence[str]) -> Markup:
             GROW,
             button("All in the library", "library", "end"),
         ),
-        _cards("Rendered rooms", "made here in a minute, with truth", rooms, open_as),
+        _cards(
+            "Rendered rooms",
+            "made here in a minute, with truth",
+            rooms,
+            open_as,
+            GROW,
+            button(
+                "Render another…",
+                "recording",
+                "end",
+                data_value=another,
+                title="A room of any kind: other cameras, people, light and disturbances",
+            ),
+        ),
         class_="open-list",
         aria_label="Recordings",
     )

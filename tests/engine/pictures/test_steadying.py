@@ -1,0 +1,167 @@
+"""A camera that shakes is measured and held still; one that does not is left alone."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from numpy import ndarray
+
+from tests.golden.pieces import cut
+from tracker import pipeline
+from tracker.parameters import ForegroundParams, RunParameters, with_values
+from tracker.pictures.foreground import BackgroundModel
+from tracker.runs.gates import notices
+from tracker.sequences.library import open_sequence
+from tracker.sequences.pictures.frames import FrameReader, Picture
+from tracker.single_view.working.sequence import Working
+from tracker.single_view.working.steadying import Steadying, agreed
+
+SIZE = (320, 240)
+MIDDLE = np.array([(SIZE[0] - 1) / 2, (SIZE[1] - 1) / 2])
+
+
+def scene(rng: np.random.Generator) -> ndarray:
+    """Furniture: rectangles of all greys, a little larger than a picture of it."""
+    room = np.full((SIZE[1] + 60, SIZE[0] + 60, 3), 128, dtype=np.uint8)
+    for _ in range(80):
+        x, y = rng.integers(0, [SIZE[0], SIZE[1]]) + rng.integers(0, 60, 2)
+        w, h = rng.integers(8, 70, 2)
+        colour = rng.integers(30, 225, 3).tolist()
+        cv2.rectangle(room, (int(x), int(y)), (int(x + w), int(y + h)), colour, -1)
+    return np.asarray(cv2.GaussianBlur(room, (0, 0), 1.0))
+
+
+def taken(room: ndarray, moved: ndarray, rng: np.random.Generator, light: float = 1.0) -> ndarray:
+    """What a camera sees that is shifted and turned so, with somebody before the scene."""
+    cos, sin = np.cos(moved[2]), np.sin(moved[2])
+    turn = np.array([[cos, -sin], [sin, cos]])
+    matrix = np.column_stack([turn, MIDDLE - turn @ MIDDLE + moved[:2] - turn @ [30.0, 30.0]])
+    picture = cv2.warpAffine(room, matrix, SIZE, flags=cv2.INTER_CUBIC).astype(float)
+    x, y = rng.integers([20, 40], [SIZE[0] - 80, 100])
+    picture[y : y + 130, x : x + 50] = rng.integers(0, 255, 3)
+    bands = 1.0 + 0.1 * np.sin(np.arange(SIZE[1]) / 30.0 + rng.uniform(0.0, 6.0))
+    picture *= light * bands[:, None, None]
+    noise = rng.normal(0.0, 2.0, picture.shape)
+    return np.asarray(np.clip(picture + noise, 0.0, 255.0), dtype=np.uint8)
+
+
+def shaken(
+    rng: np.random.Generator, sigma: float, count: int = 32
+) -> tuple[list[ndarray], ndarray]:
+    room = scene(rng)
+    moved = rng.normal(0.0, 1.0, (count, 3)) * [sigma, sigma, 0.001 * sigma]
+    lights = rng.uniform(0.7, 1.3, count)
+    return [taken(room, *each) for each in zip(moved, [rng] * count, lights, strict=True)]
+
+
+@pytest.mark.parametrize("sigma", [0.5, 2.0])
+def test_a_shake_is_measured_and_undone(sigma: float) -> None:
+    pictures = shaken(np.random.default_rng(3), sigma)
+    found = Steadying.learn(pictures, None, 0.2)
+    assert found is not None
+    assert found.shake == pytest.approx(sigma, rel=0.35)
+    held = [found.still(picture) for picture in pictures]
+    # what is left of the shake, measured in the same way on the pictures that are held still
+    left = Steadying.learn(held, None, 0.0)
+    assert left is not None
+    assert left.shake < 0.15 * sigma
+
+
+def test_a_shake_undone_leaves_people_as_foreground_and_no_edges() -> None:
+    pictures = shaken(np.random.default_rng(3), 2.0)
+    found = Steadying.learn(pictures, None, 0.2)
+    assert found is not None
+    shares = []
+    for some in (pictures, [found.still(picture) for picture in pictures]):
+        background = BackgroundModel.learn(some)
+        assert background is not None
+        masks = [background.foreground(one, ForegroundParams()) for one in some]
+        shares.append(float(np.mean([mask.mean() for mask in masks])))
+    person = 50 * 130 / (SIZE[0] * SIZE[1])
+    shaking, held = shares
+    assert held == pytest.approx(person, rel=0.2)
+    assert abs(held - person) < 0.7 * abs(shaking - person)
+
+
+def test_people_light_and_noise_are_no_shake() -> None:
+    found = Steadying.learn(shaken(np.random.default_rng(4), 0.0), None, 0.2)
+    assert found is not None
+    assert found.shake < 0.06
+
+
+def test_who_moves_does_not_move_the_scene() -> None:
+    rng = np.random.default_rng(5)
+    places = rng.uniform(-100.0, 100.0, (60, 2))
+    truth = np.array([1.5, -0.7, 0.004])
+    shifts = truth[:2] + truth[2] * np.stack([-places[:, 1], places[:, 0]], axis=1)
+    shifts += rng.normal(0.0, 0.05, shifts.shape)
+    shifts[:20] += [6.0, 2.0]  # somebody who walks
+    found = agreed(places, shifts, 240.0)
+    assert found is not None
+    assert (np.abs(found - truth) < [0.05, 0.05, 0.001]).all()
+
+
+def test_what_nobody_agrees_on_or_lies_too_far_is_no_shake() -> None:
+    rng = np.random.default_rng(6)
+    places = rng.uniform(-100.0, 100.0, (60, 2))
+    assert agreed(places, rng.uniform(-20.0, 20.0, (60, 2)), 240.0) is None
+    assert agreed(places, np.full((60, 2), 13.0), 240.0) is None
+    assert agreed(places, np.full((60, 2), 11.0), 240.0) is not None
+    assert agreed(places[:11], np.zeros((11, 2)), 240.0) is None
+    assert agreed(places[:0], np.zeros((0, 2)), 240.0) is None
+
+
+def test_a_plain_wall_tells_nothing() -> None:
+    walls = [np.full((240, 320, 3), 90, dtype=np.uint8) for _ in range(8)]
+    found = Steadying.learn(walls, None, 0.2)
+    assert found is not None
+    assert found.shake == 0.0
+    assert found.still(walls[0]) is walls[0]
+    assert Steadying.learn([], None, 0.2) is None
+
+
+class _Shaking(FrameReader):
+    """The pictures of a recording, of which one camera shakes."""
+
+    def picture(self, camera: int, step: int) -> Picture | None:
+        return self._shaken(super().picture(camera, step), camera, step)
+
+    def iterate(self, camera: int, first: int = 0):  # type: ignore[no-untyped-def]
+        for step, picture in enumerate(super().iterate(camera, first), first):
+            yield self._shaken(picture, camera, step)
+
+    @staticmethod
+    def _shaken(picture: Picture | None, camera: int, step: int) -> Picture | None:
+        if picture is None or camera != 0:
+            return picture
+        moved = np.random.default_rng(step).normal(0.0, 1.5, 2)
+        matrix = np.column_stack([np.eye(2), moved])
+        size = picture.shape[1::-1]
+        return np.asarray(
+            cv2.warpAffine(picture, matrix, size, borderMode=cv2.BORDER_REPLICATE), dtype=np.uint8
+        )
+
+
+def test_a_run_holds_the_shaking_camera_still_and_says_so() -> None:
+    sequence = cut(open_sequence("room24-2p"), 270, 32)
+    parameters = with_values(RunParameters(), {"single_view": "association_matrix"})
+    with FrameReader(sequence) as calm, _Shaking(sequence) as reader:
+        working = Working.of(sequence, parameters, reader)
+        undone = pipeline.compute(sequence, parameters, reader=reader, steps=3)
+        off = with_values(parameters, {"pictures.steady_from": 100.0})
+        left = pipeline.compute(sequence, off, reader=reader, steps=3)
+        plain = Working.of(sequence, parameters, calm)
+        assert working.shake(0) == pytest.approx(1.5, rel=0.4)
+        for camera in range(1, len(sequence.views)):
+            assert working.shake(camera) == 0.0
+            picture = working.reader.picture(camera, 5)
+            assert (picture == calm.picture(camera, 5)).all()
+        first, second = working.reader.picture(0, 7), next(iter(working.reader.iterate(0, 7)))
+        assert (first == second).all()
+        assert (first != reader.picture(0, 7)).any()
+        assert plain.shake(0) == 0.0
+        assert (plain.reader.picture(0, 7) == calm.picture(0, 7)).all()
+    name = sequence.views[0].camera.name
+    assert any(f'"{name}" shakes by 1.' in one for one in notices(undone))
+    assert not any("shakes" in one for one in notices(left))
