@@ -28,6 +28,8 @@ const ACTS = /** @type {const} */ ([
 ]);
 /** Where there is little room their words go first. */
 const SHORT = ["check-here", "check-nobody", "check-skip"];
+/** What is done with those who are there, not with who is missing. */
+const OF_OTHERS = ["check-exchange", "check-split"];
 /** Which of them a kind of doubt proposes where it is wrong. @type {Record<string, string>} */
 const PROPOSES = {
 	exchange: "check-exchange",
@@ -237,8 +239,9 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 							: (PROPOSES[chosen.kind] ?? "check-confirm");
 		fill(
 			acts,
-			...ACTS.map(([name, sign, word]) =>
-				button(name, sign, name === main && name === "check-join" ? "Join" : word, name === main),
+			...ACTS.filter(([name]) => main !== "check-apply" || !OF_OTHERS.includes(name)).map(
+				([name, sign, word]) =>
+					button(name, sign, name === main && name === "check-join" ? "Join" : word, name === main),
 			),
 			h("span", { class: "grow" }),
 			main === "check-apply" && button(main, "i-here", alternative || "Apply", true),
