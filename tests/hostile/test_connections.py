@@ -27,6 +27,7 @@ from websockets.typing import Subprotocol
 
 from app.web import server
 from app.web.access import connections
+from app.web.server import listening
 from tests.app.conftest import wait_until
 
 VISER = Subprotocol(f"viser-v{viser.__version__}")
@@ -83,9 +84,10 @@ def running(data: Path) -> Iterator[Running]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(connections, "SECONDS_TO_ASK", SOON)
         patch.setattr(connections, "SECONDS_TO_READ", SOON)
-        patch.setattr(server, "_Server", Stoppable)
+        patch.setattr(listening, "_Server", Stoppable)
         running = Running(server.Settings(sequence="crossing", data=data))
         wait_until(lambda: httpx.get(f"{running.address}/viser/").status_code == 200)
+        wait_until(lambda: httpx.get(f"{running.address}/api/state").json()["sequence"] is not None)
         yield running
         assert Stoppable.newest is not None
         Stoppable.newest.should_exit = True
@@ -97,7 +99,7 @@ def running(data: Path) -> Iterator[Running]:
             gc.collect()
 
 
-class Stoppable(server._Server):
+class Stoppable(listening._Server):
     """One that another thread can end."""
 
     newest: Stoppable | None = None

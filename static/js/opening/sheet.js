@@ -245,7 +245,12 @@ export function mountOpening({ store, actions }) {
 	dialog.addEventListener("keydown", (/** @type {any} */ event) => {
 		const { target, key } = event;
 		const types = target.matches("input");
-		if (key === "Enter" && types) target.id === "open-path" ? DO.path("") : target.blur();
+		// The field is left, for what is typed in is not written over.
+		if (key === "Enter" && types) {
+			const open = target.id === "open-path" && target.form.querySelector("button");
+			target.blur();
+			open && (open.focus(), open.click());
+		}
 		if (!event.ctrlKey && !event.metaKey) return key === "Enter" && types && event.preventDefault();
 		if (key === "Enter") void write(true);
 		else if (key === "o") dialog.close();

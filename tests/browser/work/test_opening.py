@@ -173,6 +173,17 @@ def test_the_sheet_opens_what_is_there(page: Page, server: Server, folder: Path)
     expect(sheet).not_to_be_visible()
 
 
+def test_a_path_is_looked_into_by_enter(page: Page, files: Path, folder: Path) -> None:
+    shutil.copytree(files, folder / "data/by-path")
+    page.keyboard.press("Control+o")
+    page.locator("#open-path").fill("by-path")
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("heading", name="Import", exact=True)).to_be_visible(timeout=10_000)
+    settled(page)
+    expect(page.locator("dialog.opener tbody tr")).to_have_count(4)
+    page.get_by_role("button", name="Cancel").click()
+
+
 def test_an_upload_is_stopped_cleanly(page: Page, files: Path, folder: Path) -> None:
     page.route("**/files/**", lambda route: None)  # nothing of it ever arrives
     drop(page, files)
