@@ -129,6 +129,15 @@ class AlternativeInfo(Model):
     as_it_is: bool
 
 
+class Sight(Model):
+    """Where in a camera's picture somebody would be whom no track has."""
+
+    step: int
+    camera: int
+    box: tuple[float, float, float, float]
+    """left, top, width, height, pixels."""
+
+
 class DoubtInfo(Model):
     """A doubtful place."""
 
@@ -148,6 +157,8 @@ class DoubtInfo(Model):
     """Steps that depend on it."""
     alternatives: list[AlternativeInfo]
     """As it is, then the most probable first."""
+    sights: list[Sight]
+    """Of who may be missing, at its places; empty for all others, whose boxes are their tracks'."""
 
 
 class DoubtQueue(Model):

@@ -57,6 +57,31 @@ def test_a_search_finds_what_is_better(tmp_path: Path) -> None:
     assert all(0.0 <= share <= 1.0 and spread >= 0.0 for _, (share, spread) in summary.importance)
 
 
+def test_who_looks_again_reads_only_what_is_new(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = study(tmp_path, trials=8, prune=False)
+    crew = Serial(made_up(near), stop_after=5)
+    with pytest.raises(KeyboardInterrupt):
+        run(store, crew)
+    before = summary_of(store)
+    assert 0 < len(before.trials) < 8
+    run(store, Serial(made_up(near)))
+    asked = []
+    trials = Store.trials
+    monkeypatch.setattr(
+        Store, "trials", lambda self, after=0.0: asked.append(after) or trials(self, after)
+    )
+    now = summary_of(store, before)
+    assert asked == [max(one.ended for one in before.trials)]
+    fresh = summary_of(store)
+    assert now.trials == fresh.trials
+    assert (now.best, now.front) == (fresh.best, fresh.front)
+    again = summary_of(store, now)
+    assert again.trials == fresh.trials
+    assert again.front == fresh.front
+
+
 @pytest.mark.parametrize("after", [0, 1, 3, 7, 10])
 def test_a_study_that_is_ended_goes_on_and_does_nothing_twice(tmp_path: Path, after: int) -> None:
     recording(tmp_path / "other")

@@ -94,7 +94,7 @@ def _missing(run: Run, lanes: Lanes, one: Unclaimed) -> Doubt:
     return Doubt(
         "missing", "Somebody is missing?",
         f"boxes of {told} meet for {seconds:.1f} s where nobody is tracked",
-        first.step, last.step, (), (first, last), wrong, last.step - first.step + 1,
+        first.step, last.step, (), tuple(along), wrong, last.step - first.step + 1,
         (
             Alternative("nobody", 1.0 - wrong, unsaid("nobody", along)),
             Alternative("somebody", wrong, here),

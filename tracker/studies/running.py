@@ -10,20 +10,22 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from contextlib import nullcontext
 from typing import Any
 
+from tracker.studies.active import Active, at_work
 from tracker.studies.defined.definition import Definition
 from tracker.studies.defined.space import defaults_of
 from tracker.studies.errors import StudyError
 from tracker.studies.judging import Judge
-from tracker.studies.kept.records import JobRow, Status, Trial
+from tracker.studies.kept.records import Status, Trial
 from tracker.studies.kept.store import JOURNAL, Store
 from tracker.studies.kept.writer import Writer
 from tracker.studies.opened import Recordings, check_same, open_recordings
 from tracker.studies.pace import Pace
 from tracker.studies.proposing import SEARCH_SHARE, Proposer
-from tracker.studies.sampling import Sampler
+from tracker.studies.sampling import Sampler, first_values
+from tracker.studies.turn import turn
 from tracker.studies.weighing import Weighing
 from tracker.studies.work.cluster import Crew
 from tracker.studies.work.jobs import Job, Outcome
@@ -35,24 +37,6 @@ AHEAD = 1
 """Runs that wait beside each one under way, so that no worker waits for the sampler."""
 
 
-@dataclass(eq=False)
-class _Active:
-    """A trial under way."""
-
-    number: int
-    values: dict[str, Any]
-    jobs: list[tuple[JobRow, Job]]
-    sent: int = 0
-    wanted: int = 0
-    """Different runs among those that were sent."""
-    outcomes: dict[str, Outcome] = field(default_factory=dict)
-
-    @property
-    def is_back(self) -> bool:
-        """Whether all runs that were sent have ended."""
-        return len(self.outcomes) >= self.wanted
-
-
 def run_study(
     store: Store,
     writer: Writer,
@@ -60,6 +44,7 @@ def run_study(
     *,
     told: Callable[[Status], None] = lambda status: None,
     stopped: Callable[[], bool] = lambda: False,
+    beside: bool = False,
 ) -> Status:
     """Run a study, or go on with it, to its end.
 
@@ -69,6 +54,8 @@ def run_study(
         crew: Makes the workers; given whom to tell what is being waited for.
         told: Called with the status now and then.
         stopped: Asked as often.
+        beside: Whether it runs beside other studies, since its workers are not this machine's;
+            else it waits for its turn.
 
     Returns:
         The status at the end: ``done``, or ``stopped`` where that was asked for.
@@ -79,9 +66,13 @@ def run_study(
     study = _Running(store, writer, told, stopped)
     try:
         study.prepare()
-        study.crew = crew(study.wait_for)
-        study.work()
-        study.say()
+        with nullcontext(True) if beside else turn(store.name, study.waits) as mine:
+            if mine:
+                study.crew = crew(study.wait_for)
+                study.work()
+            else:
+                study.end_early()
+            study.say()
     except StudyError as error:
         study.state, study.words = "failed", str(error)
         study.say()
@@ -109,8 +100,8 @@ class _Running:
     ) -> None:
         self._store, self._writer, self._told, self._stopped = store, writer, told, stopped
         self._definition: Definition = store.definition()
-        self._active: dict[int, _Active] = {}
-        self._waiting: dict[str, list[_Active]] = {}
+        self._active: dict[int, Active] = {}
+        self._waiting: dict[str, list[Active]] = {}
         self._queue: list[dict[str, Any]] = []
         self._begin = time.monotonic()
         self._spent = float(store.told("spent") or 0.0)
@@ -144,30 +135,18 @@ class _Running:
                 self._sampler_hears(by_number[number])
             else:
                 self._take_up(number, values)
-        self._first_values()
         defaults = defaults_of(definition.varied, self._recordings.bases[0])
+        first = first_values(definition, defaults)
+        self._fixed = len(first)
+        grid = self._sampler.grid() if definition.search == "grid" else None
+        self._trials = definition.trials if grid is None else len(first) + len(grid)
+        self._queue = [*first, *(grid or [])][self._asked :]
         self._weighing = Weighing(definition.varied, defaults)
 
     def close(self) -> None:
         """Close what the sampler keeps."""
         if hasattr(self, "_sampler"):
             self._sampler.close()
-
-    def _first_values(self) -> None:
-        """What is tried before the sampler chooses: the defaults, where somebody was, a grid."""
-        definition, base = self._definition, self._recordings.bases[0]
-        defaults = defaults_of(definition.varied, base)
-        self._queue = [defaults]
-        if definition.start and dict(definition.start) != {
-            key: defaults[key] for key in definition.start
-        }:
-            self._queue.append({**defaults, **definition.start})
-        self._fixed = len(self._queue)
-        self._trials = definition.trials
-        if definition.search == "grid":
-            self._queue += self._sampler.grid()
-            self._trials = len(self._queue)
-        self._queue = self._queue[self._asked :]
 
     # the loop
 
@@ -189,6 +168,10 @@ class _Running:
                 return
             self._settle(self.crew.finished(SECONDS_BETWEEN))
             self._now_and_then()
+        self.end_early()
+
+    def end_early(self) -> None:
+        """Be stopped, with everything kept."""
         self.state = "stopped"
         self.words = "stopped; `multiview-phd study resume` goes on"
 
@@ -220,15 +203,15 @@ class _Running:
     def _seconds(self) -> float:
         return time.monotonic() - self._begin
 
-    def _take_up(self, number: int, values: dict[str, Any]) -> _Active:
+    def _take_up(self, number: int, values: dict[str, Any]) -> Active:
         if number == 0:
             values = defaults_of(self._definition.varied, self._recordings.bases[0])
         # on each recording its own defaults: nothing is changed
         jobs = self._recordings.jobs({} if number == 0 else values)
-        active = self._active[number] = _Active(number, values, jobs)
+        active = self._active[number] = Active(number, values, jobs)
         return active
 
-    def _send(self, active: _Active) -> None:
+    def _send(self, active: Active) -> None:
         """Have the next runs of a trial done; those that ended before are there at once."""
         first = self._judge.first_runs(len(active.jobs), self._definition.prune)
         upto = first if active.sent == 0 else len(active.jobs)
@@ -308,7 +291,7 @@ class _Running:
         for trial in ended:
             self._sampler_hears(trial)
 
-    def _gone_on(self, active: _Active) -> Trial | None:
+    def _gone_on(self, active: Active) -> Trial | None:
         """A trial that ended now; none before the defaults, by which it is judged."""
         while active.is_back:
             failed = next((o for o in active.outcomes.values() if o.became != "done"), None)
@@ -328,7 +311,7 @@ class _Running:
             return self._end(active, failed)
         return None
 
-    def _end(self, active: _Active, failed: Outcome | None) -> Trial:
+    def _end(self, active: Active, failed: Outcome | None) -> Trial:
         rows = tuple(row for row, _ in active.jobs[: active.sent])
         words = "the defaults" if active.number == 0 else ""
         if active.number == 1 and self._fixed > 1:
@@ -358,6 +341,12 @@ class _Running:
         self.words = words
         self.say()
 
+    def waits(self, words: str) -> bool:
+        """Say what is being waited for, at no cost of its time; False where somebody stops it."""
+        self._begin = time.monotonic()
+        self.wait_for(words)
+        return not self._is_stopped()
+
     def _now_and_then(self) -> None:
         if time.monotonic() - self._said >= SECONDS_BETWEEN:
             self._slots = self.crew.slots
@@ -369,6 +358,7 @@ class _Running:
         """Write down how far it is."""
         seconds = self._seconds()
         done = len(getattr(self, "_ended", ()))
+        at_it = self.state == "running" and hasattr(self, "crew")
         self.status = Status(
             self.state,
             self.words,
@@ -378,7 +368,7 @@ class _Running:
             seconds=seconds,
             seconds_left=self._seconds_left(done),
             busy=self._pace.busy(self._slots),
-            workers=self._working(),
+            workers=at_work(self.crew.workers(), self._waiting) if at_it else [],
             process=os.getpid(),
             written=time.time(),
         )
@@ -387,23 +377,6 @@ class _Running:
             self._writer.tell("spent", self._spent + seconds)
         self._told(self.status)
         self._said = time.monotonic()
-
-    def _working(self) -> list[dict[str, Any]]:
-        """Each worker with the trial that it is at."""
-        if self.state != "running" or not hasattr(self, "crew"):
-            return []
-        found = []
-        for one in self.crew.workers():
-            told: dict[str, Any] = {"trial": None, "recording": None, "seed": None}
-            for active in self._waiting.get(one.job or "", ())[:1]:
-                row = next(row for row, _ in active.jobs if row.key == one.job)
-                told = {"trial": active.number, "recording": row.recording, "seed": row.seed}
-            words = one.words or ("" if told["trial"] is not None else "waits for a run")
-            found.append(
-                {"name": one.name, "machine": one.machine, "words": words, "since": one.since}
-                | told
-            )
-        return found
 
     def _seconds_left(self, done: int) -> float | None:
         if self.state != "running" or not hasattr(self, "_trials"):

@@ -23,6 +23,14 @@ STARTUP = 12
 """Trials drawn at random before TPE trusts what it has."""
 
 
+def first_values(definition: Definition, defaults: dict[str, Any]) -> list[dict[str, Any]]:
+    """What is tried before a sampler chooses: the defaults, and where somebody was."""
+    first, start = [defaults], dict(definition.start or {})
+    if start and start != {key: defaults[key] for key in start}:
+        first.append({**defaults, **start})
+    return first
+
+
 class Sampler:
     """Asks Optuna for the values of each trial and tells it what became of them.
 

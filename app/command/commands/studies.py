@@ -140,6 +140,7 @@ def run(store: Store, where: Where, *, as_json: bool = False, quiet: bool = Fals
         quiet: Tell nothing at the end.
     """
     from tracker.studies.running import run_study
+    from tracker.studies.work.cluster import ADDRESS
 
     before: list[str] = []
     with (
@@ -156,7 +157,8 @@ def run(store: Store, where: Where, *, as_json: bool = False, quiet: bool = Fals
             if status.done:
                 bar.at(status.done, status.trials)
 
-        status = run_study(store, writer, crew, told=told, stopped=stopped.is_set)
+        elsewhere = bool(where.scheduler or os.environ.get(ADDRESS))
+        status = run_study(store, writer, crew, told=told, stopped=stopped.is_set, beside=elsewhere)
     if as_json:
         _print({"study": store.name, "state": status.state, "trials": len(store.trials())})
     elif not quiet:

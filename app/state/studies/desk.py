@@ -167,13 +167,13 @@ class StudyDesk:
             self._seen.pop(name, None)
 
     def summary(self, store: Store) -> Summary:
-        """A study as it is read; kept until its files change."""
+        """A study as it is read; kept, and only what is new is read when its files change."""
         touched = store.touched()
         with self._lock:
             kept = self._summaries.get(store.name)
         if kept is not None and kept[0] == touched:
             return kept[1]
-        summary = summary_of(store)
+        summary = summary_of(store, None if kept is None else kept[1])
         with self._lock:
             self._summaries[store.name] = touched, summary
         return summary

@@ -18,6 +18,7 @@ from app.models.correcting import (
     DoubtInfo,
     DoubtQueue,
     GhostTrack,
+    Sight,
 )
 from app.state.correcting import Correcting
 from app.state.snapshot import Ghosts, Snapshot
@@ -87,11 +88,11 @@ def queue_of(snapshot: Snapshot, found: Queue, skipped: AbstractSet[str]) -> Dou
         complete=run is not None and run.complete,
         how=found.how,
         answered=found.answered,
-        doubts=[_doubt(one) for one in found.doubts if one.id not in skipped],
+        doubts=[_doubt(one, run) for one in found.doubts if one.id not in skipped],
     )
 
 
-def _doubt(one: Doubt) -> DoubtInfo:
+def _doubt(one: Doubt, run: Run | None) -> DoubtInfo:
     return DoubtInfo(
         id=one.id, kind=one.kind, title=one.title, why=one.why, first=one.first, last=one.last,
         tracks=list(one.tracks), places=[(p.step, p.x, p.y, p.z) for p in one.places],
@@ -100,7 +101,21 @@ def _doubt(one: Doubt) -> DoubtInfo:
             AlternativeInfo(words=a.words, probability=a.probability, as_it_is=number == 0)
             for number, a in enumerate(one.alternatives)
         ],
+        sights=[] if one.tracks or run is None else _sights(one, run),
     )  # fmt: skip
+
+
+def _sights(one: Doubt, run: Run) -> list[Sight]:
+    points = np.array([place.point for place in one.places])
+    found = []
+    for number, camera in enumerate(run.sequence.cameras):
+        boxes, visible = camera.project_boxes(points, run.sequence.target_half_extents)
+        found += [
+            Sight(step=place.step, camera=number, box=tuple(box))
+            for place, box, there in zip(one.places, boxes.tolist(), visible, strict=True)
+            if there
+        ]
+    return found
 
 
 def preview_of(snapshot: Snapshot, doubt: Doubt, alternative: int) -> AlternativePreview:

@@ -27,6 +27,7 @@ from app.web.manual import Manual
 from app.web.pictures import foreground, likelihood_routes, view_routes
 from app.web.server.running import lifespan
 from app.web.server.settings import Settings
+from app.web.studies import result_routes as study_results
 from app.web.studies import routes as studies
 from app.web.tables import event_tables, tables, teaching_tables
 from tracker import __version__
@@ -49,6 +50,7 @@ ROUTERS = (
     library.router,
     export_routes.router,
     studies.router,
+    study_results.router,
     stream.router,
     gateway.router,
 )

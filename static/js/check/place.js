@@ -4,6 +4,7 @@ import { all, fill, h, icon, idTag } from "../elements/dom.js";
 import { scoresOf } from "../state/events.js";
 import { commandOf, keyLabel, perform } from "../state/commands.js";
 import { drawCrop } from "./crops.js";
+import { camerasOf, fillSights } from "./sights.js";
 import {
 	camerasFor,
 	filmSteps,
@@ -27,6 +28,8 @@ const ACTS = /** @type {const} */ ([
 ]);
 /** Where there is little room their words go first. */
 const SHORT = ["check-here", "check-nobody", "check-skip"];
+/** What is done with those who are there, not with who is missing. */
+const OF_OTHERS = ["check-exchange", "check-split"];
 /** Which of them a kind of doubt proposes where it is wrong. @type {Record<string, string>} */
 const PROPOSES = {
 	exchange: "check-exchange",
@@ -36,7 +39,9 @@ const PROPOSES = {
 	gap: "check-split",
 	fast: "check-split",
 	short: "check-nobody",
-	missing: "check-here",
+	missing: "check-apply",
+	begins: "check-apply",
+	ends: "check-apply",
 };
 
 /** What is to be done while somebody is placed. */
@@ -234,10 +239,12 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 							: (PROPOSES[chosen.kind] ?? "check-confirm");
 		fill(
 			acts,
-			...ACTS.map(([name, sign, word]) =>
-				button(name, sign, name === main && name === "check-join" ? "Join" : word, name === main),
+			...ACTS.filter(([name]) => main !== "check-apply" || !OF_OTHERS.includes(name)).map(
+				([name, sign, word]) =>
+					button(name, sign, name === main && name === "check-join" ? "Join" : word, name === main),
 			),
 			h("span", { class: "grow" }),
+			main === "check-apply" && button(main, "i-here", alternative || "Apply", true),
 			button("check-skip", "i-next", "Skip", false),
 			button("check-confirm", "i-tick", "Confirm", main === "check-confirm"),
 		);
@@ -250,6 +257,13 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 		if (!chosen || store.get().place !== "check") return;
 		const { frames, fps, cameras: views, basis } = store.get();
 		steps = filmSteps(chosen.first, chosen.last, { frames, fps });
+		if (chosen.sights.length) {
+			const best = camerasOf(chosen.sights, views.length);
+			const camera = by !== null && by < views.length ? by : best[0];
+			numbers(best, camera);
+			steps = fillSights(film, chosen.sights, camera, { views, crops, seek: playback.seek });
+			return mark();
+		}
 		const ids = (
 			preview?.tracks.length
 				? [...new Set([...chosen.tracks, ...preview.tracks.map(({ id }) => id)])]

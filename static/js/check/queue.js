@@ -103,7 +103,13 @@ export function mountQueue(root, { store, actions }, check, crops) {
 		const doubt = state.get().queue?.doubts.find(({ id }) => id === item.dataset.doubt);
 		const canvases = item.querySelectorAll("canvas");
 		if (!doubt) return;
-		const { tracks, first, last } = doubt;
+		const { tracks, first, last, sights } = doubt;
+		if (sights.length) {
+			const ends = sights.filter(({ camera }) => camera === sights[0].camera);
+			for (const [k, { step, camera, box }] of [ends[0], ends[ends.length - 1]].entries())
+				drawCrop(canvases[k], await crops.pictureOf(camera, step), box, palette().id(1));
+			return;
+		}
 		const ends = /** @type {[number, number][]} */ ([
 			[tracks[0], first],
 			[tracks[tracks.length - 1], last],

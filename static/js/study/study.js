@@ -1,10 +1,10 @@
 /** The place Study: what is tried, how far it is, what it has found. */
 import { choices, fill, h, icon } from "../elements/dom.js";
 import { getJson } from "../state/api.js";
+import { bestTrials } from "./best.js";
 import { definition } from "./form.js";
 import { overview } from "./overview.js";
 import { progressPane } from "./progress.js";
-import { trialsTable } from "./trials.js";
 import { lasting, lineOf } from "./words.js";
 
 const EVERY_MS = 1000;
@@ -69,46 +69,9 @@ export function mountStudy(root, { store, actions }) {
 	);
 	const progress = progressPane({ pause: () => void pauseOrGoOn() });
 	const figures = overview({ choose, narrow: (key, low, high) => void copy(key, low, high) });
-	const rows = trialsTable({ choose, use: (number) => void use(number) });
-	const which = h("span", { class: "sub" });
-	const put = h(
-		"button",
-		{ class: "btn main", onclick: () => chosen !== null && void use(chosen) },
-		"Use",
-	);
-	const beside = h(
-		"button",
-		{ class: "btn box", onclick: () => void compare() },
-		"Compare with current",
-	);
-	const keep = h("button", { class: "btn box", onclick: askName }, "Save as preset…");
-	const differs = h("span", { class: "sub" });
-	const command = h(
-		"button",
-		{
-			class: "btn",
-			onclick: () => void copyCommand(),
-			title: "The command that gives these tracks again",
-		},
-		icon("i-copy", "s"),
-		"Command",
-	);
-	const best = h(
-		"section",
-		{ class: "pane tab2", "aria-label": "Best trials" },
-		h(
-			"div",
-			{ class: "pane-head" },
-			h("h2", { class: "pane-title" }, "Best trials"),
-			differs,
-			h("span", { class: "grow" }),
-			which,
-			put,
-			beside,
-			keep,
-			command,
-		),
-		rows.element,
+	const best = bestTrials(
+		{ store, actions },
+		{ choose, chosen: () => chosen, name: () => name, path },
 	);
 	const blank = h("section", { class: "pane stu-blank" });
 	const main = h(
@@ -118,7 +81,7 @@ export function mountStudy(root, { store, actions }) {
 		form.element,
 		progress.element,
 		figures.elements,
-		best,
+		best.element,
 		blank,
 	);
 	fill(root, main);
@@ -299,13 +262,7 @@ export function mountStudy(root, { store, actions }) {
 		progress.show(study);
 		if (!news) return;
 		const done = [...trials.values()].sort((a, b) => a.ended - b.ended);
-		rows.show(study, done, chosen);
-		fill(
-			differs,
-			`difference to the default${study.definition.seeds?.length > 1 ? `, mean of ${study.definition.seeds.length} seeds` : ""}`,
-		);
-		fill(which, chosen === null ? "" : chosen ? `trial ${chosen}` : "default");
-		for (const part of [put, beside, keep, command]) part.disabled = chosen === null;
+		best.show(study, done);
 		void figures.show(study, done, chosen);
 	}
 
@@ -313,63 +270,7 @@ export function mountStudy(root, { store, actions }) {
 	function choose(number) {
 		chosen = number;
 		show(true);
-		rows.reveal(number);
-	}
-
-	/** @param {number} number */
-	async function use(number) {
-		if (!(await actions.ask("POST", path(`/trials/${number}/use`)))) return;
-		actions.note(
-			"info",
-			`The values of ${number ? `trial ${number}` : "the default"} are on the sliders`,
-			"Ctrl Z takes them back.",
-			{
-				word: "To Tune",
-				act: () => (location.hash = "#tune"),
-			},
-		);
-	}
-
-	async function compare() {
-		if (chosen === null || !(await actions.ask("POST", "run/pin"))) return;
-		if (await actions.ask("POST", path(`/trials/${chosen}/use`))) location.hash = "#tune";
-		store.set({ tab: "compare" });
-	}
-
-	/** The name is asked for where the button stands. */
-	function askName() {
-		const field = h("input", {
-			class: "field",
-			value: `${name} ${chosen}`,
-			"aria-label": "Name of the preset",
-		});
-		let over = false;
-		const end = async (/** @type {boolean} */ kept) => {
-			if (over) return;
-			over = true;
-			field.replaceWith(keep);
-			if (!kept || !field.value.trim()) return;
-			if (await actions.ask("POST", path(`/trials/${chosen}/preset`), { name: field.value.trim() }))
-				actions.note(
-					"info",
-					`Kept as the preset ${field.value.trim()}`,
-					"It is among the presets in Tune.",
-				);
-		};
-		field.addEventListener("keydown", (event) => {
-			event.stopPropagation();
-			if (event.key === "Enter" || event.key === "Escape") void end(event.key === "Enter");
-		});
-		field.addEventListener("blur", () => void end(false));
-		keep.replaceWith(field);
-		field.select();
-	}
-
-	async function copyCommand() {
-		if (chosen === null) return;
-		const { commands } = await getJson(`/api/${path(`/trials/${chosen}`)}`);
-		await navigator.clipboard.writeText(commands.join("\n"));
-		actions.note("info", "The command was copied", commands[0] ?? "");
+		best.rows.reveal(number);
 	}
 
 	/** What a key does here. @type {Record<string, () => void>} */
@@ -377,13 +278,13 @@ export function mountStudy(root, { store, actions }) {
 		" ": () => void pauseOrGoOn(),
 		ArrowDown: () => move(1),
 		ArrowUp: () => move(-1),
-		Enter: () => chosen !== null && void use(chosen),
-		c: () => void compare(),
+		Enter: () => best.use(),
+		c: () => void best.compare(),
 		Escape: () => (location.hash = "#tune"),
 	};
 	/** @param {number} by */
 	function move(by) {
-		const next = rows.beside(chosen, by);
+		const next = best.rows.beside(chosen, by);
 		if (next !== null) choose(next);
 	}
 	document.addEventListener(

@@ -998,6 +998,14 @@ declare namespace Server {
 		sequences: SequenceEntryInfo[];
 	}
 
+	/** Where in a camera's picture somebody would be whom no track has. */
+	interface Sight {
+		step: number;
+		camera: number;
+		/** left, top, width, height, pixels. */
+		box: [number, number, number, number];
+	}
+
 	/** Everything that all pages share, but for the results themselves. */
 	interface State {
 		/** Another for every start of the server. */
@@ -1387,6 +1395,10 @@ declare namespace Server {
 		stake: number;
 		/** As it is, then the most probable first. */
 		alternatives: AlternativeInfo[];
+		/**
+		 * Of who may be missing, at its places; empty for all others, whose boxes are their tracks'.
+		 */
+		sights: Sight[];
 	}
 
 	/** A moment at which other ways to look disagree. */

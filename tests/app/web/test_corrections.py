@@ -264,3 +264,31 @@ def test_only_what_was_checked_counts_as_truth(desk: TestClient, own: Path, run:
     assert sum(answer["series"]["truth"][:10]) == 0
     assert sum(answer["series"]["estimates"][30:]) == 0
     assert any("truth says nothing" in note for note in answer["notes"])
+
+
+def test_who_may_be_missing_is_shown_where_each_camera_would_have_him(
+    desk: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = desk.app.state.workbench.snapshot().run  # type: ignore[attr-defined]
+    place = Lanes(run.tracks).place(tracks(desk)[0]["id"], 60)
+    other = place._replace(step=70)
+    here = (*unsaid("here", (place,)), *unsaid("here", (other,)))
+    made = Doubt(
+        "missing", "Somebody is missing?", "told", 60, 70, (), (place, other), 0.7, 11,
+        (Alternative("nobody", 0.3, unsaid("nobody", (place, other))),
+         Alternative("somebody", 0.7, here)),
+    )  # fmt: skip
+    monkeypatch.setattr(Doubting, "of", lambda self, snapshot: Queue((made,), 0, "a test"))
+    (told,) = desk.get(f"{PLACE}/queue").json()["doubts"]
+    assert told["tracks"] == []
+    assert {(one["step"], one["camera"]) for one in told["sights"]} == {
+        (step, camera) for step in (60, 70) for camera in range(len(run.sequence.cameras))
+    }
+    boxes, _ = run.sequence.cameras[0].project_boxes(
+        place.point[None], run.sequence.target_half_extents
+    )
+    first = next(one for one in told["sights"] if (one["step"], one["camera"]) == (60, 0))
+    assert first["box"] == pytest.approx(boxes[0])
+    assert desk.get(f"{PLACE}/queue/{told['id']}/1").status_code == 200
+    answer = desk.post(f"{PLACE}/answers", json={"doubt": told["id"], "alternative": 1})
+    assert [one["kind"] for one in answer.json()["corrections"]] == ["here", "here"]

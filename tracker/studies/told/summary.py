@@ -98,23 +98,35 @@ class Summary:
         return found
 
 
-def summary_of(store: Store) -> Summary:
+def summary_of(store: Store, before: Summary | None = None) -> Summary:
     """Read a study.
+
+    Args:
+        store: Its folder.
+        before: As it was read last: what was written since is read alone, so that who looks often
+            at a long study does not read all of it each time.
 
     Raises:
         StudyError: If its files are not as they must be.
     """
-    definition, trials = store.definition(), store.trials()
+    definition, status = store.definition(), store.status()
+    if before is not None and (before.definition != definition or status.done < len(before.trials)):
+        before = None  # another one of that name
+    known = {} if before is None else {one.number: one for one in before.trials}
+    news = store.trials(max((one.ended for one in known.values()), default=0.0))
+    known |= {one.number: one for one in news}
+    trials = [known[number] for number in sorted(known)]
     objectives = objectives_of(store, definition)
+    same = before is not None and not news and objectives == before.objectives
     importance = store.told("importance") or {"trials": 0, "shares": {}}
     return Summary(
         store.name,
         definition,
-        store.status(),
+        status,
         objectives,
         tuple(trials),
-        best_of(trials, objectives),
-        front_of(trials, objectives),
+        before.best if same and before is not None else best_of(trials, objectives),
+        before.front if same and before is not None else front_of(trials, objectives),
         [(key, (pair[0], pair[1])) for key, pair in importance["shares"].items()],
         importance["trials"],
     )

@@ -1,0 +1,35 @@
+"""What the routes of studies are given: the desk, and the study that is named."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import Depends, Request
+
+from app.errors import ApiError, sentence
+from app.state.studies.desk import StudyDesk
+from tracker.studies.errors import StudyError
+from tracker.studies.kept.store import Store
+
+
+def _desk(request: Request) -> StudyDesk:
+    desk: StudyDesk = request.app.state.studies
+    return desk
+
+
+Desk = Annotated[StudyDesk, Depends(_desk)]
+
+
+def no_study(error: StudyError | OSError) -> ApiError:
+    """The answer where a study is not as it must be."""
+    return ApiError(409, "no_study", f"{sentence(error)}.")
+
+
+def _study(name: str, desk: Desk) -> Store:
+    try:
+        return desk.store(name)
+    except StudyError as error:
+        raise ApiError(404, "no_study", f"{sentence(error)}.", field="name") from None
+
+
+Named = Annotated[Store, Depends(_study)]
