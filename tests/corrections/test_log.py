@@ -77,6 +77,8 @@ places = [[3, 5.0, 2.0, 0.8]]
     ("old", "new", "line", "words"),
     [
         ('kind = "here"', 'kind = "hier"', 12, "expected one of same"),
+        ('kind = "here"', "kind = {}", 12, "expected one of same"),
+        ('kind = "here"', "kind = [[]]", 12, "expected one of same"),
         ("[[3, 5.0", "[[3.5, 5.0", 14, "places"),
         ("[[3, 5.0, 2.0, 0.8]]", "[]", 14, "here has 1, found 0"),
         ("[9, 1.2", "[2, 1.2", 6, "forward in time"),

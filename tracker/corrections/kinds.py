@@ -120,7 +120,7 @@ class Correction(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _with_defaults(cls, values: Any) -> Any:
-        if isinstance(values, dict) and values.get("kind") in KINDS:
+        if isinstance(values, dict) and values.get("kind") in list(KINDS):
             known = KINDS[values["kind"]]
             values = dict(values)
             if known.accuracy is not None and values.get("accuracy") is None:

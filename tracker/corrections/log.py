@@ -170,7 +170,7 @@ def parse(text: str, where: str) -> tuple[Correction, ...]:
 
 
 def _correction(table: dict[str, Any], text: str, where: str, line: int) -> Correction:
-    if "kind" in table and table["kind"] not in KINDS:
+    if "kind" in table and table["kind"] not in list(KINDS):  # a table cannot be looked up
         known = ", ".join(KINDS)
         raise CorrectionError(
             f"{where}, line {_line_of(text, 'kind', line)}: kind: expected one of {known}, found "
