@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Annotated, Any, Literal, Required
 
-from annotated_types import Len
-from pydantic import ConfigDict
+from pydantic import ConfigDict, Field
 from typing_extensions import TypedDict
 
 TrialState = Literal["complete", "pruned", "failed"]
@@ -107,7 +106,7 @@ TOLD: dict[str, Any] = {
     "spent": float,
     "code": str,
     "recordings": list[_Recording],
-    "objectives": Annotated[list[_Objective], Len(1)],
+    "objectives": Annotated[list[_Objective], Field(min_length=1)],
     "importance": _Importance,
     "tuned": dict[str, Any],
 }
