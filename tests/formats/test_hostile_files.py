@@ -102,6 +102,13 @@ def test_the_sentence_says_what_is_wrong(tmp_path: Path, name: str, words: str) 
     assert name in one.complaint
 
 
+def test_pictures_that_are_none_are_told(tmp_path: Path) -> None:
+    for number in range(3):
+        (tmp_path / f"{number:03}.jpg").write_bytes(b"\xff\xd8\xff\xe0" + bytes(60))
+    (one,) = gather([tmp_path])
+    assert "000.jpg: cannot be read as a picture (64 bytes); expected a whole JPEG" in one.complaint
+
+
 def test_a_small_matlab_file_that_unpacks_to_gigabytes_is_refused(tmp_path: Path) -> None:
     packed = zlib.compress(b"\0" * 100_000_000, 9)
     head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"

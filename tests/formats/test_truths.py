@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from tests.formats.rig import read
 from tracker.formats.pieces import DetectionPiece, TruthPiece
@@ -33,6 +34,15 @@ def test_wildtrack_has_places_on_its_grid_and_boxes_of_each_view(tmp_path: Path)
     first, second = (p for p in read(files[0], *files)[1] if isinstance(p, DetectionPiece))
     np.testing.assert_array_equal(first.boxes[:, 3], [60, 65, 70])
     assert (first.layout, len(second.boxes)) == ("xyxy", 0)
+
+
+@pytest.mark.parametrize("number", ["1e9", "-1e9", "1e300", "9" * 400, "nan", "inf"])
+def test_a_trc_s_frame_beyond_a_year_is_no_frame(tmp_path: Path, number: str) -> None:
+    path = tmp_path / "person.trc"
+    head = "PathFileType\t4\t(X/Y/Z)\tperson.trc\nDataRate\tUnits\n25\tm\n"
+    rows = f"999999999\t0\t1\t2\t3\n{number}\t0.04\t1\t2\t3\n"
+    path.write_text(f"{head}Frame#\tTime\tHip\n\t\tX1\tY1\tZ1\n{rows}")
+    assert _truth(path).frames.tolist() == [999_999_999]
 
 
 def test_trc_gives_the_mid_of_the_hips(tmp_path: Path) -> None:

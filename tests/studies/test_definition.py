@@ -63,7 +63,7 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "field": ({"trails": 5}, r"trails: there is no such field; did you mean \"trials\""),
     "name": ({"name": "../up"}, "name: expected 1 to 60 letters"),
     "no recording": ({"recordings": []}, "recordings: expected at least one"),
-    "recording": ({"recordings": ["nowhere"]}, "recordings: expected the name .* 'nowhere'"),
+    "recording": ({"recordings": ["nowhere"]}, "recordings: expected the name .* \"nowhere\""),
     "parameter": (
         {"parameters": {"fusion.cluter_rate": {}}},
         r"parameters.fusion.cluter_rate: there is no such parameter; did you mean \"fusion.clutter",
@@ -82,7 +82,7 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "choice": (
         {"parameters": {"fusion_method": {"choices": ["multi_bernoulli", "magic"]}}},
-        "expected choices among .* found 'magic'",
+        "expected choices among .* found \"magic\"",
     ),
     "nothing varied": ({"parameters": {}}, "parameters: expected at least one"),
     "varied and held": (
@@ -113,3 +113,40 @@ def test_a_file_that_is_none_is_told(tmp_path: Path) -> None:
     (tmp_path / "broken.toml").write_text("name = ", encoding="utf-8")
     with pytest.raises(StudyError, match=r"broken.toml: expected TOML"):
         read_definition(tmp_path / "broken.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("trials = 6", "trials = " + "[" * 3000 + "]" * 3000, "expected TOML"),
+        ("trials = 6", "trials = 1" + "0" * 5000, "expected TOML"),
+        ("trials = 6", "trials = 0x" + "f" * 9000, "a number with thousands of digits"),
+        ("trials = 6", 'trials = "' + "n" * 3000 + '"', "trials: expected .*…"),
+        ('"recording"', '"' + "n" * 3000 + '"', "recordings: expected .*…"),
+        ('"recording"', '"~nobody-of-that-name/x"', "recordings: expected .*nobody"),
+        ("trials = 6", "fusion_method = 3", "fusion_method: there is no such field"),
+        ("trials = 6", 'trials = "\\u001b[31m"', "trials: expected a whole number"),
+    ],
+)
+def test_a_damaged_file_is_told(tmp_path: Path, old: str, new: str, words: str) -> None:
+    recording(tmp_path / "recording")
+    path = tmp_path / "study.toml"
+    text = """
+name = "small"
+recordings = ["recording"]
+trials = 6
+parameters.fusion.clutter_rate = { low = 1.0, high = 5.0 }
+"""
+    path.write_text(text)
+    assert read_definition(path).trials == 6
+    path.write_text(text.replace(old, new))
+    with pytest.raises(StudyError, match=words) as told:
+        read_definition(path)
+    assert str(told.value).startswith(str(path))
+    assert str(told.value).isprintable()
+    assert len(str(told.value)) < 600 + len(str(path))
+
+
+def test_choices_that_are_no_list_are_told(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="fusion_method: expected a list of choices, found 3"):
+        definition(tmp_path, parameters={"fusion_method": {"choices": 3}})

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -10,8 +13,10 @@ import pytest
 from tests.studies.small import Serial, definition, made_up, run
 from tracker.studies.errors import StudyError
 from tracker.studies.kept import writer
+from tracker.studies.kept.records import Status
 from tracker.studies.kept.store import JOURNAL, Store, create, find
-from tracker.studies.kept.writer import Writer
+from tracker.studies.kept.writer import RESULTS, STATUS, Writer
+from tracker.studies.told.summary import summary_of
 from tracker.studies.work.jobs import Job, Outcome
 from tracker.studies.work.recordings import packed
 
@@ -76,6 +81,69 @@ def test_results_that_are_no_database_are_told(tmp_path: Path) -> None:
     (store.folder / "results.sqlite3").write_text("nothing of the kind" * 100, encoding="utf-8")
     with pytest.raises(StudyError, match=r"results.sqlite3: cannot be"):
         run(store, Serial(made_up(lambda values: 0.5)))
+
+
+@pytest.mark.parametrize(
+    ("table", "change", "words"),
+    [
+        ("trials", {"values": True}, "trial 0, values: expected an object, found true"),
+        ("trials", {"objectives": []}, "trial 0, objectives: expected 1, found 0"),
+        ("trials", {"objectives": ["a"]}, "trial 0, objectives.0: expected a valid number"),
+        ("trials", {"jobs": [{"key": 1}]}, "trial 0, jobs.0.key: expected a valid string"),
+        ("trials", None, "trial 0: expected JSON, found something else"),
+        ("trials", {"jobs": ...}, "trial 0, jobs: expected a value, found none"),
+        ("jobs", {"became": "won"}, "became: expected 'done', 'failed'.*found \"won\""),
+        ("told", {"key": "luck"}, 'objectives: expected some of .*found "luck"'),
+    ],
+)
+def test_results_that_were_changed_are_told(
+    tmp_path: Path, table: str, change: dict[str, object] | None, words: str
+) -> None:
+    store = study(tmp_path, trials=2)
+    run(store, Serial(made_up(lambda values: 0.5)))
+    column = {"trials": "told", "jobs": "outcome", "told": "value"}[table]
+    own = "name = 'objectives'" if table == "told" else "1"
+    with closing(sqlite3.connect(store.folder / RESULTS, isolation_level=None)) as connection:
+        place, text = connection.execute(
+            f"SELECT rowid, {column} FROM {table} WHERE {own} ORDER BY rowid"
+        ).fetchone()
+        kept = json.loads(text)
+        of = kept[0] if table == "told" else kept
+        of |= {key: value for key, value in (change or {}).items() if value is not ...}
+        for key, value in (change or {}).items():
+            if value is ...:
+                del of[key]
+        new = "{" if change is None else json.dumps(kept)
+        connection.execute(f"UPDATE {table} SET {column} = ? WHERE rowid = ?", (new, place))
+        key = kept["key"] if table == "jobs" else ""
+    with pytest.raises(StudyError, match=f"{RESULTS}, .*{words}"):
+        store.outcome(key) if key else summary_of(store, None)
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"state": [1]}', '{"workers": 3.5}', "[]"])
+def test_a_spoilt_status_stops_nobody(tmp_path: Path, text: str) -> None:
+    store = study(tmp_path, trials=1)
+    (store.folder / STATUS).write_text(text)
+    assert store.status() == Status()
+
+
+@pytest.mark.parametrize("line", ['{"op_code": null}', "[]", '{"op_code": 99}'])
+def test_a_line_that_the_sampler_never_wrote_is_told(tmp_path: Path, line: str) -> None:
+    store = study(tmp_path, trials=2)
+    run(store, Serial(made_up(lambda values: 0.5)))
+    with (store.folder / JOURNAL).open("a") as journal:
+        journal.write(line + "\n")
+    with pytest.raises(StudyError, match=r"journal\.log: the record of what was tried cannot"):
+        run(store, Serial(made_up(lambda values: 0.5)))
+
+
+def test_trials_that_are_gone_are_told(tmp_path: Path) -> None:
+    store = study(tmp_path, trials=3)
+    run(store, Serial(made_up(lambda values: 0.5)))
+    with closing(sqlite3.connect(store.folder / RESULTS, isolation_level=None)) as connection:
+        connection.execute("DELETE FROM trials WHERE number = 1")
+    status = run(store, Serial(made_up(lambda values: 0.5)))
+    assert status.words == "some of its trials are not among the results any more"
 
 
 def test_a_study_that_is_not_there_is_told(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from tracker.sequences.pictures.media import (
     locate,
     probe,
 )
-from tracker.sequences.pictures.video import read_image
+from tracker.sequences.pictures.video import not_a_picture, read_image
 from tracker.sequences.sequence import View
 from tracker.sequences.tables import BoxTable, Reading, read_box_table
 
@@ -170,7 +170,7 @@ def _background(view: View, fields: Fields, steps: int, reading: Reading) -> Pat
         reading.files.append(path)
         picture = read_image(path)
         if picture is None:
-            raise fields.error("background", f'"{path.name}" cannot be read as a picture')
+            raise fields.error("background", f'"{path.name}" {not_a_picture(path)}')
         check_size(view, fields, (picture.shape[1], picture.shape[0]), "background")
         return path
     first, last = fields.vector("background", 2, "the first and the last step without anybody")

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from tracker.visible import visible
+
 
 class StudyError(ValueError):
     """A study cannot be read, run or gone on with; the message says why and what to do."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(visible(message))

@@ -387,6 +387,8 @@ class _Running:
     def _why_done(self) -> str:
         if len(self._ended) >= self._trials:
             return ""
+        if self._definition.minutes is None:
+            return "some of its trials are not among the results any more"
         return f"the {self._definition.minutes:g} minutes are over"
 
     def _weigh(self, *, last: bool = False) -> None:

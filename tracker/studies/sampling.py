@@ -73,7 +73,9 @@ class Sampler:
                 sampler=self._sampler(),
                 load_if_exists=True,
             )
-        except (ValueError, KeyError) as error:
+            self._study.get_trials(deepcopy=False)  # here, where what fails is told
+        except (ValueError, LookupError, TypeError, AttributeError, AssertionError,
+                RecursionError) as error:  # fmt: skip
             self.close()
             raise StudyError(
                 f"{path}: the record of what was tried cannot be read ({error}); the results are "

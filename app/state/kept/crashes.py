@@ -22,7 +22,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TextIO
 
-from app.state.kept.json_files import set_aside
+from app.state.kept.json_files import read_as, set_aside
 
 LAST = "last-crash.txt"
 """What is known of the last crash: for whoever reports it."""
@@ -176,8 +176,8 @@ class Crashes:
 
 def _note_of(path: Path) -> Note:
     try:
-        return Note(**json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):
+        return read_as(path, Note)
+    except (OSError, ValueError):
         return Note()
 
 

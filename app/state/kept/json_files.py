@@ -10,12 +10,21 @@ import hashlib
 import json
 import logging
 import os
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
 
 from tracker.placing import write_whole
+from tracker.sequences.fields import shown
+from tracker.visible import visible
 
 logger = logging.getLogger("app")
+
+T = TypeVar("T")
+
+_adapter: Any = cache(TypeAdapter)
 
 _KEYS = {"sha256", "value"}
 
@@ -44,15 +53,37 @@ def read_json(path: Path) -> Any:
         raise ValueError(f"expected at most {MOST_BYTES >> 20} MB, found a larger file")
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(found, dict) or not _KEYS >= set(found) or "value" not in found:
+            return found
+        value = found["value"]
+        same = "sha256" not in found or found["sha256"] == _sum(value)
     except (UnicodeDecodeError, RecursionError):
         raise ValueError("it is no JSON any more") from None
-    if not isinstance(found, dict) or not _KEYS >= set(found) or "value" not in found:
-        return found
-    value = found["value"]
-    if "sha256" in found and found["sha256"] != _sum(value):
+    if not same:
         raise ValueError(
             "it was changed since it was written; where that was you, take the line sha256 out"
         )
+    return value
+
+
+def read_as(path: Path, kind: type[T]) -> T:
+    """The value of a file, checked field by field.
+
+    Raises:
+        OSError: If it cannot be read.
+        ValueError: With the field, what was expected and what was found.
+    """
+    text = json.dumps(read_json(path))
+    try:
+        value: T = _adapter(kind).validate_json(text, strict=True)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        place = ".".join(str(part) for part in first["loc"])
+        words = first["msg"].replace("Input should be", "expected")
+        if first["type"] == "json_invalid":  # as half a letter in a name
+            raise ValueError(f"expected JSON, found something else ({words})") from None
+        at = f"{visible(place)[:80]}: " if place else ""
+        raise ValueError(f"{at}{words}, found {visible(shown(first['input']))}") from None
     return value
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from app.errors import FULL, sentence
-from app.state.kept.json_files import read_json, set_aside, write_json
+from app.state.kept.json_files import read_as, set_aside, write_json
 from app.state.snapshot import Presets
 from app.state.workbench import Workbench
 from tracker import parameters as table
@@ -23,6 +23,8 @@ YOURS = "GET /api/state lists your presets."
 
 LONGEST_NAME = 60
 """Characters."""
+
+_KIND = dict[str, dict[str, Any]]
 
 
 class OwnPresets:
@@ -113,7 +115,7 @@ class OwnPresets:
     def _read(self, path: Path) -> Presets:
         """What the file has; a spoilt one is set aside, and what is known stays."""
         try:
-            return _valid(read_json(path))
+            return read_as(path, _KIND)
         except FileNotFoundError:
             return self._workbench.snapshot().presets
         except (OSError, ValueError) as error:
@@ -138,15 +140,8 @@ def keep_preset(path: Path, name: str, values: Mapping[str, Any]) -> None:
     """
     name = _checked(name)
     with locked(path):
-        presets = _valid(read_json(path)) if path.is_file() else {}
+        presets = read_as(path, _KIND) if path.is_file() else {}
         write_json(path, {**presets, name: dict(values)})
-
-
-def _valid(found: Any) -> Presets:
-    """What a file held, if it is an object of values for each name."""
-    if not isinstance(found, dict) or not all(isinstance(v, dict) for v in found.values()):
-        raise ValueError("expected an object of values for each name")
-    return found
 
 
 def _checked(name: str) -> str:

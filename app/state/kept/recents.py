@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 import threading
 import time
@@ -10,8 +11,10 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from pydantic import FiniteFloat
+
 from app.state.importing.draft import small_jpeg
-from app.state.kept.json_files import read_json, write_json
+from app.state.kept.json_files import read_as, set_aside, write_json
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
 from tracker.folders import cache_folder
@@ -20,6 +23,8 @@ from tracker.sequences import library
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import FILE
 from tracker.sequences.sequence import SequenceError
+
+logger = logging.getLogger("app")
 
 KEPT = 24
 
@@ -33,8 +38,8 @@ class Recent:
     """Opens it again."""
     cameras: int
     frames: int
-    fps: float
-    opened: float
+    fps: FiniteFloat
+    opened: FiniteFloat
     """Seconds since 1970."""
 
 
@@ -97,9 +102,13 @@ def _first(one: Recent, others: Iterable[Recent]) -> list[Recent]:
 
 def _read(file: Path | None) -> list[Recent]:
     try:
-        values = read_json(file) if file is not None else []
-        return [Recent(**value) for value in values]
-    except (OSError, ValueError, TypeError):  # none yet, or of another version
+        return read_as(file, list[Recent]) if file is not None else []
+    except OSError:  # none yet
+        return []
+    except ValueError as error:
+        assert file is not None
+        aside = set_aside(file)
+        logger.warning("%s cannot be read and is now %s: %s", file, aside or file, error)
         return []
 
 

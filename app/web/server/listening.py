@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import uvicorn
 from fastapi import FastAPI
+from fastapi.routing import iter_route_contexts
 
 from app.web.access.connections import Requests, Sockets
 from app.web.access.viewer import LARGEST_MESSAGE
@@ -68,9 +69,11 @@ def build_routes(app: FastAPI) -> None:
     """Have all routes built before another thread runs.
 
     FastAPI builds a route when it is first needed, and silences a warning of pydantic's
-    meanwhile, with a filter that any other thread which handles warnings may take away.
+    meanwhile, with a filter that any other thread which handles warnings may take away. Their
+    description, which takes several times as long, is made when it is asked for.
     """
-    app.openapi()
+    for _ in iter_route_contexts(app.routes):
+        pass
 
 
 class _Server(uvicorn.Server):

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from app.state.kept.crashes import LAST, Crashes
+from app.state.kept.crashes import LAST, Crashes, Note
 from app.state.kept.json_files import write_json
 from app.state.memory import LEAST_BYTES, Budget, machine_memory
 from app.state.workers.watchdog import Watchdog
@@ -104,3 +104,13 @@ def test_a_budget_is_shared(monkeypatch: pytest.MonkeyPatch) -> None:
     small = Budget.of()
     assert small.pictures + small.columns <= 256 << 20
     assert small.pictures <= usual.pictures
+
+
+@pytest.mark.parametrize(
+    "text", ["[" * 100_000, '{"place": 3}', '{"draft": ["a"]}', '{"good": -1}', '{"values": null}']
+)
+def test_a_spoilt_note_stops_no_start(tmp_path: Path, text: str) -> None:
+    (tmp_path / "start-999999999.txt").write_text("Fatal Python error")
+    (tmp_path / "start-999999999.json").write_text(text)
+    (crash,) = Crashes(tmp_path).tidy()
+    assert crash.note == Note()

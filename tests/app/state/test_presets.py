@@ -66,7 +66,7 @@ def test_names_that_do_not_do(name: str) -> None:
         OwnPresets(Workbench(), None).save(name)
 
 
-@pytest.mark.parametrize("text", ["{", "[]", '{"a": 1}'])
+@pytest.mark.parametrize("text", ["{", "[]", '{"a": 1}', '{"\\ud800": {}}', "[" * 100_000])
 def test_a_spoilt_file_is_kept_aside(tmp_path: Path, text: str) -> None:
     path = tmp_path / "presets.json"
     path.write_text(text)

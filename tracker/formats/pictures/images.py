@@ -10,7 +10,7 @@ from tracker.formats.pieces import ImagesPiece, Piece
 from tracker.formats.protocol import Certainty, Kind
 from tracker.formats.source import SourceFile
 from tracker.sequences.pictures.numbering import whole_row
-from tracker.sequences.pictures.video import read_image
+from tracker.sequences.pictures.video import not_a_picture, read_image
 
 NAME = "numbered pictures"
 KIND: Kind = "pictures"
@@ -30,7 +30,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
     """One piece, its size that of the first picture."""
     picture = read_image(file.series[0])
     if picture is None:
-        raise file.member(file.series[0]).error("cannot be read as a picture; it is spoilt")
+        raise file.member(file.series[0]).error(not_a_picture(file.series[0]))
     files, _ = whole_row(sorted(file.series, key=_by_number))
     yield ImagesPiece(file.path.parent, files, (picture.shape[1], picture.shape[0]))
 

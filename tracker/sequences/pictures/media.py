@@ -15,7 +15,7 @@ from numpy import ndarray
 from tracker.folders import files_matching
 from tracker.sequences.fields import LONGEST_NAME, Fields, did_you_mean, listed
 from tracker.sequences.pictures.numbering import whole_row
-from tracker.sequences.pictures.video import VideoError, index_video, read_image
+from tracker.sequences.pictures.video import VideoError, index_video, not_a_picture, read_image
 from tracker.sequences.sequence import SequenceError, View
 
 
@@ -115,7 +115,7 @@ def probe(video: Path | None, images: tuple[Path, ...], fields: Fields) -> Pictu
     if images:
         picture = read_image(images[0])
         if picture is None:
-            raise fields.error("images", f'"{images[0].name}" cannot be read as a picture')
+            raise fields.error("images", f'"{images[0].name}" {not_a_picture(images[0])}')
         return Pictures((picture.shape[1], picture.shape[0]), len(images), None)
     return None
 

@@ -279,3 +279,16 @@ def read_image(path: Path) -> UInt8[ndarray, "h w 3"] | None:
         picture = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
         return None if picture is None else np.asarray(picture, dtype=np.uint8)
     return None
+
+
+def not_a_picture(path: Path) -> str:
+    """What is said of a file of which :func:`read_image` makes nothing, but its name."""
+    try:
+        status = path.stat()
+        found = f"{status.st_size:,} bytes" if stat.S_ISREG(status.st_mode) else "no file"
+    except OSError as error:
+        found = error.strerror or "nothing"
+    return (
+        f"cannot be read as a picture ({found}); expected a whole JPEG, PNG, BMP, TIFF or WebP "
+        f"file of at most {LARGEST_IMAGE >> 20} MB"
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import os
 import re
 import tomllib
 from collections.abc import Mapping
@@ -10,7 +11,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from tracker.parameters import METHODS, PARAMETERS, PRESETS, RunParameters, value, with_values
-from tracker.sequences.fields import did_you_mean
+from tracker.sequences.fields import did_you_mean, shown
 from tracker.studies.defined.definition import GRID_STEPS, MOST_TRIALS, Definition, Search, Varied
 from tracker.studies.defined.objectives import OBJECTIVES
 from tracker.studies.errors import StudyError
@@ -35,7 +36,7 @@ def read_definition(path: Path) -> Definition:
         raise StudyError(
             f"{path}: cannot be read ({error.strerror}); name a study's file"
         ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # no number has thousands of digits
         raise StudyError(f"{path}: expected TOML, found something else ({error})") from None
     return definition_of(found, where=str(path), folder=path.absolute().parent)
 
@@ -56,21 +57,23 @@ def definition_of(found: Mapping[str, Any], *, where: str, folder: Path) -> Defi
     name = fields.text("name")
     if not _NAME.fullmatch(name):
         raise fields.error(
-            "name", f"expected 1 to 60 letters, digits, spaces and . + -, found {name!r}"
+            "name", f"expected 1 to 60 letters, digits, spaces and . + -, found {_shown(name)}"
         )
     preset = fields.text("preset", "") or None
     if preset is not None and preset not in PRESETS:
-        raise fields.error("preset", f"expected one of {', '.join(PRESETS)}, found {preset!r}")
+        raise fields.error(
+            "preset", f"expected one of {', '.join(PRESETS)}, found {_shown(preset)}"
+        )
     search = fields.text("search", "auto")
     if search not in get_args(Search):
         known = ", ".join(get_args(Search))
-        raise fields.error("search", f"expected one of {known}, found {search!r}")
+        raise fields.error("search", f"expected one of {known}, found {_shown(search)}")
     objectives = tuple(fields.texts("objectives", []))
     for one in objectives:
         if one not in OBJECTIVES:
             hint = did_you_mean(one, OBJECTIVES)
             raise fields.error(
-                "objectives", f"expected some of {', '.join(OBJECTIVES)}, found {one!r}{hint}"
+                "objectives", f"expected some of {', '.join(OBJECTIVES)}, found {_shown(one)}{hint}"
             )
     varied = tuple(_varied(fields, key, table) for key, table in fields.table("parameters").items())
     if not varied:
@@ -113,18 +116,20 @@ def _recordings(fields: _Fields, folder: Path) -> tuple[str, ...]:
         if is_room(name):
             found.append(name)
             continue
-        pattern = str(folder / Path(name).expanduser())
-        if Path(pattern).exists():
+        pattern = str(folder / os.path.expanduser(name))
+        if os.path.exists(pattern):  # of the module: no name is too long for it
             found.append(pattern)
             continue
         some = sorted(
-            path for path in glob.glob(pattern) if (Path(path) / "sequence.toml").is_file()
+            path
+            for path in glob.glob(pattern)
+            if os.path.isfile(os.path.join(path, "sequence.toml"))
         )
         if not some:
             raise fields.error(
                 "recordings",
                 f"expected the name of a rendered room, a folder or a pattern of folders with a "
-                f"sequence.toml, found nothing at {name!r}{did_you_mean(name, ROOMS)}",
+                f"sequence.toml, found nothing at {_shown(name)}{did_you_mean(name, ROOMS)}",
             )
         found += some
     if not found:
@@ -140,7 +145,7 @@ def _seeds(fields: _Fields) -> tuple[int, ...]:
         return tuple(dict.fromkeys(seeds))
     raise fields.error(
         "seeds",
-        f"expected how many (1 to 1000), or a list of whole numbers from 0, found {seeds!r}",
+        f"expected how many (1 to 1000), or a list of whole numbers from 0, found {_shown(seeds)}",
     )
 
 
@@ -158,12 +163,12 @@ def _varied(fields: _Fields, key: str, table: Any) -> Varied:
     where = f"parameters.{key}"
     if not isinstance(table, Mapping):
         raise fields.error(
-            where, f"expected a table such as {{ low = 1, high = 5 }}, found {table!r}"
+            where, f"expected a table such as {{ low = 1, high = 5 }}, found {_shown(table)}"
         )
     for name in table:
         if name not in _RANGE:
             raise fields.error(
-                where, f"expected some of low, high, log, steps and choices, found {name!r}"
+                where, f"expected some of low, high, log, steps and choices, found {_shown(name)}"
             )
     if key not in PARAMETERS and key not in METHODS:
         hint = did_you_mean(key, (*PARAMETERS, *METHODS))
@@ -178,11 +183,15 @@ def _varied(fields: _Fields, key: str, table: Any) -> Varied:
             if PARAMETERS[key].kind == "bool"
             else PARAMETERS[key].choices
         )
-        choices = tuple(table.get("choices", allowed))
+        choices = table.get("choices", allowed)
+        if not isinstance(choices, list | tuple):
+            raise fields.error(where, f"expected a list of choices, found {_shown(choices)}")
+        choices = tuple(choices)
         for one in choices:
             if one not in allowed:
                 raise fields.error(
-                    where, f"expected choices among {', '.join(map(str, allowed))}, found {one!r}"
+                    where,
+                    f"expected choices among {', '.join(map(str, allowed))}, found {_shown(one)}",
                 )
         if len(choices) < 2:
             raise fields.error(where, "expected at least two choices; name one under [values]")
@@ -191,7 +200,9 @@ def _varied(fields: _Fields, key: str, table: Any) -> Varied:
     if "choices" in table:
         choices = tuple(table["choices"]) if isinstance(table["choices"], list) else ()
         if len(choices) < 2:
-            raise fields.error(where, f"expected at least two choices, found {table['choices']!r}")
+            raise fields.error(
+                where, f"expected at least two choices, found {_shown(table['choices'])}"
+            )
         for one in choices:
             _number(fields, where, key, one)
         return Varied(key, choices=choices)
@@ -201,10 +212,14 @@ def _varied(fields: _Fields, key: str, table: Any) -> Varied:
         raise fields.error(where, f"expected low below high, found {low:g} and {high:g}")
     log = table.get("log", parameter.log)
     if not isinstance(log, bool) or (log and low <= 0.0):
-        raise fields.error(where, f"log: expected true with low above 0, or false, found {log!r}")
+        raise fields.error(
+            where, f"log: expected true with low above 0, or false, found {_shown(log)}"
+        )
     steps = table.get("steps", GRID_STEPS)
     if type(steps) is not int or not 2 <= steps <= 1000:
-        raise fields.error(where, f"steps: expected a whole number from 2 to 1000, found {steps!r}")
+        raise fields.error(
+            where, f"steps: expected a whole number from 2 to 1000, found {_shown(steps)}"
+        )
     return Varied(key, low, high, log, steps)
 
 
@@ -297,4 +312,4 @@ def _flat_ranges(table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _shown(found: Any) -> str:
-    return "nothing" if found is None else repr(found)
+    return "nothing" if found is None else shown(found)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, Required
+
+from pydantic import ConfigDict, Field
+from typing_extensions import TypedDict
 
 TrialState = Literal["complete", "pruned", "failed"]
 
@@ -69,14 +71,43 @@ class Status:
     """Seconds since 1970."""
 
 
-def trial_of(told: dict[str, Any]) -> Trial:
-    """A trial as it was written down."""
-    objectives: Sequence[float] | None = told["objectives"]
-    return Trial(
-        **{
-            **told,
-            "objectives": None if objectives is None else tuple(objectives),
-            "spreads": tuple(told["spreads"]),
-            "jobs": tuple(JobRow(**one) for one in told["jobs"]),
-        }
-    )
+class ToldOutcome(TypedDict, total=False):
+    """A run that ended, as :meth:`tracker.studies.work.jobs.Outcome.to_json` writes it."""
+
+    key: Required[str]
+    became: Required[Literal["done", "failed", "unreadable", "version"]]
+    words: str
+    figures: dict[str, float | None]
+    overlap: float | None
+    tracks: str
+    people: int
+    seconds: float
+    worker: str
+    machine: str
+
+
+class _Importance(TypedDict):
+    trials: int
+    shares: dict[str, tuple[float, float]]
+
+
+class _Objective(TypedDict):
+    key: str
+
+
+class _Recording(TypedDict):
+    __pydantic_config__ = ConfigDict(extra="allow")  # type: ignore[misc]  # how pydantic asks it
+
+    place: str
+    content: str
+
+
+TOLD: dict[str, Any] = {
+    "spent": float,
+    "code": str,
+    "recordings": list[_Recording],
+    "objectives": Annotated[list[_Objective], Field(min_length=1)],
+    "importance": _Importance,
+    "tuned": dict[str, Any],
+}
+"""What is written down beside the trials, by name."""

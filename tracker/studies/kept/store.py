@@ -7,7 +7,6 @@ any number read it meanwhile.
 
 from __future__ import annotations
 
-import json
 import os
 import sqlite3
 from collections.abc import Iterator
@@ -20,7 +19,8 @@ from tracker.placing import filling
 from tracker.studies.defined.defining import read_definition
 from tracker.studies.defined.definition import Definition
 from tracker.studies.errors import StudyError
-from tracker.studies.kept.records import Status, Trial, trial_of
+from tracker.studies.kept.reading import read_as
+from tracker.studies.kept.records import TOLD, Status, ToldOutcome, Trial
 from tracker.studies.kept.writer import RESULTS, STATUS, Writer
 from tracker.studies.work.jobs import Outcome
 
@@ -129,14 +129,20 @@ class Store:
 
         Args:
             after: Only those that ended later, seconds since 1970.
+
+        Raises:
+            StudyError: If one cannot be read any more, with the field.
         """
         with self._reading() as connection:
             if connection is None:
                 return []
             rows = connection.execute(
-                "SELECT told FROM trials WHERE ended > ? ORDER BY number", (after,)
+                "SELECT number, told FROM trials WHERE ended > ? ORDER BY number", (after,)
             ).fetchall()
-        return [trial_of(json.loads(text)) for (text,) in rows]
+        return [
+            read_as(Trial, text, f"{self.folder / RESULTS}, trial {number}")
+            for number, text in rows
+        ]
 
     def trial(self, number: int) -> Trial:
         """One that ended.
@@ -155,7 +161,9 @@ class Store:
             if connection is None:
                 return None
             row = connection.execute("SELECT outcome FROM jobs WHERE key = ?", (key,)).fetchone()
-        return None if row is None else Outcome(**json.loads(row[0]))
+        if row is None:
+            return None
+        return Outcome(**read_as(ToldOutcome, row[0], f"{self.folder / RESULTS}, run {key}"))
 
     def told(self, name: str) -> Any:
         """Something that was written down beside the trials; None where it was not."""
@@ -163,13 +171,15 @@ class Store:
             if connection is None:
                 return None
             row = connection.execute("SELECT value FROM told WHERE name = ?", (name,)).fetchone()
-        return None if row is None else json.loads(row[0])
+        if row is None:
+            return None
+        return read_as(TOLD.get(name, object), row[0], f"{self.folder / RESULTS}, {name}")
 
     def status(self) -> Status:
         """What it is doing. Of a process that was killed the state is that it was stopped."""
         try:
-            status = Status(**json.loads((self.folder / STATUS).read_text(encoding="utf-8")))
-        except (OSError, ValueError, TypeError):
+            status = read_as(Status, (self.folder / STATUS).read_bytes(), STATUS)
+        except (OSError, StudyError):  # it is told anew, and nothing else is in it
             return Status()
         if status.state == "running" and not self.is_running():
             words = "the program that ran it was ended; nothing that ended before is lost"

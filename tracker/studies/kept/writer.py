@@ -13,7 +13,8 @@ from typing import Any
 
 from tracker.placing import replacing
 from tracker.studies.errors import StudyError
-from tracker.studies.kept.records import Status, Trial
+from tracker.studies.kept.reading import read_as
+from tracker.studies.kept.records import Status, ToldOutcome, Trial
 from tracker.studies.work.jobs import Outcome
 
 RESULTS = "results.sqlite3"
@@ -77,7 +78,11 @@ class Writer:
     def outcome(self, key: str) -> Outcome | None:
         """A run that ended before."""
         text = self._outcomes.get(key)
-        return None if text is None else Outcome(**json.loads(text))
+        return (
+            None
+            if text is None
+            else Outcome(**read_as(ToldOutcome, text, f"{self._path}, run {key}"))
+        )
 
     def keep(self, outcome: Outcome) -> None:
         """Write down a run that ended; one that is there stays as it is."""

@@ -6,11 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from tracker.sequences.fields import shown
 from tracker.studies.defined.definition import Definition
 from tracker.studies.defined.objectives import IDENTITY, OBJECTIVES, WITH_TRUTH, Objective
+from tracker.studies.errors import StudyError
 from tracker.studies.judging import best_of, front_of, usable
 from tracker.studies.kept.records import Status, Trial
 from tracker.studies.kept.store import Store
+from tracker.studies.kept.writer import RESULTS
 from tracker.without_truth.estimate import WARNING
 
 BETTER_SIGMAS = 2.0
@@ -117,6 +120,12 @@ def summary_of(store: Store, before: Summary | None = None) -> Summary:
     known |= {one.number: one for one in news}
     trials = [known[number] for number in sorted(known)]
     objectives = objectives_of(store, definition)
+    for one in news:
+        if one.objectives is not None and len(one.objectives) != len(objectives):
+            raise StudyError(
+                f"{store.folder / RESULTS}, trial {one.number}, objectives: expected "
+                f"{len(objectives)}, found {len(one.objectives)}; start a study of another name"
+            )
     same = before is not None and not news and objectives == before.objectives
     importance = store.told("importance") or {"trials": 0, "shares": {}}
     return Summary(
@@ -136,5 +145,12 @@ def objectives_of(store: Store, definition: Definition) -> tuple[Objective, ...]
     """As they were chosen when it began; before that as its definition has them."""
     told: Sequence[dict[str, Any]] | None = store.told("objectives")
     if told is not None:
+        for one in told:
+            if one["key"] not in OBJECTIVES:
+                raise StudyError(
+                    f"{store.folder / RESULTS}, objectives: expected some of "
+                    f"{', '.join(OBJECTIVES)}, found {shown(one['key'])}; start a study of "
+                    "another name"
+                )
         return tuple(OBJECTIVES[one["key"]] for one in told)
     return tuple(OBJECTIVES[key] for key in definition.objectives or WITH_TRUTH)
