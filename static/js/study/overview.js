@@ -73,7 +73,11 @@ export function overview({ choose, narrow }) {
 
 	/** What the other axis may show. @returns {Measure[]} */
 	function measures() {
+		/** @type {Measure[]} */
 		const more = (shown.study?.objectives ?? []).map((_, k) => measure(k)).slice(1);
+		const of = shown.study?.beside.at(-1); // the camera left out, or where people are
+		if (of && (of.of === "agreement" || !more.length))
+			more.push({ name: of.name, of, at: ({ figures }) => figures[of.key] });
 		more.push({
 			name: "time",
 			of: {
@@ -83,7 +87,7 @@ export function overview({ choose, narrow }) {
 				higher: false,
 				unit: "s",
 				digits: 1,
-				needs_truth: false,
+				of: "run",
 			},
 			at: ({ seconds }) => seconds,
 		});
