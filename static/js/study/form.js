@@ -247,12 +247,14 @@ export function definition({ store }, { start, cost: told, copy }) {
 		element.classList.add("locked");
 		foot.hidden = true;
 		again.hidden = false;
-		const { info } = study;
-		fill(sub, info.state === "running" ? "locked" : "");
+		state(study.info);
 		fill(body, lockedParts(study));
 	}
 
-	return { element, edit, locked, places: () => where };
+	/** @param {Server.StudyInfo} info */
+	const state = (info) => fill(sub, info.state === "running" ? "locked while it runs" : "");
+
+	return { element, edit, locked, state, places: () => where };
 }
 
 /** @param {string} name @returns {[string, string]} */

@@ -1,6 +1,6 @@
 /** The figures of a study: its trials, what matters, each parameter. */
 import { fill, h, write } from "../elements/dom.js";
-import { MOST_PARAMETERS, against, bestSoFar, scatter } from "./charts.js";
+import { MOST_PARAMETERS, against, bestSoFar, clear, scatter } from "./charts.js";
 import { figureOf, symbolOf } from "./words.js";
 
 /** @import { Measure } from "./charts.js" */
@@ -108,9 +108,8 @@ export function overview({ choose, narrow }) {
 					{ class: "ib" },
 					h(
 						"span",
-						{ class: "lab", title: range?.help ?? key },
-						range?.label ?? key,
-						" ",
+						{ class: "lab", title: range ? `${range.label}: ${range.help}` : key },
+						h("span", {}, range?.label ?? key),
 						range && symbolOf(range.symbol),
 					),
 					h(
@@ -136,7 +135,17 @@ export function overview({ choose, narrow }) {
 
 	async function draw() {
 		const { study: now, done, chosen } = shown;
-		if (!now || !done.length) return;
+		if (!now) return;
+		if (!done.length) {
+			// of the study that was shown before nothing stays
+			for (const figure of [pareto, sofar, ...grid.querySelectorAll(".fill")]) clear(figure);
+			fill(pareto, h("p", { class: "blank" }, "The default is run first, then the trials come."));
+			fill(axes);
+			fill(since);
+			fill(grid);
+			grid.dataset.keys = "";
+			return;
+		}
 		const y = measure(0);
 		const others = measures();
 		const x = others.find(({ of: { key } }) => key === across) ?? others[0];
@@ -154,7 +163,7 @@ export function overview({ choose, narrow }) {
 			),
 		);
 		const complete = done.filter(({ state }) => state === "complete");
-		const told = { best: now.best, chosen, front: now.front };
+		const told = { best: now.best, chosen };
 		const top = now.best === null ? undefined : done.find(({ number }) => number === now.best);
 		const worth = figureOf(top?.objectives?.[0], y.of);
 		pareto.ariaLabel = `${y.name} against ${x.name} of ${complete.length} trials; the best is ${now.best ? `trial ${now.best}` : "the default"} with ${worth}`;
@@ -215,8 +224,8 @@ export function overview({ choose, narrow }) {
 			{ class: "mp" },
 			h(
 				"div",
-				{ class: "mh", title: help },
-				h("span", { class: "lab" }, label, " ", symbolOf(symbol)),
+				{ class: "mh", title: `${label}: ${help}` },
+				h("span", { class: "lab" }, h("span", {}, label), symbolOf(symbol)),
 				h("span", { class: "grow" }),
 				h("span", { class: "q" }, "best"),
 				h("b"),

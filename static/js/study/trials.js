@@ -90,7 +90,7 @@ export function trialsTable({ choose, use }) {
 						? "vetoed"
 						: trial.state !== "complete"
 							? trial.state
-							: study.front.includes(number)
+							: study.objectives.length > 1 && study.front.includes(number)
 								? "front"
 								: "";
 		return h(
