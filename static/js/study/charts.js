@@ -95,6 +95,7 @@ const SETTINGS = { displayModeBar: false, responsive: true };
  */
 async function draw(place, traces, layout) {
 	const Plotly = await plotly();
+	if (!place.classList.contains("js-plotly-plot")) fill(place); // what was said in its place
 	await Plotly.react(place, traces, layout, SETTINGS);
 	sizes ??= new ResizeObserver((changes) => {
 		for (const { target, contentRect: now } of changes) {
@@ -111,6 +112,7 @@ async function draw(place, traces, layout) {
 export function clear(place) {
 	sizes?.unobserve(place);
 	/** @type {any} */ (window).Plotly?.purge(place);
+	place.classList.remove("js-plotly-plot");
 	fill(place);
 }
 

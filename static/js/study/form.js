@@ -252,7 +252,7 @@ export function definition({ store }, { start, cost: told, copy }) {
 	}
 
 	/** @param {Server.StudyInfo} info */
-	const state = (info) => fill(sub, info.state === "running" ? "locked while it runs" : "");
+	const state = (info) => fill(sub, info.state === "running" ? "locked" : "");
 
 	return { element, edit, locked, state, places: () => where };
 }
