@@ -212,6 +212,11 @@ function core(values, seen) {
 	return room([...inside, ...seen]);
 }
 
+/** What stands along an upright axis: what is better, too, where it is long enough for that.
+ * @param {HTMLElement} place @param {string} title @param {string} better */
+const upright = (place, title, better) =>
+	7 * (title.length + better.length + 2) < place.clientHeight - 40 ? `${title}, ${better}` : title;
+
 /**
  * The trials by two figures, with those that nothing beats in both.
  * @param {HTMLElement} place
@@ -261,7 +266,7 @@ export async function scatter(place, trials, x, y, which, choose) {
 			...layoutOf(
 				ink,
 				{ range: across, title: { text: `${titledOf(x.of)}, ${better(x)}`, standoff: 6 } },
-				{ range: up, title: { text: `${titledOf(y.of)}, ${better(y)}`, standoff: 6 } },
+				{ range: up, title: { text: upright(place, titledOf(y.of), better(y)), standoff: 6 } },
 				[58, 20, 18, 40],
 			),
 			annotations: outside

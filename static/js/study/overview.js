@@ -5,6 +5,9 @@ import { figureOf, symbolOf } from "./words.js";
 
 /** @import { Measure } from "./charts.js" */
 
+/** Letters of a figure's name beyond which it is not said again beside others. */
+const LONG = 16;
+
 /**
  * @param {object} on
  * @param {(number: number) => void} on.choose
@@ -75,7 +78,9 @@ export function overview({ choose, narrow }) {
 	function measures() {
 		/** @type {Measure[]} */
 		const more = (shown.study?.objectives ?? []).map((_, k) => measure(k)).slice(1);
-		const of = shown.study?.beside.at(-1); // the camera left out, or where people are
+		const beside = shown.study?.beside ?? [];
+		// the camera that was left out, else where people are
+		const of = beside.find((one) => one.of === "agreement") ?? beside.at(-1);
 		if (of && (of.of === "agreement" || !more.length))
 			more.push({ name: of.name, of, at: ({ figures }) => figures[of.key] });
 		more.push({
@@ -96,7 +101,8 @@ export function overview({ choose, narrow }) {
 
 	/** @param {Server.Study} now */
 	function showMatters({ importance, importance_trials: count, varied, objectives }) {
-		fill(of, `share of ${objectives[0].name}'s variance`);
+		const { name } = objectives[0];
+		fill(of, `share of ${name.length > LONG ? "the" : `${name}'s`} variance`);
 		const most = Math.max(...importance.map(({ share, spread }) => share + spread), 0.01);
 		fill(
 			bars,
@@ -158,7 +164,7 @@ export function overview({ choose, narrow }) {
 						"aria-pressed": String(key === x.of.key),
 						onclick: () => ((across = key), void draw()),
 					},
-					`${y.name} · ${word}`,
+					y.name.length > LONG ? `against ${word}` : `${y.name} · ${word}`,
 				),
 			),
 		);

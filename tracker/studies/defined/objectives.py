@@ -73,8 +73,8 @@ HELD_OUT = Objective(
 )  # fmt: skip
 
 BESIDE: dict[str, Objective] = {
-    **{key: OBJECTIVES[key] for key in ("idf1", "hota", "ospa", "position_error")},
     HELD_OUT.key: HELD_OUT,
+    **{key: OBJECTIVES[key] for key in ("idf1", "hota", "ospa", "position_error")},
 }
 """What trials are shown with beside their objectives, where it is known of them."""
 
