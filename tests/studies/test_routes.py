@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from app.state.studies.desk import StudyDesk
 from app.web.server import Settings, create_app
 from tests.studies.small import Serial, made_up, recording, run
 from tracker.studies.kept.store import find
@@ -137,6 +139,32 @@ def test_no_more_workers_than_the_machine_can_bear(client: TestClient) -> None:
         assert answer.status_code == 409
         assert "workers: expected 1 to " in answer.json()["detail"]
     assert client.get("/api/studies").json() == before
+
+
+def test_who_goes_on_at_once_waits_for_what_is_just_ending(
+    client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    define(client)
+    store = find("mine", tmp_path / "studies")
+    begun: list[bool] = []
+    monkeypatch.setattr(StudyDesk, "run", lambda *_: begun.append(store.is_running()))
+    holds, ends = threading.Event(), threading.Event()
+
+    def ending() -> None:
+        with store.running():
+            store.ask_to_stop()
+            holds.set()
+            ends.wait(30.0)
+
+    other = threading.Thread(target=ending)
+    other.start()
+    assert holds.wait(30.0)
+    threading.Timer(0.3, ends.set).start()
+    answer = client.post("/api/studies/mine/start", json={"workers": 1})
+    assert answer.status_code == 200, answer.text
+    assert ends.is_set()
+    assert begun == [False]
+    other.join()
 
 
 @pytest.mark.full

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import sqlite3
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,9 @@ import pytest
 from tests.studies.small import Serial, definition, made_up, recording, run
 from tracker.studies.errors import StudyError
 from tracker.studies.kept.store import JOURNAL, Store, create
+from tracker.studies.kept.writer import RESULTS
 from tracker.studies.sampling import Sampler
+from tracker.studies.told.report import report_html
 from tracker.studies.told.summary import summary_of
 from tracker.studies.work.jobs import Job, Outcome
 
@@ -205,6 +209,33 @@ def test_people_who_leave_the_pictures_are_vetoed(tmp_path: Path) -> None:
                for one in summary.trials)  # fmt: skip
     assert summary.best.values["fusion.detection_probability"] > 0.8
     assert any("no truth was looked at" in one for one in summary.sentences())
+    assert [one.key for one in summary.beside] == ["held_out"]
+    for one in summary.trials:
+        assert one.figures["held_out"] == (0.2 if one.vetoed else 0.6)
+    assert '<th scope="col">Held-out camera</th>' in report_html(store)
+
+
+def test_a_study_of_before_the_camera_left_out_was_kept_opens_and_goes_on(tmp_path: Path) -> None:
+    recording(tmp_path / "blind", truth=False)
+    store = study(tmp_path, trials=4, recordings=["blind"], objectives=[], prune=False)
+    with pytest.raises(KeyboardInterrupt):
+        run(store, Serial(made_up(near), stop_after=2))
+    with sqlite3.connect(store.folder / RESULTS) as results:
+        for number, told in results.execute("SELECT number, told FROM trials").fetchall():
+            trial = json.loads(told)
+            del trial["figures"]["held_out"]
+            results.execute(
+                "UPDATE trials SET told = ? WHERE number = ?", (json.dumps(trial), number)
+            )
+    results.close()
+    assert len(summary_of(store).trials) == 2
+    assert "held_out" not in [one.key for one in summary_of(store).beside]
+    assert "Held-out camera" not in report_html(store)
+    run(store, Serial(made_up(near)))
+    known = ["held_out" in one.figures for one in store.trials()]
+    assert known == [False, False, True, True]
+    assert "held_out" in [one.key for one in summary_of(store).beside]
+    assert "<td>–</td>" in report_html(store)
 
 
 def test_what_needs_a_truth_is_told_where_there_is_none(tmp_path: Path) -> None:

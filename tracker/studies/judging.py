@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from tracker.studies.defined.objectives import VETO, Objective, front, mean_over
+from tracker.studies.defined.objectives import HELD_OUT, VETO, Objective, front, mean_over
 from tracker.studies.kept.records import JobRow, Trial
 from tracker.studies.work.jobs import Outcome
 
@@ -116,11 +116,12 @@ class Judge:
         done = [(r, outcomes[r.key]) for r in rows if outcomes.get(r.key) is not None]
         done = [(row, outcome) for row, outcome in done if outcome.became == "done"]
         figures = {}
-        for key in sorted({key for _, outcome in done for key in outcome.figures}):
+        measured = [(row, {**one.figures, HELD_OUT.key: one.overlap}) for row, one in done]
+        for key in sorted({key for _, of_run in measured for key in of_run}):
             found = {
                 (row.recording, row.seed): float(value)
-                for row, outcome in done
-                if (value := outcome.figures.get(key)) is not None
+                for row, of_run in measured
+                if (value := of_run.get(key)) is not None
             }
             if found:
                 figures[key] = mean_over(found)

@@ -173,7 +173,7 @@ class _Running:
     def end_early(self) -> None:
         """Be stopped, with everything kept."""
         self.state = "stopped"
-        self.words = "stopped; `multiview-phd study resume` goes on"
+        self.words = "stopped; nothing that ended before is lost"
 
     def _fill(self) -> None:
         """Ask for trials until nobody will wait."""

@@ -168,6 +168,8 @@ def run(store: Store, where: Where, *, as_json: bool = False, quiet: bool = Fals
 
 def _tell_end(store: Store, status: Status) -> None:
     words = f"; {status.words}" if status.words else ""
+    if status.state == "stopped":
+        words += "; `study resume` goes on"
     say(
         f"{store.name}: {status.done} of {status.trials} trials, {status.runs} runs in "
         f"{status.seconds:.0f} s{words}"

@@ -32,6 +32,7 @@ LOG = "log.txt"
 """What the process of a study said last."""
 
 STOP_SECONDS = 5.0
+ENDING_SECONDS = 20.0
 
 _NICENESS = 5
 
@@ -97,7 +98,7 @@ class StudyDesk:
             how_many(workers)
 
     def start(self, name: str, workers: int | None, scheduler: str | None) -> Store:
-        """Have a process run a study, or go on with it.
+        """Have a process run a study, or go on with it; one that is just ending is waited for.
 
         Raises:
             StudyError: If it runs already, no process can be started, or there would be more
@@ -105,7 +106,12 @@ class StudyDesk:
         """
         self.check_place(workers, scheduler)
         store = self.store(name)
-        if store.is_running():
+        until = time.monotonic() + ENDING_SECONDS
+        while (running := store.is_running()) and time.monotonic() < until:
+            if store.status().state == "running" and not store.asked_to_stop():
+                break
+            time.sleep(0.05)  # its workers end before it does
+        if running:
             raise StudyError(f'the study "{name}" runs already')
         line = [sys.executable, "-m", "app", "study", "resume", str(store.folder)]
         line += ["--workers", str(workers)] if workers else []

@@ -68,7 +68,8 @@ class ObjectiveInfo(Model):
     """Whether more of it is better."""
     unit: str
     digits: int
-    needs_truth: bool
+    of: Literal["truth", "run", "agreement"]
+    """What it needs: a truth, nothing but the run, or other looks at the recording."""
 
 
 class StudyDraft(Model):
@@ -199,6 +200,8 @@ class Study(Model):
     """As its file has it."""
     toml: str
     objectives: list[ObjectiveInfo]
+    beside: list[ObjectiveInfo]
+    """Other figures worth a column, by their keys in those of the trials."""
     varied: list[RangeInfo]
     status: StudyStatus
     best: int | None

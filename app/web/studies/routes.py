@@ -27,6 +27,9 @@ router = APIRouter(prefix="/api/studies", responses=ERRORS)
 RUN_BYTES, TRIAL_BYTES = 2500, 4000
 """What a run and a trial take on disk, about."""
 
+FEWEST_STEPS = 50
+"""Of a run before its speed says anything: the first ones wait for what is compiled and read."""
+
 SECONDS_FOR_A_SCHEDULER = 5.0
 
 
@@ -150,8 +153,9 @@ def estimate(wish: models.StudyWish, desk: Desk, bench: Bench) -> models.StudyCo
 
 
 def _seconds(snapshot: Snapshot, definition: Definition, runs: int) -> float | None:
-    speed, sequence = snapshot.run_state.steps_per_second, snapshot.sequence
-    if not speed or sequence is None:
+    state, sequence = snapshot.run_state, snapshot.sequence
+    speed = state.steps_per_second
+    if not speed or sequence is None or state.done < min(FEWEST_STEPS, sequence.frames):
         return None
     truth = sequence.ground_truth is not None
     looks = "identity" in (definition.objectives or (WITH_TRUTH if truth else WITHOUT_TRUTH))
@@ -160,7 +164,9 @@ def _seconds(snapshot: Snapshot, definition: Definition, runs: int) -> float | N
 
 
 def _minutes(seconds: float) -> str:
-    return f"{seconds:.0f} s" if seconds < 90.0 else f"{seconds / 60.0:.0f} min"
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.0f} h"
 
 
 @router.post("")

@@ -33,6 +33,7 @@ def study_of(desk: StudyDesk, store: Store) -> models.Study:
         definition=summary.definition.to_json(),
         toml=summary.definition.to_toml(),
         objectives=[objective_of(one) for one in summary.objectives],
+        beside=[objective_of(one) for one in summary.beside],
         varied=[
             range_of(one, defaults.get(one.key), summary.definition.start.get(one.key))
             for one in summary.definition.varied
@@ -64,7 +65,7 @@ def objective_of(one: Objective) -> models.ObjectiveInfo:
         higher=one.higher,
         unit=one.unit,
         digits=one.digits,
-        needs_truth=one.of == "truth",
+        of=one.of,
     )
 
 

@@ -1,5 +1,5 @@
 /** The figures of a study, drawn by Plotly; the table says the same in words. */
-import { h } from "../elements/dom.js";
+import { fill, h } from "../elements/dom.js";
 import { figureOf, titledOf, valueOf } from "./words.js";
 
 /** Trials that are shown against each parameter: a place for each. */
@@ -83,6 +83,9 @@ function layoutOf(ink, x, y, [left, top, right, bottom]) {
 	};
 }
 
+/** Plotly follows the window, not its place. @type {ResizeObserver | null} */
+let sizes = null;
+
 const SETTINGS = { displayModeBar: false, responsive: true };
 
 /**
@@ -92,7 +95,25 @@ const SETTINGS = { displayModeBar: false, responsive: true };
  */
 async function draw(place, traces, layout) {
 	const Plotly = await plotly();
+	if (!place.classList.contains("js-plotly-plot")) fill(place); // what was said in its place
 	await Plotly.react(place, traces, layout, SETTINGS);
+	sizes ??= new ResizeObserver((changes) => {
+		for (const { target, contentRect: now } of changes) {
+			const drawn = /** @type {any} */ (target)._fullLayout;
+			if (!drawn || !now.width || !now.height) continue;
+			if (Math.abs(drawn.width - now.width) > 1 || Math.abs(drawn.height - now.height) > 1)
+				void Plotly.Plots.resize(target);
+		}
+	});
+	sizes.observe(place);
+}
+
+/** Nothing is drawn there any more. @param {Element} place */
+export function clear(place) {
+	sizes?.unobserve(place);
+	/** @type {any} */ (window).Plotly?.purge(place);
+	place.classList.remove("js-plotly-plot");
+	fill(place);
 }
 
 /**
@@ -128,8 +149,9 @@ function points(trials, x, y, ink, size, says) {
  * @param {(trial: Server.TrialInfo) => any} y
  * @param {ReturnType<typeof inks>} ink
  * @param {(trial: Server.TrialInfo) => string} [note]
+ * @param {number} [middle]  of the axis: what is beyond it has its note to the left
  */
-function marks(trials, { best, chosen }, x, y, ink, note) {
+function marks(trials, { best, chosen }, x, y, ink, note, middle = Infinity) {
 	const of = (/** @type {number | null} */ number) =>
 		trials.filter((trial) => trial.number === number);
 	const trace = (
@@ -143,7 +165,7 @@ function marks(trials, { best, chosen }, x, y, ink, note) {
 		y: found.map(y),
 		customdata: found.map(({ number }) => number),
 		text: found.map((trial) => (note ? `${word} ${note(trial)}` : "")),
-		textposition: "middle right",
+		textposition: found.map((trial) => (x(trial) > middle ? "top left" : "top right")),
 		textfont: { size: ink.size + 1, color: ink.strong },
 		marker,
 		hovertemplate: `${word}<extra></extra>`,
@@ -190,13 +212,18 @@ function core(values, seen) {
 	return room([...inside, ...seen]);
 }
 
+/** What stands along an upright axis: what is better, too, where it is long enough for that.
+ * @param {HTMLElement} place @param {string} title @param {string} better */
+const upright = (place, title, better) =>
+	7 * (title.length + better.length + 2) < place.clientHeight - 40 ? `${title}, ${better}` : title;
+
 /**
  * The trials by two figures, with those that nothing beats in both.
  * @param {HTMLElement} place
  * @param {Server.TrialInfo[]} trials
  * @param {Measure} x
  * @param {Measure} y
- * @param {{best: number | null, chosen: number | null, front: number[]}} which
+ * @param {{best: number | null, chosen: number | null}} which
  * @param {(number: number) => void} choose
  */
 export async function scatter(place, trials, x, y, which, choose) {
@@ -217,9 +244,7 @@ export async function scatter(place, trials, x, y, which, choose) {
 	const better = (/** @type {Measure} */ { of }) =>
 		of.higher ? "more is better" : "less is better";
 	const says = `trial %{customdata}<br>${y.name} %{y:.4g}<br>${x.name} %{x:.4g}<extra></extra>`;
-	const front = known
-		.filter(({ number }) => which.front.includes(number))
-		.sort((a, b) => Number(x.at(a)) - Number(x.at(b)));
+	const front = unbeaten(known, x, y);
 	const note = (/** @type {Server.TrialInfo} */ trial) => figureOf(y.at(trial), y.of);
 	await draw(
 		place,
@@ -235,14 +260,14 @@ export async function scatter(place, trials, x, y, which, choose) {
 				marker: { color: ink.accent, size: 6 },
 				hovertemplate: `front: ${says}`,
 			},
-			...marks(known, which, x.at, y.at, ink, note),
+			...marks(known, which, x.at, y.at, ink, note, (across[0] + across[1]) / 2),
 		],
 		{
 			...layoutOf(
 				ink,
 				{ range: across, title: { text: `${titledOf(x.of)}, ${better(x)}`, standoff: 6 } },
-				{ range: up, title: { text: `${titledOf(y.of)}, ${better(y)}`, standoff: 6 } },
-				[58, 12, 18, 40],
+				{ range: up, title: { text: upright(place, titledOf(y.of), better(y)), standoff: 6 } },
+				[58, 20, 18, 40],
 			),
 			annotations: outside
 				? [
@@ -262,6 +287,28 @@ export async function scatter(place, trials, x, y, which, choose) {
 		},
 	);
 	onClick(place, choose);
+}
+
+/**
+ * Those that no other beats in one of two figures without losing in the other, by the first.
+ * @param {Server.TrialInfo[]} trials
+ * @param {Measure} x
+ * @param {Measure} y
+ */
+export function unbeaten(trials, x, y) {
+	const worth = (/** @type {Measure} */ { of, at }, /** @type {Server.TrialInfo} */ trial) =>
+		(of.higher ? 1 : -1) * Number(at(trial));
+	const free = trials
+		.filter(({ vetoed }) => !vetoed)
+		.sort((a, b) => worth(x, b) - worth(x, a) || worth(y, b) - worth(y, a));
+	let top = -Infinity;
+	const found = free.filter((trial) => {
+		const now = worth(y, trial);
+		if (now <= top) return false;
+		top = now;
+		return true;
+	});
+	return x.of.higher ? found.reverse() : found;
 }
 
 /** @param {any} place @param {(number: number) => void} choose */
@@ -327,6 +374,13 @@ export async function bestSoFar(place, trials, y, of) {
 	);
 }
 
+/** The ends of a range and the power of ten between. @param {number[]} ends */
+function logTicks([low, high]) {
+	const ten = 10 ** Math.round(Math.log10(low * high) / 2);
+	const apart = (high / low) ** 0.25;
+	return ten > low * apart && ten < high / apart ? [low, ten, high] : [low, high];
+}
+
 /**
  * One parameter against the leading figure.
  * @param {HTMLElement} place
@@ -354,7 +408,12 @@ export async function against(place, trials, range, y, which, choose, narrow) {
 	const across = !ends
 		? { type: "category" }
 		: range.log
-			? { type: "log", range: ends.map((end, k) => Math.log10(end) + (k ? 0.04 : -0.04)) }
+			? {
+					type: "log",
+					range: ends.map((end, k) => Math.log10(end) + (k ? 0.04 : -0.04)),
+					tickvals: logTicks(ends),
+					ticktext: logTicks(ends).map(valueOf),
+				}
 			: { range: [ends[0] - more, ends[1] + more] };
 	await draw(
 		place,

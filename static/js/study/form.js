@@ -3,6 +3,7 @@ import { choices, fill, h, icon } from "../elements/dom.js";
 import { getJson, sendJson } from "../state/api.js";
 import { SEARCHES, numberField, tag } from "./fields.js";
 import { lockedParts } from "./locked.js";
+import { objectiveCards } from "./objective.js";
 import { parameterRanges, rangeOf } from "./ranges.js";
 import { runsOn } from "./where.js";
 import { nameOf, symbolOf, valueOf } from "./words.js";
@@ -131,7 +132,12 @@ export function definition({ store }, { start, cost: told, copy }) {
 			recordings(now),
 			parameterRanges(now, known, store.get().schema?.parameters ?? [], { changed, show, add }),
 			numbers(now),
-			objective(now),
+			objectiveCards(
+				now,
+				figures,
+				{ hasTruth, cameras: store.get().sequence?.cameras.length ?? 2 },
+				{ changed, show },
+			),
 			runsOn(where, { changed, show }),
 		);
 	}
@@ -234,64 +240,6 @@ export function definition({ store }, { start, cost: told, copy }) {
 		);
 	}
 
-	/** @param {Wish} now */
-	function objective(now) {
-		const possible = figures.filter(({ needs_truth: needs }) => hasTruth || !needs);
-		/** @param {number} place @param {string} word */
-		const chooser = (place, word) => {
-			const select = h("select", {
-				class: "field",
-				"aria-label": word,
-				onchange: () => {
-					const next = [...now.objectives];
-					if (select.value) next[place] = select.value;
-					else next.splice(place, 1);
-					now.objectives = [...new Set(next)];
-					show();
-					changed();
-				},
-			});
-			const free = possible.filter(
-				({ key }) => now.objectives[place] === key || !now.objectives.includes(key),
-			);
-			choices(
-				select,
-				[
-					...(place ? [/** @type {[string, string]} */ (["", "nothing else"])] : []),
-					...free.map(
-						({ key, name, higher }) =>
-							/** @type {[string, string]} */ ([
-								key,
-								`${name}, ${higher ? "more" : "less"} is better`,
-							]),
-					),
-				],
-				now.objectives[place] ?? "",
-			);
-			return h("label", {}, h("span", {}, word), select);
-		};
-		const lead = figures.find(({ key }) => key === now.objectives[0]);
-		return h(
-			"div",
-			{ class: "blk" },
-			h("h3", { class: "h" }, "Objective"),
-			h(
-				"div",
-				{ class: "stack" },
-				chooser(0, "best is"),
-				now.objectives.length > 0 && chooser(1, "against"),
-				now.objectives.length > 1 && chooser(2, "and"),
-			),
-			h("p", { class: "small" }, lead?.help ?? ""),
-			!hasTruth &&
-				h(
-					"p",
-					{ class: "small" },
-					"There is no truth here: a tracker can be consistently wrong, so look at the best trial before you use it.",
-				),
-		);
-	}
-
 	/** A study that is there: what it tries cannot change. @param {Server.Study} study */
 	function locked(study) {
 		wish = null;
@@ -299,12 +247,14 @@ export function definition({ store }, { start, cost: told, copy }) {
 		element.classList.add("locked");
 		foot.hidden = true;
 		again.hidden = false;
-		const { info } = study;
-		fill(sub, info.state === "running" ? "locked" : "");
+		state(study.info);
 		fill(body, lockedParts(study));
 	}
 
-	return { element, edit, locked, places: () => where };
+	/** @param {Server.StudyInfo} info */
+	const state = (info) => fill(sub, info.state === "running" ? "locked" : "");
+
+	return { element, edit, locked, state, places: () => where };
 }
 
 /** @param {string} name @returns {[string, string]} */

@@ -1,9 +1,12 @@
 /** The figures of a study: its trials, what matters, each parameter. */
 import { fill, h, write } from "../elements/dom.js";
-import { MOST_PARAMETERS, against, bestSoFar, scatter } from "./charts.js";
+import { MOST_PARAMETERS, against, bestSoFar, clear, scatter } from "./charts.js";
 import { figureOf, symbolOf } from "./words.js";
 
 /** @import { Measure } from "./charts.js" */
+
+/** Letters of a figure's name beyond which it is not said again beside others. */
+const LONG = 16;
 
 /**
  * @param {object} on
@@ -73,7 +76,13 @@ export function overview({ choose, narrow }) {
 
 	/** What the other axis may show. @returns {Measure[]} */
 	function measures() {
+		/** @type {Measure[]} */
 		const more = (shown.study?.objectives ?? []).map((_, k) => measure(k)).slice(1);
+		const beside = shown.study?.beside ?? [];
+		// the camera that was left out, else where people are
+		const of = beside.find((one) => one.of === "agreement") ?? beside.at(-1);
+		if (of && (of.of === "agreement" || !more.length))
+			more.push({ name: of.name, of, at: ({ figures }) => figures[of.key] });
 		more.push({
 			name: "time",
 			of: {
@@ -83,7 +92,7 @@ export function overview({ choose, narrow }) {
 				higher: false,
 				unit: "s",
 				digits: 1,
-				needs_truth: false,
+				of: "run",
 			},
 			at: ({ seconds }) => seconds,
 		});
@@ -92,7 +101,8 @@ export function overview({ choose, narrow }) {
 
 	/** @param {Server.Study} now */
 	function showMatters({ importance, importance_trials: count, varied, objectives }) {
-		fill(of, `share of ${objectives[0].name}'s variance`);
+		const { name } = objectives[0];
+		fill(of, `share of ${name.length > LONG ? "the" : `${name}'s`} variance`);
 		const most = Math.max(...importance.map(({ share, spread }) => share + spread), 0.01);
 		fill(
 			bars,
@@ -104,9 +114,8 @@ export function overview({ choose, narrow }) {
 					{ class: "ib" },
 					h(
 						"span",
-						{ class: "lab", title: range?.help ?? key },
-						range?.label ?? key,
-						" ",
+						{ class: "lab", title: range ? `${range.label}: ${range.help}` : key },
+						h("span", {}, range?.label ?? key),
 						range && symbolOf(range.symbol),
 					),
 					h(
@@ -132,7 +141,17 @@ export function overview({ choose, narrow }) {
 
 	async function draw() {
 		const { study: now, done, chosen } = shown;
-		if (!now || !done.length) return;
+		if (!now) return;
+		if (!done.length) {
+			// of the study that was shown before nothing stays
+			for (const figure of [pareto, sofar, ...grid.querySelectorAll(".fill")]) clear(figure);
+			fill(pareto, h("p", { class: "blank" }, "The default is run first, then the trials come."));
+			fill(axes);
+			fill(since);
+			fill(grid);
+			grid.dataset.keys = "";
+			return;
+		}
 		const y = measure(0);
 		const others = measures();
 		const x = others.find(({ of: { key } }) => key === across) ?? others[0];
@@ -145,12 +164,12 @@ export function overview({ choose, narrow }) {
 						"aria-pressed": String(key === x.of.key),
 						onclick: () => ((across = key), void draw()),
 					},
-					`${y.name} · ${word}`,
+					y.name.length > LONG ? `against ${word}` : `${y.name} · ${word}`,
 				),
 			),
 		);
 		const complete = done.filter(({ state }) => state === "complete");
-		const told = { best: now.best, chosen, front: now.front };
+		const told = { best: now.best, chosen };
 		const top = now.best === null ? undefined : done.find(({ number }) => number === now.best);
 		const worth = figureOf(top?.objectives?.[0], y.of);
 		pareto.ariaLabel = `${y.name} against ${x.name} of ${complete.length} trials; the best is ${now.best ? `trial ${now.best}` : "the default"} with ${worth}`;
@@ -211,8 +230,8 @@ export function overview({ choose, narrow }) {
 			{ class: "mp" },
 			h(
 				"div",
-				{ class: "mh", title: help },
-				h("span", { class: "lab" }, label, " ", symbolOf(symbol)),
+				{ class: "mh", title: `${label}: ${help}` },
+				h("span", { class: "lab" }, h("span", {}, label), symbolOf(symbol)),
 				h("span", { class: "grow" }),
 				h("span", { class: "q" }, "best"),
 				h("b"),

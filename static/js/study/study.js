@@ -1,5 +1,5 @@
 /** The place Study: what is tried, how far it is, what it has found. */
-import { choices, fill, h, icon } from "../elements/dom.js";
+import { choices, fill, h, icon, write } from "../elements/dom.js";
 import { getJson } from "../state/api.js";
 import { bestTrials } from "./best.js";
 import { definition } from "./form.js";
@@ -24,6 +24,8 @@ export function mountStudy(root, { store, actions }) {
 	let last = 0;
 	/** @type {number | null} */
 	let chosen = null;
+	/** Whether somebody chose it; before that it follows the best. */
+	let picked = false;
 	/** @type {Server.StudyCost | null} */
 	let cost = null;
 
@@ -106,6 +108,7 @@ export function mountStudy(root, { store, actions }) {
 		trials = new Map();
 		last = 0;
 		chosen = null;
+		picked = false;
 		if (name === NEW) return begin();
 		await refresh();
 	}
@@ -236,7 +239,7 @@ export function mountStudy(root, { store, actions }) {
 			study = told;
 			for (const trial of more.trials) trials.set(trial.number, trial);
 			last = more.last;
-			if (chosen === null && study?.best !== null && study?.best !== undefined) chosen = study.best;
+			if (!picked && study) chosen = study.best;
 			if (begun && study) form.locked(study);
 			show(begun || more.trials.length > 0);
 		} catch (error) {
@@ -259,6 +262,9 @@ export function mountStudy(root, { store, actions }) {
 		if (!study) return;
 		main.dataset.shows = "study";
 		tools();
+		form.state(study.info);
+		for (const option of list.options)
+			if (option.value === study.info.name) write(option, lineOf(study.info));
 		progress.show(study);
 		if (!news) return;
 		const done = [...trials.values()].sort((a, b) => a.ended - b.ended);
@@ -269,6 +275,7 @@ export function mountStudy(root, { store, actions }) {
 	/** @param {number} number */
 	function choose(number) {
 		chosen = number;
+		picked = true;
 		show(true);
 		best.rows.reveal(number);
 	}

@@ -50,6 +50,7 @@ export function trialsTable({ choose, use }) {
 					titledOf(of),
 				),
 			),
+			study.beside.map((of) => h("th", { class: "num", title: of.help }, titledOf(of))),
 			study.varied.map((range) =>
 				h("th", { class: "num", title: `${range.label}: ${range.help}` }, symbolOf(range.symbol)),
 			),
@@ -89,7 +90,7 @@ export function trialsTable({ choose, use }) {
 						? "vetoed"
 						: trial.state !== "complete"
 							? trial.state
-							: study.front.includes(number)
+							: study.objectives.length > 1 && study.front.includes(number)
 								? "front"
 								: "";
 		return h(
@@ -116,6 +117,14 @@ export function trialsTable({ choose, use }) {
 					{ class: "num" },
 					figureOf(trial.objectives?.[k], of),
 					number !== 0 && differenceOf(trial.objectives?.[k], standard?.objectives?.[k], of),
+				),
+			),
+			study.beside.map((of) =>
+				h(
+					"td",
+					{ class: "num" },
+					figureOf(trial.figures[of.key], of),
+					number !== 0 && differenceOf(trial.figures[of.key], standard?.figures[of.key], of),
 				),
 			),
 			study.varied.map(({ key }) =>

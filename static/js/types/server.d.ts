@@ -697,7 +697,8 @@ declare namespace Server {
 		higher: boolean;
 		unit: string;
 		digits: number;
-		needs_truth: boolean;
+		/** What it needs: a truth, nothing but the run, or other looks at the recording. */
+		of: "truth" | "run" | "agreement";
 	}
 
 	/** A sequence on its way. */
@@ -1068,6 +1069,8 @@ declare namespace Server {
 		definition: Record<string, any>;
 		toml: string;
 		objectives: ObjectiveInfo[];
+		/** Other figures worth a column, by their keys in those of the trials. */
+		beside: ObjectiveInfo[];
 		varied: RangeInfo[];
 		status: StudyStatus;
 		/** Number of the best trial; 0 where nothing is better than the defaults. */

@@ -65,6 +65,19 @@ OBJECTIVES: dict[str, Objective] = {
 }  # fmt: skip
 """All of them by their keys."""
 
+HELD_OUT = Objective(
+    "held_out", "Held-out camera", True, "agreement", "", 3,
+    "Each camera in turn is left out: how far its boxes overlap the people whom the others found, "
+    "intersection over union, mean over cameras. It vetoes trials and is no objective: by itself "
+    "it ranks settings badly.",
+)  # fmt: skip
+
+BESIDE: dict[str, Objective] = {
+    HELD_OUT.key: HELD_OUT,
+    **{key: OBJECTIVES[key] for key in ("idf1", "hota", "ospa", "position_error")},
+}
+"""What trials are shown with beside their objectives, where it is known of them."""
+
 WITH_TRUTH = ("hota", "idf1", "speed")
 WITHOUT_TRUTH = ("identity",)
 

@@ -201,13 +201,19 @@ def _commands(summary: Summary) -> str:
 
 def _trials(summary: Summary) -> str:
     keys = [one.key for one in summary.definition.varied]
-    head = ["trial", *(one.name for one in summary.objectives), *keys, "runs' seconds", "remark"]
+    beside = summary.beside
+    named = [one.name for one in (*summary.objectives, *beside)]
+    head = ["trial", *named, *keys, "runs' seconds", "remark"]
     rows = []
     for trial in summary.ranked[:_BEST]:
         rows.append(
             (
                 str(trial.number),
                 *_measured(summary, trial),
+                *(
+                    "–" if (v := trial.figures.get(one.key)) is None else one.words(v, None)
+                    for one in beside
+                ),
                 *(_value(trial.values.get(key)) for key in keys),
                 f"{trial.seconds:.1f}",
                 summary.remark(trial),

@@ -8,7 +8,7 @@ from typing import Any
 
 from tracker.sequences.fields import shown
 from tracker.studies.defined.definition import Definition
-from tracker.studies.defined.objectives import IDENTITY, OBJECTIVES, WITH_TRUTH, Objective
+from tracker.studies.defined.objectives import BESIDE, IDENTITY, OBJECTIVES, WITH_TRUTH, Objective
 from tracker.studies.errors import StudyError
 from tracker.studies.judging import best_of, front_of, usable
 from tracker.studies.kept.records import Status, Trial
@@ -47,6 +47,13 @@ class Summary:
     def defaults(self) -> dict[str, Any]:
         """What the varied parameters are by default."""
         return dict(self.default.values) if self.default is not None else {}
+
+    @property
+    def beside(self) -> list[Objective]:
+        """Other figures worth a column: those that are known of a trial at least. Studies that
+        were run before a figure was kept do not have it."""
+        known = {key for trial in self.trials for key in trial.figures}
+        return [one for key, one in BESIDE.items() if key in known and one not in self.objectives]
 
     @property
     def ranked(self) -> list[Trial]:
