@@ -55,6 +55,7 @@ export function mountPlaces(root, context) {
 			if (site.name === place) void fillIn(site);
 		});
 		one(".app").classList.toggle("away", !isBench(place));
+		one(".app").dataset.at = place;
 		for (const part of all("[data-place]"))
 			part.hidden =
 				part.dataset.place !== (part.dataset.place === "bench" && isBench(place) ? "bench" : place);

@@ -238,3 +238,19 @@ def test_nothing_serious_in_any_state(check: Page, theme: str, screenshots: Path
     if screenshots:
         check.screenshot(path=screenshots / f"check-{theme}.png")
     assert {name: bad for name, bad in states.items() if bad} == {}
+
+
+def test_a_new_person_with_a_small_window_has_the_place_and_its_buttons_in_sight(
+    browser: Browser, server: Server, as_it_was: None
+) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = context.new_page()
+    page.goto(server.address)
+    tour = page.get_by_role("heading", name="What you see")
+    expect(tour).to_be_visible()
+    page.get_by_role("link", name="Check").click()
+    expect(tour).to_be_hidden()
+    for name in ("Split here", "Confirm"):
+        button = page.locator("#panel-place").get_by_role("button", name=name)
+        expect(button.first).to_be_in_viewport(ratio=1.0)
+    context.close()
