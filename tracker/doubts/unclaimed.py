@@ -92,11 +92,7 @@ def _taken(
     tracks = run.tracks
     drawn, _ = camera.project_boxes(tracks.positions, run.sequence.target_half_extents)
     theirs = Boxes.from_left_top(drawn)
-    first, last = np.searchsorted(tracks.frames, [steps, steps + 1])
-    counts = last - first
-    box = np.repeat(np.arange(len(steps)), counts)
-    row = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    row += np.repeat(first, counts)
+    box, row = _at_one_step(steps, tracks.frames)
     with np.errstate(invalid="ignore"):  # who is behind the camera takes nothing
         inside = (np.abs(boxes[box, :2] - theirs.centres[row]) <= theirs.half_sizes[row]).all(
             axis=1
@@ -106,14 +102,20 @@ def _taken(
     return taken
 
 
+def _at_one_step(
+    one: Int[ndarray, " A"], other: Int[ndarray, " B"]
+) -> tuple[Int[ndarray, " P"], Int[ndarray, " P"]]:
+    """Rows of both that are of one step, every one with every one; the other's are in order."""
+    first, last = np.searchsorted(other, [one, one + 1])
+    counts = last - first
+    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    return np.repeat(np.arange(len(one)), counts), np.repeat(first, counts) + within
+
+
 def _meet(run: Run, one: int, other: int, mine: _Free, theirs: _Free) -> Float[ndarray, "M 6"]:
     """Step, world place and the two cameras of every meeting of free boxes."""
     cameras, sequence = run.sequence.cameras, run.sequence
-    first, last = np.searchsorted(theirs.steps, [mine.steps, mine.steps + 1])
-    counts = last - first
-    i = np.repeat(np.arange(len(mine.steps)), counts)
-    j = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    j += np.repeat(first, counts)
+    i, j = _at_one_step(mine.steps, theirs.steps)
     if not len(i):
         return np.zeros((0, 6))
     # the points of the two rays that are nearest to each other

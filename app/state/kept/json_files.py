@@ -10,21 +10,15 @@ import hashlib
 import json
 import logging
 import os
-from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import TypeAdapter, ValidationError
-
+from tracker.checked import value_of
 from tracker.placing import write_whole
-from tracker.sequences.fields import shown
-from tracker.visible import visible
 
 logger = logging.getLogger("app")
 
 T = TypeVar("T")
-
-_adapter: Any = cache(TypeAdapter)
 
 _KEYS = {"sha256", "value"}
 
@@ -73,18 +67,7 @@ def read_as(path: Path, kind: type[T]) -> T:
         OSError: If it cannot be read.
         ValueError: With the field, what was expected and what was found.
     """
-    text = json.dumps(read_json(path))
-    try:
-        value: T = _adapter(kind).validate_json(text, strict=True)
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False)[0]
-        place = ".".join(str(part) for part in first["loc"])
-        words = first["msg"].replace("Input should be", "expected")
-        if first["type"] == "json_invalid":  # as half a letter in a name
-            raise ValueError(f"expected JSON, found something else ({words})") from None
-        at = f"{visible(place)[:80]}: " if place else ""
-        raise ValueError(f"{at}{words}, found {visible(shown(first['input']))}") from None
-    return value
+    return value_of(kind, json.dumps(read_json(path)))
 
 
 def set_aside(path: Path) -> Path | None:

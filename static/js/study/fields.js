@@ -80,3 +80,29 @@ export const rangesBlock = (count, rows, last) => [
 		h("tbody", {}, rows),
 	),
 ];
+
+/**
+ * One of several cards, of which one is chosen.
+ * @param {boolean} on  whether it is this one
+ * @param {string} title
+ * @param {() => void} choose
+ * @param {boolean} can  whether it may be chosen
+ * @param {...Child} rest  what stands below its title
+ */
+export const choiceCard = (on, title, choose, can, ...rest) =>
+	h(
+		"div",
+		{ class: `choice${on ? " on" : ""}` },
+		h(
+			"button",
+			{
+				class: "as-text",
+				role: "radio",
+				"aria-checked": String(on),
+				disabled: !can,
+				onclick: choose,
+			},
+			h("b", {}, title),
+		),
+		rest,
+	);

@@ -1,5 +1,6 @@
 /** What trials are judged by: figures against the truth, or agreement where nobody knows it. */
 import { choices, h } from "../elements/dom.js";
+import { choiceCard } from "./fields.js";
 
 /** @import { Wish } from "./form.js" */
 
@@ -55,22 +56,13 @@ export function objectiveCards(now, figures, { hasTruth, cameras }, { changed, s
 	const card = (kind, title, beside, ...rest) => {
 		const on = byAgreement === (kind === "agreement");
 		const can = leads[kind].length > 0 && (kind === "agreement" || hasTruth);
-		return h(
-			"div",
-			{ class: `choice${on ? " on" : ""}` },
-			h(
-				"button",
-				{
-					class: "as-text",
-					role: "radio",
-					"aria-checked": String(on),
-					disabled: !on && !can,
-					onclick: () => !on && set([usual(kind)]),
-				},
-				h("b", {}, title),
-			),
+		return choiceCard(
+			on,
+			title,
+			() => !on && set([usual(kind)]),
+			on || can,
 			h("span", { class: "small beside" }, beside),
-			rest,
+			...rest,
 		);
 	};
 	/** @param {"truth" | "agreement"} kind */

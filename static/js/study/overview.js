@@ -1,6 +1,7 @@
 /** The figures of a study: its trials, what matters, each parameter. */
 import { fill, h, write } from "../elements/dom.js";
-import { MOST_PARAMETERS, against, bestSoFar, clear, scatter } from "./charts.js";
+import { MOST_PARAMETERS, against, bestSoFar, scatter } from "./charts.js";
+import { clear } from "./plotting.js";
 import { figureOf, symbolOf } from "./words.js";
 
 /** @import { Measure } from "./charts.js" */

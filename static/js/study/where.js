@@ -1,7 +1,7 @@
 /** Where a study runs: on this machine, or on a cluster that exists. */
 import { fill, h } from "../elements/dom.js";
 import { sendJson } from "../state/api.js";
-import { numberField } from "./fields.js";
+import { choiceCard, numberField } from "./fields.js";
 
 /** @typedef {{scheduler: string | null, workers: number}} Where */
 
@@ -36,24 +36,11 @@ export function runsOn(where, { changed, show }) {
 	/** @param {boolean} here @param {string} title @param {...Child} rest */
 	const choice = (here, title, ...rest) => {
 		const on = here === (where.scheduler === null);
-		return h(
-			"div",
-			{ class: `choice${on ? " on" : ""}` },
-			h(
-				"button",
-				{
-					class: "as-text",
-					role: "radio",
-					"aria-checked": String(on),
-					onclick: () => {
-						where.scheduler = here ? null : (where.scheduler ?? "");
-						show();
-					},
-				},
-				h("b", {}, title),
-			),
-			on && rest,
-		);
+		const choose = () => {
+			where.scheduler = here ? null : (where.scheduler ?? "");
+			show();
+		};
+		return choiceCard(on, title, choose, true, ...(on ? rest : []));
 	};
 	const workers = numberField(
 		changed,
