@@ -6,6 +6,7 @@ import { definition } from "./form.js";
 import { overview } from "./overview.js";
 import { progressPane } from "./progress.js";
 import { lasting, lineOf } from "./words.js";
+import { placeOf } from "./where.js";
 
 const EVERY_MS = 1000;
 
@@ -198,11 +199,7 @@ export function mountStudy(root, { store, actions }) {
 		const made = await actions.ask("POST", "studies", wish);
 		if (!made) return;
 		name = made.info.name;
-		await actions.ask(
-			"POST",
-			path("/start"),
-			where.scheduler === null ? { workers: where.workers } : { scheduler: where.scheduler },
-		);
+		await actions.ask("POST", path("/start"), placeOf(where));
 		await refreshList();
 		await open(name);
 	}
