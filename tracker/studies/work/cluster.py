@@ -152,7 +152,8 @@ def check_address(address: str) -> None:
 def _no_scheduler(address: str | None, error: Exception) -> StudyError:
     return StudyError(
         f"there is no Dask scheduler at {address} ({_words(error)}); start one by "
-        "`dask scheduler`, name another address, or leave it out to work on this machine"
+        "`dask scheduler`, or name another address; to work on this machine, leave out "
+        f"--scheduler and ${ADDRESS}"
     )
 
 
