@@ -6,8 +6,8 @@ kernels; what the first real run calls is then there.
 
 ``python -m tracker.warm_up`` does it in two processes, one a half of the methods, which
 leave the interpreter of the workbench alone. Each tells how far it is: a line ``done
-total`` whenever a kernel has been compiled; the first half tells ``ready`` when the methods
-that a sequence starts with have what cannot run as plain Python.
+total`` whenever a kernel has been compiled; the first half tells ``ready`` when the method
+that a sequence with templates starts with has what cannot run as plain Python.
 """
 
 from __future__ import annotations
@@ -68,8 +68,8 @@ def compile_kernels(
         half: One of :data:`HALVES`.
         told: Called with the number of kernels that are ready and of all, whenever one has
             been compiled.
-        ready: Called by the first half when the methods that a sequence starts with have the
-            kernels that cannot run as plain Python.
+        ready: Called by the first half when the method that a sequence with templates starts
+            with has the kernels that cannot run as plain Python.
     """
     for methods in REGISTERED.values():
         for method in methods.values():
@@ -81,10 +81,11 @@ def compile_kernels(
     ):
         recording = _recording(Path(folder))
         if half == HALVES[0]:
-            with compilation.only_of_pixels():
-                for single_view in FOLLOWING:
+            for single_view in FOLLOWING:
+                with compilation.only_of_pixels():
                     pipeline.compute(recording, RunParameters(single_view=single_view))
-            ready()
+                if single_view == FOLLOWING[0]:
+                    ready()
         for parameters in _ways(half):
             pipeline.compute(recording, parameters)
 
@@ -197,7 +198,7 @@ def main() -> int:
             compilation.mark_compiled()
         return max(statuses)
     half = sys.argv[1]
-    _give_way(5 if half == HALVES[0] else 15)
+    _give_way(5 if half == HALVES[0] else 19)
 
     def say(words: str) -> None:
         sys.stdout.write(f"{words}\n")
