@@ -46,8 +46,8 @@ _COLOURS = ((40, 40, 220), (220, 60, 40))
 """Of the two people, blue green red."""
 
 HALVES = ("first", "second")
-"""The work of two processes: stage 1 with the intensity filter, and the labelled fusion's step, which
-takes longest to compile, with what comes after it."""
+"""The work of two processes: stage 1 with the intensity filter; and the labelled fusion's step,
+which takes longest to compile, with what comes after it."""
 
 _OTHER_WAYS = (
     {"fusion.update": "unscented"},
