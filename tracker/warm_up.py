@@ -46,7 +46,8 @@ _COLOURS = ((40, 40, 220), (220, 60, 40))
 """Of the two people, blue green red."""
 
 HALVES = ("first", "second")
-"""The work of two processes: the fusion's step takes longest to compile, and has its own."""
+"""The work of two processes: stage 1 with the intensity filter; and the labelled fusion's step,
+which takes longest to compile, with what comes after it."""
 
 _OTHER_WAYS = (
     {"fusion.update": "unscented"},
@@ -93,7 +94,15 @@ def compile_kernels(
 def _ways(half: str) -> Iterable[RunParameters]:
     """Ways of tracking that between them call every kernel, the usual ones first."""
     of_views = (
-        with_values(RunParameters(), {**preset, "single_view": single_view})
+        with_values(
+            RunParameters(),
+            {
+                **preset,
+                "single_view": single_view,
+                "fusion_method": "sequential_phd",
+                "smoothing_method": "none",
+            },
+        )
         for preset in PRESETS.values()
         for single_view in _own("single_view")
     )
@@ -104,15 +113,16 @@ def _ways(half: str) -> Iterable[RunParameters]:
         for values in (*PRESETS.values(), *_OTHER_WAYS)
         for fusion_method in _own("fusion_method")
     )
+    of_smoothings = (
+        RunParameters(single_view=single_view, smoothing_method=smoothing_method)
+        for single_view in FOLLOWING
+        for smoothing_method in _own("smoothing_method")
+    )
+    # neither compiles what the other does just then: that would be done twice
     if half == HALVES[0]:
-        of_smoothings = (
-            RunParameters(single_view=single_view, smoothing_method=smoothing_method)
-            for single_view in FOLLOWING
-            for smoothing_method in _own("smoothing_method")
-        )
-        return chain(of_smoothings, of_fusions)
-    boxes = RunParameters(single_view="detection_phd", fusion_method="sequential_phd")
-    return chain([boxes], of_views)
+        return of_views
+    boxes = RunParameters(single_view="none")
+    return chain([boxes], of_smoothings, of_fusions)
 
 
 def _own(key: MethodKey) -> list[str]:
