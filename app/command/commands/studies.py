@@ -112,14 +112,20 @@ def to_be_stopped() -> Iterator[threading.Event]:
 @contextmanager
 def crew_of(where: Where) -> Iterator[Any]:
     """What makes the workers that the flags name; they end with this."""
-    from tracker.studies.work.cluster import ADDRESS, DaskCrew
+    from tracker.studies.work.cluster import ADDRESS, DaskCrew, check_address
 
+    scheduler = where.scheduler or os.environ.get(ADDRESS) or None
+    if scheduler is not None:
+        try:
+            check_address(scheduler)
+        except StudyError as error:
+            name = "--scheduler" if where.scheduler else f"${ADDRESS}"
+            raise CommandError(f"{name}{str(error).removeprefix('scheduler')}") from None
     if where.workers is not None and where.workers < 1:
         raise CommandError(f"--workers: expected a whole number from 1, got {where.workers}")
     made: list[DaskCrew] = []
 
     def make(tell: Any) -> DaskCrew:
-        scheduler = where.scheduler or os.environ.get(ADDRESS) or None
         made.append(DaskCrew(scheduler, workers=where.workers, tell=tell))
         return made[0]
 

@@ -184,9 +184,9 @@ class StudyStatus(Model):
     """What a study does now."""
 
     runs: int
-    """That ended since it was started."""
+    """That ended, however often it was started."""
     seconds: float
-    """Since then."""
+    """In which it was at work."""
     seconds_left: float | None
     busy: float | None
     """Share of the workers' time in which they worked."""

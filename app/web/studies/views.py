@@ -39,8 +39,8 @@ def study_of(desk: StudyDesk, store: Store) -> models.Study:
             for one in summary.definition.varied
         ],
         status=models.StudyStatus(
-            runs=status.runs,
-            seconds=status.seconds,
+            runs=status.all_runs,
+            seconds=status.all_seconds,
             seconds_left=status.seconds_left,
             busy=status.busy,
             workers=[models.WorkerInfo(**one) for one in status.workers],

@@ -1157,9 +1157,9 @@ declare namespace Server {
 
 	/** What a study does now. */
 	interface StudyStatus {
-		/** That ended since it was started. */
+		/** That ended, however often it was started. */
 		runs: number;
-		/** Since then. */
+		/** In which it was at work. */
 		seconds: number;
 		seconds_left: number | null;
 		/** Share of the workers' time in which they worked. */
