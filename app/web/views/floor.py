@@ -54,7 +54,7 @@ def _grid(room: Room, cell: float) -> list[Float[ndarray, "P 3"]]:
         for number in np.arange(first, last + 1):
             ends = np.array([low, high])
             ends[:, axis], ends[:, 2] = number * cell, low[2]
-            ways.append(_way(*ends, cell))
+            ways.append(_way(ends[0], ends[1], cell))
     return ways
 
 
