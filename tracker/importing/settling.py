@@ -11,14 +11,15 @@ from numpy import ndarray
 
 from tracker.agreement.suggestion import STANDING, Suggestion, agreement, suggest
 from tracker.camera import Camera
-from tracker.checks.reading import Reading, read_boxes, to_camera
+from tracker.checks.level import lean_of
+from tracker.checks.reading import Reading, pose, read_boxes, to_camera
 from tracker.checks.readings import Open, Seen, find_meaning
 from tracker.formats.pieces import FormatError, Layout, RawCamera
 from tracker.importing.arriving import short_videos
 from tracker.importing.finding.calibrations import camera_sets
 from tracker.importing.finding.geometry import read_poses
 from tracker.importing.finding.matching import MatchedCamera, match_all
-from tracker.importing.finding.people import lean_of, rate_of, rays_of_all
+from tracker.importing.finding.people import rate_of, rays_of_all
 from tracker.importing.finding.pictures import picture_sizes, scaled
 from tracker.importing.finding.times import (
     CameraTime,
@@ -290,7 +291,10 @@ def _read(
     else:
         reading = meaning.reading
         if convention.up is None:
-            reading = replace(reading, lean=lean_of(meaning, raws))
+            poses = [pose(raw, reading) for raw in raws]
+            best = meaning.best
+            lean = lean_of(best.consensus, best.pictured, poses, best.turns, reading.up)
+            reading = replace(reading, lean=lean)
         share = 100.0 * meaning.best.consensus.share
         why = f"since {share:.0f} % of the boxes meet so"
         if unknown:
