@@ -31,6 +31,9 @@ def likely_unit(away: float, agreed: Consensus, height: float | None = None) -> 
 _USUAL_HEIGHTS = ((1.70, 0.15, 0.0), (1.2, 0.25, -1.5), (0.7, 0.2, -1.5), (0.25, 0.25, -0.5))
 """People standing, seated, head and torso, heads: metres, spread of the logarithm, log weight."""
 
+USUAL_HEIGHTS = tuple(height for height, _, _ in _USUAL_HEIGHTS)
+"""Metres: of boxes of people who stand, of seated ones, of heads with shoulders, of heads."""
+
 _USUAL_DISTANCE = (6.0, 0.9)  # metres from a camera, spread of the logarithm
 
 
