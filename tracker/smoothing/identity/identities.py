@@ -110,13 +110,26 @@ def _settled(
     refitted = smoother.fit(cut, links)
     own = Shared(links, shared.chances[:, kept], shared.missed[:, kept], shared.hidden_by[:, kept])
     worths, births, deaths = odds.of_pieces(smoother, refitted, own, parameters)
-    pairs = odds.goes_on(smoother, refitted.paths, links, parameters, looks)
+    known = pieces.Known.alone(refitted.paths, smoother.prior)
+    pairs = odds.goes_on(smoother, refitted.paths, known, links, parameters, looks)
     longest = max(round(parameters.longest / smoother.model.step_time), 1)
     now, later = ties.parted(cut, longest)
     following, used = joining.join(
         worths, births, deaths, pairs.earlier, pairs.later, pairs.gains, now
     )
     first = joining.chains(following, used)
+    import os
+    for _ in range(int(os.environ.get("I14_N","1"))):
+        whole, rows = pieces.chained(refitted.paths, first, list(range(len(first))))
+        as_chains = smoother.fit(whole, pieces.moved_to(links, rows))
+        more = known.in_chains(refitted.paths, as_chains, rows, smoother.model.motion)
+        pairs = odds.goes_on(smoother, refitted.paths, more, links, parameters, looks)
+        following, used = joining.join(
+            worths, births, deaths, pairs.earlier, pairs.later, pairs.gains, now
+        )
+        again = joining.chains(following, used)
+        if again == first: break
+        first = again
     of_chains = later.of_chains(first, cut)
     if of_chains is None:  # who is tied to somebody far away may not be joined to another meanwhile
         following, used = joining.join(

@@ -11,6 +11,7 @@ from numpy import ndarray
 
 from tracker.filters.models import Motion
 from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.smoother import Fitted
 
 
 def contested(paths: Paths, links: Links) -> Float[ndarray, " N"]:
@@ -107,8 +108,66 @@ class Pairs:
         )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Known:
+    """What is known of n pieces at both ends."""
+
+    ends: Float[ndarray, "n d"]
+    """By what is before its end, the last state of each."""
+    end_covariances: Float[ndarray, "n d d"]
+    information: Float[ndarray, "n d d"]
+    """Λ of what comes from its beginning on, of the first state of each."""
+    vectors: Float[ndarray, "n d"]
+    """η."""
+
+    @staticmethod
+    def alone(pieces: Paths, prior: Float[ndarray, "d d"]) -> Known:
+        """By the boxes of each alone, to which it was fitted."""
+        ends, begins = pieces.starts[1:] - 1, pieces.starts[:-1]
+        inverse, origin = np.linalg.inv(pieces.covariances[begins]), np.linalg.inv(prior)
+        centre = pieces.states[begins].copy()
+        centre[:, 3:] = 0.0
+        vectors = np.einsum("pij,pj->pi", inverse, pieces.states[begins]) - centre @ origin
+        return Known(
+            pieces.states[ends], pieces.covariances[ends], inverse - origin, vectors
+        )
+
+    def in_chains(
+        self, cut: Paths, fitted: Fitted, rows: Int[ndarray, " M"], motion: Motion
+    ) -> Known:
+        """With what the chains of pieces say before and after each, to which they were fitted.
+
+        Args:
+            cut: The pieces.
+            fitted: Their chains.
+            rows: Of the chains, those of the pieces' rows, -1 for nobody's.
+            motion: Of both.
+        """
+        firsts, lasts = rows[cut.starts[:-1]], rows[cut.starts[1:] - 1]
+        known = np.flatnonzero(firsts >= 0)
+        paths = fitted.paths
+        first, last = firsts[known], lasts[known]
+        ends, end_covariances = self.ends.copy(), self.end_covariances.copy()
+        information, vectors = self.information.copy(), self.vectors.copy()
+        back = np.linalg.inv(motion.transition)
+        goes = np.ones(len(known), dtype=bool)
+        goes[np.isin(last, paths.starts[1:] - 1)] = False
+        ends[known[~goes]] = paths.states[last[~goes]]
+        end_covariances[known[~goes]] = paths.covariances[last[~goes]]
+        after = last[goes] + 1
+        ends[known[goes]] = fitted.ahead[after] @ back.T
+        end_covariances[known[goes]] = back @ (fitted.ahead_covariances[after] - motion.noise) @ back.T
+        inverse = np.linalg.inv(paths.covariances[first])
+        before = np.linalg.inv(fitted.ahead_covariances[first])
+        information[known] = inverse - (1.0 - 1e-9) * before
+        vectors[known] = np.einsum("pij,pj->pi", inverse, paths.states[first])
+        vectors[known] -= (1.0 - 1e-9) * np.einsum("pij,pj->pi", before, fitted.ahead[first])
+        return Known(ends, end_covariances, information, vectors)
+
+
 def motion_pairs(
     pieces: Paths,
+    known: Known,
     motion: Motion,
     prior: Float[ndarray, "d d"],
     log_place: float,
@@ -154,15 +213,12 @@ def motion_pairs(
         transitions[k + 1] = motion.transition @ transitions[k]
         noises[k + 1] = motion.transition @ noises[k] @ motion.transition.T + motion.noise
     f = transitions[gaps]
-    a = np.einsum("pij,pj->pi", f, pieces.states[ends[earlier]])
-    spread = f @ pieces.covariances[ends[earlier]] @ f.transpose(0, 2, 1) + noises[gaps]
-    inverse = np.linalg.inv(pieces.covariances[begins])
-    origin = np.linalg.inv(prior)
-    information = inverse - origin
+    a = np.einsum("pij,pj->pi", f, known.ends[earlier])
+    spread = f @ known.end_covariances[earlier] @ f.transpose(0, 2, 1) + noises[gaps]
+    information, vectors = known.information, known.vectors
     centre = pieces.states[begins].copy()
     centre[:, 3:] = 0.0
-    vectors = np.einsum("pij,pj->pi", inverse, pieces.states[begins]) - centre @ origin
-    newcomer = log_integral(centre, np.broadcast_to(prior, inverse.shape), information, vectors)
+    newcomer = log_integral(centre, np.broadcast_to(prior, information.shape), information, vectors)
     gains = (
         log_integral(a, spread, information[later], vectors[later]) - newcomer[later] - log_place
     )
