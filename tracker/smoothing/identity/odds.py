@@ -13,7 +13,8 @@ from tracker.kernels.smoothing import evidence
 from tracker.parameters import SmoothingParams
 from tracker.smoothing.identity import pieces
 from tracker.smoothing.identity.appearance import Appearance
-from tracker.smoothing.identity.pieces import Known, Pairs, chained, same_label
+from tracker.smoothing.identity.ends import Ends
+from tracker.smoothing.identity.pieces import Pairs, chained, same_label
 from tracker.smoothing.lifetimes import independence, misses
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.smoother import Fitted, Shared, Smoother
@@ -51,7 +52,7 @@ def anew(smoother: Smoother) -> float:
 def goes_on(
     smoother: Smoother,
     paths: Paths,
-    known: Known,
+    known: Ends,
     links: Links,
     p: SmoothingParams,
     looks: Many[Float[ndarray, "B A"]] | None,

@@ -10,8 +10,11 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.filters.models import Motion
+from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.paths import Links, Paths
-from tracker.smoothing.smoother import Fitted
+
+_CHANGES = 0.1
+"""Probability that somebody begins to move as the motion model says while nobody sees him."""
 
 
 def contested(paths: Paths, links: Links) -> Float[ndarray, " N"]:
@@ -108,66 +111,9 @@ class Pairs:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Known:
-    """What is known of n pieces at both ends."""
-
-    ends: Float[ndarray, "n d"]
-    """By what is before its end, the last state of each."""
-    end_covariances: Float[ndarray, "n d d"]
-    information: Float[ndarray, "n d d"]
-    """Λ of what comes from its beginning on, of the first state of each."""
-    vectors: Float[ndarray, "n d"]
-    """η."""
-
-    @staticmethod
-    def alone(pieces: Paths, prior: Float[ndarray, "d d"]) -> Known:
-        """By the boxes of each alone, to which it was fitted."""
-        ends, begins = pieces.starts[1:] - 1, pieces.starts[:-1]
-        inverse, origin = np.linalg.inv(pieces.covariances[begins]), np.linalg.inv(prior)
-        centre = pieces.states[begins].copy()
-        centre[:, 3:] = 0.0
-        vectors = np.einsum("pij,pj->pi", inverse, pieces.states[begins]) - centre @ origin
-        return Known(
-            pieces.states[ends], pieces.covariances[ends], inverse - origin, vectors
-        )
-
-    def in_chains(
-        self, cut: Paths, fitted: Fitted, rows: Int[ndarray, " M"], motion: Motion
-    ) -> Known:
-        """With what the chains of pieces say before and after each, to which they were fitted.
-
-        Args:
-            cut: The pieces.
-            fitted: Their chains.
-            rows: Of the chains, those of the pieces' rows, -1 for nobody's.
-            motion: Of both.
-        """
-        firsts, lasts = rows[cut.starts[:-1]], rows[cut.starts[1:] - 1]
-        known = np.flatnonzero(firsts >= 0)
-        paths = fitted.paths
-        first, last = firsts[known], lasts[known]
-        ends, end_covariances = self.ends.copy(), self.end_covariances.copy()
-        information, vectors = self.information.copy(), self.vectors.copy()
-        back = np.linalg.inv(motion.transition)
-        goes = np.ones(len(known), dtype=bool)
-        goes[np.isin(last, paths.starts[1:] - 1)] = False
-        ends[known[~goes]] = paths.states[last[~goes]]
-        end_covariances[known[~goes]] = paths.covariances[last[~goes]]
-        after = last[goes] + 1
-        ends[known[goes]] = fitted.ahead[after] @ back.T
-        end_covariances[known[goes]] = back @ (fitted.ahead_covariances[after] - motion.noise) @ back.T
-        inverse = np.linalg.inv(paths.covariances[first])
-        before = np.linalg.inv(fitted.ahead_covariances[first])
-        information[known] = inverse - (1.0 - 1e-9) * before
-        vectors[known] = np.einsum("pij,pj->pi", inverse, paths.states[first])
-        vectors[known] -= (1.0 - 1e-9) * np.einsum("pij,pj->pi", before, fitted.ahead[first])
-        return Known(ends, end_covariances, information, vectors)
-
-
 def motion_pairs(
     pieces: Paths,
-    known: Known,
+    known: Ends,
     motion: Motion,
     prior: Float[ndarray, "d d"],
     log_place: float,
@@ -177,15 +123,17 @@ def motion_pairs(
 ) -> Pairs:
     """The pairs that the motion allows, with the motion's log odds.
 
-    With Λ, η the information that the boxes of the later piece hold of its first state, and
-    N(a, A) the earlier one's last state predicted over the gap,
+    With Λ, η the information of what is from the later piece's beginning on, and N(a, A_s) the
+    earlier one's last state predicted over the gap by a motion with noise s Q,
 
-        gain = log ∫ N(x; a, A) e^{ηᵀx − ½ xᵀΛx} dx − log ∫ p_0(x) e^{ηᵀx − ½ xᵀΛx} dx
+        gain = log Σ_s w_s ∫ N(x; a, A_s) e^{ηᵀx − ½ xᵀΛx} dx − log ∫ p_0(x) e^{ηᵀx − ½ xᵀΛx} dx
 
-    with the density p_0 of a newcomer: anywhere in the room, at a newcomer's speed.
+    with the density p_0 of a newcomer: anywhere in the room, at a newcomer's speed. The person is
+    mostly as restless as before and after, s = √(s_i s_j), and else no less than the motion says.
 
     Args:
         pieces: Each fitted to its own boxes alone.
+        known: Of their ends.
         motion: Of the fusion.
         prior: Covariance of a first state in the fit.
         log_place: What turns its density into that of the room.
@@ -214,14 +162,24 @@ def motion_pairs(
         noises[k + 1] = motion.transition @ noises[k] @ motion.transition.T + motion.noise
     f = transitions[gaps]
     a = np.einsum("pij,pj->pi", f, known.ends[earlier])
-    spread = f @ known.end_covariances[earlier] @ f.transpose(0, 2, 1) + noises[gaps]
-    information, vectors = known.information, known.vectors
+    spread = f @ known.covariances[earlier] @ f.transpose(0, 2, 1)
+    own = np.sqrt(known.restlessness[earlier, 1] * known.restlessness[later, 0])
+    told = known.information[later], known.vectors[later]
     centre = pieces.states[begins].copy()
     centre[:, 3:] = 0.0
-    newcomer = log_integral(centre, np.broadcast_to(prior, information.shape), information, vectors)
-    gains = (
-        log_integral(a, spread, information[later], vectors[later]) - newcomer[later] - log_place
+    newcomer = log_integral(
+        centre,
+        np.broadcast_to(prior, known.information.shape),
+        known.information,
+        known.vectors,
     )
+    gains = np.logaddexp(
+        *(
+            np.log(weight) + log_integral(a, spread + s[:, None, None] * noises[gaps], *told)
+            for weight, s in ((1.0 - _CHANGES, own), (_CHANGES, np.maximum(own, 1.0)))
+        )
+    )
+    gains -= newcomer[later] + log_place
     return Pairs(earlier, later, gaps, gains)
 
 
