@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tracker.experiments import association
-from tracker.experiments.association import DEFAULTS, ONE_OBJECT, PUBLISHED, compare
+from tracker.experiments.claims import association
+from tracker.experiments.claims.association import DEFAULTS, ONE_OBJECT, PUBLISHED, compare
 from tracker.experiments.clips.association import (
     CLIPS,
     FULL_LIGHT,

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tracker.experiments import EXPERIMENTS, Context, Unavailable
-from tracker.experiments.cmc import BEST_PUBLISHED, GATES, methods
+from tracker.experiments.claims.cmc import BEST_PUBLISHED, GATES, methods
 
 
 def test_without_the_recordings_it_says_what_is_missing(tmp_path: Path) -> None:

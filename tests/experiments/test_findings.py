@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tracker.experiments import EXPERIMENTS, Experiment, Result, cameras, fig1, fig3
+from tracker.experiments import EXPERIMENTS, Experiment, Result
+from tracker.experiments.claims import cameras, fig1, fig3
 from tracker.experiments.laboratory import sequences
 from tracker.experiments.laboratory.writing import write
 

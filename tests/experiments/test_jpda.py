@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tracker.experiments import Context, jpda
-from tracker.experiments.jpda import CLASSICAL, DEFAULTS, PUBLISHED, STEPS, centre_errors
+from tracker.experiments import Context
+from tracker.experiments.claims import jpda
+from tracker.experiments.claims.jpda import CLASSICAL, DEFAULTS, PUBLISHED, STEPS, centre_errors
 from tracker.single_view.protocol import ViewResult
 
 

@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
-from tracker.experiments import Context, cameras, methods
-from tracker.experiments.methods import BOXES_RECORDING, ON_BOXES, ON_PICTURES
+from tracker.experiments import Context
+from tracker.experiments.claims import cameras, methods
+from tracker.experiments.claims.methods import BOXES_RECORDING, ON_BOXES, ON_PICTURES
 from tracker.parameters import METHODS
 from tracker.sequences.reader import read_sequence
 

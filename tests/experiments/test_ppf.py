@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.testing import assert_array_equal
 
-from tracker.experiments import Context, ppf
+from tracker.experiments import Context
+from tracker.experiments.claims import ppf
+from tracker.experiments.claims.ppf import CLASSICAL, PSEUDO, ROBUST, Scene
 from tracker.experiments.clips import clip as clips
 from tracker.experiments.clips.clip import Clip
 from tracker.experiments.clips.ppf import CLIPS, SHADE
 from tracker.experiments.laboratory.pool import Desk
-from tracker.experiments.ppf import CLASSICAL, PSEUDO, ROBUST, Scene
 
 NOBODY = Desk(advance=lambda steps: None, cancelled=lambda: False)
 BOX = [50.0, 60.0, 10.0, 14.0]

@@ -13,11 +13,12 @@ from typing import Any
 import pytest
 
 from tests.conftest import DATA
-from tracker.experiments import EXPERIMENTS, association, jpda, ppf
+from tracker.experiments import EXPERIMENTS
+from tracker.experiments.claims import association, jpda, ppf
+from tracker.experiments.claims.cmc import GATES
+from tracker.experiments.claims.cmc import methods as cmc_methods
+from tracker.experiments.claims.methods import ON_PICTURES
 from tracker.experiments.clips.light import ROBUST
-from tracker.experiments.cmc import GATES
-from tracker.experiments.cmc import methods as cmc_methods
-from tracker.experiments.methods import ON_PICTURES
 
 pytestmark = pytest.mark.full
 

@@ -1,6 +1,7 @@
 """The claims of the papers, run again: ``multiview-phd experiment NAME``.
 
-One module a claim; its ``EXPERIMENT`` is entered in :mod:`tracker.experiments.registry`.
+One module a claim in :mod:`tracker.experiments.claims`; its ``EXPERIMENT`` is entered in
+:mod:`tracker.experiments.registry`.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tracker.experiments import (
+from tracker.experiments.claims import (
     association,
     cameras,
     cmc,

@@ -1086,7 +1086,7 @@ declare namespace Server {
 	/** What a study would take. */
 	interface StudyCost {
 		runs: number;
-		/** Null where nothing is known of how long a run takes. */
+		/** Null where nothing is known of how long a run takes, or of how many there are at a time. */
 		seconds: number | null;
 		bytes: number;
 		words: string;

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from tracker.evaluation import evaluate_sequence
 from tracker.evaluation.figures import number
-from tracker.experiments import cameras, fig1
-from tracker.experiments.fig1 import ROOM
+from tracker.experiments.claims import cameras, fig1
+from tracker.experiments.claims.fig1 import ROOM
 from tracker.experiments.laboratory import runs
 from tracker.experiments.laboratory.experiment import (
     Context,

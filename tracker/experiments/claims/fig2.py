@@ -10,7 +10,7 @@ import numpy as np
 from tracker.boxes import box_overlaps
 from tracker.evaluation.figures import number
 from tracker.evaluation.measures.matching import assign
-from tracker.experiments.fig1 import QUICK_STEPS, ROOM
+from tracker.experiments.claims.fig1 import QUICK_STEPS, ROOM
 from tracker.experiments.laboratory import runs
 from tracker.experiments.laboratory.experiment import Context, Experiment, Finding, Result
 from tracker.pipeline import Run

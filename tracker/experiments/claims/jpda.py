@@ -22,7 +22,7 @@ from tracker.assignment import linear_sum_assignment
 from tracker.boxes import Boxes
 from tracker.evaluation.figures import number
 from tracker.evaluation.measures.matching import assign
-from tracker.experiments import cameras
+from tracker.experiments.claims import cameras
 from tracker.experiments.clips import clip as clips
 from tracker.experiments.laboratory import runs
 from tracker.experiments.laboratory.experiment import (

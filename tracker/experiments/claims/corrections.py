@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from tracker import pipeline
 from tracker.evaluation import EvaluationSettings
 from tracker.evaluation.figures import number
-from tracker.experiments.answering import Answered, session
 from tracker.experiments.laboratory import runs
+from tracker.experiments.laboratory.answering import Answered, session
 from tracker.experiments.laboratory.experiment import (
     Context,
     Experiment,

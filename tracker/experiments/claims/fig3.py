@@ -15,7 +15,7 @@ from tracker import parameters as table
 from tracker import pipeline
 from tracker.evaluation import EvaluationSettings, evaluate
 from tracker.evaluation.figures import number
-from tracker.experiments.fig1 import QUICK_STEPS, ROOM
+from tracker.experiments.claims.fig1 import QUICK_STEPS, ROOM
 from tracker.experiments.laboratory import runs
 from tracker.experiments.laboratory.experiment import Context, Experiment, Finding, Result, Verdict
 from tracker.experiments.laboratory.noise import NoisyReader

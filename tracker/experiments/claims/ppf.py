@@ -16,7 +16,7 @@ from tracker import parameters as table
 from tracker import single_view
 from tracker.evaluation.figures import number
 from tracker.evaluation.measures.matching import assign
-from tracker.experiments import cameras
+from tracker.experiments.claims import cameras
 from tracker.experiments.clips import clip as clips
 from tracker.experiments.clips.ppf import CLIPS
 from tracker.experiments.laboratory import runs

@@ -12,7 +12,7 @@ import numpy as np
 from tracker import parameters as table
 from tracker.evaluation import EvaluationSettings, evaluate
 from tracker.evaluation.figures import number
-from tracker.experiments.fig3 import parameters_of
+from tracker.experiments.claims.fig3 import parameters_of
 from tracker.experiments.laboratory import runs
 from tracker.experiments.laboratory.experiment import Context, Experiment, Finding, Result
 from tracker.experiments.laboratory.pool import Desk, spread

@@ -11,7 +11,7 @@ from tracker import parameters as table
 from tracker import pipeline
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.evaluation.figures import number
-from tracker.experiments import cameras, fig1
+from tracker.experiments.claims import cameras, fig1
 from tracker.experiments.laboratory import runs, sequences
 from tracker.experiments.laboratory.experiment import (
     Context,
