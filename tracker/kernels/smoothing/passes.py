@@ -303,4 +303,5 @@ def sums_around(starts: ndarray, values: ndarray, kept: float) -> ndarray:
             before[k] += kept * before[k - 1]
         for k in range(last - 2, first - 1, -1):
             after[k] += kept * after[k + 1]
-    return before + after - values
+    total: ndarray = before + after - values
+    return total
