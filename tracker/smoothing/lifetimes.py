@@ -14,6 +14,9 @@ from tracker.smoothing.smoother import Shared, Smoother
 UNSURE = 0.3
 """Existence with which a row beyond a path's ends, or within its gaps, competes for boxes."""
 
+_MEETING = 2
+"""Cameras whose boxes of anything meet somewhere."""
+
 _SAID = 1e4
 """Votes for a person where somebody said that he is: more than any camera has against it."""
 
@@ -36,7 +39,9 @@ def lifetimes(
 
     A camera that shows the person votes for him with as much as it would against him if it
     showed nothing, log 1/(1 − p_D): a false box that stays is no better witness than a miss.
-    Where stage 1 tells how much likelier a person looks so, log Λ is added to that.
+    Where stage 1 tells how much likelier a person looks so, log Λ is added to that. Two boxes of
+    something else meet somewhere in the room; a third at the same place hardly does. So each
+    camera beyond the second outweighs as much doubt of how the boxes look as it is worth a vote.
 
     Returns:
         (N,) probabilities; (n,) log odds of a person at some step against nobody.
@@ -50,7 +55,9 @@ def lifetimes(
         looks[own] = -np.log(camera.clutter_factors[links.boxes[own]])
     rows = len(paths.states)
     votes = hit * np.bincount(links.rows, links.shares, rows)
-    votes += np.bincount(links.rows, links.shares * looks, rows)
+    looking = np.bincount(links.rows, links.shares * looks, rows)
+    agreeing = np.maximum(np.bincount(links.rows, links.shares, rows) - _MEETING, 0.0)
+    votes += np.where(looking < 0.0, np.minimum(looking + hit * agreeing, 0.0), looking)
     votes[smoother.pinned(paths)[0]] += _SAID
     weight = independence(smoother.model.step_time, parameters.memory)
     survival = min(p.survival_probability, 1.0 - 1e-9)

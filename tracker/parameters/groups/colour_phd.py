@@ -59,7 +59,7 @@ class ColourPeakParams(Params):
 
     shapes: Annotated[
         Literal["never", "unsure", "fitting", "always"], ui("S_h", published="never")
-    ] = "unsure"
+    ] = "fitting"
     """Whether people found by shape count as well: where the foreground is not to be believed
     about somebody; also where they lie where the templates are; or always."""
 

@@ -218,13 +218,16 @@ class PeakFinder:
         s = self._shape_numbers
         near = self._near(found, peaks)
         alone = np.flatnonzero(~near.any(axis=0))
+        # the surest alone: others there are parts of the same person
+        surest = np.where(near, found.log_odds[:, None], -np.inf)
+        vouched = near & (surest == surest.max(axis=0, initial=-np.inf))
         seen = self._trusted(person)  # by the foreground, which took each peak for somebody
         ratios = log_ratios(found.log_odds, s.even_odds, s.odds_weight, s.largest_ratio)
-        ratios = ratios + COLOUR_RATIO * near.any(axis=1)
-        ratios = _at_least(ratios, np.where(near, seen, 0.0).max(axis=1, initial=0.0))
+        ratios = ratios + COLOUR_RATIO * vouched.any(axis=1)
+        ratios = _at_least(ratios, np.where(vouched, seen, 0.0).max(axis=1, initial=0.0))
         least = log_ratios(np.array(s.passed_odds), s.even_odds, s.odds_weight, s.largest_ratio)
         told = self._by_shape[person[alone]]
-        of_alone = _at_least(np.log(told * np.exp(least) + 1.0 - told), seen[alone])
+        of_alone = np.log(told * np.exp(least) + 1.0 - told)
         return Passed(
             np.concatenate([found.boxes, peaks[alone]]),
             self._likelihood(np.concatenate([self._nearest(scene, found.boxes), distances[alone]])),
