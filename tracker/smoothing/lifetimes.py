@@ -39,9 +39,11 @@ def lifetimes(
 
     A camera that shows the person votes for him with as much as it would against him if it
     showed nothing, log 1/(1 − p_D): a false box that stays is no better witness than a miss.
-    Where stage 1 tells how much likelier a person looks so, log Λ is added to that. Two boxes of
-    something else meet somewhere in the room; a third at the same place hardly does. So each
-    camera beyond the second outweighs as much doubt of how the boxes look as it is worth a vote.
+
+    Where stage 1 tells how much likelier a person looks so, log Λ is added to that; its boxes are
+    many, and most are false. One alone has a place somewhere on its ray whatever it shows, so
+    that only its looks count. Two of something else meet somewhere in the room, a third hardly
+    meets them: each beyond the second outweighs as much doubt of their looks as a vote.
 
     Returns:
         (N,) probabilities; (n,) log odds of a person at some step against nobody.
@@ -54,10 +56,13 @@ def lifetimes(
         own = links.cameras == c
         looks[own] = -np.log(camera.clutter_factors[links.boxes[own]])
     rows = len(paths.states)
-    votes = hit * np.bincount(links.rows, links.shares, rows)
-    looking = np.bincount(links.rows, links.shares * looks, rows)
-    agreeing = np.maximum(np.bincount(links.rows, links.shares, rows) - _MEETING, 0.0)
-    votes += np.where(looking < 0.0, np.minimum(looking + hit * agreeing, 0.0), looking)
+    shown = np.bincount(links.rows, links.shares, rows)
+    votes = hit * shown
+    if looks.any():
+        doubt = np.bincount(links.rows, links.shares * looks, rows)
+        outweighed = np.minimum(doubt + hit * np.maximum(shown - _MEETING, 0.0), 0.0)
+        votes = hit * np.minimum(shown, 2.0 * np.maximum(shown - 1.0, 0.0))
+        votes += np.where(doubt < 0.0, outweighed, doubt)
     votes[smoother.pinned(paths)[0]] += _SAID
     weight = independence(smoother.model.step_time, parameters.memory)
     survival = min(p.survival_probability, 1.0 - 1e-9)

@@ -212,13 +212,14 @@ class PeakFinder:
     ) -> Passed:
         """People by shape, surer where a peak is of the same, and peaks where there is no shape.
 
-        Of those ln (t Λ + 1 - t) tells what it means that nobody would take them for a person,
-        where t says how far the shapes are to be believed about whose colours they have.
+        A peak vouches for the surest shape at its place: others there are parts of the same
+        person. Of a peak without any ln (t Λ + 1 - t) tells what it means that nobody would take
+        it for a person, where t says how far the shapes are to be believed about whose colours
+        it has; that it lies on the foreground is no excuse, for so do parts of people and shadows.
         """
         s = self._shape_numbers
         near = self._near(found, peaks)
         alone = np.flatnonzero(~near.any(axis=0))
-        # the surest alone: others there are parts of the same person
         surest = np.where(near, found.log_odds[:, None], -np.inf)
         vouched = near & (surest == surest.max(axis=0, initial=-np.inf))
         seen = self._trusted(person)  # by the foreground, which took each peak for somebody
