@@ -59,9 +59,10 @@ class ColourPeakParams(Params):
 
     shapes: Annotated[
         Literal["never", "unsure", "fitting", "always"], ui("S_h", published="never")
-    ] = "fitting"
+    ] = "unsure"
     """Whether people found by shape count as well: where the foreground is not to be believed
-    about somebody; also where they lie where the templates are; or always."""
+    about somebody, or not everybody has a template in every camera; also where they lie where
+    the templates are; or always."""
 
     shape_odds: Annotated[
         float,
