@@ -6,8 +6,8 @@ kernels; what the first real run calls is then there.
 
 ``python -m tracker.warm_up`` does it in two processes, one a half of the methods, which
 leave the interpreter of the workbench alone. Each tells how far it is: a line ``done
-total`` whenever a kernel has been compiled; the first half tells ``ready`` when the methods
-that a sequence starts with have what cannot run as plain Python.
+total`` whenever a kernel has been compiled; the first half tells ``ready`` when the method
+that a sequence with templates starts with has what cannot run as plain Python.
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ _COLOURS = ((40, 40, 220), (220, 60, 40))
 """Of the two people, blue green red."""
 
 HALVES = ("first", "second")
-"""The work of two processes: the fusion's step takes longest to compile, and has its own."""
+"""The work of two processes: stage 1 with the intensity filter; and the labelled fusion's step,
+which takes longest to compile, with what comes after it."""
 
 _OTHER_WAYS = (
     {"fusion.update": "unscented"},
@@ -68,8 +69,8 @@ def compile_kernels(
         half: One of :data:`HALVES`.
         told: Called with the number of kernels that are ready and of all, whenever one has
             been compiled.
-        ready: Called by the first half when the methods that a sequence starts with have the
-            kernels that cannot run as plain Python.
+        ready: Called by the first half when the method that a sequence with templates starts
+            with has the kernels that cannot run as plain Python.
     """
     for methods in REGISTERED.values():
         for method in methods.values():
@@ -81,10 +82,11 @@ def compile_kernels(
     ):
         recording = _recording(Path(folder))
         if half == HALVES[0]:
-            with compilation.only_of_pixels():
-                for single_view in FOLLOWING:
+            for single_view in FOLLOWING:
+                with compilation.only_of_pixels():
                     pipeline.compute(recording, RunParameters(single_view=single_view))
-            ready()
+                if single_view == FOLLOWING[0]:
+                    ready()
         for parameters in _ways(half):
             pipeline.compute(recording, parameters)
 
@@ -92,7 +94,15 @@ def compile_kernels(
 def _ways(half: str) -> Iterable[RunParameters]:
     """Ways of tracking that between them call every kernel, the usual ones first."""
     of_views = (
-        with_values(RunParameters(), {**preset, "single_view": single_view})
+        with_values(
+            RunParameters(),
+            {
+                **preset,
+                "single_view": single_view,
+                "fusion_method": "sequential_phd",
+                "smoothing_method": "none",
+            },
+        )
         for preset in PRESETS.values()
         for single_view in _own("single_view")
     )
@@ -103,15 +113,16 @@ def _ways(half: str) -> Iterable[RunParameters]:
         for values in (*PRESETS.values(), *_OTHER_WAYS)
         for fusion_method in _own("fusion_method")
     )
+    of_smoothings = (
+        RunParameters(single_view=single_view, smoothing_method=smoothing_method)
+        for single_view in FOLLOWING
+        for smoothing_method in _own("smoothing_method")
+    )
+    # neither compiles what the other does just then: that would be done twice
     if half == HALVES[0]:
-        of_smoothings = (
-            RunParameters(single_view=single_view, smoothing_method=smoothing_method)
-            for single_view in FOLLOWING
-            for smoothing_method in _own("smoothing_method")
-        )
-        return chain(of_smoothings, of_fusions)
-    boxes = RunParameters(single_view="detection_phd", fusion_method="sequential_phd")
-    return chain([boxes], of_views)
+        return of_views
+    boxes = RunParameters(single_view="none")
+    return chain([boxes], of_smoothings, of_fusions)
 
 
 def _own(key: MethodKey) -> list[str]:
@@ -197,7 +208,7 @@ def main() -> int:
             compilation.mark_compiled()
         return max(statuses)
     half = sys.argv[1]
-    _give_way(5 if half == HALVES[0] else 15)
+    _give_way(5 if half == HALVES[0] else 19)
 
     def say(words: str) -> None:
         sys.stdout.write(f"{words}\n")

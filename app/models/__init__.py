@@ -12,6 +12,7 @@ from app.models.base import (
     Vector,
 )
 from app.models.course import CourseKind, CourseKinds, Courses, TrackCourse
+from app.models.floor import CameraFloor, Floor
 from app.models.requests import (
     CurveRequest,
     LayerChanges,
@@ -79,6 +80,7 @@ from app.models.timeline import (
 __all__ = [
     "Box",
     "CameraEvent",
+    "CameraFloor",
     "CameraInfo",
     "CameraStep",
     "CameraTrack",
@@ -92,6 +94,7 @@ __all__ = [
     "EntranceInfo",
     "Estimate",
     "Feeding",
+    "Floor",
     "Gate",
     "GroupInfo",
     "LaneEvent",

@@ -20,6 +20,8 @@ class Measurement(Model):
     """Of one that is nobody's: the track that it is nearest to."""
     sigmas: float | None = None
     """And how far that is, in standard deviations of where its box is expected."""
+    gate: float | None = None
+    """And within how many of them a box would have been taken for the track's."""
 
 
 class Estimate(Model):

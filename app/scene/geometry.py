@@ -1,4 +1,4 @@
-"""Shapes of the 3D scene as arrays: ellipsoids, boxes, trails, the view of the whole volume."""
+"""Shapes of the 3D scene as arrays: ellipsoids, boxes, trails."""
 
 from __future__ import annotations
 
@@ -76,6 +76,26 @@ def ellipsoids(
     variances, axes = np.linalg.eigh(covariances)
     axes[:, :, 0] *= np.sign(np.linalg.det(axes))[:, None]  # a rotation, not a mirror
     return quaternions(axes), np.sqrt(np.maximum(variances, 0.0)) * mass_radius(mass)
+
+
+def surfaces(
+    means: Float[ndarray, "N 3"], wxyzs: Float[ndarray, "N 4"], axes: Float[ndarray, "N 3"]
+) -> Float[ndarray, "M 3"]:
+    """Points all over ellipsoids, 42 of each.
+
+    Args:
+        means: Their middles.
+        wxyzs: Unit quaternions of their turns.
+        axes: Half axes.
+    """
+    ball = icosphere(1)[0]
+    w, x, y, z = (part[:, None] for part in wxyzs.T)
+    local = ball[None] * axes[:, None]
+    imaginary = np.concatenate([x, y, z], axis=1)[:, None]
+    # v + 2 w (u × v) + 2 u × (u × v), the turn of v by the quaternion (w, u)
+    turned = np.cross(imaginary, local)
+    placed = local + 2.0 * w[..., None] * turned + 2.0 * np.cross(imaginary, turned)
+    return np.asarray(means[:, None] + placed).reshape(-1, 3)
 
 
 @cache
@@ -285,97 +305,3 @@ def trails(
         ids=ids[starts],
         ages=np.stack([ages[starts], ages[starts + 1]], axis=1),
     )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Pose:
-    """Where to look from, at what, and how wide."""
-
-    position: Float[ndarray, " 3"]
-    look_at: Float[ndarray, " 3"]
-    up: Float[ndarray, " 3"]
-    fov: float
-    """Vertical field of view, radians."""
-
-
-def overview(
-    points: Float[ndarray, "N 3"],
-    eyes: Float[ndarray, "C 3"],
-    centre: Float[ndarray, " 3"],
-    aspect: float,
-    fov: float = 0.72,
-    elevation: float = 0.56,
-) -> Pose:
-    """A pose outside and above that has all points in the picture.
-
-    Of the directions around, the one is taken that lets it come nearest, where a camera in
-    front of the volume counts as if it were a quarter farther.
-
-    Args:
-        points: What must be seen: corners of the volume, the cameras.
-        eyes: The cameras' positions.
-        centre: Of the volume.
-        aspect: Width over height of the picture.
-        fov: Vertical field of view, radians.
-        elevation: Angle above the floor, radians.
-    """
-    around = np.arctan2(eyes[:, 1] - centre[1], eyes[:, 0] - centre[0])
-    best: tuple[float, Pose] | None = None
-    for azimuth in np.deg2rad(-52.0) + np.arange(24) * np.pi / 12.0:
-        pose = _framed(points, centre, aspect, fov, elevation, float(azimuth))
-        near = np.max(np.cos(around - azimuth), initial=0.0)
-        cost = float(np.linalg.norm(pose.position - pose.look_at)) * (1.0 + 0.25 * near)
-        if best is None or cost < best[0] - 1e-9:
-            best = cost, pose
-    assert best is not None
-    return best[1]
-
-
-def _framed(
-    points: Float[ndarray, "N 3"],
-    centre: Float[ndarray, " 3"],
-    aspect: float,
-    fov: float,
-    elevation: float,
-    azimuth: float,
-) -> Pose:
-    """The nearest pose in a direction that has all points in the picture."""
-    away = np.array(
-        [
-            np.cos(azimuth) * np.cos(elevation),
-            np.sin(azimuth) * np.cos(elevation),
-            np.sin(elevation),
-        ]
-    )
-    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
-    up = np.cross(away, right)
-    tangent = np.tan(fov / 2.0) * 0.94  # a margin at the edges
-    across, above, nearer = ((points - centre) @ np.stack([right, up, away], axis=1)).T
-    shift_x = shift_y = 0.0
-    distance = 1.0
-    for _ in range(8):
-        wide = np.abs(across - shift_x) / (tangent * aspect) + nearer
-        tall = np.abs(above - shift_y) / tangent + nearer
-        distance = float(max(wide.max(), tall.max()))
-        depth = distance - nearer
-        sideways, upright = (across - shift_x) / depth, (above - shift_y) / depth
-        shift_x += float(sideways.max() + sideways.min()) * distance / 2.0
-        shift_y += float(upright.max() + upright.min()) * distance / 2.0
-    target = centre + shift_x * right + shift_y * up
-    return Pose(target + distance * away, target, np.array([0.0, 0.0, 1.0]), fov)
-
-
-def from_above(points: Float[ndarray, "N 3"], aspect: float, fov: float = 0.3) -> Pose:
-    """A pose high above that has all points in the picture: nearly a plan, x to the right.
-
-    Args:
-        points: What must be seen.
-        aspect: Width over height of the picture.
-        fov: Vertical field of view, radians; small, so that little is drawn askew.
-    """
-    low, high = points.min(axis=0), points.max(axis=0)
-    centre = (low + high) / 2.0
-    wide, tall = (high - low)[:2] / 2.0 * 1.08  # a margin at the edges
-    distance = max(tall, wide / aspect) / np.tan(fov / 2.0)
-    eye = np.array([centre[0], centre[1], high[2] + distance])
-    return Pose(eye, centre, np.array([0.0, 1.0, 0.0]), fov)

@@ -12,17 +12,18 @@ from functools import partial
 
 import numpy as np
 import viser
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
 
 from app.colours import PALETTES, Theme
-from app.scene import geometry
-from app.scene.geometry import Pose
+from app.scene import framing, geometry
+from app.scene.framing import Pose
 from app.scene.room.standing import FrustumNodes, RoomNodes, entrance_edges, grid_cell, pose_through
 from app.scene.tracks.ghosts import GhostNodes
-from app.scene.tracks.people import PeopleNodes
+from app.scene.tracks.people import PeopleNodes, room_taken
 from app.scene.tracks.reference import ReferenceNodes
 from app.scene.views import Views
 from app.scene.worker import LatestWorker
+from app.state import opening_step
 from app.state.snapshot import Change, Snapshot, View
 from app.state.workbench import Workbench
 from tracker.pipeline import Run
@@ -50,6 +51,9 @@ class Scene:
         self._shown = Snapshot()
         self._drawn: tuple[object, ...] = ()
         self._looking: View = None
+        self._sight = 0
+        self._walked: Float[np.ndarray, "N 3"] = np.zeros((0, 3))
+        """How far the people of the run reach, wherever they are."""
         self._theme: Theme | None = None
         server.scene.set_up_direction("+z")
         server.scene.world_axes.visible = False
@@ -146,6 +150,7 @@ class Scene:
                 )
                 self._frusta.place(sequence.cameras, sequence.room, through, palette)
         self._draw_step(snapshot, shown_run(snapshot))
+        self._frame(snapshot, shown_run(snapshot), another=another)
         if another:
             self._set_home(snapshot)
             self._views.home()
@@ -219,8 +224,31 @@ class Scene:
         reach = np.linalg.norm(room.maximum - room.minimum)
         near = np.linalg.norm(eyes - centre, axis=1) <= 1.2 * reach
         rims = self._frusta.corners(near)
-        seen = np.concatenate([corners, rims, entrance_edges(room)])
-        return geometry.overview(seen, eyes[near], centre, aspect)
+        seen = [corners, rims, entrance_edges(room), self._people.points, self._walked]
+        pictures = self._frusta.pictures(near)
+        return framing.overview(np.concatenate(seen), eyes[near], centre, aspect, pictures=pictures)
+
+    def _frame(self, snapshot: Snapshot, run: Run | None, *, another: bool) -> None:
+        """Place anew who has not moved, once there is more to be seen than there was.
+
+        That is when the first people are drawn, when the run is finished, and where the recording
+        is opened; afterwards the view stands still, whatever is played.
+        """
+        sequence = snapshot.sequence
+        assert sequence is not None
+        if another:
+            self._sight, self._walked = 0, np.zeros((0, 3))
+        sight = 0
+        if run is not None:
+            opened = snapshot.playhead_origin == opening_step.ORIGIN
+            sight = 3 if opened else 2 if run.complete else 1
+        if sight > self._sight:
+            self._sight = sight
+            assert run is not None
+            self._walked = room_taken(
+                places_of(run.tracks.positions), sequence.target_half_extents, sequence.room
+            )
+            self._views.again()
 
     def _set_home(self, snapshot: Snapshot) -> None:
         """Where viser's own "reset view" goes."""
@@ -236,11 +264,16 @@ class Scene:
         if snapshot.view is None:
             return None
         if snapshot.view == "top":
-            return partial(geometry.from_above, _margin_around(room))
+            return partial(framing.from_above, _margin_around(room))
         view = self._frusta.view(snapshot.view)
         middle = (room.minimum + room.maximum)[None] / 2.0
         distance = max(0.5, float(view.camera.to_camera(middle)[0, 2]))
         return partial(pose_through, view, distance)
+
+
+def places_of(positions: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "M 3"]:
+    """Where people are in a run, to half a metre: few places, however long it is."""
+    return np.asarray(np.unique(np.round(2.0 * positions), axis=0) / 2.0)
 
 
 def _margin_around(room: Room) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 import viser
 import viser.transforms as tf
 
-from app.scene.geometry import Pose
+from app.scene.framing import Pose
 
 FLIGHT_SECONDS = 0.25
 FRAMES_A_SECOND = 60.0
@@ -49,6 +49,13 @@ class Views:
             followers = list(self._followers.values())
         for follower in followers:
             follower.place_again()
+
+    def again(self) -> None:
+        """Place every browser whose person has not moved: the overview is another by now."""
+        with self._lock:
+            followers = list(self._followers.values()) if self._through is None else []
+        for follower in followers:
+            follower.renew()
 
     def look(self, through: Callable[[float], Pose] | None, *, flies: bool = True) -> None:
         """Fly every browser to a camera's place, or back to where it was.
@@ -148,6 +155,13 @@ class _Follower:
             self._moved = self._had_moved = False
             self._aspect = 0.0
             self.follow(self._client.camera)
+
+    def renew(self) -> None:
+        """Place it where it belongs by now, unless its person has moved."""
+        with self._lock:
+            if not self._moved:
+                self._aspect = 0.0
+                self.follow(self._client.camera)
 
     def sent(self, pose: Pose, *, back: bool) -> None:
         """Somebody else moves it to a pose: away from where it is, or back there.

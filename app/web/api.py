@@ -208,11 +208,14 @@ async def picture(
     camera: int,
     step: int,
     w: Annotated[int | None, Query(ge=16, le=8192, description="A smaller width.")] = None,
+    nearest: Annotated[bool, Query(description="Else that of the nearest step.")] = False,
 ) -> Response:
-    """One camera's picture of one step."""
+    """One camera's picture of one step; ``X-Step`` says which one it is of."""
     pictures: Pictures = request.app.state.pictures
-    jpeg = await pictures.get(sequence_key, camera, step, w)
-    return Response(jpeg, media_type="image/jpeg", headers={"cache-control": FOR_EVER})
+    found = await pictures.nearest(sequence_key, camera, step) if nearest else step
+    jpeg = await pictures.get(sequence_key, camera, found, w)
+    headers = {"cache-control": FOR_EVER, "x-step": str(found)}
+    return Response(jpeg, media_type="image/jpeg", headers=headers)
 
 
 @router.get("/step/{step}")

@@ -20,6 +20,9 @@ LATER = {
     "optuna": "studies",
     "distributed": "studies, in a process of their own",
     "sklearn": "studies: what matters",
+    "tomlkit": "what is saved",
+    "websockets.asyncio.client": "the way to viser",
+    "concurrent.futures.process": "experiments, and the check of identities",
 }
 """What neither the web nor the engine imports before it is used, and what it is for."""
 

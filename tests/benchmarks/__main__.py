@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import time
 from pathlib import Path
 
 from tests.benchmarks import record, studies
@@ -52,6 +53,7 @@ def main() -> int:
         return 0
     found: list[Measurement] = []
     for name in arguments.names or SUITES:
+        begin = time.monotonic()
         for measurement in SUITES[name](arguments.short):
             found.append(measurement)
             mark = "  FAILED" if measurement.failed else ""
@@ -60,6 +62,7 @@ def main() -> int:
                 f"{measurement.name:<78} {measurement.value:>12.4g} {measurement.unit}{aim}{mark}",
                 flush=True,
             )
+        print(f"── {name}: {time.monotonic() - begin:.0f} s", flush=True)
     if arguments.json:
         report = {"machine": machine(), "figures": [m.as_dict() for m in found]}
         arguments.json.write_text(json.dumps(report, indent=1), encoding="utf-8")

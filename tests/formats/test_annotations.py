@@ -116,6 +116,27 @@ def test_label_studio_moves_boxes_between_key_frames(tmp_path: Path) -> None:
     np.testing.assert_allclose(piece.boxes[:, 0], [0.1, 0.15, 0.2, 0.25, 0.3, 0.5])
 
 
+def test_cvat(tmp_path: Path) -> None:
+    tracks = "".join(
+        f'<track id="{n}" label="person"><box frame="{f}" outside="{int(n % 5 == 4)}" '
+        'xtl="{}" ytl="{}" xbr="{}" ybr="{}"/></track>'.format(
+            *map(repr, (b[0], b[1], b[0] + b[2], b[1] + b[3]))
+        )
+        for n, (f, b) in enumerate(zip(FRAMES, BOXES.tolist(), strict=True))
+    )
+    path = tmp_path / "annotations.xml"
+    path.write_text(
+        "<?xml version='1.0' encoding='utf-8'?><annotations><version>1.1</version><meta><task>"
+        "<name>cam 1</name><original_size><width>1280</width><height>720</height>"
+        f"</original_size></task></meta>{tracks}</annotations>"
+    )
+    piece = _piece(path)
+    kept = np.arange(len(FRAMES)) % 5 != 4
+    np.testing.assert_array_equal(piece.frames, FRAMES[kept])
+    np.testing.assert_allclose(read_boxes(piece.boxes, "xyxy"), BOXES[kept], atol=1e-9)
+    assert (piece.camera, piece.image_size) == ("cam 1", SIZE)
+
+
 def test_parquet(tmp_path: Path) -> None:
     pa = pytest.importorskip("pyarrow")
     pq = pytest.importorskip("pyarrow.parquet")

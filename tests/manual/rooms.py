@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,7 @@ def _section(contract: dict[str, Any]) -> str:
         "|---|---|",
     ]
     for layer in contract["layers"]:
-        rooms = [f"{container}.{name}".lstrip(".") for name in layer.split(" : ")]
+        rooms = [f"{container}.{name}".lstrip(".") for name in re.split(r" [|:] ", layer)]
         words = "<br>".join(f"`{room}`: {_says(room)}" for room in rooms)
         lines.append(f"| {_listed(room.rpartition('.')[2] for room in rooms)} | {words} |")
     return title + "\n".join(lines)

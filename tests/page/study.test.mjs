@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { unbeaten } from "../../static/js/study/charts.js";
+import { placeOf } from "../../static/js/study/where.js";
 
 /** @param {string} key @param {boolean} higher */
 const measure = (key, higher) => ({
@@ -25,4 +26,10 @@ test("the front has those that no other beats in both figures, along the first",
   assert.deepEqual(numbers(false), [1, 3, 0]);
   assert.deepEqual(numbers(true), [4]);
   assert.deepEqual(unbeaten([], measure("error", true), measure("idf1", true)), []);
+});
+
+test("a study runs at one place: workers of this machine, or a cluster", () => {
+  assert.deepEqual(placeOf({ scheduler: null, workers: 3 }), { workers: 3 });
+  assert.deepEqual(placeOf({ scheduler: "tcp://a:1", workers: 3 }), { scheduler: "tcp://a:1" });
+  assert.deepEqual(placeOf({ scheduler: "", workers: 3 }), { scheduler: "" });
 });

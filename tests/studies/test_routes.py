@@ -13,6 +13,7 @@ from starlette.testclient import TestClient
 
 from app.state.studies.desk import StudyDesk
 from app.web.server import Settings, create_app
+from app.web.studies import routes
 from tests.studies.small import Serial, made_up, recording, run
 from tracker.studies.kept.store import find
 
@@ -69,6 +70,56 @@ def test_it_is_told_what_a_study_takes_or_why_it_is_refused(client: TestClient) 
     refused = client.post("/api/studies", json=wish)
     assert refused.status_code == 422
     assert "must be between" in refused.json()["detail"]
+
+
+def test_the_time_goes_by_the_workers_that_are_wanted(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(routes, "cores", lambda: 4)
+    monkeypatch.setattr(routes, "FEWEST_STEPS", 1)
+    # so many runs that a recording of a second takes hours
+    wish = {"name": "mine", "parameters": RANGES, "trials": 10**6}
+
+    def cost(**place: Any) -> dict[str, Any]:
+        found: dict[str, Any] = client.post("/api/studies/estimate", json=wish | place).json()
+        assert found["error"] is None
+        return found
+
+    one = cost(workers=1)
+    assert one["words"].endswith("with 1 worker")
+    assert one["seconds"] == pytest.approx(2.0 * cost(workers=2)["seconds"])
+    assert cost(workers=2)["words"].endswith("with 2 workers")
+    assert cost()["words"].endswith("with 4 workers")
+    more = cost(workers=8)
+    assert more["words"].endswith("with 8 workers on 4 cores")
+    assert more["seconds"] == pytest.approx(one["seconds"] / 4.0)
+    assert cost(workers=1, minutes=3)["seconds"] == 180.0
+    there = cost(scheduler="tcp://10.0.0.1:8786")
+    assert there["seconds"] is None
+    assert there["words"].endswith("of one worker's time")
+    refused = client.post("/api/studies/estimate", json=wish | {"workers": 1000}).json()
+    assert refused["error"].startswith("workers: expected 1 to ")
+    refused = client.post("/api/studies/estimate", json=wish | {"scheduler": ""}).json()
+    assert refused["error"].startswith("scheduler: expected an address as tcp://10.0.0.1:8786")
+
+
+def test_a_study_goes_on_where_it_ran(
+    client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines: list[list[str]] = []
+    monkeypatch.setattr(StudyDesk, "run", lambda _, store, line: lines.append(line[5:]))
+    define(client)
+    start = "/api/studies/mine/start"
+    for place in ({}, {"workers": 1}, {}, {"scheduler": "tcp://10.0.0.1:8786"}, {}):
+        answer = client.post(start, json=place)
+        assert answer.status_code == 200, answer.text
+    here, there = ["--workers", "1"], ["--scheduler", "tcp://10.0.0.1:8786"]
+    assert [line[1:] for line in lines] == [[], here, here, there, there]
+    (tmp_path / "studies" / "mine" / "place.json").write_text('{"workers": "many"}')
+    answer = client.post(start, json={})
+    assert answer.status_code == 409
+    assert "place.json, workers: expected" in answer.json()["detail"]
+    assert client.post(start, json={"workers": 1}).status_code == 200
 
 
 def test_what_is_on_the_sliders_is_held_and_tried(client: TestClient) -> None:

@@ -11,12 +11,18 @@ from typing import Any
 import pytest
 
 from tests.studies.small import Serial, definition, made_up, recording, run
+from tracker.parameters import with_values
+from tracker.runs.run import stage_keys
 from tracker.studies.errors import StudyError
+from tracker.studies.kept.records import Trial
 from tracker.studies.kept.store import JOURNAL, Store, create
 from tracker.studies.kept.writer import RESULTS
+from tracker.studies.opened import open_recordings
 from tracker.studies.sampling import Sampler
 from tracker.studies.told.report import report_html
 from tracker.studies.told.summary import summary_of
+from tracker.studies.weighing import Weighing
+from tracker.studies.work import working
 from tracker.studies.work.jobs import Job, Outcome
 
 
@@ -294,3 +300,52 @@ def test_a_trial_that_ended_before_the_sampler_heard_of_it_stays_as_it_is(
     run(store, Serial(made_up(near)))
     assert store.trials()[:3] == before
     assert len(store.trials()) == 6
+
+
+def test_a_worker_keeps_stage_1_and_little_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(working, "_process", None)
+    monkeypatch.setattr(working, "LATER_BYTES", 300_000)
+    every = open_recordings(definition(tmp_path))
+    kept = []
+    for number in range(24):
+        values = {"fusion.detection_probability": 0.7 + 0.01 * number}
+        ((_, job),) = every.jobs(values)
+        assert working.work(job).became == "done"
+        assert working._process is not None
+        kept.append(working._process.cache.used_bytes)
+    assert kept[0] < kept[1], "later stages are kept at all"
+    assert max(kept[12:]) <= max(kept[:12]) < kept[0] + 300_000
+    one = every.every[0]
+    parameters = with_values(one.base, {"fusion.detection_probability": 0.5})
+    key = stage_keys(one.sequence, parameters, job.seed)["single_view"]
+    cache = working._process.cache
+    assert cache.views(key, frames=one.sequence.frames, cameras=3) is not None
+
+
+def test_what_matters_is_told_by_all_trials_at_the_end() -> None:
+    trials = [
+        Trial(k, "complete", {}, (float(k),), (None,), {}, False, "", 0.1, ()) for k in range(40)
+    ]
+    asked: list[int] = []
+
+    class Slow(Serial):
+        def call(self, function: Any, *arguments: Any) -> Any:
+            rows = arguments[1]
+            asked.append(len(rows))
+            looks = 0
+
+            def found() -> dict[str, Any] | None:
+                nonlocal looks
+                looks += 1
+                return {"trials": len(rows), "seconds": 0.0} if looks > 2 else None
+
+            return found
+
+    weighing, crew = Weighing((), {}), Slow()
+    assert weighing.news(trials[:13], crew, worked=9.0) is None
+    assert weighing.news(trials, crew, worked=9.0, last=True) == {"trials": 40}
+    assert asked == [13, 40]
+    assert weighing.news(trials, crew, worked=9.0, last=True) is None
+    assert asked == [13, 40]

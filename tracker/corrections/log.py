@@ -16,7 +16,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import tomlkit
 from pydantic import ValidationError
 
 from tracker.corrections.contradictions import refuse_contradiction
@@ -200,6 +199,8 @@ def _line_of(text: str, field: str, first: int = 1) -> int:
 
 def dump(corrections: Iterable[Correction]) -> str:
     """The log as text."""
+    import tomlkit
+
     document = tomlkit.document()
     document.add(
         tomlkit.comment("What a person put right; each place is [step, x, y, z] in metres")
@@ -230,6 +231,8 @@ def _in_utc(time: datetime) -> datetime:
 
 
 def _places(one: Correction) -> Any:
+    import tomlkit
+
     rows = tomlkit.array()
     for place in one.places:
         row = tomlkit.array()

@@ -11,28 +11,16 @@ from tracker.formats.calibration import (
     kalibr,
     matlab,
     opencv,
-    panoptic,
     plain,
     projection,
-    qualisys,
     ros,
-    tsai,
-    voxelpose,
 )
+from tracker.formats.calibration.capture import qualisys
+from tracker.formats.calibration.datasets import panoptic, tsai, voxelpose
 from tracker.formats.calibration.reconstruction import colmap, metashape, nerfstudio, openmvg
-from tracker.formats.detections import (
-    coco,
-    cvat,
-    label_studio,
-    labelme,
-    motchallenge,
-    nested,
-    openpose,
-    parquet,
-    table,
-    voc,
-    yolo,
-)
+from tracker.formats.detections import coco, motchallenge, nested, parquet, table, yolo
+from tracker.formats.detections.annotations import cvat, label_studio, labelme, voc
+from tracker.formats.detections.poses import openpose
 from tracker.formats.pictures import images, times, video
 from tracker.formats.pieces import FormatError
 from tracker.formats.protocol import Certainty, Format

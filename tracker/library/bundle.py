@@ -18,7 +18,6 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
-import tomlkit
 
 from tracker import __version__, export
 from tracker.library import columns
@@ -101,6 +100,8 @@ def _fill(folder: Path, result: Result, sequence: Sequence, videos: bool) -> Non
 
 def _write_sequence(folder: Path, sequence: Sequence, videos: bool) -> None:
     """The recording as a folder of its own, everything by steps."""
+    import tomlkit
+
     folder.mkdir()
     text = (sequence.folder / "sequence.toml").read_text(encoding="utf-8-sig")
     document = tomlkit.parse(text).unwrap()

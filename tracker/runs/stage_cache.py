@@ -68,6 +68,7 @@ class StageCache:
         self,
         *,
         memory_bytes: int = MEMORY_BYTES,
+        later_bytes: int | None = None,
         files: StageFiles | None = None,
         start: Callable[[Callable[[], object]], object] = lambda work: work(),
     ) -> None:
@@ -76,13 +77,15 @@ class StageCache:
         Args:
             memory_bytes: Bound on what is kept in memory. The newest column of each stage
                 stays whatever its size, so that a run's own parts are always there.
+            later_bytes: Of these at most so many for the stages after the first; None for all.
             files: For finished columns of stage 1; None for memory only.
             start: How a file is written: at once, or for instance in a thread.
         """
         self._limit = memory_bytes
+        self._later_limit = memory_bytes if later_bytes is None else later_bytes
         self._files = files
         self._start = start
-        self._used = 0
+        self._used = self._later = 0
         self._kept: OrderedDict[tuple[Stage, str], tuple[Any, int]] = OrderedDict()
         self._lock = threading.Lock()
 
@@ -154,7 +157,7 @@ class StageCache:
         """Let go of everything in memory."""
         with self._lock:
             self._kept.clear()
-            self._used = 0
+            self._used = self._later = 0
 
     def _get(self, stage: Stage, key: str) -> Any:
         with self._lock:
@@ -167,14 +170,22 @@ class StageCache:
     def _put(self, stage: Stage, key: str, column: Any) -> None:
         weight = weigh(column)
         with self._lock:
-            self._used += weight - self._kept.pop((stage, key), (None, 0))[1]
+            self._take_out((stage, key))
             self._kept[stage, key] = column, weight
+            self._count(stage, weight)
             newest = {stage: (stage, key) for stage, key in self._kept}
             for name in list(self._kept):
-                if self._used <= self._limit:
-                    break
-                if newest[name[0]] != name:
-                    self._used -= self._kept.pop(name)[1]
+                is_later = name[0] != "single_view" and self._later > self._later_limit
+                if (self._used > self._limit or is_later) and newest[name[0]] != name:
+                    self._take_out(name)
+
+    def _take_out(self, name: tuple[Stage, str]) -> None:
+        self._count(name[0], -self._kept.pop(name, (None, 0))[1])
+
+    def _count(self, stage: Stage, weight: int) -> None:
+        self._used += weight
+        if stage != "single_view":
+            self._later += weight
 
 
 def weigh(column: ViewColumn | FusionColumn | Smoothed | TrackColumn) -> int:

@@ -51,17 +51,21 @@ class Weighing:
             last: Whether no more trials come: then it is waited for.
         """
         found = self._found()
+        until = time.monotonic() + LAST_SECONDS
+        while True:  # at the end what was asked for earlier may not be there yet
+            self._ask(complete, crew, worked, last)
+            if not last or self._asked is None or time.monotonic() >= until:
+                return found
+            time.sleep(0.02)
+            found = self._found() or found
+
+    def _ask(self, complete: Sequence[Trial], crew: Crew, worked: float, last: bool) -> None:
         needed = self._weighed / NEARLY if last else self._weighed * GROWTH
         spared = last or self._spent + GROWTH * self._took <= SHARE * worked
         if self._asked is None and spared and len(complete) >= max(importance.FEWEST, needed):
             self._weighed = len(complete)
             rows = [(one.values, one.objectives) for one in complete if one.objectives]
             self._asked = crew.call(importance.importance, self._varied, rows, self._defaults)
-        until = time.monotonic() + LAST_SECONDS
-        while last and self._asked is not None and time.monotonic() < until:
-            found = self._found() or found
-            time.sleep(0.0 if self._asked is None else 0.02)
-        return found
 
     def _found(self) -> dict[str, Any] | None:
         found = None if self._asked is None else self._asked()

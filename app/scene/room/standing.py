@@ -12,7 +12,7 @@ from numpy import ndarray
 from app import colours
 from app.colours import Palette
 from app.scene import geometry
-from app.scene.geometry import Pose
+from app.scene.framing import Pose
 from app.scene.nodes import Lines, Meshes, Tag, Tags
 from app.scene.room.pictures import StraightView
 from tracker.camera import Camera
@@ -233,6 +233,13 @@ class FrustumNodes:
             points += [camera.centre + np.array(rim) @ view.rotation, camera.centre[None]]
             points.append(camera.centre[None] + np.array([0.0, 0.0, 0.6 * self._size]))
         return np.concatenate(points)
+
+    def pictures(self, chosen: ndarray) -> tuple[Float[ndarray, "C 3"], Float[ndarray, "C 3"]]:
+        """Middles of the pictures of the chosen frusta, and the directions that these face."""
+        indices = np.flatnonzero(chosen).tolist()
+        ahead = np.array([self.view(index).rotation[2] for index in indices]).reshape(-1, 3)
+        eyes = np.array([self._cameras[index].centre for index in indices]).reshape(-1, 3)
+        return eyes + self._size * ahead, ahead
 
     def view(self, index: int) -> StraightView:
         """The straight picture of a camera, as large as it is to be drawn now."""

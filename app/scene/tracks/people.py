@@ -21,6 +21,10 @@ from tracker.trajectories import Trajectories
 
 TAGS = 16
 """Made at once; a step with more people adds some for good."""
+NAME_ABOVE = 0.12
+"""Metres of a name above its box."""
+FOOT = 1.35
+"""How much wider than a person the disc is that he stands on."""
 UNREPORTED_WEIGHT = 0.02
 """Below this a component without a track is not drawn: its ellipsoid would be large and mean
 next to nothing."""
@@ -38,6 +42,7 @@ class PeopleNodes:
         """
         self._on_pick = on_pick
         self._palette = PALETTES["dark"]
+        self._reach: Float[ndarray, "N 3"] = np.zeros((0, 3))
         self._box_ids: Int[ndarray, " N"] = np.zeros(0, dtype=np.int64)
         self._component_ids: Int[ndarray, " J"] = np.zeros(0, dtype=np.int64)
         self._future = Lines(server, "/people/future", 1.0)
@@ -54,6 +59,8 @@ class PeopleNodes:
             server, "/people/ellipsoids", *sphere, on_click=self._pick_component
         )
         self._tags = Tags(server, "/labels/people", TAGS, 1.0)
+        self.points: Float[ndarray, "N 3"] = np.zeros((0, 3))
+        """How far what is drawn reaches: boxes, bodies, feet, names and ellipsoids, metres."""
 
     def _pick_box(self, index: int) -> None:
         if index < len(self._box_ids):
@@ -120,8 +127,11 @@ class PeopleNodes:
             posterior if layers["ellipsoids"] else GaussianMixture.empty(3), known, selected
         )
         named = boxes or layers["ellipsoids"] or layers["bodies"]
+        self.points = np.concatenate(
+            [self._reach, room_taken(positions[: None if named else 0], half, sequence.room)]
+        )
         shades = self._palette.of(ids)
-        above = np.array([0.0, 0.0, half[2] + 0.12])
+        above = np.array([0.0, 0.0, half[2] + NAME_ABOVE])
         self._tags.show(
             [
                 Tag(
@@ -170,7 +180,7 @@ class PeopleNodes:
             feet, np.concatenate([wide, tall[:, None]], axis=1), shades, np.where(chosen, 0.7, 0.5)
         )
         feet = feet + np.array([0.0, 0.0, 0.006])  # in front of the floor
-        round_ = np.broadcast_to(np.array([*half[:2] * 1.35, 1.0]), positions.shape)
+        round_ = np.broadcast_to(np.array([*half[:2] * FOOT, 1.0]), positions.shape)
         self._feet.show(feet, round_, shades, np.where(chosen, 0.55, 0.34))
 
     def _show_rays(
@@ -245,4 +255,15 @@ class PeopleNodes:
         if selected is not None:
             opacities = opacities + 0.15 * (numbers == selected)
         self._component_ids = numbers
+        self._reach = geometry.surfaces(mixture.means[:, :3], wxyzs, axes)
         self._ellipsoids.show(mixture.means[:, :3], axes, shades, opacities, wxyzs)
+
+
+def room_taken(
+    positions: Float[ndarray, "N 3"], half: Float[ndarray, " 3"], room: Room
+) -> Float[ndarray, "M 3"]:
+    """How far people reach who are at these positions: from their feet to the names above."""
+    low = np.stack([positions[:, 0], positions[:, 1], np.full(len(positions), room.minimum[2])], 1)
+    high = positions + np.array([0.0, 0.0, half[2] + 2.0 * NAME_ABOVE])
+    beside = FOOT * np.array([[x * half[0], y * half[1], 0.0] for x in (-1, 1) for y in (-1, 1)])
+    return np.concatenate([(ends[:, None] + beside).reshape(-1, 3) for ends in (low, high)])

@@ -6,18 +6,22 @@ work. Nothing of a study is kept here but when its files were last seen to chang
 
 from __future__ import annotations
 
+import json
 import logging
 import shutil
 import subprocess
 import sys
 import threading
 import time
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from app.state.workbench import Workbench
+from tracker.placing import write_whole
 from tracker.studies.defined.definition import Definition
 from tracker.studies.errors import StudyError
+from tracker.studies.kept.reading import read_as
 from tracker.studies.kept.records import Trial
 from tracker.studies.kept.store import FILE, Store, create, find, stores
 from tracker.studies.told.summary import Summary, summary_of
@@ -31,10 +35,21 @@ LOOKS_SECONDS = 0.5
 LOG = "log.txt"
 """What the process of a study said last."""
 
+PLACE = "place.json"
+"""Where a study that the page started runs."""
+
 STOP_SECONDS = 5.0
 ENDING_SECONDS = 20.0
 
 _NICENESS = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a study runs: with neither, on this machine with one process a core."""
+
+    workers: int | None = None
+    scheduler: str | None = None
 
 
 class StudyDesk:
@@ -92,20 +107,34 @@ class StudyDesk:
         """Whether a study can run there.
 
         Raises:
-            StudyError: If there would be more workers than this machine can bear.
+            StudyError: If there would be more workers than this machine can bear, or what is said
+                to be a scheduler's address is none.
         """
         if scheduler is None:
             how_many(workers)
+        else:
+            from tracker.studies.work.cluster import check_address
+
+            check_address(scheduler)
 
     def start(self, name: str, workers: int | None, scheduler: str | None) -> Store:
         """Have a process run a study, or go on with it; one that is just ending is waited for.
+
+        Args:
+            name: Of the study.
+            workers: Processes on this machine.
+            scheduler: Address of a cluster's. With neither it runs where it ran last, and at first
+                with one process a core of this machine.
 
         Raises:
             StudyError: If it runs already, no process can be started, or there would be more
                 workers than this machine can bear.
         """
-        self.check_place(workers, scheduler)
         store = self.store(name)
+        place = Place(workers, scheduler)
+        if place == Place():
+            place = self._last_place(store)
+        self.check_place(place.workers, place.scheduler)
         until = time.monotonic() + ENDING_SECONDS
         while (running := store.is_running()) and time.monotonic() < until:
             if store.status().state == "running" and not store.asked_to_stop():
@@ -114,10 +143,23 @@ class StudyDesk:
         if running:
             raise StudyError(f'the study "{name}" runs already')
         line = [sys.executable, "-m", "app", "study", "resume", str(store.folder)]
-        line += ["--workers", str(workers)] if workers else []
-        line += ["--scheduler", scheduler] if scheduler else []
+        line += ["--workers", str(place.workers)] if place.workers else []
+        line += ["--scheduler", place.scheduler] if place.scheduler else []
+        try:
+            write_whole(store.folder / PLACE, json.dumps(asdict(place)).encode())
+        except OSError as error:
+            raise StudyError(
+                f"{store.folder / PLACE}: cannot be written ({error.strerror or error})"
+            ) from None
         self.run(store, line)
         return store
+
+    def _last_place(self, store: Store) -> Place:
+        try:
+            text = (store.folder / PLACE).read_bytes()
+        except FileNotFoundError:
+            return Place()
+        return read_as(Place, text, str(store.folder / PLACE))
 
     def run(self, store: Store, line: list[str]) -> None:
         """Start the process of a study, with a lower priority, on its own."""

@@ -12,14 +12,16 @@ import contextlib
 import hashlib
 import secrets
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import websockets
 from fastapi import APIRouter, Request, WebSocket, WebSocketDisconnect
 from fastapi.responses import RedirectResponse, Response
-from websockets.asyncio.client import ClientConnection
 
 from app.errors import ApiError
 from app.web.access.viewer import Entrance
+
+if TYPE_CHECKING:
+    from websockets.asyncio.client import ClientConnection
 
 CONTENT_POLICY = (
     "default-src 'none'; script-src 'nonce-{nonce}' 'unsafe-eval'; "
@@ -118,10 +120,12 @@ class Gateway:
 
     async def relay(self, socket: WebSocket) -> None:
         """Pass messages both ways until either side ends."""
+        from websockets.exceptions import InvalidHandshake
+
         try:
             await self.there()
             upstream = await self.entrance.connect(socket.scope["subprotocols"])
-        except (ApiError, OSError, TimeoutError, websockets.InvalidHandshake):
+        except (ApiError, OSError, TimeoutError, InvalidHandshake):
             await socket.close(1013, "the 3D view is not running")
             return
         try:

@@ -17,15 +17,12 @@ import sys
 import threading
 from typing import TYPE_CHECKING, Any
 
-import websockets
-import websockets.asyncio.server
-from websockets.asyncio.client import ClientConnection, connect, unix_connect
-from websockets.asyncio.server import ServerConnection
-from websockets.http11 import Request, Response
-
 if TYPE_CHECKING:
     import viser
     from viser.infra import WebsockMessageHandler
+    from websockets.asyncio.client import ClientConnection
+    from websockets.asyncio.server import ServerConnection
+    from websockets.http11 import Request, Response
 
 SECRET_HEADER = "X-Entrance"
 """Of the request to connect. A browser lets no page add a header to one."""
@@ -58,8 +55,11 @@ class Entrance:
         Raises:
             OSError, TimeoutError, websockets.InvalidHandshake: If viser does not answer.
         """
+        from websockets import Subprotocol
+        from websockets.asyncio.client import connect, unix_connect
+
         options: dict[str, Any] = {
-            "subprotocols": [websockets.Subprotocol(name) for name in subprotocols],
+            "subprotocols": [Subprotocol(name) for name in subprotocols],
             "additional_headers": {SECRET_HEADER: self._secret},
             # viser's messages are compressed already and may have many megabytes
             "compression": None,
@@ -92,6 +92,7 @@ def start_viser(entrance: Entrance | None = None) -> viser.ViserServer:
     """
     import rich
     import viser
+    import websockets.asyncio.server
     from viser import _messages
 
     way = entrance or Entrance()

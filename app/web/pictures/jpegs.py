@@ -18,6 +18,9 @@ QUALITY = 88
 THREADS = 4
 """One request mostly waits for one camera's decoder; four cameras are asked at once."""
 
+REACH = 250
+"""Steps before and after one that has no picture, among which one is sought that stands for it."""
+
 _missing = missing("no_picture")
 
 Key = tuple[str, int, int, int]
@@ -62,6 +65,19 @@ class Pictures:
             raise no_picture(sequence, camera, step, _missing)
         return jpeg
 
+    async def nearest(self, sequence_key: str, camera: int, step: int) -> int:
+        """The step nearest to one of which the camera has a picture; the earlier of two.
+
+        Raises:
+            ApiError: 404 where there is none within :data:`REACH` steps.
+        """
+        sequence, reader = self._checked(sequence_key, camera, step)
+        loop = asyncio.get_running_loop()
+        found = await loop.run_in_executor(self._pool, _nearest, reader, camera, step)
+        if found is None:
+            raise no_picture(sequence, camera, step, _missing)
+        return found
+
     def _checked(self, sequence_key: str, camera: int, step: int) -> tuple[Sequence, FrameReader]:
         return checked(self._workbench.snapshot(), sequence_key, camera, step, _missing)
 
@@ -81,6 +97,14 @@ class Pictures:
     def close(self) -> None:
         """End the threads; what is being decoded is finished first."""
         self._pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _nearest(reader: FrameReader, camera: int, step: int) -> int | None:
+    for away in range(REACH + 1):
+        for other in (step - away, step + away):
+            if reader.picture(camera, other) is not None:
+                return other
+    return None
 
 
 def _encode(reader: FrameReader, camera: int, step: int, width: int | None) -> bytes | None:

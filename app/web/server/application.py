@@ -24,7 +24,7 @@ from app.web.importing import routes as importing
 from app.web.library import export_routes
 from app.web.library import routes as library
 from app.web.manual import Manual
-from app.web.pictures import foreground, likelihood_routes, view_routes
+from app.web.pictures import floor_routes, foreground, likelihood_routes, view_routes
 from app.web.server.running import lifespan
 from app.web.server.settings import Settings
 from app.web.studies import result_routes as study_results
@@ -37,6 +37,7 @@ ROUTERS = (
     api.router,
     foreground.router,
     likelihood_routes.router,
+    floor_routes.router,
     view_routes.router,
     tables.router,
     event_tables.router,

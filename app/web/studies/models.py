@@ -118,12 +118,21 @@ class StudyWish(Model):
     prune: bool = True
 
 
+class CostWish(StudyWish):
+    """A study, and where it is to run."""
+
+    workers: int | None = Field(default=None, ge=1, le=1024)
+    """Processes on this machine; null for one a core."""
+    scheduler: str | None = None
+    """Address of a Dask scheduler; null for this machine."""
+
+
 class StudyCost(Model):
     """What a study would take."""
 
     runs: int
     seconds: float | None
-    """Null where nothing is known of how long a run takes."""
+    """Null where nothing is known of how long a run takes, or of how many there are at a time."""
     bytes: int
     words: str
     error: str | None
@@ -134,9 +143,10 @@ class StartWish(Model):
     """Where a study runs."""
 
     workers: int | None = Field(default=None, ge=1, le=1024)
-    """Processes on this machine; null for one a core."""
+    """Processes on this machine."""
     scheduler: str | None = None
-    """Address of a Dask scheduler; null for this machine."""
+    """Address of a Dask scheduler. With neither it runs where it ran last, and at first with one
+    process a core of this machine."""
 
 
 class SchedulerWish(Model):

@@ -128,12 +128,13 @@ def _definition(wish: models.StudyWish, bench: Bench) -> Definition:
 
 
 @router.post("/estimate")
-def estimate(wish: models.StudyWish, desk: Desk, bench: Bench) -> models.StudyCost:
+def estimate(wish: models.CostWish, desk: Desk, bench: Bench) -> models.StudyCost:
     """What a study would take, and why it would be refused."""
     try:
         definition = _definition(wish, bench)
         if wish.name in {store.name for store in desk.all()}:
             raise StudyError(f'name: there is a study "{wish.name}" already; take another')
+        desk.check_place(wish.workers, wish.scheduler)
         snapshot = bench.snapshot()
         assert snapshot.sequence is not None
         if wish.recordings is None:
@@ -142,17 +143,25 @@ def estimate(wish: models.StudyWish, desk: Desk, bench: Bench) -> models.StudyCo
     except StudyError as error:
         return models.StudyCost(runs=0, seconds=None, bytes=0, words="", error=sentence(error))
     runs = definition.trials * len(definition.recordings) * len(definition.seeds)
-    seconds = _seconds(snapshot, definition, runs)
-    if seconds is not None and definition.minutes is not None:
-        seconds = min(seconds, 60.0 * definition.minutes)
+    words, seconds = f"up to {runs} runs", _seconds(snapshot, definition, runs)
+    if wish.scheduler is not None:
+        if seconds is not None:
+            words += f", about {_minutes(seconds)} of one worker's time"
+        seconds = None
+    elif seconds is not None:
+        workers = wish.workers or cores()
+        seconds /= min(workers, cores())
+        if definition.minutes is not None:
+            seconds = min(seconds, 60.0 * definition.minutes)
+        words += f", about {_minutes(seconds)} with {workers} worker{'s' if workers > 1 else ''}"
+        if workers > cores():
+            words += f" on {cores()} cores"
     size = runs * RUN_BYTES + definition.trials * TRIAL_BYTES
-    words = f"up to {runs} runs" + (
-        "" if seconds is None else f", about {_minutes(seconds)} with {cores()} workers"
-    )
     return models.StudyCost(runs=runs, seconds=seconds, bytes=size, words=words, error=None)
 
 
 def _seconds(snapshot: Snapshot, definition: Definition, runs: int) -> float | None:
+    """Of one worker, for all runs; None where nothing is known yet."""
     state, sequence = snapshot.run_state, snapshot.sequence
     speed = state.steps_per_second
     if not speed or sequence is None or state.done < min(FEWEST_STEPS, sequence.frames):
@@ -160,7 +169,7 @@ def _seconds(snapshot: Snapshot, definition: Definition, runs: int) -> float | N
     truth = sequence.ground_truth is not None
     looks = "identity" in (definition.objectives or (WITH_TRUTH if truth else WITHOUT_TRUTH))
     times = 2 + len(sequence.views) if looks else 1
-    return runs * times * sequence.frames / speed / cores()
+    return runs * times * sequence.frames / speed
 
 
 def _minutes(seconds: float) -> str:

@@ -72,7 +72,8 @@ def step_tables(step: int, bench: Bench) -> str:
             "Nothing is computed at this step",
             "Where people are, what each camera saw of them and the curves' values stand here.",
         )
-    return _people(message) + _pictures(message) + _curves(snapshot, sequence, message)
+    parts = _people(message), _pictures(message), _nobodys(message)
+    return "".join(parts) + _curves(snapshot, sequence, message)
 
 
 def _people(message: Step) -> str:
@@ -111,6 +112,29 @@ def _pictures(message: Step) -> str:
             for track in camera.tracks
         ],
     )
+
+
+def _nobodys(message: Step) -> str:
+    """Detections that feed no track, each with the track that it is nearest to."""
+    rows: list[tuple[Cell, ...]] = [
+        (
+            camera.name,
+            f"box {index + 1}",
+            number(box.score, 2),
+            "no track in this picture" if box.nearest is None else id_tag(box.nearest),
+            number(box.sigmas, 2),
+            number(box.gate, 2),
+            "  ".join(str(round(side)) for side in box.box),
+        )
+        for camera in message.cameras
+        for index, box in enumerate(camera.measurements)
+        if box.track is None
+    ]
+    heads = (
+        "Camera", "Nobody's", "#Score", "Nearest track", "#σ away", "#Gate, σ",
+        "#Left, top, width, height  px",
+    )  # fmt: skip
+    return table("Detections that are nobody's", heads, rows) if rows else ""
 
 
 def _because(track: CameraTrack) -> str:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from jaxtyping import Int
 from numpy import ndarray
 
 from app import models
 from tracker.boxes import Boxes, box_overlaps
+from tracker.filters.gaussian_mixture import gate_distance
 from tracker.fusion.target_model import TargetModel
 from tracker.pipeline import Run
 from tracker.sequences.sequence import Sequence
@@ -26,7 +29,8 @@ def tell_owners(message: models.Step, sequence: Sequence, run: Run, step: int) -
         d = sqrt((z − h(x))ᵀ (H P Hᵀ + R)⁻¹ (z − h(x)))
 
     in the measurement space of the fusion, with the track's state x and covariance P as they
-    are after the step's update, and R of the boxes of this camera.
+    are after the step's update, and R of the boxes of this camera; and so is the gate, the root
+    of the χ² quantile of P_G with as many degrees of freedom as a box has numbers.
 
     Args:
         message: Its cameras have their detections and tracks.
@@ -36,6 +40,7 @@ def tell_owners(message: models.Step, sequence: Sequence, run: Run, step: int) -
     """
     p = run.parameters.fusion
     target = TargetModel(sequence.target_half_extents, p.measurement, p.update, p.posture_share, p)
+    gate = round(math.sqrt(gate_distance(p.gate_probability, target.size)), 2)
     tracks, posterior = run.tracks, run.fused[step].posterior
     rows = tracks.at(step)
     # the filter knew nothing of whom the smoothing alone found
@@ -68,6 +73,7 @@ def tell_owners(message: models.Step, sequence: Sequence, run: Run, step: int) -
             if np.isfinite(row[nearest]):
                 camera.measurements[i].nearest = int(ids[nearest])
                 camera.measurements[i].sigmas = round(float(row[nearest]), 2)
+                camera.measurements[i].gate = gate
 
 
 def _as_boxes(view: ViewResult, rows: Int[ndarray, " F"]) -> ViewResult:

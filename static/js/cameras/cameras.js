@@ -4,6 +4,7 @@ import { prepare } from "../draw/canvas.js";
 import { drawLoupe, drawPicture, lensOf } from "../draw/picture.js";
 import { visibleTracks } from "../draw/overlay.js";
 import { fillBoxCard, fillTrackCard } from "./cards.js";
+import { createFloor } from "./floor.js";
 import { decisionsOf, isAlone, viewWords } from "../state/events.js";
 import { mosaic } from "./mosaic.js";
 import { pictureInk } from "../draw/colours.js";
@@ -15,10 +16,10 @@ const LONE = 0.4;
 
 /** @type {Pane} */
 export function mountCameras(root, { store, actions, playback }) {
-	const { mosaic: body, blank } = parts(root);
+	const { mosaic: body, blank, nearest } = parts(root);
 	/**
 	 * @type {{element: HTMLElement, canvas: HTMLCanvasElement, name: HTMLElement, words: HTMLElement,
-	 * card: HTMLElement}[]}
+	 * absent: HTMLElement, card: HTMLElement}[]}
 	 */
 	let cells = [];
 	/** @type {Cell[]} */
@@ -31,6 +32,7 @@ export function mountCameras(root, { store, actions, playback }) {
 	/** Where the pointer is, in which cell.  @type {{index: number, x: number, y: number} | null} */
 	let over = null;
 	const cameras = () => store.get().cameras;
+	const floor = createFloor(store, playback.repaint);
 
 	function build() {
 		sequenceKey = store.get().sequence?.key ?? "";
@@ -38,6 +40,7 @@ export function mountCameras(root, { store, actions, playback }) {
 		cells = cameras().map((camera, index) => {
 			const canvas = h("canvas");
 			const [name, words] = [h("b", {}, camera.name), h("span")];
+			const absent = h("p", { class: "cam-absent", hidden: true });
 			const card = h("div", { class: "card", hidden: true });
 			const through = () => {
 				clearTimeout(clicked);
@@ -71,10 +74,11 @@ export function mountCameras(root, { store, actions, playback }) {
 					},
 				},
 				canvas,
+				absent,
 				h("div", { class: "cam-tag" }, name, words),
 				card,
 			);
-			return { element, canvas, name, words, card };
+			return { element, canvas, name, words, absent, card };
 		});
 		fill(
 			body,
@@ -118,14 +122,20 @@ export function mountCameras(root, { store, actions, playback }) {
 		const { sequence, layers2d: layers, selection, hover, zooms, loupe, pointed } = store.get();
 		if (sequence?.key !== sequenceKey) return;
 		const ink = pictureInk();
-		cells.forEach(({ element, canvas, words }, index) => {
+		cells.forEach(({ element, canvas, words, absent }, index) => {
 			// what is drawn says which step it is of, so that a test can hold them against each other
 			element.dataset.step = String(next.step);
 			element.dataset.overlay = String(next.result?.step ?? "");
 			const { width, height } = places[index];
 			const g = prepare(canvas, width, height);
 			const view = next.result?.cameras[index];
-			const what = { bitmap: next.pictures[index]?.bitmap, maps: next.maps[index] ?? [], view };
+			const what = {
+				bitmap: next.pictures[index]?.bitmap,
+				maps: next.maps[index] ?? [],
+				faint: !isOwn(next, index),
+				floor: floor.of(index),
+				view,
+			};
 			/** @type {Scene} */
 			const scene = {
 				scale: width / cameras()[index].width,
@@ -145,10 +155,16 @@ export function mountCameras(root, { store, actions, playback }) {
 			drawPicture(g, what, scene, lens);
 			if (loupe && over?.index === index) drawLoupe(g, what, scene, lens, over);
 			write(words, wordsOf(next, index, width > 260));
+			absent.hidden = !next.pictures[index]?.missing;
+			write(absent, absent.hidden ? "" : `${cameras()[index].name}: no frame ${next.step}`);
 			if (!store.get().playing) element.ariaLabel = sentenceOf(next, index);
 		});
+		nearest.hidden = next.pictures.every((one, index) => !one?.missing && isOwn(next, index));
 		placeCards();
 	}
+
+	/** Whether a picture is of the step that is shown. @param {Pick<Frame, "step" | "pictures">} shown @param {number} index */
+	const isOwn = ({ step, pictures }, index) => (pictures[index]?.of || step) === step;
 
 	/**
 	 * The magnification that keeps the selected track in the middle, where somebody wants that.
@@ -197,6 +213,9 @@ export function mountCameras(root, { store, actions, playback }) {
 		if (!cameras()[index].has_pictures) roomy && words.push("boxes only, no pictures");
 		else if (!pictures[index]?.bitmap)
 			words.push(pictures[index] ? `no picture for step ${step}` : "picture not loaded");
+		else if (!isOwn({ step, pictures }, index))
+			words.push(`no frame ${step}, this is ${pictures[index]?.of}`);
+		if (roomy && floor.words()) words.push(floor.words());
 		const view = result?.cameras[index];
 		if (stale) words.push("computing");
 		else if (result && !result.computed)

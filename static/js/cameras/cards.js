@@ -67,7 +67,8 @@ export function fillTrackCard(card, track, whole, decisions) {
  * @param {Server.Measurement} measurement
  * @param {number} index
  */
-export function fillBoxCard(card, { score, track, nearest, sigmas }, index) {
+export function fillBoxCard(card, { score, track, nearest, sigmas, gate }, index) {
+	const beyond = sigmas !== null && gate !== null ? sigmas - gate : 0;
 	fill(
 		card,
 		h("h3", {}, `box ${index + 1}`, h("small", {}, track === null ? " nobody's" : " feeds")),
@@ -79,7 +80,13 @@ export function fillBoxCard(card, { score, track, nearest, sigmas }, index) {
 			track === null &&
 				(nearest === null || sigmas === null
 					? row("nearest", "no track in this picture")
-					: row("nearest", idTag(nearest), ...about(sigmas, " σ away"))),
+					: row("nearest track", idTag(nearest), " ", ...about(sigmas, " σ away"))),
+			track === null &&
+				gate !== null &&
+				row(
+					"gate",
+					...about(gate, beyond > 0 ? ` σ: ${show(Number(beyond.toFixed(2)))} σ outside` : " σ"),
+				),
 		),
 	);
 }

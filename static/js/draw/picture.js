@@ -1,4 +1,5 @@
 /** One camera's picture with what lies over it, at any magnification. */
+import { drawFloor } from "../cameras/floor.js";
 import { drawEmptyPicture, drawOverlay } from "./overlay.js";
 import { stroke } from "./canvas.js";
 
@@ -20,21 +21,25 @@ export function lensOf(zoom, width, height) {
 
 /**
  * @param {Brush} g
- * @param {{bitmap: CanvasImageSource | null | undefined, maps: Picture[],
- * view: Server.CameraStep | undefined}} what
+ * @param {{bitmap: CanvasImageSource | null | undefined, maps: Picture[], faint: boolean,
+ * floor: Server.CameraFloor | undefined, view: Server.CameraStep | undefined}} what
  * @param {Scene} scene  of the picture as it is
  * @param {Lens} lens
  */
-export function drawPicture(g, { bitmap, maps, view }, scene, { k, left, top }) {
+export function drawPicture(g, { bitmap, maps, faint, floor, view }, scene, { k, left, top }) {
 	const [width, height] = [scene.width * k, scene.height * k];
 	g.save();
 	g.translate(-left, -top);
 	// Enlarged much, a pixel is a square: nothing is made up between two.
 	g.imageSmoothingEnabled = scene.scale * k < 4;
 	g.imageSmoothingQuality = "medium";
+	if (!bitmap || faint) drawEmptyPicture(g, width, height);
+	// One of another step, which stands for one that is missing, never passes for it.
+	g.globalAlpha = faint ? 0.4 : 1;
 	if (bitmap) g.drawImage(bitmap, 0, 0, width, height);
-	else drawEmptyPicture(g, width, height);
+	g.globalAlpha = 1;
 	for (const map of maps) if (map.bitmap) g.drawImage(map.bitmap, 0, 0, width, height);
+	if (floor) drawFloor(g, floor, scene.scale * k);
 	// The overlay is drawn at the scale that it is seen at: its lines stay thin.
 	if (view) drawOverlay(g, view, { ...scene, scale: scene.scale * k, width, height });
 	g.restore();

@@ -47,10 +47,11 @@ export function mountControls({ store, actions, press }) {
 		for (const [index, name] of ["undo", "redo"].entries())
 			for (const button of all(`[data-command=${name}]`)) button.disabled = !undoable[index];
 	});
-	store.watch(["loupe", "realTime", "follow"], (state) => {
+	store.watch(["loupe", "realTime", "follow", "nearest"], (state) => {
 		for (const [name, key] of /** @type {const} */ ([
 			["loupe", "loupe"],
 			["real-time", "realTime"],
+			["nearest", "nearest"],
 		]))
 			for (const button of all(`[data-command=${name}]`)) button.ariaPressed = String(state[key]);
 	});

@@ -17,6 +17,9 @@ export const PICTURE_BUDGET = 256 * 2 ** 20;
 export const pictureName = (sequence, camera, step, kind = "picture") =>
 	`/api/${kind}/${sequence}/${camera}/${step}.${kind === "picture" ? "jpg" : "png"}`;
 
+/** The address of the one that stands for a picture that is missing. @param {string} name */
+export const standIn = (name) => `${name}?nearest=true`;
+
 /** What can be laid over a picture. */
 const MAPS = /** @type {const} */ (["foreground", "likelihood"]);
 
@@ -41,7 +44,8 @@ export function createPictures(arrived) {
 		load: async (name, signal) => {
 			const response = await request(name, { signal });
 			const bitmap = await createImageBitmap(await response.blob());
-			return /** @type {Picture} */ ({ bitmap, missing: null });
+			const of = Number(response.headers.get("x-step") ?? NaN);
+			return /** @type {Picture} */ ({ bitmap, missing: null, of });
 		},
 		sizeOf: ({ bitmap }) => (bitmap ? bitmap.width * bitmap.height * 4 : 64),
 		budget: PICTURE_BUDGET,

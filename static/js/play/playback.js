@@ -8,7 +8,7 @@
 import { getJson } from "../state/api.js";
 import { createCache } from "./cache.js";
 import { advance, clampStep, playedRange, prefetchWindow, restOf3d } from "./clock.js";
-import { createPictures, mapNames, pictureName, PICTURE_BUDGET } from "./pictures.js";
+import { createPictures, mapNames, pictureName, standIn, PICTURE_BUDGET } from "./pictures.js";
 
 const RESULTS_KEPT = 600;
 
@@ -46,8 +46,10 @@ export function createPlayback(store, sendSeek) {
 	/** @type {Timer} */
 	let settling;
 
-	const pictures = createPictures(() => {
+	const pictures = createPictures((name) => {
 		store.set({ loaded: store.get().loaded + 1 });
+		// Another may be wanted for one that is missing.
+		windowDirty ||= store.get().nearest && Boolean(pictures.get(name)?.missing);
 		ask();
 	});
 
@@ -107,7 +109,7 @@ export function createPlayback(store, sendSeek) {
 	/** @param {PageState} state */
 	function refreshWindow(state) {
 		windowDirty = false;
-		const { sequence, basis, step, speed, playing, layers2d } = state;
+		const { sequence, basis, step, speed, playing, layers2d, nearest } = state;
 		if (!sequence) {
 			pictures.want([]);
 			results.want([]);
@@ -132,9 +134,11 @@ export function createPlayback(store, sendSeek) {
 				const result = results.get(resultName(basis, k, queryNow()));
 				const maps = result ? mapNames(sequence.key, result, layers2d).flat() : [];
 				return [
-					...sequence.cameras.flatMap((camera, index) =>
-						camera.has_pictures ? [pictureName(sequence.key, index, k)] : [],
-					),
+					...sequence.cameras.flatMap((camera, index) => {
+						const name = pictureName(sequence.key, index, k);
+						const other = nearest && pictures.get(name)?.missing ? [standIn(name)] : [];
+						return camera.has_pictures ? [name, ...other] : [];
+					}),
 					...maps,
 				];
 			}),
@@ -153,11 +157,12 @@ export function createPlayback(store, sendSeek) {
 		const { sequence } = state;
 		if (!sequence) return null;
 		const lost = state.link === "lost";
-		const found = sequence.cameras.map((camera, index) =>
-			camera.has_pictures
-				? pictures.get(pictureName(sequence.key, index, step))
-				: { bitmap: null, missing: null },
-		);
+		const found = sequence.cameras.map((camera, index) => {
+			if (!camera.has_pictures) return { bitmap: null, missing: null };
+			const name = pictureName(sequence.key, index, step);
+			const own = pictures.get(name);
+			return own?.missing && state.nearest ? pictures.get(standIn(name)) : own;
+		});
 		if (!lost && found.some((picture) => picture === undefined)) return null;
 		const result =
 			results.get(resultName(state.basis, step, queryNow())) ??
@@ -231,7 +236,8 @@ export function createPlayback(store, sendSeek) {
 		windowDirty = true;
 		ask();
 	});
-	store.on(["step", "playing", "speed", "layers2d", "link"], () => {
+	store.on(["nearest"], () => (dirty = true));
+	store.on(["step", "playing", "speed", "layers2d", "link", "nearest"], () => {
 		windowDirty = true;
 		ask();
 	});

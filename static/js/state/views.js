@@ -16,6 +16,7 @@ export const LAYERS_2D = {
 	likelihood: false,
 	foreground: false,
 	trails: false,
+	floor: false,
 	truth: true,
 };
 

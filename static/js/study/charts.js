@@ -35,18 +35,33 @@ export async function scatter(place, trials, x, y, which, choose) {
 		of.higher ? "more is better" : "less is better";
 	const says = `trial %{customdata}<br>${y.name} %{y:.4g}<br>${x.name} %{x:.4g}<extra></extra>`;
 	const front = unbeaten(known, x, y);
+	const worst = up[y.of.higher ? 0 : 1];
+	/** @type {[number, number][]} */
+	const stairs = front.map((trial) => [Number(x.at(trial)), Number(y.at(trial))]);
+	if (stairs.length) {
+		const [first, last] = [stairs[0], stairs[stairs.length - 1]];
+		stairs.unshift(x.of.higher ? [across[0], first[1]] : [first[0], worst]);
+		stairs.push(x.of.higher ? [last[0], worst] : [across[1], last[1]]);
+	}
 	const note = (/** @type {Server.TrialInfo} */ trial) => figureOf(y.at(trial), y.of);
 	await draw(
 		place,
 		[
 			points(known, x.at, y.at, ink, 6, says),
 			{
-				mode: "lines+markers",
+				mode: "lines",
+				type: "scatter",
+				x: stairs.map(([a]) => a),
+				y: stairs.map(([, b]) => b),
+				line: { color: ink.accent, width: 1.25, shape: x.of.higher ? "vh" : "hv" },
+				hoverinfo: "skip",
+			},
+			{
+				mode: "markers",
 				type: "scatter",
 				x: front.map(x.at),
 				y: front.map(y.at),
 				customdata: front.map(({ number }) => number),
-				line: { color: ink.accent, width: 1.25, shape: x.of.higher === y.of.higher ? "vh" : "hv" },
 				marker: { color: ink.accent, size: 6 },
 				hovertemplate: `front: ${says}`,
 			},

@@ -5,7 +5,7 @@ import { SEARCHES, numberField, tag } from "./fields.js";
 import { lockedParts } from "./locked.js";
 import { objectiveCards } from "./objective.js";
 import { parameterRanges, rangeOf } from "./ranges.js";
-import { runsOn } from "./where.js";
+import { placeOf, runsOn } from "./where.js";
 import { nameOf, symbolOf, valueOf } from "./words.js";
 
 /** @import { Range } from "./ranges.js" */
@@ -73,7 +73,8 @@ export function definition({ store }, { start, cost: told, copy }) {
 		waiting = setTimeout(async () => {
 			if (!wish) return;
 			const turn = (asked += 1);
-			const answer = await sendJson("POST", "/api/studies/estimate", wish).catch((error) => ({
+			const wanted = { ...wish, ...placeOf(where) };
+			const answer = await sendJson("POST", "/api/studies/estimate", wanted).catch((error) => ({
 				error: error.message,
 			}));
 			if (turn !== asked || !wish) return;

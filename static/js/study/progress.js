@@ -6,9 +6,12 @@ import { lasting, nameOf } from "./words.js";
 export function progressPane({ pause }) {
 	const element = h("section", { class: "pane prog", "aria-label": "Progress" });
 
-	/** @param {Server.Study} now */
-	function show({ info, status, sentences }) {
+	/** @param {Server.Study} now @param {boolean} going whether it is just being started or stopped */
+	function show({ info, status, sentences }, going) {
 		const running = info.state === "running";
+		/** @type {Record<string, string>} */
+		const words = { running: "Pause", done: "Done", new: "Start" };
+		const word = going && !running ? "Starting…" : (words[info.state] ?? "Go on");
 		const gone = [
 			`${status.runs} runs`,
 			lasting(status.seconds),
@@ -56,10 +59,10 @@ export function progressPane({ pause }) {
 					class: "btn box tall2",
 					"data-key": "Space",
 					onclick: pause,
-					disabled: info.state === "done",
+					disabled: going || info.state === "done",
 				},
 				icon(running ? "i-pause" : "i-play", "s"),
-				running ? "Pause" : info.state === "done" ? "Done" : "Go on",
+				word,
 			),
 		);
 	}

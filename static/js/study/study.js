@@ -6,6 +6,7 @@ import { definition } from "./form.js";
 import { overview } from "./overview.js";
 import { progressPane } from "./progress.js";
 import { lasting, lineOf } from "./words.js";
+import { placeOf } from "./where.js";
 
 const EVERY_MS = 1000;
 
@@ -197,14 +198,9 @@ export function mountStudy(root, { store, actions }) {
 	async function start(wish, where) {
 		const made = await actions.ask("POST", "studies", wish);
 		if (!made) return;
-		name = made.info.name;
-		await actions.ask(
-			"POST",
-			path("/start"),
-			where.scheduler === null ? { workers: where.workers } : { scheduler: where.scheduler },
-		);
 		await refreshList();
-		await open(name);
+		await open(made.info.name);
+		await go("/start", placeOf(where));
 	}
 
 	async function tuneNow() {
@@ -221,8 +217,19 @@ export function mountStudy(root, { store, actions }) {
 	}
 
 	async function pauseOrGoOn() {
-		if (!study) return;
-		await actions.ask("POST", path(study.info.state === "running" ? "/stop" : "/start"), {});
+		if (!study || going || study.info.state === "done") return;
+		await go(study.info.state === "running" ? "/stop" : "/start", {});
+	}
+
+	/** Whether the server is just starting or stopping it. */
+	let going = false;
+	/** @param {"/start" | "/stop"} to @param {Partial<import("./where.js").Where>} place */
+	async function go(to, place) {
+		going = true;
+		if (study) progress.show(study, going);
+		await actions.ask("POST", path(to), place);
+		going = false;
+		if (study) progress.show(study, going);
 		await refresh();
 	}
 
@@ -265,7 +272,7 @@ export function mountStudy(root, { store, actions }) {
 		form.state(study.info);
 		for (const option of list.options)
 			if (option.value === study.info.name) write(option, lineOf(study.info));
-		progress.show(study);
+		progress.show(study, going);
 		if (!news) return;
 		const done = [...trials.values()].sort((a, b) => a.ended - b.ended);
 		best.show(study, done);

@@ -5,6 +5,10 @@ import { choiceCard, numberField } from "./fields.js";
 
 /** @typedef {{scheduler: string | null, workers: number}} Where */
 
+/** As the server is told. @param {Where} where */
+export const placeOf = ({ scheduler, workers }) =>
+	scheduler === null ? { workers } : { scheduler };
+
 /** @param {Where} where @param {{changed: () => void, show: () => void}} on */
 export function runsOn(where, { changed, show }) {
 	const address = h("input", {
@@ -12,7 +16,10 @@ export function runsOn(where, { changed, show }) {
 		value: where.scheduler ?? "",
 		placeholder: "tcp://scheduler:8786",
 		"aria-label": "Address of the Dask scheduler",
-		oninput: () => (where.scheduler = address.value.trim()),
+		oninput: () => {
+			where.scheduler = address.value.trim();
+			changed();
+		},
 	});
 	const answer = h("span", { class: "small", role: "status" });
 	const test = h(
@@ -39,6 +46,7 @@ export function runsOn(where, { changed, show }) {
 		const choose = () => {
 			where.scheduler = here ? null : (where.scheduler ?? "");
 			show();
+			changed();
 		};
 		return choiceCard(on, title, choose, true, ...(on ? rest : []));
 	};

@@ -109,6 +109,8 @@ interface PageState {
 	layers3d: Record<string, boolean>;
 	/** Whether steps are left out where painting is slower than the clock. */
 	realTime: boolean;
+	/** Whether the nearest picture stands for one that is missing. */
+	nearest: boolean;
 	/** What the timeline does while the playhead moves through a part of it. */
 	turn: "page" | "centre" | "off";
 	/** Which tracks are listed. */
@@ -257,7 +259,7 @@ interface Actions {
 	/** How long trails are, seconds, and whether they fade. */
 	trail: (changes: { seconds?: number; fades?: boolean }) => void;
 	fadeTrails: () => void;
-	toggle: (what: "realTime" | "follow" | "loupe") => void;
+	toggle: (what: "realTime" | "follow" | "loupe" | "nearest") => void;
 	/** A pane and a kind of file: `cams png`. */
 	keepPicture: (what: string) => Promise<void>;
 	nextTurn: () => void;
@@ -378,7 +380,12 @@ type Place = {
 	view: Record<string, string>;
 };
 
-type Picture = { bitmap: ImageBitmap | null; missing: string | null };
+type Picture = {
+	bitmap: ImageBitmap | null;
+	missing: string | null;
+	/** Step that it is of. */
+	of?: number;
+};
 
 interface Palette {
 	/** A token without its dashes. */

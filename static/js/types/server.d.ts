@@ -33,6 +33,14 @@ declare namespace Server {
 		labels: number[];
 	}
 
+	/** In the picture of one camera, bent as its lens bends what is straight. */
+	interface CameraFloor {
+		/** Of the grid; what the camera does not see is left out. */
+		lines: [number, number][][];
+		/** Of the room's floor. */
+		edges: [number, number][][];
+	}
+
 	/** One camera of the sequence. */
 	interface CameraInfo {
 		name: string;
@@ -390,6 +398,15 @@ declare namespace Server {
 		headline: boolean;
 	}
 
+	/** Of the open sequence's room. */
+	interface Floor {
+		/** Metres between two lines. */
+		cell: number;
+		/** z of the floor, metres. */
+		height: number;
+		cameras: CameraFloor[];
+	}
+
 	/** A form that tracks leave in. */
 	interface FormatInfo {
 		name: string;
@@ -672,6 +689,8 @@ declare namespace Server {
 		nearest: number | null;
 		/** And how far that is, in standard deviations of where its box is expected. */
 		sigmas: number | null;
+		/** And within how many of them a box would have been taken for the track's. */
+		gate: number | null;
 	}
 
 	/** The chosen methods. */
@@ -1086,7 +1105,7 @@ declare namespace Server {
 	/** What a study would take. */
 	interface StudyCost {
 		runs: number;
-		/** Null where nothing is known of how long a run takes. */
+		/** Null where nothing is known of how long a run takes, or of how many there are at a time. */
 		seconds: number | null;
 		bytes: number;
 		words: string;

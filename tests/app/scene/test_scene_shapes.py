@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from app import colours
 from app.scene import geometry
-from app.scene.geometry import dashes, ellipsoids, icosphere, mass_radius, overview, quaternions
+from app.scene.framing import overview
+from app.scene.geometry import dashes, ellipsoids, icosphere, mass_radius, quaternions
 from app.scene.nodes import linear
 from app.scene.room.pictures import StraightView
 from app.scene.room.standing import pose_through
@@ -105,26 +106,6 @@ def test_trails_fade_end_at_the_step_and_have_a_gap_where_nobody_saw() -> None:
     assert len(geometry.trails(tracks, -5, 4.0, fps=10.0).ids) == 0
 
 
-@pytest.mark.parametrize("aspect", [0.6, 1.0, 2.4])
-@pytest.mark.parametrize("cameras", [0, 2, 5])
-def test_the_overview_has_everything_in_the_picture(aspect: float, cameras: int) -> None:
-    room = scene_case.ROOM
-    eyes = np.array([scene_case.camera(i, cameras).centre for i in range(cameras)]).reshape(-1, 3)
-    points = np.concatenate([geometry.box_corners(room.minimum, room.maximum), eyes])
-    pose = overview(points, eyes, (room.minimum + room.maximum) / 2.0, aspect)
-    ahead = pose.look_at - pose.position
-    ahead /= np.linalg.norm(ahead)
-    right = np.cross(ahead, pose.up)
-    right /= np.linalg.norm(right)
-    axes = np.stack([right, np.cross(right, ahead), ahead], axis=1)
-    x, y, z = ((points - pose.position) @ axes).T
-    assert (z > 0.0).all()
-    slope = np.tan(pose.fov / 2.0)
-    assert (np.abs(y / z) < slope).all()
-    assert (np.abs(x / z) < slope * aspect).all()
-    assert pose.position[2] > room.maximum[2]
-
-
 # pictures
 
 
@@ -156,17 +137,6 @@ def test_looking_through_a_camera_fits_its_whole_picture_into_any_window() -> No
         assert np.tan(pose.fov / 2.0) >= np.tan(view.fov / 2.0)
         assert np.tan(pose.fov / 2.0) * aspect >= np.tan(view.fov / 2.0) * view.aspect
         np.testing.assert_allclose(pose.position, view.camera.centre)
-
-
-@pytest.mark.parametrize("aspect", [0.6, 1.0, 2.2])
-def test_the_view_from_above_has_everything_in_it(aspect: float) -> None:
-    points = geometry.box_corners(np.array([-1.0, -4.0, 0.0]), np.array([3.0, 2.0, 2.0]))
-    pose = geometry.from_above(points, aspect)
-    assert pose.position[:2] == pytest.approx([1.0, -1.0])
-    depth = pose.position[2] - points[:, 2]
-    tangent = np.tan(pose.fov / 2.0)
-    assert (np.abs(points[:, 0] - 1.0) / depth <= tangent * aspect).all()
-    assert (np.abs(points[:, 1] + 1.0) / depth <= tangent).all()
 
 
 def test_trails_go_back_and_ahead() -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import threading
 from contextlib import nullcontext
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from app.scene.geometry import Pose
+from app.scene.framing import Pose
 from app.scene.views import _Follower
 
 
@@ -89,4 +90,28 @@ def test_who_has_moved_is_left_alone() -> None:
     camera.shape = 1.2
     follower.follow(camera)  # type: ignore[arg-type]
     assert follower._pose is not None
+    np.testing.assert_allclose(follower._pose.position, 2.0)
+
+
+def test_a_new_overview_places_only_who_has_not_moved() -> None:
+    client = Client()
+    scale = [1.0]
+
+    def overview(aspect: float) -> Pose:
+        return replace(pose_for(aspect), position=np.full(3, scale[0]))
+
+    follower = _Follower(client, overview)  # type: ignore[arg-type]
+    follower.follow(client.camera)  # type: ignore[arg-type]
+    client.camera.at = np.full(3, 1.0)
+    follower.follow(client.camera)  # type: ignore[arg-type]
+    scale[0] = 2.0
+    follower.renew()
+    assert follower._pose is not None
+    np.testing.assert_allclose(follower._pose.position, 2.0)
+    client.camera.at = np.full(3, 2.0)
+    follower.follow(client.camera)  # type: ignore[arg-type]
+    client.camera.at = np.array([5.0, 0.0, 0.0])
+    follower.follow(client.camera)  # type: ignore[arg-type]
+    scale[0] = 3.0
+    follower.renew()
     np.testing.assert_allclose(follower._pose.position, 2.0)

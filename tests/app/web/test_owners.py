@@ -11,6 +11,8 @@ import pytest
 from app.web.views.steps import step_of
 from app.web.views.timeline import deviation
 from tracker import pipeline
+from tracker.filters.gaussian_mixture import gate_distance
+from tracker.fusion.target_model import SIZES
 from tracker.sequences.reader import read_sequence
 
 
@@ -41,6 +43,11 @@ def test_a_detection_is_the_tracks_that_it_feeds_and_any_other_one_is_nobodys(
     assert last.nearest in {track.id for track in before.tracks}
     assert last.sigmas is not None
     assert last.sigmas > 4.0
+    # in the measurement space of the fusion
+    p = run.parameters.fusion
+    gate = gate_distance(p.gate_probability, SIZES[p.measurement])
+    assert last.gate == pytest.approx(gate**0.5, abs=0.01)
+    assert last.sigmas > last.gate
     # one that lies where the track's box is expected is near
     there = next(track for track in before.tracks if track.box is not None)
     left, top, width, height = there.box or (0.0, 0.0, 1.0, 1.0)

@@ -72,6 +72,8 @@ def test_a_box_that_is_nobodys_says_who_is_nearest(flat_page: Page, server: Serv
     card = page.locator(".cam .card:visible")
     expect(card).to_contain_text("nobody's")
     expect(card).to_contain_text("σ away")
+    beyond = f"{round(m['sigmas'] - m['gate'], 2):g}" if m["sigmas"] > m["gate"] else ""
+    expect(card).to_contain_text(f"{beyond} σ outside" if beyond else "gate")
     expect(card.locator(".id")).to_have_text(str(m["nearest"]))
 
 

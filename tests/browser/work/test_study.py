@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from tests.browser.looking import ask
 from tests.browser.serving import Server
@@ -92,3 +92,31 @@ def test_a_copy_is_changed_and_what_is_wrong_is_said(study: Page) -> None:
     expect(begin).to_be_enabled()
     study.get_by_role("button", name="Leave out Clutter rate").click()
     expect(study.locator(".pt tbody tr")).to_have_count(1)
+
+
+def test_the_estimate_goes_by_the_workers_and_a_new_study_begins_empty(
+    study: Page, server: Server
+) -> None:
+    study.get_by_role("button", name="Edit a copy").click()
+    why = study.locator(".def-foot .why")
+    for count, words in (("1", "with 1 worker"), ("3", "with 3 workers")):
+        study.get_by_label("Workers").fill(count)
+        expect(why).to_contain_text(words)
+    study.get_by_text("Dask scheduler", exact=True).click()
+    expect(why).to_contain_text("expected an address as tcp://")
+    study.get_by_text("This machine", exact=True).click()
+    study.get_by_label("Name of the study").fill("fresh")
+    begin = study.get_by_role("button", name="Start", exact=True)
+    expect(begin).to_be_enabled()
+    held: list[Route] = []
+    study.route("**/api/studies/fresh/start", lambda route: held.append(route))
+    begin.click()
+    starting = study.get_by_role("button", name="Starting…")
+    expect(starting).to_be_disabled()
+    expect(study.locator(".big")).to_contain_text(f"0 of {TRIALS}")
+    study.wait_for_timeout(600)  # news of the study have come by now
+    expect(study.locator("tr[data-trial]")).to_have_count(0)
+    assert held[0].request.post_data_json == {"workers": 3}
+    held[0].fulfill(status=409, json={"error": "study", "detail": "not now"})
+    expect(study.locator(".prog button")).to_have_text("Start")
+    ask(server, "DELETE", "studies/fresh")

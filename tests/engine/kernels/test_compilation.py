@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import shutil
 import subprocess
@@ -89,6 +90,12 @@ def test_without_any_place_to_write_it_still_works(package: Path, tmp_path: Path
         "from tracker import (\n    b_kernels as b,\n)",
         "import tracker.b_kernels",
         "def late():\n    from tracker import b_kernels",
+        "from tracker import \\\n    b_kernels",
+        "from tracker import (  # what counts (and what does not)\n    b_kernels,\n)",
+        "from tracker import b_kernels  # import of a neighbour",
+        "if True: import tracker.b_kernels",
+        "import os; import tracker.b_kernels",
+        '"""Whoever reads this may\nimport what(ever) there is"""\nimport tracker.b_kernels',
     ],
 )
 def test_the_digest_follows_imports(
@@ -111,6 +118,7 @@ def test_the_digest_follows_imports(
         (root / name).write_text(text, encoding="utf-8")
 
     def digest() -> str:
+        compilation._looked_at.cache_clear()
         known = compilation._with_used(root / "a_kernels.py", set())
         assert {path.name for path in known} == {"a_kernels.py", "b_kernels.py", "pairs.py"}
         return compilation._digest(known)
@@ -122,6 +130,28 @@ def test_the_digest_follows_imports(
         (root / name).write_text(files[name] + "# changed\n", encoding="utf-8")
         assert digest() != before
         before = digest()
+
+
+def test_imports_alone_tell_what_the_whole_file_tells() -> None:
+    quick = 0
+    for file in compilation._ROOT.rglob("*.py"):
+        source = file.read_bytes()
+        named = {
+            name
+            for node in ast.walk(ast.parse(source))
+            if isinstance(node, ast.ImportFrom) and node.module
+            for name in (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
+        } | {
+            alias.name
+            for node in ast.walk(ast.parse(source))
+            if isinstance(node, ast.Import)
+            for alias in node.names
+        }
+        told = compilation._imported(source)
+        assert set(told) == {name for name in named if name.split(".")[0] == "tracker"}, file
+        matches = len(compilation._IMPORT.findall(source))
+        quick += matches == len(compilation._IMPORT_WORD.findall(source))
+    assert quick > 300  # else the short way is never taken
 
 
 def test_what_was_not_used_for_long_is_deleted(

@@ -170,6 +170,26 @@ def test_memory_stays_within_its_bytes_and_the_newest_stays() -> None:
     assert 0 < cache.used_bytes <= 110_000
 
 
+def test_later_stages_push_out_no_stage_1() -> None:
+    cache = StageCache(memory_bytes=1_000_000, later_bytes=60_000)
+    views = [tuple(views_at(WHOLE, 0))] * 20
+    cache.keep_views("v", ViewColumn(views, None, costly=False), complete=False)
+    alone = cache.used_bytes
+    for name in "abcdef":
+        cache.keep_fusion(name, column(10, 300))
+        assert cache.used_bytes - alone <= 60_000
+    assert [name for name in "abcdef" if cache.fusion(name)] == ["e", "f"]
+    assert cache.views("v", frames=20, cameras=3) is not None
+    cache.keep_views("w", ViewColumn(views, None, costly=False), complete=False)
+    cache.keep_views("v", ViewColumn([*views, *views], None, costly=False), complete=False)
+    assert [name for name in "abcdef" if cache.fusion(name)] == ["e", "f"]
+    cache.clear()
+    assert cache.used_bytes == 0
+    for name in "abcdef":
+        cache.keep_fusion(name, column(10, 300))
+    assert [name for name in "abcdef" if cache.fusion(name)] == ["e", "f"]
+
+
 def test_the_newest_of_each_stage_stays() -> None:
     cache = StageCache(memory_bytes=1)
     views = [tuple(views_at(WHOLE, 0))]

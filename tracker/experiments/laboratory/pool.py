@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import signal
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -65,6 +64,9 @@ def spread(
     if min(context.processes, len(items)) <= 1:
         return [work(item, _desk_here(context, words, index, steps, len(items)))
                 for index, item in enumerate(items)]  # fmt: skip
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+
     spawn = multiprocessing.get_context("spawn")  # a fork would copy threads' locks as they are
     stop, counter = spawn.Event(), spawn.Value("q", 0)
     pool = ProcessPoolExecutor(
@@ -104,6 +106,8 @@ def _desk_here(context: Context, words: str, index: int, steps: int, count: int)
 
 def _begin(stop: Any, counter: Any) -> None:
     """A worker's process begins."""
+    import multiprocessing
+
     import cv2
 
     _own.update(stop=stop, counter=counter)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from tracker.formats.columns import number_in, people, to_unit
-from tracker.formats.detections.body import read_people
+from tracker.formats.detections.poses.body import read_people
 from tracker.formats.pieces import DetectionPiece, Piece
 from tracker.formats.protocol import Certainty, Kind
 from tracker.formats.source import SourceFile

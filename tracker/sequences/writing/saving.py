@@ -18,7 +18,6 @@ from tracker.folders import cache_folder
 from tracker.placing import beside, replacing, sweep, sync_file, sync_folder
 from tracker.sequences.reader import FILE, check_own_file, given_folder, read_sequence
 from tracker.sequences.sequence import Sequence, SequenceError
-from tracker.sequences.writing.rewriting import rewritten
 
 BACKUP = f"{FILE}.bak"
 """What a file was before it was saved over; later ones have a number."""
@@ -47,6 +46,8 @@ def save(sequence: Sequence, saved: Sequence) -> Path:
         SequenceError: If the file may not be written, or somebody else changed what was
             taught in it meanwhile; it is then as it was.
     """
+    from tracker.sequences.writing.rewriting import rewritten
+
     folder, where = sequence.folder, f"{sequence.folder.name}/{FILE}"
     reason = why_not_in_place(folder)
     if reason is not None:
@@ -85,6 +86,8 @@ def save_copy(sequence: Sequence, saved: Sequence, folder: Path) -> Sequence:
     Raises:
         SequenceError: If it cannot be written there; nothing is left then.
     """
+    from tracker.sequences.writing.rewriting import rewritten
+
     source = sequence.folder
     folder = given_folder(folder).absolute()
     _check_place(folder, source)

@@ -59,9 +59,9 @@ class Status:
     """Trials that ended."""
     trials: int = 0
     runs: int = 0
-    """Runs that ended in this start, those that were not needed again left out."""
+    """Runs that ended, each counted once."""
     seconds: float = 0.0
-    """Since this start."""
+    """At work, all starts together."""
     seconds_left: float | None = None
     busy: float | None = None
     """Share of the workers' time, since all were there, in which they worked."""

@@ -104,7 +104,7 @@ class Summary:
                 f"{lead.name} varies"
             )
         if lead.key == IDENTITY.key:
-            found.append(f"no truth was looked at. {WARNING}")
+            found.append(f"no truth was looked at. {WARNING.removesuffix('.')}")
         return found
 
 

@@ -115,7 +115,7 @@ def look_at(address: str, seconds: float) -> dict[str, Any]:
     Raises:
         StudyError: If there is none at the address, or it is none.
     """
-    _check_address(address)
+    check_address(address)
     distributed: Any = importlib.import_module("distributed")  # slow, and without types
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
@@ -130,8 +130,13 @@ def look_at(address: str, seconds: float) -> dict[str, Any]:
     }
 
 
-def _check_address(address: str) -> None:
-    """What is no address Dask may refuse by anything, an assertion included."""
+def check_address(address: str) -> None:
+    """Whether a text may be a scheduler's address; what is none Dask may refuse by anything, an
+    assertion included.
+
+    Raises:
+        StudyError: If it cannot be one.
+    """
     found = re.fullmatch(
         r"(?:[a-z]+://)?(?:[A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\]):(\d{1,5})/?", address
     )
@@ -191,7 +196,7 @@ class DaskCrew:
                 how_many(workers) if processes else workers or cores(), processes, tell
             )
         else:
-            _check_address(scheduler)
+            check_address(scheduler)
         target = scheduler if scheduler is not None else self._cluster
         try:
             self._client: Any = distributed.Client(

@@ -39,8 +39,12 @@ from tracker.studies.work.jobs import Job, Outcome, code_version
 from tracker.without_truth import estimate
 
 CACHE_BYTES = 128 << 20
-"""Memory of a worker for columns of runs: those of stage 1 are used by every trial and stay, others
-are seldom used again."""
+"""Memory of a worker for columns of runs, above all of stage 1, which every trial uses that changes
+what comes after."""
+
+LATER_BYTES = 16 << 20
+"""Of this for the stages after the first, which hardly any other trial uses: a worker has soon
+taken all that it ever takes."""
 
 MOST_OPEN = 16
 """Recordings that a worker keeps open."""
@@ -96,7 +100,9 @@ def prepare(tell: Tell = lambda words: None) -> None:
             tell(COMPILING)
             _compile()
         files = StageFiles(cache_folder() / "stages")
-        _process = _Process(StageCache(memory_bytes=CACHE_BYTES, files=files))
+        _process = _Process(
+            StageCache(memory_bytes=CACHE_BYTES, later_bytes=LATER_BYTES, files=files)
+        )
 
 
 def _compile() -> None:

@@ -14,12 +14,12 @@ from typing import TypeVar
 import msgspec
 import pytest
 import viser
+import websockets.asyncio.server
 from viser import _messages
 from websockets.asyncio.client import connect, unix_connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.typing import Subprotocol
 
-from app.web.access import viewer as module
 from app.web.access.viewer import LARGEST_MESSAGE, SECRET_HEADER, Entrance, start_viser
 
 T = TypeVar("T")
@@ -186,9 +186,9 @@ def test_viser_that_listens_by_itself_is_not_started(monkeypatch: pytest.MonkeyP
         def stop(self) -> None:
             Other.stopped = True
 
-    serve = module.websockets.asyncio.server.serve
+    serve = websockets.asyncio.server.serve
     monkeypatch.setattr(viser, "ViserServer", Other)
     with pytest.raises(RuntimeError, match="viser listens by other means"):
         start_viser()
     assert Other.stopped
-    assert module.websockets.asyncio.server.serve is serve
+    assert websockets.asyncio.server.serve is serve

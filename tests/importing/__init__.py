@@ -1,0 +1,1 @@
+"""Importing recordings: gathered, settled, written as a sequence folder."""

@@ -1,0 +1,1 @@
+"""Cameras as motion capture systems export them."""

@@ -1,0 +1,1 @@
+"""Cameras as published recordings give them."""

@@ -1,0 +1,1 @@
+"""Boxes that people drew, as annotation programs write them."""

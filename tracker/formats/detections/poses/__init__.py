@@ -1,0 +1,1 @@
+"""Boxes out of the joints of poses."""
