@@ -9,6 +9,10 @@ export function progressPane({ pause }) {
 	/** @param {Server.Study} now @param {boolean} going whether it is just being started or stopped */
 	function show({ info, status, sentences }, going) {
 		const running = info.state === "running";
+		const { done, trials } = info;
+		// where the time alone ends it, its share
+		const timed = status.seconds / (status.seconds + (status.seconds_left ?? 0) || 1);
+		const part = trials === null ? (info.state === "new" ? 0 : timed) : done / Math.max(1, trials);
 		/** @type {Record<string, string>} */
 		const words = { running: "Pause", done: "Done", new: "Start" };
 		const word = going && !running ? "Starting…" : (words[info.state] ?? "Go on");
@@ -26,19 +30,19 @@ export function progressPane({ pause }) {
 				h(
 					"div",
 					{ class: "big" },
-					h("b", {}, info.done),
-					h("span", { class: "q" }, ` of ${info.trials} trials`),
+					h("b", {}, done),
+					h("span", { class: "q" }, trials === null ? " trials so far" : ` of ${trials} trials`),
 				),
 				h(
 					"span",
 					{
 						class: "bar wide",
-						"--part": info.done / Math.max(1, info.trials),
+						"--part": part,
 						role: "progressbar",
 						"aria-label": "Trials",
-						"aria-valuenow": info.done,
+						"aria-valuenow": trials === null ? Math.round(100 * part) : done,
 						"aria-valuemin": 0,
-						"aria-valuemax": info.trials,
+						"aria-valuemax": trials ?? 100,
 					},
 					h("i"),
 				),
