@@ -25,7 +25,9 @@ export const PLACES = [
 		tip: "Many runs at once: which values are better, and which matter",
 		read: () => import("../study/study.js").then(({ mountStudy }) => mountStudy),
 		sign: ({ study }) =>
-			study?.state === "running" ? [study.done, study.trials ?? "…"].join("/") : "",
+			study?.state === "running"
+				? [study.done, study.trials].filter((count) => count !== null).join("/")
+				: "",
 	},
 	{
 		name: "library",

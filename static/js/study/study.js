@@ -226,14 +226,14 @@ export function mountStudy(root, { store, actions }) {
 		await go(study.info.state === "running" ? "/stop" : "/start", {});
 	}
 
-	/** Whether the server is just starting or stopping it. */
-	let going = false;
+	/** What the server is just asked to do with it. @type {"" | "Starting…" | "Pausing…"} */
+	let going = "";
 	/** @param {"/start" | "/stop"} to @param {Partial<import("./where.js").Where>} place */
 	async function go(to, place) {
-		going = true;
+		going = to === "/start" ? "Starting…" : "Pausing…";
 		if (study) progress.show(study, going);
 		await actions.ask("POST", path(to), place);
-		going = false;
+		going = "";
 		if (study) progress.show(study, going);
 		await refresh();
 	}
