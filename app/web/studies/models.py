@@ -18,7 +18,8 @@ class StudyInfo(Model):
     """What it waits for, or why it ended."""
     done: int
     """Trials that ended."""
-    trials: int
+    trials: int | None
+    """All there are to be; null where the time alone ends it."""
     touched: float
     """When it was at work last, seconds since 1970."""
     seconds_left: float | None

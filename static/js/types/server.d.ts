@@ -1138,7 +1138,8 @@ declare namespace Server {
 		words: string;
 		/** Trials that ended. */
 		done: number;
-		trials: number;
+		/** All there are to be; null where the time alone ends it. */
+		trials: number | null;
 		/** When it was at work last, seconds since 1970. */
 		touched: number;
 		seconds_left: number | null;
