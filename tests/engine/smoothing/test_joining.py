@@ -159,6 +159,31 @@ def test_the_motion_prefers_who_goes_on_as_he_went() -> None:
     assert len(near.gains) == 0
 
 
+def test_boxes_that_err_alike_contradict_each_other_less() -> None:
+    paths = together(straight(1, 0, 0.0, 10), straight(2, 11, 1.1, 10, side=0.8))
+    prior = np.diag([100.0] * 3 + [0.49] * 3)
+    motion = Motion.of(FusionParams(), 0.1)
+    known = Ends.alone(as_fitted(paths), prior)
+    gains = [
+        float(motion_pairs(paths, told, motion, prior, 0.0, longest=20, fastest=0.3).gains[0])
+        for told in (known, known.told_by(0.2), known.told_by(1.0))
+    ]
+    assert gains[1] > gains[0] + 1.0
+    assert gains[2] == gains[0]
+
+
+def test_as_the_filter_had_it_is_always_possible() -> None:
+    # at once two metres further, the same label again, and another's who is as far
+    paths = together(
+        straight(1, 0, 0.0, 10), straight(1, 10, 1.0, 10, side=2.0), straight(2, 10, 1.0, 10, -2.0)
+    )
+    prior = np.diag([100.0] * 3 + [0.49] * 3)
+    known = Ends.alone(as_fitted(paths), prior)
+    motion = Motion.of(FusionParams(), 0.1)
+    found = motion_pairs(paths, known, motion, prior, 0.0, longest=20, fastest=0.3)
+    assert list(zip(found.earlier.tolist(), found.later.tolist(), strict=True)) == [(0, 1)]
+
+
 def test_boxes_that_are_as_well_anothers_are_contested() -> None:
     paths = together(straight(1, 0, 0.0, 2), straight(2, 0, 0.0, 2, side=0.2))
     links = Links(

@@ -65,7 +65,7 @@ def goes_on(
     longest = max(round(p.longest / step_time), 1)
     motion = pieces.motion_pairs(
         paths,
-        known,
+        known.told_by(independence(step_time, p.memory)),
         smoother.model.motion,
         smoother.prior,
         smoother.log_place,

@@ -151,6 +151,11 @@ def motion_pairs(
     gaps = firsts[later] - lasts[earlier]
     way = pieces.states[begins[later], :3] - pieces.states[ends[earlier], :3]
     near = np.linalg.norm(way, axis=1) <= 1.0 + fastest * gaps
+    # as the filter had it is always possible: it may have followed another before
+    goes_on = np.full(len(lasts), -1)
+    for one, other in same_label(pieces):
+        goes_on[one] = other
+    near |= goes_on[earlier] == later
     earlier, later, gaps = earlier[near], later[near], gaps[near]
     # F^k, and the noise that k steps add
     d = motion.dimension
