@@ -14,6 +14,9 @@ from tracker.smoothing.smoother import Shared, Smoother
 UNSURE = 0.3
 """Existence with which a row beyond a path's ends, or within its gaps, competes for boxes."""
 
+_MEETING = 2
+"""Cameras whose boxes of anything meet somewhere."""
+
 _SAID = 1e4
 """Votes for a person where somebody said that he is: more than any camera has against it."""
 
@@ -36,7 +39,11 @@ def lifetimes(
 
     A camera that shows the person votes for him with as much as it would against him if it
     showed nothing, log 1/(1 − p_D): a false box that stays is no better witness than a miss.
-    Where stage 1 tells how much likelier a person looks so, log Λ is added to that.
+
+    Where stage 1 tells how much likelier a person looks so, log Λ is added to that; its boxes are
+    many, and most are false. One alone has a place somewhere on its ray whatever it shows, so
+    that only its looks count. Two of something else meet somewhere in the room, a third hardly
+    meets them: each beyond the second outweighs as much doubt of their looks as a vote.
 
     Returns:
         (N,) probabilities; (n,) log odds of a person at some step against nobody.
@@ -49,8 +56,13 @@ def lifetimes(
         own = links.cameras == c
         looks[own] = -np.log(camera.clutter_factors[links.boxes[own]])
     rows = len(paths.states)
-    votes = hit * np.bincount(links.rows, links.shares, rows)
-    votes += np.bincount(links.rows, links.shares * looks, rows)
+    shown = np.bincount(links.rows, links.shares, rows)
+    votes = hit * shown
+    if looks.any():
+        doubt = np.bincount(links.rows, links.shares * looks, rows)
+        outweighed = np.minimum(doubt + hit * np.maximum(shown - _MEETING, 0.0), 0.0)
+        votes = hit * np.minimum(shown, 2.0 * np.maximum(shown - 1.0, 0.0))
+        votes += np.where(doubt < 0.0, outweighed, doubt)
     votes[smoother.pinned(paths)[0]] += _SAID
     weight = independence(smoother.model.step_time, parameters.memory)
     survival = min(p.survival_probability, 1.0 - 1e-9)

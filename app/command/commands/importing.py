@@ -143,8 +143,9 @@ def _print_checks(sequence: Any, reading: Any = None) -> int:
     """Every check in a row; status 1 where one of them warns."""
     from tracker.checks import check
     from tracker.importing.remedies import for_import
+    from tracker.single_view.working.shaking import check_shake
 
-    checks = check(sequence)
+    checks = [*check(sequence), *check_shake(sequence)]
     if reading is not None:
         checks = [for_import(one, reading) for one in checks]
     rows = [(SIGNS[one.status], one.name, str(one)) for one in checks]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from tracker.runs.gates import notices
 from tracker.sequences.library import open_sequence
 from tracker.sequences.pictures.frames import FrameReader, Picture
 from tracker.single_view.working.sequence import Working
+from tracker.single_view.working.shaking import check_shake
 from tracker.single_view.working.steadying import Steadying, agreed
 
 SIZE = (320, 240)
@@ -165,3 +168,18 @@ def test_a_run_holds_the_shaking_camera_still_and_says_so() -> None:
     name = sequence.views[0].camera.name
     assert any(f'"{name}" shakes by 1.' in one for one in notices(undone))
     assert not any("shakes" in one for one in notices(left))
+
+
+def test_check_names_the_camera_that_shakes_and_no_other() -> None:
+    sequence = cut(open_sequence("room24-2p"), 270, 32)
+    with FrameReader(sequence) as calm, _Shaking(sequence) as reader:
+        (shaking,) = check_shake(sequence, reader)
+        (still,) = check_shake(sequence, calm)
+    assert shaking.status == "warning"
+    assert shaking.sentence.startswith(f'camera "{sequence.views[0].camera.name}" shakes by 1.')
+    assert shaking.numbers["shake"] == pytest.approx(1.5, rel=0.4)
+    assert still.status == "good"
+    blind = replace(
+        sequence, views=tuple(replace(v, video=None, images=()) for v in sequence.views)
+    )
+    assert [one.status for one in check_shake(blind)] == ["absent"]

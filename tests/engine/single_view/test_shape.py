@@ -11,6 +11,7 @@ import pytest
 from scipy.special import logit
 
 from tracker import pipeline
+from tracker.boxes import Boxes
 from tracker.parameters import RunParameters, with_values
 from tracker.pictures.foreground import BackgroundModel
 from tracker.sequences.pictures.frames import FrameReader
@@ -18,7 +19,8 @@ from tracker.sequences.reader import read_sequence
 from tracker.sequences.rendering import render_random
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
-from tracker.single_view.colour.trust import shapes_of_templates
+from tracker.single_view.colour.peaks import PeakFinder
+from tracker.single_view.colour.trust import shapes_of_templates, taught_everywhere
 from tracker.single_view.protocol import ViewResult
 from tracker.single_view.shape.channels import Channels
 from tracker.single_view.shape.finder import Shapes, strongest
@@ -186,3 +188,42 @@ def test_where_shapes_fit_the_templates_they_place_whom_colours_find(room: Seque
     for view in best:
         surest = int(view.log_ratios.argmax())
         assert view.sigmas[surest, 0] < view.boxes[surest, 2], "placed by shape, not by colour"
+
+
+def test_a_peak_vouches_for_the_surest_shape_at_its_place_and_says_little_alone(
+    room: Sequence,
+) -> None:
+    parameters = with_values(RunParameters(), {"single_view": "colour_phd"})
+    template = room.templates[0]
+    camera = [view.camera.name for view in room.views].index(template.camera)
+    with FrameReader(room) as reader:
+        finder = PeakFinder(room, camera, parameters.colour_phd, parameters.foreground, reader)
+        picture = reader.picture(camera, template.frame)
+        assert picture is not None
+        _, scene = finder._appearance.look(finder._appearance.start(), picture)
+    finder._appearance.trust[:] = 1.0  # as if nobody had stayed while the background was learnt
+    box = Boxes.from_left_top(template.box[None]).centred
+    sizes = np.tile(box[:, 2:] / [0.28, 0.86], (2, 1))  # pixels a metre
+    aside = box + [0.3, 0.3, 0.0, 0.0] * np.tile(sizes[0], 2)
+    away = box + [3.0, 0.0, 0.0, 0.0] * np.tile(sizes[0], 2)
+    none = Windows(np.zeros((0, 4)), np.zeros((0, 4)))
+    found = Shapes(np.concatenate([box, aside]), np.array([1.0, 0.0]), sizes, 0, none, np.zeros(0))
+    distances, person = np.zeros(2), np.zeros(2, dtype=np.int64)
+    passed = finder._passed(scene, found, np.concatenate([box, away]), distances, person)
+    without = finder._passed(scene, found, away, distances[:1], person[:1])
+    sure, part, lone = passed.log_ratios
+    assert sure >= 0.0 > without.log_ratios[0]
+    assert part == without.log_ratios[1] < 0.0
+    # of a person whom shapes show, a peak without one is little
+    assert finder._by_shape[0] > 0.9
+    assert lone == without.log_ratios[2] < -2.0
+
+
+def test_colours_are_unsure_where_somebody_is_not_taught_in_every_camera(room: Sequence) -> None:
+    cameras = [camera.name for camera in room.cameras]
+    first = room.templates[0]
+    whole = replace(room, templates=tuple(replace(first, camera=name) for name in cameras))
+    assert taught_everywhere(whole)
+    assert not taught_everywhere(replace(whole, templates=whole.templates[1:]))
+    another = replace(first, name="another")
+    assert not taught_everywhere(replace(whole, templates=(*whole.templates, another)))

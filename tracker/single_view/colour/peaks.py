@@ -22,7 +22,11 @@ from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.appearance import Appearance, Scene
-from tracker.single_view.colour.trust import shapes_of_templates, template_trust
+from tracker.single_view.colour.trust import (
+    shapes_of_templates,
+    taught_everywhere,
+    template_trust,
+)
 from tracker.single_view.protocol import CANDIDATES, DROPPED, TRUST
 from tracker.single_view.shape.evidence import log_ratios, shape_sigmas
 from tracker.single_view.shape.finder import SAME_PERSON, ShapeFinder, Shapes
@@ -117,7 +121,7 @@ class PeakFinder:
         """Whether people by shape lie where the templates are."""
         if p.shapes in ("unsure", "fitting") and p.asks_foreground:
             # who is doubted in one camera is sought by shape in all: one alone tells no place
-            wanted = any(
+            wanted = not taught_everywhere(sequence) or any(
                 trust < BELIEVED
                 for camera in range(len(sequence.views))
                 for trust in template_trust(sequence, camera, reader, foreground).values()
@@ -212,19 +216,26 @@ class PeakFinder:
     ) -> Passed:
         """People by shape, surer where a peak is of the same, and peaks where there is no shape.
 
-        Of those ln (t Λ + 1 - t) tells what it means that nobody would take them for a person,
-        where t says how far the shapes are to be believed about whose colours they have.
+        A peak vouches for the surest shape at its place: others there are parts of the same
+        person. Of a peak without any ln (t Λ + 1 - t) tells what it means that nobody would take
+        it for a person, where t says how far the shapes are to be believed about whose colours
+        it has; that it lies on the foreground is no excuse, for so do parts of people and shadows.
         """
         s = self._shape_numbers
         near = self._near(found, peaks)
-        alone = np.flatnonzero(~near.any(axis=0))
+        surest = np.where(near, found.log_odds[:, None], -np.inf)
+        vouched = near & (surest == surest.max(axis=0, initial=-np.inf))
+        behind = self._behind(found, peaks, person, vouched)
+        alone = np.flatnonzero(~near.any(axis=0) | behind)
+        vouched &= ~behind
         seen = self._trusted(person)  # by the foreground, which took each peak for somebody
         ratios = log_ratios(found.log_odds, s.even_odds, s.odds_weight, s.largest_ratio)
-        ratios = ratios + COLOUR_RATIO * near.any(axis=1)
-        ratios = _at_least(ratios, np.where(near, seen, 0.0).max(axis=1, initial=0.0))
+        ratios = ratios + COLOUR_RATIO * vouched.any(axis=1)
+        ratios = _at_least(ratios, np.where(vouched, seen, 0.0).max(axis=1, initial=0.0))
         least = log_ratios(np.array(s.passed_odds), s.even_odds, s.odds_weight, s.largest_ratio)
         told = self._by_shape[person[alone]]
-        of_alone = _at_least(np.log(told * np.exp(least) + 1.0 - told), seen[alone])
+        of_alone = np.log(told * np.exp(least) + 1.0 - told)
+        of_alone = _at_least(of_alone, np.where(behind[alone], seen[alone], 0.0))
         return Passed(
             np.concatenate([found.boxes, peaks[alone]]),
             self._likelihood(np.concatenate([self._nearest(scene, found.boxes), distances[alone]])),
@@ -236,6 +247,23 @@ class PeakFinder:
             ),
             np.concatenate([ratios, of_alone]),
         )
+
+    @staticmethod
+    def _behind(
+        found: Shapes,
+        peaks: Float[ndarray, "N 4"],
+        person: Int[ndarray, " N"],
+        vouched: Bool[ndarray, "K N"],
+    ) -> Bool[ndarray, " N"]:
+        """Which peaks are of somebody else than the one whose colours are nearest to the shape:
+        of two people before each other the picture has one shape."""
+        behind = np.zeros(len(peaks), dtype=bool)
+        for k in np.flatnonzero(vouched.sum(axis=1) > 1):
+            own = np.flatnonzero(vouched[k])
+            apart = np.abs(peaks[own, :2] - found.boxes[k, :2]) / found.sizes[k]
+            nearest = own[(apart**2).sum(axis=1).argmin()]
+            behind[own] |= person[own] != person[nearest]
+        return behind
 
     def _nearest(self, scene: Scene, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, " N"]:
         """The distance of each box to the nearest template."""

@@ -75,6 +75,17 @@ def template_trust(
     return trust
 
 
+def taught_everywhere(sequence: Sequence) -> bool:
+    """Whether every person has a template in every camera.
+
+    What somebody's colours are in another camera, by another light and from another side, is
+    guessed from those in one.
+    """
+    taught = {(template.name, template.camera) for template in sequence.templates}
+    names = {template.name for template in sequence.templates}
+    return all((name, camera.name) in taught for name in names for camera in sequence.cameras)
+
+
 @dataclass(frozen=True, slots=True)
 class ShapesOfTemplates:
     """What people by shape are at the templates, which are proof of a person."""
