@@ -16,6 +16,7 @@ from tracker.checks.check import Check, Remedy, absent, good, percent, warning
 from tracker.checks.level import confirmed, upwards
 from tracker.checks.reading import Reading, exchanged, exchanges
 from tracker.checks.readings import (
+    CLEARLY,
     LEAST_SHARE,
     Judge,
     Judged,
@@ -99,9 +100,10 @@ def listen(sequence: Sequence, *, exchanges: bool = True) -> BoxesTell | None:
     meaning = find_meaning(cameras, seen, tried=Open(orders=exchanges))
     assert meaning is not None
     best = meaning.best
-    enough = best.consensus.agreeing >= LEAST_AGREEING and best.consensus.share >= LEAST_SHARE
     otherwise = replace(best.reading, unit="m", up="z") != AS_GIVEN
-    mistaken = enough and otherwise and clearly_better(best, given)
+    enough = best.consensus.agreeing >= LEAST_AGREEING and best.consensus.share >= LEAST_SHARE
+    alone = all(best.score > CLEARLY * other.score for other in meaning.tried[1:])
+    mistaken = enough and alone and otherwise and clearly_better(best, given)
     chosen = judge.righted(best, AS_GIVEN.up) if mistaken else given
     known = 2.0 * float(sequence.target_half_extents[2])
     unit = likely_unit(judge.away(chosen), chosen.consensus)
@@ -214,8 +216,11 @@ def _mistake(sequence: Sequence, told: BoxesTell) -> Check:
 
 def _nothing_meets(told: BoxesTell) -> Check:
     agreed = told.given.consensus
-    if agreed.possible < 3 * LEAST_AGREEING:
-        return absent("boxes meet in 3D", "too few boxes to see whether they meet")
+    best = told.meaning.tried[0].consensus
+    if agreed.possible < 3 * LEAST_AGREEING or best.agreeing >= LEAST_AGREEING:
+        return absent(
+            "boxes meet in 3D", "too few boxes meet to tell how calibration and boxes are meant"
+        )
     return warning(
         "boxes meet in 3D",
         f"only {percent(agreed.share)} of the boxes of several cameras meet, and no usual way to "

@@ -20,7 +20,7 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.agreement.consensus import Consensus, consensus
-from tracker.agreement.observed import PairsOfBoxes, Pose, Rays, pair_up, rays_of
+from tracker.agreement.observed import PairsOfBoxes, Pose, Rays, pair_up, rays_of, uncut
 from tracker.checks.level import upwards
 from tracker.checks.reading import (
     Reading,
@@ -43,6 +43,9 @@ MOST_IN_ALL = 60_000
 _PLAIN = 0.5
 """Share of boxes that meet with heads at their tops with which nobody asks for another side: how
 broad people are agrees between cameras too, but of fewer."""
+
+_LEAST_BREADTH = -0.2
+"""Logarithm: who lies across the picture is not so much taller there than broad."""
 
 _REFINED = 8
 """Of so many readings, the best, heads and feet are found exactly."""
@@ -241,18 +244,32 @@ class Judge:
         poses = self.poses(reading)
         best: Judged | None = None
         for turns in turns_tried(poses):
+            aside = [self._breadth(n, reading) for n, turn in enumerate(turns) if turn % 2]
+            if aside and np.mean(aside) < _LEAST_BREADTH:
+                continue
             rays = [
                 self._of(camera, own, reading, turn)
                 for (camera, own), turn in zip(enumerate(self._order(reading)), turns, strict=True)
             ]
             agreed = consensus(rays, poses, self.pairs)
             score = float(agreed.fits.sum())
+            judged = Judged(reading, agreed, score, agreed.rise, turns)
             if best is None or score > best.score:
-                best = Judged(reading, agreed, score, agreed.rise, turns)
+                best = judged
             if not any(best.turns) and best.consensus.share > _PLAIN:
                 break
         assert best is not None
         return best
+
+    def _breadth(self, camera: int, reading: Reading) -> float:
+        """The logarithm of how many times as broad as tall the usual box of a camera is."""
+        own = self._seen[camera]
+        if own is None or not len(own.four):
+            return 0.0
+        size = self.sizes[self._order(reading)[camera]]
+        boxes = read_boxes(own.four, reading.layout, size if reading.normalised else None)
+        sides = boxes[uncut(boxes, size), 2:]
+        return float(np.median(np.log(sides[:, 0] / sides[:, 1]))) if len(sides) else 0.0
 
     def refined(self, judged: Judged) -> Judged:
         """With heads and feet where people who stand upright have them in the boxes."""
