@@ -8,6 +8,7 @@ not found by shape.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,15 +76,15 @@ def template_trust(
     return trust
 
 
-def taught_everywhere(sequence: Sequence) -> bool:
-    """Whether every person has a template in every camera.
+def taught_well(sequence: Sequence) -> bool:
+    """Whether every person has several templates in every camera.
 
-    What somebody's colours are in another camera, by another light and from another side, is
-    guessed from those in one.
+    What somebody's colours are in another camera, by another light, is guessed from those in
+    one, and from the other side from those of one side.
     """
-    taught = {(template.name, template.camera) for template in sequence.templates}
+    taught = Counter((template.name, template.camera) for template in sequence.templates)
     names = {template.name for template in sequence.templates}
-    return all((name, camera.name) in taught for name in names for camera in sequence.cameras)
+    return all(taught[name, camera.name] > 1 for name in names for camera in sequence.cameras)
 
 
 @dataclass(frozen=True, slots=True)
