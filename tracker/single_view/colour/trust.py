@@ -77,14 +77,16 @@ def template_trust(
 
 
 def taught_well(sequence: Sequence) -> bool:
-    """Whether every person has several templates in every camera.
+    """Whether every person has a template in every camera, and several in one.
 
     What somebody's colours are in another camera, by another light, is guessed from those in
     one, and from the other side from those of one side.
     """
     taught = Counter((template.name, template.camera) for template in sequence.templates)
     names = {template.name for template in sequence.templates}
-    return all(taught[name, camera.name] > 1 for name in names for camera in sequence.cameras)
+    cameras = [camera.name for camera in sequence.cameras]
+    counts = [[taught[name, camera] for camera in cameras] for name in names]
+    return all(min(count) > 0 and max(count) > 1 for count in counts)
 
 
 @dataclass(frozen=True, slots=True)
