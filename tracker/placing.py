@@ -39,11 +39,13 @@ ABANDONED_SECONDS = 3600.0
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Path]:
+def replacing(path: Path, *, passing: bool = False) -> Iterator[Path]:
     """A file to write, which takes its place when it is complete and never before.
 
     Args:
         path: Replaced if it is there.
+        passing: Whether it is soon written anew, so that a machine that loses its power may lose
+            it: then nobody waits for the disk.
 
     Raises:
         OSError: With a sentence, if it cannot be written; what was there still is.
@@ -56,9 +58,11 @@ def replacing(path: Path) -> Iterator[Path]:
     temporary = beside(path)
     try:
         yield temporary
-        sync_file(temporary)
+        if not passing:
+            sync_file(temporary)
         temporary.replace(path)
-        sync_folder(path.parent)
+        if not passing:
+            sync_folder(path.parent)
     except OSError as error:
         raise OSError(f"{path}: cannot be written ({error.strerror or error})") from None
     finally:

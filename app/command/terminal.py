@@ -52,8 +52,8 @@ class Bar:
         if self._bar is not None:
             self._bar.close()
 
-    def at(self, done: int, total: int) -> None:
-        """Show that ``done`` of ``total`` units are done."""
+    def at(self, done: int, total: int | None) -> None:
+        """Show that ``done`` of ``total`` units are done; None where nobody knows how many."""
         if self._bar is None:
             from tqdm import tqdm
 

@@ -7,6 +7,7 @@ what comes in numbers is a batch or a pool that only grows.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -19,6 +20,10 @@ from app import colours
 
 DISC = 26.0
 """Pixels across, of the disc behind a label of 12 pixels."""
+
+ROOM_FOR = 14
+"""Labels of full size; where there are more, all are smaller."""
+SMALLEST = 0.6
 
 NO_TURN = np.array([1.0, 0.0, 0.0, 0.0])
 """The identity as a unit quaternion w, x, y, z."""
@@ -43,6 +48,15 @@ class Lines:
             thickness_units="screen",
             visible=False,
         )
+
+    @property
+    def thickness(self) -> float:
+        """Pixels, whatever the distance."""
+        return float(self._handle.thickness)
+
+    @thickness.setter
+    def thickness(self, pixels: float) -> None:
+        self._handle.thickness = pixels
 
     def show(
         self,
@@ -147,6 +161,11 @@ class Tag:
     """Of what it names: a disc behind the words."""
 
 
+def crowded(count: int) -> float:
+    """How large labels are where there are so many, as a share: they are not to hide each other."""
+    return round(max(SMALLEST, min(1.0, math.sqrt(ROOM_FOR / max(1, count)))), 1)
+
+
 class Tags:
     """A pool of labels that face the viewer; it grows to the most that was needed.
 
@@ -165,7 +184,7 @@ class Tags:
         """
         self._server = server
         self._name = name
-        self._scale = scale
+        self._scale = self._drawn = scale
         self._discs = Lines(server, f"{name}_discs", DISC * scale)
         self._nodes: list[viser.LabelHandle] = []
         for _ in range(size):
@@ -183,9 +202,16 @@ class Tags:
         )
 
     def show(self, tags: list[Tag]) -> None:
-        """Show these labels and no others."""
+        """Show these labels and no others; smaller ones where there are many."""
         while len(self._nodes) < len(tags):
             self._grow()
+        scale = self._scale * crowded(len(tags))
+        if scale != self._drawn:
+            self._drawn = scale
+            self._discs.thickness = DISC * scale
+        for node in self._nodes[: len(tags)]:
+            if node.font_screen_scale != scale:
+                node.font_screen_scale = scale
         for node, tag in zip(self._nodes, tags, strict=False):
             node.position = tag.position
             node.text = tag.text

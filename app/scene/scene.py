@@ -138,7 +138,6 @@ class Scene:
         taught = sequence is not before
         turned = snapshot.view != self._looking
         self._looking = snapshot.view
-        self._shown = snapshot
         if taught or turned or themed or "layers" in topics:
             palette, through = PALETTES[snapshot.theme], self._through
             with self._server.atomic():
@@ -149,6 +148,7 @@ class Scene:
                     floor=through is None,
                 )
                 self._frusta.place(sequence.cameras, sequence.room, through, palette)
+        self._shown = snapshot  # from here on a browser that comes asks for the overview of it
         self._draw_step(snapshot, shown_run(snapshot))
         self._frame(snapshot, shown_run(snapshot), another=another)
         if another:

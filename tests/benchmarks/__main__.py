@@ -36,6 +36,7 @@ SUITES = {
     "library": library.run,
     "kept": kept.run,
     "studies": studies.run,
+    "crowd": studies.crowd,
 }
 
 

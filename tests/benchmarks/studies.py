@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import logging
+import sqlite3
 import tempfile
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +22,7 @@ from tests.synthetic import write_sequence
 from tracker.studies.defined.defining import definition_of
 from tracker.studies.defined.definition import Definition
 from tracker.studies.kept.store import Store, create
+from tracker.studies.kept.writer import RESULTS
 from tracker.studies.opened import open_recordings
 from tracker.studies.running import run_study
 from tracker.studies.work import working
@@ -39,15 +43,19 @@ PARAMETERS: dict[str, Any] = {
 
 
 def run(short: bool) -> Iterator[Measurement]:
-    """Trials that sleep on many threads, then real ones against a loop written by hand."""
+    """A study of three recordings on two workers, then its runs in a loop written by hand."""
+    if all((DATA / name).is_dir() for name in RECORDINGS):
+        yield from _real(12 if short else 300)
+
+
+def crowd(short: bool) -> Iterator[Measurement]:
+    """Trials that sleep on many threads."""
     growth = [(1000, "random"), (3000, "random"), (10_000, "random"), (3000, "tpe")]
     for trials, search in [(300, "random")] if short else growth:
         busy, beside = _asleep(trials, search)
         words = f"{trials} trials that sleep {SLEEP:g} s, {search}, {THREADS} threads"
         yield Measurement(f"studies: busy, {words}", busy, "share", "≥ 0.9", better="higher")
         yield Measurement(f"studies: the asker's time a trial, {words}", beside * 1e3, "ms")
-    if all((DATA / name).is_dir() for name in RECORDINGS):
-        yield from _real(12 if short else 300)
 
 
 def _definition(folder: Path, recordings: list[str], trials: int, search: str) -> Definition:
@@ -125,17 +133,23 @@ def _real(trials: int) -> Iterator[Measurement]:
                 run_study(store, writer, ready)
             whole = time.time() - begin
         found = store.trials()
-        seconds = max(one.ended for one in found) - begin
-        worked = sum(one.seconds for one in found)
+        end = max(one.ended for one in found)
+        seconds, worked = end - begin, sum(one.seconds for one in found)
+        yield Measurement(f"studies: a trial, {words}", seconds / trials, "s")
         yield Measurement(
             f"studies: busy, {words}", worked / (WORKERS * seconds), "share", "≥ 0.85",
             better="higher",
         )  # fmt: skip
-        beside = (WORKERS * seconds - worked) / trials
+        idle = sum(end - last for last in _last_runs(store))
+        beside = (WORKERS * seconds - worked - idle) / trials
         yield Measurement(f"studies: beside the runs, {words}", beside * 1e3, "ms/trial", "≤ 30 ms")
+        yield Measurement(f"studies: no run left for a worker, {words}", idle, "s")
         words_after = f"studies: from the last trial to the end, {words}"
         yield Measurement(words_after, whole - seconds, "s")
-        yield Measurement(f"studies: memory's growth, {words}", memory.growth / 1e6, "MB")
+        first, middle, last = memory.thirds(begin, end)
+        for third, size in (("first", first), ("middle", middle), ("last", last)):
+            yield Measurement(f"studies: memory in the {third} third, {words}", size / 1e6, "MB")
+        yield Measurement(f"studies: memory's growth, {words}", (last - middle) / 1e6, "MB")
         recordings = open_recordings(store.definition())
         jobs = [
             job for one in found for _, job in recordings.jobs(one.values if one.number else {})
@@ -144,6 +158,16 @@ def _real(trials: int) -> Iterator[Measurement]:
         yield Measurement(
             f"studies: against joblib by hand, {words}", by_hand / whole, "×", "≥ 1/1.1"
         )
+
+
+def _last_runs(store: Store) -> list[float]:
+    """When the last run of each worker had come back; seconds since 1970."""
+    ended: dict[str, float] = {}
+    with closing(sqlite3.connect(store.folder / RESULTS)) as results:
+        for outcome, kept in results.execute("SELECT outcome, ended FROM jobs"):
+            worker = json.loads(outcome)["worker"]
+            ended[worker] = max(kept, ended.get(worker, 0.0))
+    return list(ended.values())
 
 
 def _by_hand(jobs: list[Job]) -> float:
@@ -158,10 +182,10 @@ def _by_hand(jobs: list[Job]) -> float:
 
 
 class _Memory:
-    """Memory of this process and of those below it, from its middle third to its last."""
+    """Memory of this process and of those below it, over time."""
 
     def __enter__(self) -> _Memory:
-        self._samples: list[float] = []
+        self._samples: list[tuple[float, float]] = []
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._look, daemon=True)
         self._thread.start()
@@ -176,20 +200,16 @@ class _Memory:
                     total += process.memory_info().rss
                 except psutil.NoSuchProcess:
                     continue
-            self._samples.append(total)
+            self._samples.append((time.time(), total))
 
     def __exit__(self, *_: object) -> None:
         self._ended.set()
         self._thread.join()
 
-    @property
-    def growth(self) -> float:
-        """Bytes."""
-        third = max(1, len(self._samples) // 3)
-        middle, last = self._samples[third : 2 * third], self._samples[2 * third :]
-        if not middle or not last:
-            return 0.0
-        return float(np.mean(last) - np.mean(middle))
+    def thirds(self, begin: float, end: float) -> list[float]:
+        """Mean bytes in each third of the time between."""
+        found = [size for at, size in self._samples if begin <= at <= end]
+        return [float(np.mean(part)) for part in np.array_split(found, 3)]
 
 
 logging.getLogger("distributed").setLevel(logging.CRITICAL)

@@ -13,7 +13,8 @@ from tracker.agreement.suggestion import agreement, suggest
 from tracker.checks import check
 from tracker.checks.boxes import listen, raw_cameras
 from tracker.checks.reading import FLIP, Reading, pose, read_boxes, to_camera, upright
-from tracker.checks.readings import Seen, find_meaning, likely_unit
+from tracker.checks.readings import Seen, find_meaning
+from tracker.checks.sizes import likely_unit
 from tracker.formats.pieces import METRES, RawCamera
 from tracker.sequences.sequence import Sequence
 

@@ -3,6 +3,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { unbeaten } from "../../static/js/study/charts.js";
 import { placeOf } from "../../static/js/study/where.js";
+import { lineOf } from "../../static/js/study/words.js";
 
 /** @param {string} key @param {boolean} higher */
 const measure = (key, higher) => ({
@@ -32,4 +33,10 @@ test("a study runs at one place: workers of this machine, or a cluster", () => {
   assert.deepEqual(placeOf({ scheduler: null, workers: 3 }), { workers: 3 });
   assert.deepEqual(placeOf({ scheduler: "tcp://a:1", workers: 3 }), { scheduler: "tcp://a:1" });
   assert.deepEqual(placeOf({ scheduler: "", workers: 3 }), { scheduler: "" });
+});
+
+test("a study that the time alone ends is told without a number of trials to come", () => {
+  const study = { name: "mine", state: "running", done: 3, trials: 60 };
+  assert.equal(lineOf(study), "mine  ·  3 of 60 trials, running");
+  assert.equal(lineOf({ ...study, trials: null }), "mine  ·  3 trials, running");
 });

@@ -11,10 +11,12 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from app.command.commands.studies import _trials as command_words
 from app.state.studies.desk import StudyDesk
 from app.web.server import Settings, create_app
 from app.web.studies import routes
 from tests.studies.small import Serial, made_up, recording, run
+from tracker.studies.kept.records import Status
 from tracker.studies.kept.store import find
 
 ADDRESS = "http://127.0.0.1:8000"
@@ -120,6 +122,21 @@ def test_a_study_goes_on_where_it_ran(
     assert answer.status_code == 409
     assert "place.json, workers: expected" in answer.json()["detail"]
     assert client.post(start, json={"workers": 1}).status_code == 200
+
+
+def test_where_the_time_alone_ends_it_no_number_of_trials_is_told(
+    client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(StudyDesk, "run", lambda *_: None)
+    told = client.post("/api/studies/tune", json={"minutes": 2}).json()
+    assert told["info"]["trials"] is None
+    store = find(told["info"]["name"], tmp_path / "studies")
+    assert store.definition().within() == "in 2 minutes"
+    assert command_words(store, Status("running", done=7, trials=10**6)) == "7 trials"
+    bounded = define(client, minutes=2)
+    assert bounded["info"]["trials"] == 5
+    store = find("mine", tmp_path / "studies")
+    assert command_words(store, Status("running", done=1, trials=5)) == "1 of 5 trials"
 
 
 def test_what_is_on_the_sliders_is_held_and_tried(client: TestClient) -> None:

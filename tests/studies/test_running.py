@@ -110,6 +110,10 @@ def test_a_study_that_is_ended_goes_on_and_does_nothing_twice(tmp_path: Path, af
     assert store.trials()[: len(ended)] == ended
     assert len(store.trials()) == 6
     assert len(first.done) + len(second.done) == len(set(first.done) | set(second.done))
+    status = store.status()
+    assert status.runs == len(second.done)
+    assert status.all_runs == len(first.done) + len(second.done)
+    assert status.all_seconds > status.seconds
     # until it was ended it asked for what the other did
     same = [one.values for one in store.trials()[: max(1, len(ended))]]
     assert same == [one.values for one in whole.trials()[: len(same)]]

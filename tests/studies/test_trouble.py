@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
@@ -10,7 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from app.command.arguments.studies import Where
+from app.command.commands.studies import crew_of
+from app.command.terminal import CommandError
 from tests.studies.small import Serial, definition, made_up, run
+from tracker.placing import write_whole
 from tracker.studies.errors import StudyError
 from tracker.studies.kept import writer
 from tracker.studies.kept.records import Status
@@ -195,3 +200,29 @@ def test_a_recording_that_is_too_large_is_not_sent(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match="more than 0 MB are not sent; put it where every worker"):
         packed(Path(made.recordings[0]), limit=100)
     assert len(packed(Path(made.recordings[0]))) > 100
+
+
+def test_what_is_no_address_is_told_with_where_it_was_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def asked(where: Where) -> str:
+        with pytest.raises(CommandError) as told, crew_of(where):
+            pass
+        return str(told.value)
+
+    monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", "here")
+    assert asked(Where()).startswith("$DASK_SCHEDULER_ADDRESS: expected an address as tcp://")
+    assert asked(Where(scheduler="there")).startswith("--scheduler: expected an address as tcp://")
+
+
+def test_nobody_waits_for_the_disk_to_tell_how_far_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, synced = study(tmp_path), list[int]()
+    monkeypatch.setattr(os, "fsync", synced.append)
+    with store.running() as writer:
+        writer.say(Status("running", done=2))
+    assert store.folder.joinpath(STATUS).stat().st_size > 0
+    assert not synced
+    write_whole(tmp_path / "kept", b"kept")
+    assert synced

@@ -29,8 +29,8 @@ SPREAD = 0.25
 
 _LEAST_SINE = 0.05  # of the angle between two rays that are to meet: flatter ones tell no depth
 _LARGEST_RATIO = 2.5  # between the heights that two cameras see; one may look down steeply
-_HYPOTHESES = 400
-_MOST_VOTES = 4000
+_HYPOTHESES = 200
+_MOST_VOTES = 2000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -189,10 +189,11 @@ def _usual(rises: Float[ndarray, "N 3"], rng: np.random.Generator) -> Float[ndar
     tried = votes
     if len(tried) > _HYPOTHESES:
         tried = tried[rng.choice(len(tried), _HYPOTHESES, replace=False)]
-    # |v − u|² < s² |u|²  ⇔  |v|² − 2 v·u + (1 − s²) |u|² < 0
-    lengths = (votes**2).sum(axis=1)[None, :]
-    own = (tried**2).sum(axis=1)[:, None]
-    near = lengths - 2.0 * tried @ votes.T + (1.0 - SPREAD**2) * own < 0.0
+    # |v − u|² < s² |u|²  ⇔  2 v·u − |v|² − (1 − s²) |u|² > 0
+    ones = np.ones((len(tried), 1))
+    own = np.hstack([2.0 * tried, -ones, (SPREAD**2 - 1.0) * (tried**2).sum(axis=1)[:, None]])
+    all_ = np.hstack([votes, (votes**2).sum(axis=1)[:, None], np.ones((len(votes), 1))])
+    near = own @ all_.T > 0.0
     best = tried[int(np.argmax(near.sum(axis=1)))]
     for _ in range(3):
         around = rises[_agree(rises, best)]

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
+from tracker.agreement.standing import ends, sides
 from tracker.camera import Camera
 
 EDGE = 2.0
@@ -127,7 +128,12 @@ def pose_of(camera: Camera) -> Pose:
 
 
 def rays_of(
-    frames: ndarray, boxes: Float[ndarray, "D 4"], lens: Camera, known_size: bool = True
+    frames: ndarray,
+    boxes: Float[ndarray, "D 4"],
+    lens: Camera,
+    known_size: bool = True,
+    up: Float[ndarray, " 3"] | None = None,
+    turn: int = 0,
 ) -> Rays:
     """The rays of boxes (left, top, width, height, pixels), sorted by step.
 
@@ -136,12 +142,24 @@ def rays_of(
         boxes: Of one camera.
         lens: Its lens; where it stands does not matter.
         known_size: Whether the picture's size is known, so that boxes may be cut off by its edge.
+        up: The way in which people stand, a unit vector in camera axes, where it is known.
+        turn: Where it is not, the side of boxes where heads are, as
+            :func:`tracker.agreement.standing.sides` counts.
     """
     order = np.argsort(frames, kind="stable")
     boxes = boxes[order]
-    middle = boxes[:, 0] + boxes[:, 2] / 2.0
-    ends = [np.stack([middle, boxes[:, 1] + part * boxes[:, 3]], axis=1) for part in (0.0, 1.0)]
     whole = uncut(boxes, lens.image_size if known_size else None)
-    heads, feet = (lens.back_project(np.nan_to_num(end)) @ lens.rotation.T for end in ends)
+    if up is None:
+        heads, feet = (
+            lens.back_project(np.nan_to_num(end)) @ lens.rotation.T for end in sides(boxes, turn)
+        )
+    else:
+        heads, feet, told = ends(boxes, lens, up)
+        whole &= told
     whole &= np.isfinite(heads).all(axis=1) & np.isfinite(feet).all(axis=1)
     return Rays(np.asarray(frames)[order], heads, feet, whole)
+
+
+def upright_rays(frames: ndarray, boxes: Float[ndarray, "D 4"], camera: Camera) -> Rays:
+    """The rays of boxes in a calibrated camera of a world in which people stand along z."""
+    return rays_of(frames, boxes, camera, up=camera.rotation[:, 2])

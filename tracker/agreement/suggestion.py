@@ -87,7 +87,7 @@ def suggest(
     middles = agreed.feet + agreed.rises / 2.0
     low, high = np.quantile(middles, [_OUTLIERS, 1.0 - _OUTLIERS], axis=0)
     floor = float(np.median(middles[:, 2])) - float(size[2])
-    if _stands(agreed.height):
+    if stands(agreed.height):
         bottom, top = floor, floor + max(2.0, 2.5 * float(size[2]))
     else:  # heads, people at tables: how far below them the floor is nobody knows
         floor = bottom = low[2] - 2.0 * float(size[2])
@@ -103,13 +103,14 @@ def suggest(
     )
 
 
-def _stands(height: float) -> bool:
+def stands(height: float) -> bool:
+    """Whether boxes so tall, metres, are of people who stand."""
     return _SHORTEST_STANDING <= height <= _TALLEST_STANDING
 
 
 def _size(agreed: Consensus) -> Float[ndarray, " 3"]:
     height = agreed.height
-    if _stands(height):
+    if stands(height):
         height = _USUAL_HEIGHT + _TRUST * (height - _USUAL_HEIGHT)
         return np.array([_USUAL_SLENDERNESS / 2.0, _USUAL_SLENDERNESS / 2.0, 0.5]) * height
     # a head, or a head with shoulders, is less slender than a whole person

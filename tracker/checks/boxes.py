@@ -6,9 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Bool
+from numpy import ndarray
 
-from tracker.agreement.suggestion import LEAST_AGREEING, Suggestion, suggest
+from tracker.agreement.consensus import Consensus
+from tracker.agreement.observed import pose_of
+from tracker.agreement.suggestion import LEAST_AGREEING, Suggestion, stands, suggest
 from tracker.checks.check import Check, Remedy, absent, good, percent, warning
+from tracker.checks.level import confirmed, upwards
 from tracker.checks.reading import Reading, exchanged, exchanges
 from tracker.checks.readings import (
     LEAST_SHARE,
@@ -19,11 +24,10 @@ from tracker.checks.readings import (
     Seen,
     clearly_better,
     find_meaning,
-    likely_unit,
-    upwards,
 )
+from tracker.checks.sizes import likely_unit
 from tracker.formats.pieces import METRES, RawCamera
-from tracker.sequences.sequence import Sequence
+from tracker.sequences.sequence import Sequence, View
 
 AS_GIVEN = Reading()
 """How a sequence's file is read."""
@@ -37,7 +41,8 @@ _TALLEST_TARGET = 4.0  # metres: who states more has not written metres
 _LEAST_INSIDE = 0.25  # of the people: with fewer in the room it is another place
 _FLOOR_OFF = 0.5  # metres
 _TILT = np.radians(20.0)
-_OWN_SHARE = 0.2  # of what cameras usually see of others' people: with less one is out of place
+_OWN_SHARE = 0.2  # of the people whom others see: with boxes of fewer a camera is out of place
+_SAME_PLACE = 0.5  # heights of a person in the picture
 _LEAST_EXPECTED = 50
 
 
@@ -90,21 +95,21 @@ def listen(sequence: Sequence, *, exchanges: bool = True) -> BoxesTell | None:
     judge = Judge(cameras, seen)
     if not judge.possible:
         return None
-    given = judge(AS_GIVEN)
+    given = judge.righted(judge(AS_GIVEN), AS_GIVEN.up)
     meaning = find_meaning(cameras, seen, tried=Open(orders=exchanges))
     assert meaning is not None
     best = meaning.best
     enough = best.consensus.agreeing >= LEAST_AGREEING and best.consensus.share >= LEAST_SHARE
     otherwise = replace(best.reading, unit="m", up="z") != AS_GIVEN
     mistaken = enough and otherwise and clearly_better(best, given)
-    chosen = best if mistaken else given
+    chosen = judge.righted(best, AS_GIVEN.up) if mistaken else given
     known = 2.0 * float(sequence.target_half_extents[2])
     unit = likely_unit(judge.away(chosen), chosen.consensus)
     if _fits(chosen.consensus.height, known) and known < _TALLEST_TARGET:
         unit = "m"  # as tall as the file says
     up = upwards(chosen.consensus.rise)
     reading = replace(chosen.reading, unit=unit, up=up)
-    meaning = Meaning(Judged(reading, chosen.consensus, chosen.score), meaning.tried)
+    meaning = Meaning(replace(chosen, reading=reading), meaning.tried)
     agreed = chosen.consensus.agreeing >= LEAST_AGREEING
     right = reading == AS_GIVEN and agreed
     suggestion = suggest(sequence.cameras, given.consensus) if right else None
@@ -149,7 +154,7 @@ def check_boxes(sequence: Sequence, told: BoxesTell | None) -> Iterator[Check]:
         metres=gap,
         pixels=pixels,
     )
-    yield _tilt(told)
+    yield _tilt(sequence, told)
     yield from _stray_cameras(sequence, told)
     yield _size(sequence, told)
     yield _inside(sequence, told)
@@ -226,9 +231,12 @@ def _pixels(sequence: Sequence, share: float) -> float:
     return share * float(np.median(np.concatenate(heights)))
 
 
-def _tilt(told: BoxesTell) -> Check:
-    rise = told.given.consensus.rise
-    tilt = float(np.arccos(np.clip(rise[2] / np.linalg.norm(rise), -1.0, 1.0)))
+def _tilt(sequence: Sequence, told: BoxesTell) -> Check:
+    """Boxes alone do not tell: they lean in cameras that are rolled."""
+    agreed = told.given.consensus
+    poses = [pose_of(camera) for camera in sequence.cameras]
+    up = confirmed(agreed, told.given.pictured, poses, told.given.turns)
+    tilt = 0.0 if up is None else float(np.arccos(np.clip(up[2], -1.0, 1.0)))
     degrees = float(np.degrees(tilt))
     if tilt > _TILT:
         return warning(
@@ -286,7 +294,7 @@ def _inside(sequence: Sequence, told: BoxesTell) -> Check:
             Remedy("room.max", high),
             inside=inside,
         )
-    if own is not None and sequence.target_half_extents[2] > 0.7:
+    if own is not None and sequence.target_half_extents[2] > 0.7 and stands(agreed.height):
         off = own.floor - float(room.minimum[2])
         if abs(off) > _FLOOR_OFF:
             return warning(
@@ -303,25 +311,43 @@ def _inside(sequence: Sequence, told: BoxesTell) -> Check:
 
 
 def _stray_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
-    """A camera that has no box where two others see somebody: only its own pose or clock is off."""
-    agreed = told.given.consensus
+    """A camera that has no box where others see somebody: its own pose or clock is off."""
     if len(sequence.views) < 3:
         return
     shares: dict[str, float] = {}
     for index, view in enumerate(sequence.views):
-        pairs = {key: s for key, s in agreed.shares.items() if index in key}
-        others = {key: s for key, s in agreed.shares.items() if index not in key}
-        seen = [view.camera.sees(agreed.feet[(agreed.cameras != index).all(axis=1)])]
-        expected = int(seen[0].sum())
-        if pairs and others and expected >= _LEAST_EXPECTED and view.detections is not None:
-            shares[view.camera.name] = max(pairs.values()) / max(max(others.values()), 1e-9)
+        hits = _found_where_expected(view, index, told.given.consensus)
+        if len(hits) >= _LEAST_EXPECTED:
+            shares[view.camera.name] = float(hits.mean())
     for name, share in shares.items():
         if share < _OWN_SHARE:
             yield warning(
                 "every camera agrees with another",
-                f"boxes of {name} meet those of no other camera, though it sees where others meet: "
-                "its calibration, its file of boxes or its clock is another one's",
+                f"{name} has a box at {percent(share)} of the places where others' boxes meet and "
+                "it sees: its calibration, its file of boxes or its clock is another one's",
                 share=share,
             )
     if shares and min(shares.values()) >= _OWN_SHARE:
         yield good("every camera agrees with another", "boxes of every camera meet others")
+
+
+def _found_where_expected(view: View, index: int, agreed: Consensus) -> Bool[ndarray, " E"]:
+    """Whether a camera has a box where boxes of two others meet, at steps at which it has any."""
+    own = view.detections
+    if own is None:
+        return np.zeros(0, dtype=bool)
+    rows = np.flatnonzero((agreed.cameras != index).all(axis=1))
+    low, low_seen = view.camera.project(agreed.feet[rows])
+    high, high_seen = view.camera.project(agreed.feet[rows] + agreed.rises[rows])
+    first, last = np.searchsorted(own.frames, [agreed.steps[rows], agreed.steps[rows] + 1])
+    there = low_seen & high_seen & (last > first)
+    there &= view.camera.contains(low) & view.camera.contains(high)
+    low, high, first, last = low[there], high[there], first[there], last[there]
+    middles = own.boxes[:, :2] + own.boxes[:, 2:] / 2.0
+    counts = last - first
+    of = np.repeat(np.arange(len(counts)), counts)
+    boxes = np.arange(counts.sum()) + np.repeat(first - np.cumsum(counts) + counts, counts)
+    away = np.linalg.norm(middles[boxes] - (low + high)[of] / 2.0, axis=1)
+    found = np.zeros(len(counts), dtype=bool)
+    found[of[away < _SAME_PLACE * np.linalg.norm(high - low, axis=1)[of]]] = True
+    return found

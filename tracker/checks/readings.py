@@ -20,19 +20,32 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.agreement.consensus import Consensus, consensus
-from tracker.agreement.observed import PairsOfBoxes, Rays, pair_up, rays_of
+from tracker.agreement.observed import PairsOfBoxes, Pose, Rays, pair_up, rays_of
+from tracker.checks.level import upwards
 from tracker.checks.reading import (
-    UPS,
     Reading,
     lens_of,
     likely_size,
     pose,
     read_boxes,
+    upright,
 )
+from tracker.checks.sizes import likely_unit
+from tracker.checks.standing import reversed_, standing, turns_tried, upside_down
 from tracker.formats.pieces import METRES, Axes, Direction, Layout, RawCamera, Unit, Up
 
 MOST_PAIRS = 6000
-"""Pairs of boxes of two cameras that are looked at."""
+"""Pairs of boxes of two cameras that are looked at, and"""
+
+MOST_IN_ALL = 60_000
+"""of all cameras."""
+
+_PLAIN = 0.5
+"""Share of boxes that meet with heads at their tops with which nobody asks for another side: how
+broad people are agrees between cameras too, but of fewer."""
+
+_REFINED = 8
+"""Of so many readings, the best, heads and feet are found exactly."""
 
 LEAST_AGREEING = 20
 """Fewer pairs that agree prove nothing."""
@@ -79,6 +92,11 @@ class Judged:
     consensus: Consensus
     score: float
     """Agreeing pairs, each counting the less the worse it fits."""
+    pictured: Float[ndarray, " 3"]
+    """The common vector from foot to head with both at sides of the boxes: it leans in rolled
+    cameras, and in worlds that lean."""
+    turns: tuple[int, ...]
+    """Where heads are in boxes, as :func:`tracker.agreement.standing.sides` counts."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,8 +129,13 @@ class Meaning:
 
 
 def clearly_better(one: Judged, other: Judged) -> bool:
-    """Whether a reading fits so much better than another that chance is no explanation."""
-    spread = math.sqrt(max(one.score + other.score, 1.0))
+    """Whether a reading fits so much better than another that chance is no explanation.
+
+    Of a sum of the weights of things that are there by chance, independent of each other, the
+    variance is the sum of their squares.
+    """
+    squares = sum(float(np.square(each.consensus.fits).sum()) for each in (one, other))
+    spread = math.sqrt(max(squares, 1.0))
     return one.score > CLEARLY * other.score and one.score - other.score > SIGMAS * spread
 
 
@@ -148,7 +171,7 @@ def find_meaning(
         return None
     open_ = _restricted(tried or Open(), cameras, seen)
     judged = [
-        judge(Reading(direction=direction, axes=axes, layout=layout, normalised=normalised))
+        judge.turned(Reading(direction=direction, axes=axes, layout=layout, normalised=normalised))
         for direction, axes, layout, normalised in itertools.product(
             open_.directions, open_.axes, open_.layouts, open_.normalised
         )
@@ -156,14 +179,15 @@ def find_meaning(
     judged.sort(key=lambda one: -one.score)
     if open_.orders:
         judged = _with_orders(judge, judged)
+    judged[:_REFINED] = [judge.refined(one) for one in judged[:_REFINED]]
+    judged.sort(key=lambda one: -one.score)
     conventions = [camera.convention for camera in cameras]
     unit = unit or next((c.unit for c in conventions if c.unit is not None), None)
     up = up or next((c.up for c in conventions if c.up is not None), None)
-    best = judged[0]
-    rise = best.consensus.rise
-    reading = replace(best.reading, up=up or upwards(rise))
+    best = judge.righted(judged[0], up, unit, height)
+    reading = replace(best.reading, up=up or upwards(best.consensus.rise))
     reading = replace(reading, unit=unit or likely_unit(judge.away(best), best.consensus, height))
-    return Meaning(Judged(reading, best.consensus, best.score), (*judged,))
+    return Meaning(replace(best, reading=reading), (*judged,))
 
 
 class Judge:
@@ -185,7 +209,7 @@ class Judge:
         self.cameras = tuple(cameras)
         self._seen = tuple(seen)
         self.sizes = [likely_size(camera) for camera in cameras]
-        self._rays: dict[tuple[int, int, Layout, bool], Rays] = {}
+        self._rays: dict[tuple[int, int, Layout, bool, int | tuple[float, ...]], Rays] = {}
         empty = Rays(np.zeros(0, int), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, bool))
         times = [
             empty
@@ -193,10 +217,13 @@ class Judge:
             else Rays(np.sort(own.frames), empty.heads, empty.feet, empty.whole)
             for own in seen
         ]
+        count = len(times) * (len(times) - 1) // 2
+        most = max(MOST_IN_ALL // max(count, 1), MOST_PAIRS // 4)
+        most = min(most, most_pairs)
         self.pairs: Mapping[tuple[int, int], PairsOfBoxes] = {
             (a, b): found
             for a, b in itertools.combinations(range(len(times)), 2)
-            if (found := pair_up(times[a], times[b], most_pairs)).most
+            if (found := pair_up(times[a], times[b], most)).most
         }
         self._empty = empty
 
@@ -206,35 +233,97 @@ class Judge:
         return sum(own.most for own in self.pairs.values())
 
     def __call__(self, reading: Reading) -> Judged:
-        """How well the boxes meet."""
-        order = reading.order or tuple(range(len(self.cameras)))
-        poses = [pose(self.cameras[own], reading) for own in order]
-        rays = [self._of(camera, own, reading) for camera, own in enumerate(order)]
-        agreed = consensus(rays, poses, self.pairs)
-        return Judged(reading, agreed, float(agreed.fits.sum()))
+        """How well the boxes meet, as exactly as can be told."""
+        return self.refined(self.turned(reading))
 
-    def _of(self, camera: int, calibration: int, reading: Reading) -> Rays:
-        """The rays of a camera's boxes through the lens of a calibration."""
+    def turned(self, reading: Reading) -> Judged:
+        """How well they meet with heads at that side of the boxes where most of them do."""
+        poses = self.poses(reading)
+        best: Judged | None = None
+        for turns in turns_tried(poses):
+            rays = [
+                self._of(camera, own, reading, turn)
+                for (camera, own), turn in zip(enumerate(self._order(reading)), turns, strict=True)
+            ]
+            agreed = consensus(rays, poses, self.pairs)
+            score = float(agreed.fits.sum())
+            if best is None or score > best.score:
+                best = Judged(reading, agreed, score, agreed.rise, turns)
+            if not any(best.turns) and best.consensus.share > _PLAIN:
+                break
+        assert best is not None
+        return best
+
+    def refined(self, judged: Judged) -> Judged:
+        """With heads and feet where people who stand upright have them in the boxes."""
+        up = standing(judged.consensus)
+        if up is None:
+            return judged
+        poses = self.poses(judged.reading)
+        rays = [
+            self._of(camera, own, judged.reading, pose.rotation @ up)
+            for (camera, own), pose in zip(
+                enumerate(self._order(judged.reading)), poses, strict=True
+            )
+        ]
+        agreed = consensus(rays, poses, self.pairs)
+        score = float(agreed.fits.sum())
+        return replace(judged, consensus=agreed, score=score) if score > judged.score else judged
+
+    def righted(
+        self, judged: Judged, up: Up | None, unit: Unit | None = None, height: float | None = None
+    ) -> Judged:
+        """With heads above feet, where the cameras hang upside down.
+
+        Args:
+            judged: What boxes agree on.
+            up: The axis that the file claims to point up.
+            unit: Of the poses, where it is known.
+            height: Of what is tracked, metres, where it is known.
+        """
+        agreed = judged.consensus
+        metres = METRES[unit or likely_unit(self.away(judged), agreed, height)]
+        claimed = None if up is None else upright(up).T @ np.array([0.0, 0.0, 1.0])
+        if not upside_down(agreed, self.poses(judged.reading), metres, claimed):
+            return judged
+        turns = tuple((turn + 2) % 4 for turn in judged.turns)
+        return replace(judged, consensus=reversed_(agreed), pictured=-judged.pictured, turns=turns)
+
+    def poses(self, reading: Reading) -> list[Pose]:
+        """Where the cameras stand."""
+        return [pose(self.cameras[own], reading) for own in self._order(reading)]
+
+    def _order(self, reading: Reading) -> tuple[int, ...]:
+        return reading.order or tuple(range(len(self.cameras)))
+
+    def _of(
+        self, camera: int, calibration: int, reading: Reading, heads: int | Float[ndarray, " 3"]
+    ) -> Rays:
+        """The rays of a camera's boxes through the lens of a calibration.
+
+        Heads are at a side of the boxes, or where they are of people who stand this way.
+        """
         own = self._seen[camera]
         if own is None:
             return self._empty
-        key = (camera, calibration, reading.layout, reading.normalised)
+        told = heads if isinstance(heads, int) else tuple(np.round(heads, 9).tolist())
+        key = (camera, calibration, reading.layout, reading.normalised, told)
         if key not in self._rays:
             size = self.sizes[calibration]
             raw = self.cameras[calibration]
             boxes = read_boxes(own.four, reading.layout, size if reading.normalised else None)
+            turn, up = (heads, None) if isinstance(heads, int) else (0, heads)
             self._rays[key] = rays_of(
-                own.frames, boxes, lens_of(raw, size), raw.image_size is not None
+                own.frames, boxes, lens_of(raw, size), raw.image_size is not None, up, turn
             )
         return self._rays[key]
 
     def away(self, judged: Judged) -> float:
         """The usual distance from a camera to people, in the world's unit."""
-        order = judged.reading.order or tuple(range(len(self.cameras)))
         agreed = judged.consensus
         if not len(agreed.feet):
             return math.nan
-        centres = np.array([pose(self.cameras[own], judged.reading).centre for own in order])
+        centres = np.array([own.centre for own in self.poses(judged.reading)])
         ways = agreed.feet[:, None, :] - centres[agreed.cameras]
         return float(np.median(np.linalg.norm(ways, axis=2)))
 
@@ -247,7 +336,9 @@ def _with_orders(judge: Judge, judged: list[Judged]) -> list[Judged]:
     for start in judged[:1] if judged[0].consensus.share >= LEAST_SHARE else judged[:8]:
         best = start
         for _ in range(1 if count <= EVERY_ORDER else count):
-            own = [judge(replace(best.reading, order=order)) for order in _orders(best, count)]
+            own = [
+                judge.turned(replace(best.reading, order=order)) for order in _orders(best, count)
+            ]
             found += own
             better = max(own, key=lambda one: one.score, default=best)
             if better.score <= best.score:
@@ -288,44 +379,3 @@ def _restricted(tried: Open, cameras: Many[RawCamera], seen: Many[Seen | None]) 
             layouts = tuple(layout for layout in tried.layouts if layout != "xyxy")
             tried = replace(tried, layouts=layouts)
     return tried
-
-
-def upwards(rise: Float[ndarray, " 3"]) -> Up:
-    """The axis of the world that is nearest to the way from foot to head."""
-    axis = int(np.argmax(np.abs(rise)))
-    return UPS[axis + 3 * int(rise[axis] < 0.0)]
-
-
-def likely_unit(away: float, agreed: Consensus, height: float | None = None) -> Unit:
-    """The unit in which the usual person is as tall, and as far from the cameras, as people are.
-
-    Args:
-        away: The usual distance from a camera to people, in the world's unit.
-        agreed: On how tall they are, in the world's unit.
-        height: Of what is tracked, metres, where it is known.
-    """
-    if agreed.height <= 0.0:
-        return "m"
-
-    def fit(unit: Unit) -> float:
-        own = METRES[unit]
-        return likelihood_of_size(agreed.height * own, away * own, height)
-
-    units: tuple[Unit, ...] = get_args(Unit)
-    return max(units, key=fit)
-
-
-_USUAL_HEIGHTS = ((1.70, 0.15, 0.0), (1.2, 0.25, -1.5), (0.7, 0.2, -1.5), (0.25, 0.25, -0.5))
-"""People standing, seated, head and torso, heads: metres, spread of the logarithm, log weight."""
-
-_USUAL_DISTANCE = (6.0, 0.9)  # metres from a camera, spread of the logarithm
-
-
-def likelihood_of_size(height: float, away: float, known: float | None = None) -> float:
-    """The logarithm of how usual people are of that height, that far from a camera, metres."""
-    kinds = _USUAL_HEIGHTS if known is None else ((known, 0.3, 0.0),)
-    tall = max(w - 0.5 * (math.log(height / h) / s) ** 2 for h, s, w in kinds)
-    if not away > 0.0:
-        return tall
-    middle, spread = _USUAL_DISTANCE
-    return tall - 0.5 * (math.log(away / middle) / spread) ** 2

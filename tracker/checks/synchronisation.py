@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.agreement.observed import Rays, rays_of
+from tracker.agreement.observed import Rays, upright_rays
 from tracker.agreement.sliding import Course, course, slid
 from tracker.agreement.suggestion import LEAST_AGREEING, agreement
 from tracker.checks.motion import MOST_STEPS, motion_pairings
@@ -145,7 +145,7 @@ def box_pairings(
         )
         frames = np.zeros(0, dtype=int) if own is None else own.frames[kept]
         boxes = np.zeros((0, 4)) if own is None else own.boxes[kept]
-        rays.append(rays_of(frames, boxes, view.camera))
+        rays.append(upright_rays(frames, boxes, view.camera))
         courses.append(
             course(view.camera, rays[-1], boxes, sequence.frames) if len(frames) else None
         )

@@ -96,7 +96,8 @@ class Opinion:
         return replace(move, odds=move.odds + added)
 
     def moves(self) -> Iterator[Move]:
-        """What the other run links otherwise, as moves of even odds for who had none."""
+        """What the other run links otherwise: with its word, which is weighed later, each is as
+        likely as what the run has, for the one is right as often as the other."""
         stretches = sorted(self._stretches(), key=lambda one: one[1].begin.step)
         by_other: dict[int, list[tuple[int, Piece]]] = {}
         for name, piece in stretches:
@@ -115,13 +116,13 @@ class Opinion:
                     continue
                 follows, precedes = next_own.get(one.end), before_own.get(after.begin)
                 if follows is None and precedes is None:
-                    yield Move((one,), (after,), "join", 0.0)
+                    yield Move((one,), (after,), "join", -_FOR)
                 elif follows is not None and precedes is not None:
-                    yield Move((one, precedes), (follows, after), "exchange", 0.0)
+                    yield Move((one, precedes), (follows, after), "exchange", -_FOR)
                 elif follows is not None:
-                    yield Move((one,), (follows, after), "exchange", 0.0)
+                    yield Move((one,), (follows, after), "exchange", -_FOR)
                 elif precedes is not None:
-                    yield Move((precedes, one), (after,), "exchange", 0.0)
+                    yield Move((precedes, one), (after,), "exchange", -_FOR)
 
     def _stretches(self) -> Iterable[tuple[int, Piece]]:
         """Parts of tracks that are one id of the other run throughout, and which."""

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from tracker.checks import Check, Remedy
+from tracker.checks.level import upwards
 from tracker.checks.reading import UPS, Reading, upright
-from tracker.checks.readings import upwards
 from tracker.formats.pieces import METRES, Unit, Up
 
 _OTHER = {

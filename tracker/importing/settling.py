@@ -11,15 +11,17 @@ from numpy import ndarray
 
 from tracker.agreement.suggestion import STANDING, Suggestion, agreement, suggest
 from tracker.camera import Camera
-from tracker.checks.reading import Reading, read_boxes, to_camera
+from tracker.checks.level import lean_of
+from tracker.checks.reading import Reading, pose, read_boxes, to_camera
 from tracker.checks.readings import Open, Seen, find_meaning
 from tracker.formats.pieces import FormatError, Layout, RawCamera
 from tracker.importing.arriving import short_videos
 from tracker.importing.finding.calibrations import camera_sets
 from tracker.importing.finding.geometry import read_poses
 from tracker.importing.finding.matching import MatchedCamera, match_all
-from tracker.importing.finding.people import lean_of, rate_of, rays_of_all
+from tracker.importing.finding.people import rate_of, rays_of_all
 from tracker.importing.finding.pictures import picture_sizes, scaled
+from tracker.importing.finding.scale import AS_STANDING, PERSON, paced, resized
 from tracker.importing.finding.times import (
     CameraTime,
     Times,
@@ -34,9 +36,6 @@ from tracker.sequences.sequence import Detections, Entrance, GroundTruth
 
 ROOM_MARGIN = 1.0
 """Metres on each side: a room that is too large costs little, who is outside is lost."""
-
-PERSON = 1.70
-"""Metres: the usual stature, by which a reconstruction without a unit is scaled."""
 
 _WITHOUT_UNIT = ("COLMAP", "nerfstudio", "Metashape", "OpenMVG")
 """Formats whose unit is arbitrary."""
@@ -99,10 +98,17 @@ def settle(taken: Sequence[Taken], options: ImportOptions | None = None) -> Sett
     times = settle_times(cameras, matched.truths, options, found)
     boxes = _boxes(cameras, sizes, times, options, found, told)
     arbitrary = matched.format.startswith(_WITHOUT_UNIT)
-    reading, raws, boxes = _read(raws, boxes, times, arbitrary, found)
+    reading, raws, boxes, factor = _read(raws, boxes, times, arbitrary, options, found)
     settled = [to_camera(raw, reading, size) for raw, size in zip(raws, sizes, strict=True)]
     detections = [_detections(own) for own in boxes]
     at_steps = _at_steps(detections, times)
+    if factor is not None and options.half_extents is not None:
+        height = 2.0 * options.half_extents[2]
+        found.append(("unit", f"scaled by {factor:.4g}, so that people are {height:g} m; --unit"))
+    elif factor is not None:
+        more, why = paced(settled, at_steps, times.fps) if times.stated else (1.0, AS_STANDING)
+        settled = resized(settled, more)
+        found.append(("unit", f"scaled by {more * factor:.4g}, {why}: --unit"))
     if not times.stated:
         fps, why = rate_of(settled, at_steps)
         found.append(("fps", f"{fps:g}, {why}, since no file says it; --fps"))
@@ -266,9 +272,15 @@ def _read(
     boxes: list[_Boxes | None],
     times: Times,
     arbitrary: bool,
+    options: ImportOptions,
     found: list[tuple[str, str]],
-) -> tuple[Reading, list[RawCamera], list[_Boxes | None]]:
-    """How poses and boxes are meant: by flags, formats, the boxes and the poses, in this order."""
+) -> tuple[Reading, list[RawCamera], list[_Boxes | None], float | None]:
+    """How poses and boxes are meant: by flags, formats, the boxes and the poses, in this order.
+
+    Returns:
+        The reading; cameras and boxes as they are by it; and by how much the cameras' unit was
+        made larger so that people are as tall as they are said to be, or as people who stand.
+    """
     seen = [
         None if own is None else _seen(own[0], time)
         for own, time in zip(boxes, times.cameras, strict=True)
@@ -290,7 +302,10 @@ def _read(
     else:
         reading = meaning.reading
         if convention.up is None:
-            reading = replace(reading, lean=lean_of(meaning, raws))
+            poses = [pose(raw, reading) for raw in raws]
+            best = meaning.best
+            lean = lean_of(best.consensus, best.pictured, poses, best.turns, reading.up)
+            reading = replace(reading, lean=lean)
         share = 100.0 * meaning.best.consensus.share
         why = f"since {share:.0f} % of the boxes meet so"
         if unknown:
@@ -304,9 +319,10 @@ def _read(
         ("up", convention.up, "up"),
         ("unit", convention.unit, "unit"),
     ):
-        if known is None:
+        if known is None and not (name == "unit" and enough and arbitrary):
             how = "by the height of people" if name == "unit" and enough else why
             found.append((name, f"{getattr(reading, name)}, {how}; --{flag}"))
+    factor: float | None = None
     changed: list[_Boxes | None] = []
     for own in boxes:
         if own is not None and own[1] is None:
@@ -314,10 +330,10 @@ def _read(
             own = (replace(own[0], boxes=four), reading.layout)
         changed.append(own)
     if meaning is not None and enough and arbitrary and convention.unit is None:
-        factor = PERSON / meaning.height
+        stated = options.half_extents
+        factor = (PERSON if stated is None else 2.0 * stated[2]) / meaning.height
         raws = [_resized(raw, factor) for raw in raws]
-        found.append(("unit", f"scaled by {factor:.4g}, so that people are {PERSON} m; --unit"))
-    return replace(reading, layout="ltwh", order=None), raws, changed
+    return replace(reading, layout="ltwh", order=None), raws, changed, factor
 
 
 def _seen(own: Detections, time: CameraTime) -> Seen:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.agreement.observed import rays_of
+from tracker.agreement.observed import upright_rays
 from tracker.agreement.suggestion import agreement, suggest
 from tracker.sequences.fields import Fields, listed
 from tracker.sequences.sequence import Room, SequenceError, View
@@ -115,7 +115,7 @@ def find_room(
                 kept = np.flatnonzero((own.scores >= _SCORE_THRESHOLD) & (own.frames % every == 0))
             frames = np.zeros(0, int) if own is None else own.frames[kept]
             boxes = np.zeros((0, 4)) if own is None else own.boxes[kept]
-            rays.append(rays_of(frames, boxes, view.camera))
+            rays.append(upright_rays(frames, boxes, view.camera))
         agreed = agreement(cameras, rays)
     found = suggest(cameras, agreed, half_extents)
     if found is None:

@@ -33,6 +33,7 @@ from tracker.smoothing.calibration import (
 )
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.recording import CameraBoxes
+from tracker.smoothing.restlessness import restlessness
 
 _T = TypeVar("_T")
 
@@ -40,6 +41,7 @@ START_SIGMA = 10.0
 """Metres: how little is known of a path's first place but by its boxes."""
 
 _MOST_THREADS = 4
+_TURNS = 5  # in which people's restlessness settles
 _LEAST = 0.01  # association probability of a pair worth keeping
 _SURE = 0.9  # association probability of a box that tells of its person's size
 _ODD = 0.4  # half heights: who is so far off is not standing
@@ -58,6 +60,8 @@ class Fitted:
     ahead_covariances: Float[ndarray, "N d d"]
     traces: Float[ndarray, " N"]
     """Of the position's covariance before the backward pass, square metres."""
+    restlessness: Float[ndarray, " N"]
+    """s: by which the motion's noise is multiplied on the way to each row."""
 
     @property
     def jumps(self) -> Float[ndarray, " N"]:
@@ -91,6 +95,8 @@ class Smoother:
         parameters: FusionParams,
         views: Many[tuple[ViewResult, ...]],
         corrections: Many[Correction] = (),
+        *,
+        learning: bool = True,
     ) -> None:
         """Prepare for the boxes of some steps from step 0 on.
 
@@ -99,7 +105,9 @@ class Smoother:
             parameters: Of the fusion.
             views: Stage 1 of each step.
             corrections: Of them *is here* is a measurement of the place.
+            learning: Whether people's restlessness is learnt; else they move as stated.
         """
+        self._turns = _TURNS if learning else 0
         self.parameters = parameters
         self._here = [one for one in corrections if one.kind == "here"]
         self.model = model = FusionModel(sequence, parameters)
@@ -127,7 +135,8 @@ class Smoother:
         Each iteration straightens the projection at the states of the one before: Gauss and
         Newton's way to the least-squares solution over the whole path (Bell, "The iterated
         Kalman smoother as a Gauss-Newton method", SIAM J. Optimization 4(3), 1994). A box that
-        is a path's with probability a counts with a times its information.
+        is a path's with probability a counts with a times its information, and the motion's
+        noise with how restless the person is about that time.
 
         Args:
             paths: Their states are where the projection is straightened first.
@@ -138,6 +147,7 @@ class Smoother:
         motion, owners = self.model.motion, paths.owners
         learnt = learnt or self.stated(paths)
         rule = passes.PathMotion(motion.transition, motion.noise, self.prior)
+        restless = np.ones(len(paths.states))
         for _ in range(iterations):
             told = self._each_camera(partial(self._told, paths, owners, links, learnt))
             information = evidence.BoxInformation(
@@ -149,9 +159,20 @@ class Smoother:
                 information.vectors[row] += precision * one.places[0].point
             begins = paths.states[paths.starts[:-1]].copy()
             begins[:, 3:] = 0.0
-            found = passes.smooth_paths(
-                paths.starts, begins, information.matrices, information.vectors, rule
+            smooth = partial(
+                passes.smooth_paths,
+                paths.starts,
+                begins,
+                information.matrices,
+                information.vectors,
+                rule,
             )
+            found = smooth(restless)
+            for _ in range(self._turns):
+                restless = restlessness(
+                    paths.starts, found, motion.noise, restless, self.model.step_time
+                )
+                found = smooth(restless)
             paths = paths.with_states(found.means, found.covariances)
         return Fitted(
             paths,
@@ -159,6 +180,7 @@ class Smoother:
             found.ahead,
             found.ahead_covariances,
             found.traces,
+            restless,
         )
 
     def _each_camera(self, work: Callable[[int], _T]) -> list[_T]:

@@ -66,7 +66,9 @@ class Positions:
     ) -> Smoothed:
         """The tracks of some steps from step 0 on, each by the boxes of all of them."""
         p = self._parameters.smoothing
-        smoother = Smoother(self._sequence, self._parameters.fusion, views, corrections)
+        smoother = Smoother(
+            self._sequence, self._parameters.fusion, views, corrections, learning=p.learning
+        )
         dimension, cameras = smoother.model.motion.dimension, len(smoother.cameras)
         tracks = trajectories.extract(fused, cameras=cameras, extraction_threshold=CONFIRMED)
         if not len(tracks):

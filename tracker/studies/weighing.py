@@ -14,7 +14,7 @@ from tracker.studies.work.cluster import Crew
 GROWTH = 2.0
 """It is found out anew when there are so many times more trials."""
 
-SHARE = 0.01
+SHARE = 0.005
 """Of the workers' time at most so much is spent on it before the end."""
 
 NEARLY = 0.9

@@ -14,6 +14,13 @@ def write(path: Path, written: Written, options: Options) -> None:
 
     sequence = written.sequence
     evaluation = evaluate_sequence(sequence, written.tracks, steps=written.steps)
-    text = report_html(sequence, written.tracks, written.parameters, evaluation, seed=written.seed)
+    text = report_html(
+        sequence,
+        written.tracks,
+        written.parameters,
+        evaluation,
+        seed=written.seed,
+        back=written.back,
+    )
     path.write_text(text, encoding="utf-8")
     options.at(written.steps, written.steps)

@@ -62,6 +62,8 @@ class Written:
     """What must be said of it wherever it goes: that pictures were missing."""
     resting: Many[str] = ()
     """Of a corrected run the id of the correction that each row rests on, empty for none."""
+    back: str = ""
+    """The address of the page that shows it, where there is one."""
     boxes: list[tuple[Float[ndarray, "N 4"], Bool[ndarray, " N"]]] = field(init=False)
     """For each camera left, top, width, height in pixels, and whether the picture has them."""
 

@@ -112,14 +112,20 @@ def to_be_stopped() -> Iterator[threading.Event]:
 @contextmanager
 def crew_of(where: Where) -> Iterator[Any]:
     """What makes the workers that the flags name; they end with this."""
-    from tracker.studies.work.cluster import ADDRESS, DaskCrew
+    from tracker.studies.work.cluster import ADDRESS, DaskCrew, check_address
 
+    scheduler = where.scheduler or os.environ.get(ADDRESS) or None
+    if scheduler is not None:
+        try:
+            check_address(scheduler)
+        except StudyError as error:
+            name = "--scheduler" if where.scheduler else f"${ADDRESS}"
+            raise CommandError(f"{name}{str(error).removeprefix('scheduler')}") from None
     if where.workers is not None and where.workers < 1:
         raise CommandError(f"--workers: expected a whole number from 1, got {where.workers}")
     made: list[DaskCrew] = []
 
     def make(tell: Any) -> DaskCrew:
-        scheduler = where.scheduler or os.environ.get(ADDRESS) or None
         made.append(DaskCrew(scheduler, workers=where.workers, tell=tell))
         return made[0]
 
@@ -143,6 +149,7 @@ def run(store: Store, where: Where, *, as_json: bool = False, quiet: bool = Fals
     from tracker.studies.work.cluster import ADDRESS
 
     before: list[str] = []
+    by_time_alone = store.definition().by_time_alone
     with (
         to_be_stopped() as stopped,
         store.running() as writer,
@@ -155,7 +162,7 @@ def run(store: Store, where: Where, *, as_json: bool = False, quiet: bool = Fals
                 before.append(status.words)
                 say(status.words)
             if status.done:
-                bar.at(status.done, status.trials)
+                bar.at(status.done, None if by_time_alone else status.trials)
 
         elsewhere = bool(where.scheduler or os.environ.get(ADDRESS))
         status = run_study(store, writer, crew, told=told, stopped=stopped.is_set, beside=elsewhere)
@@ -171,11 +178,17 @@ def _tell_end(store: Store, status: Status) -> None:
     if status.state == "stopped":
         words += "; `study resume` goes on"
     say(
-        f"{store.name}: {status.done} of {status.trials} trials, {status.runs} runs in "
+        f"{store.name}: {_trials(store, status)}, {status.runs} runs in "
         f"{status.seconds:.0f} s{words}"
     )
     if status.done:
         _show_trials(store)
+
+
+def _trials(store: Store, status: Status) -> str:
+    if store.definition().by_time_alone:
+        return f"{status.done} trial{'' if status.done == 1 else 's'}"
+    return f"{status.done} of {status.trials} trials"
 
 
 def _list(found: list[Store], command: ListStudies) -> None:
@@ -217,7 +230,7 @@ def _show(command: ShowStudy, folder: Path) -> None:
             return
         status = store.status()
         say(
-            f"{store.name}: {status.state}, {status.done} of {status.trials} trials"
+            f"{store.name}: {status.state}, {_trials(store, status)}"
             + (f"; {status.words}" if status.words else "")
         )
         _show_trials(store)

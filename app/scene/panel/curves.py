@@ -62,6 +62,7 @@ def style_of(curves: Iterable[tuple[Curve, Any, list[str]]]) -> str:
     """
     rules = []
     for curve, now, inputs in curves:
+        # as wide as its row and no wider: words that come would widen the whole panel
         rows = ",".join(
             f'.mantine-Flex-root:has(> div > .mantine-Text-root > label[for="{uuid}"])::after'
             for uuid in inputs
@@ -71,9 +72,9 @@ def style_of(curves: Iterable[tuple[Curve, Any, list[str]]]) -> str:
             svg = urllib.parse.quote(drawing_of(curve, now))
             picture = f'background: url("data:image/svg+xml,{svg}") no-repeat left center;'
         rules.append(
-            f'{rows} {{ content: "{words_of(curve)}"; width: 100%; {picture} '
-            f"padding-left: {WIDTH + 6}px; font-size: 10px; line-height: 16px; "
-            "color: var(--mvp-ink-3); white-space: nowrap; }"
+            f'{rows} {{ content: "{words_of(curve)}"; width: 0; min-width: 100%; {picture} '
+            f"padding-left: {WIDTH + 6}px; min-height: 16px; font-size: 10px; line-height: 14px; "
+            "box-sizing: border-box; color: var(--mvp-ink-3); }"
         )
     return f"<style>{' '.join(rules)}</style>"
 

@@ -27,6 +27,8 @@ GRID_MARGIN = 1.0
 RIM_POINTS = 48
 LARGEST_FRUSTUM = 1.6
 """Metres that a frustum reaches, however large the room."""
+WIDEST_PICTURE = 0.125
+"""Width of a frustum's picture, of the room's diagonal: one in front of the room hides people."""
 FRUSTUM_WIDTH = 320
 """Pixels of the picture on a frustum."""
 BACKDROP_WIDTH = 960
@@ -156,8 +158,7 @@ class FrustumNodes:
         self._handles: list[viser.CameraFrustumHandle] = []
         self._names = Tags(server, "/labels/cameras", FRUSTA, 0.85)
         self._cameras: tuple[Camera, ...] = ()
-        self._size = 1.0
-        self._reach = 1.0
+        self._sizes: list[float] = []
         self._views: dict[tuple[int, int], StraightView] = {}
         self._through: int | None = None
         for _ in range(FRUSTA):
@@ -201,17 +202,17 @@ class FrustumNodes:
         while len(self._handles) < len(cameras):
             self._grow()
         corners = geometry.box_corners(room.minimum, room.maximum)
-        size = 0.115 * float(np.linalg.norm(room.maximum - room.minimum))
-        self._size = min(size, LARGEST_FRUSTUM)
+        across = float(np.linalg.norm(room.maximum - room.minimum))
+        self._sizes = [self._size_of(index, across) for index in range(len(cameras))]
         self._through = through
         tags: list[Tag] = []
         for index, camera in enumerate(cameras):
             handle, view = self._handles[index], self.view(index)
-            depth = self._size
+            depth = self._sizes[index]
             if index == through:
                 depth = 1.2 * float(camera.to_camera(corners)[:, 2].max())
             else:
-                above = camera.centre + np.array([0.0, 0.0, 0.3 * self._size])
+                above = camera.centre + np.array([0.0, 0.0, 0.3 * depth])
                 tags.append(Tag((above[0], above[1], above[2]), camera.name))
             handle.fov, handle.aspect = view.fov, view.aspect
             handle.color = palette.line
@@ -223,15 +224,21 @@ class FrustumNodes:
             handle.visible = False
         self._names.show(tags)
 
+    def _size_of(self, index: int, across: float) -> float:
+        """Metres that a frustum reaches in a room so large across: its picture hides little."""
+        view = self.view(index)
+        width = 2.0 * float(np.tan(view.fov / 2.0)) * view.aspect
+        return min(0.115 * across, WIDEST_PICTURE * across / width, LARGEST_FRUSTUM)
+
     def corners(self, chosen: ndarray) -> Float[ndarray, "N 3"]:
         """What the chosen frusta take of the scene: eyes, corners of the pictures, names."""
         points = [np.zeros((0, 3))]
         for index in np.flatnonzero(chosen):
-            camera, view = self._cameras[index], self.view(int(index))
-            half = self._size * np.tan(view.fov / 2.0)
-            rim = [(x * half * view.aspect, y * half, self._size) for x in (-1, 1) for y in (-1, 1)]
+            camera, view, size = self._cameras[index], self.view(int(index)), self._sizes[index]
+            half = size * np.tan(view.fov / 2.0)
+            rim = [(x * half * view.aspect, y * half, size) for x in (-1, 1) for y in (-1, 1)]
             points += [camera.centre + np.array(rim) @ view.rotation, camera.centre[None]]
-            points.append(camera.centre[None] + np.array([0.0, 0.0, 0.6 * self._size]))
+            points.append(camera.centre[None] + np.array([0.0, 0.0, 0.6 * size]))
         return np.concatenate(points)
 
     def pictures(self, chosen: ndarray) -> tuple[Float[ndarray, "C 3"], Float[ndarray, "C 3"]]:
@@ -239,7 +246,8 @@ class FrustumNodes:
         indices = np.flatnonzero(chosen).tolist()
         ahead = np.array([self.view(index).rotation[2] for index in indices]).reshape(-1, 3)
         eyes = np.array([self._cameras[index].centre for index in indices]).reshape(-1, 3)
-        return eyes + self._size * ahead, ahead
+        sizes = np.array([self._sizes[index] for index in indices]).reshape(-1, 1)
+        return eyes + sizes * ahead, ahead
 
     def view(self, index: int) -> StraightView:
         """The straight picture of a camera, as large as it is to be drawn now."""

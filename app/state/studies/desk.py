@@ -240,7 +240,9 @@ class StudyDesk:
             "state": status.state,
             "words": status.words,
             "done": len(summary.trials),
-            "trials": max(status.trials, summary.definition.trials),
+            "trials": None
+            if summary.definition.by_time_alone
+            else max(status.trials, summary.definition.trials),
             "touched": store.touched(),
             "seconds_left": status.seconds_left,
             "objective": summary.objectives[0].name,

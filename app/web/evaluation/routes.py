@@ -14,6 +14,7 @@ from app.state.workers.evaluator import Evaluator
 from app.web.dependencies import ERRORS, Bench, Part, file_name, nothing_open
 from app.web.evaluation import messages, models
 from app.web.views import results
+from app.web.views.link import address_of
 from tracker.evaluation import Evaluation
 
 router = APIRouter(prefix="/api", responses=ERRORS)
@@ -127,7 +128,7 @@ async def unpin(bench: Bench) -> State:
     response_class=Response,
     responses={200: {"content": {"text/html": {}}, "description": "The report."}},
 )
-def export_report(bench: Bench, evaluator: Scorer) -> Response:
+def export_report(request: Request, bench: Bench, evaluator: Scorer) -> Response:
     """The run scored last as one HTML file; ``X-Run-Partial`` says whether steps are missing."""
     from tracker.evaluation.report.page import report_html  # brings plotly
 
@@ -142,6 +143,9 @@ def export_report(bench: Bench, evaluator: Scorer) -> Response:
         evaluated,
         reference=evaluator.beginning(reference[1], scored.steps) if reference else None,
         seed=scored.seed,
+        back=address_of(
+            str(request.base_url), snapshot.opened_as, scored.parameters, snapshot.defaults
+        ),
     )
     name = file_name(sequence.name, "report.html")
     return Response(

@@ -15,9 +15,11 @@ from app.models.base import RowNumber
 from app.state.workers.exporter import Exporter
 from app.web.dependencies import ERRORS, Bench
 from app.web.library.routes import Kept, no_library
+from app.web.views.link import address_of
 from tracker.library.errors import LibraryError
 from tracker.library.keeping import remarks_of
 from tracker.runs import gaps
+from tracker.runs.fitting import default_parameters
 from tracker.runs.run import resting_of
 from tracker.sequences import library as sequences
 from tracker.writing.registry import FORMATS
@@ -94,7 +96,9 @@ def export(exporter: Out) -> ExportInfo:
 
 
 @router.post("")
-def begin(wish: ExportRequest, exporter: Out, keeper: Kept, bench: Bench) -> ExportInfo:
+def begin(
+    request: Request, wish: ExportRequest, exporter: Out, keeper: Kept, bench: Bench
+) -> ExportInfo:
     """Begin to write a run, instead of what is under way."""
     if wish.format not in FORMATS:
         raise ApiError(
@@ -105,7 +109,7 @@ def begin(wish: ExportRequest, exporter: Out, keeper: Kept, bench: Bench) -> Exp
         )
     form = FORMATS[wish.format]
     options = Options(wish.first, wish.last, wish.speed)
-    now = bench.snapshot()
+    now, base = bench.snapshot(), str(request.base_url)
     if wish.run is None:
         run, sequence = now.run, now.sequence
         if run is None or sequence is None or run.done == 0:
@@ -127,6 +131,7 @@ def begin(wish: ExportRequest, exporter: Out, keeper: Kept, bench: Bench) -> Exp
             done,
             tuple(gaps.sentences(run)),
             resting_of(run)[rows],
+            address_of(base, now.opened_as, run.parameters, now.defaults),
         )
         try:
             form.check(sequence)
@@ -147,6 +152,7 @@ def begin(wish: ExportRequest, exporter: Out, keeper: Kept, bench: Bench) -> Exp
             result.run.seed,
             result.run.steps,
             remarks_of(result),
+            back=address_of(base, result.place, result.parameters, default_parameters(sequence)),
         )
 
     name = f"{result.run.recording_name}-{result.run.name or result.run.id}"

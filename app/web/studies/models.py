@@ -18,7 +18,8 @@ class StudyInfo(Model):
     """What it waits for, or why it ended."""
     done: int
     """Trials that ended."""
-    trials: int
+    trials: int | None
+    """All there are to be; null where the time alone ends it."""
     touched: float
     """When it was at work last, seconds since 1970."""
     seconds_left: float | None
@@ -184,9 +185,9 @@ class StudyStatus(Model):
     """What a study does now."""
 
     runs: int
-    """That ended since it was started."""
+    """That ended, however often it was started."""
     seconds: float
-    """Since then."""
+    """In which it was at work."""
     seconds_left: float | None
     busy: float | None
     """Share of the workers' time in which they worked."""

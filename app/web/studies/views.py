@@ -39,8 +39,8 @@ def study_of(desk: StudyDesk, store: Store) -> models.Study:
             for one in summary.definition.varied
         ],
         status=models.StudyStatus(
-            runs=status.runs,
-            seconds=status.seconds,
+            runs=max(status.all_runs, status.runs),  # an older status has those of a start alone
+            seconds=max(status.all_seconds, status.seconds),
             seconds_left=status.seconds_left,
             busy=status.busy,
             workers=[models.WorkerInfo(**one) for one in status.workers],

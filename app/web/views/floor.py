@@ -10,6 +10,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from app import models
+from app.models.floor import Line
 from app.scene.room.standing import grid_cell
 from tracker.camera import Camera
 from tracker.sequences.sequence import Room, Sequence
@@ -53,7 +54,7 @@ def _grid(room: Room, cell: float) -> list[Float[ndarray, "P 3"]]:
         for number in np.arange(first, last + 1):
             ends = np.array([low, high])
             ends[:, axis], ends[:, 2] = number * cell, low[2]
-            ways.append(_way(*ends, cell))
+            ways.append(_way(ends[0], ends[1], cell))
     return ways
 
 
@@ -70,7 +71,7 @@ def _way(
     return np.linspace(start, end, count)
 
 
-def _seen(camera: Camera, way: Float[ndarray, "P 3"]) -> Iterator[models.Line]:
+def _seen(camera: Camera, way: Float[ndarray, "P 3"]) -> Iterator[Line]:
     """The parts of a line that come into a picture, with as few points as will do."""
     pixels, valid = camera.project(way)
     size = np.array(camera.image_size)

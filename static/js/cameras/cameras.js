@@ -220,7 +220,7 @@ export function mountCameras(root, { store, actions, playback }) {
 		if (stale) words.push("computing");
 		else if (result && !result.computed)
 			words.push(store.get().run?.state === "computing" ? "computing" : "not computed");
-		else if (view) {
+		else if (view && roomy) {
 			if (view.events.length) words.push(`2D: ${viewWords(view.events)}`);
 			/** @type {Record<string, number[]>} */
 			const away = {};

@@ -1,10 +1,13 @@
 /**
  * What is drawn over a picture. Dashed means "not seen by the current run here": truth and
- * coasting. Colour is the id's; the number is always printed as well.
+ * coasting. Colour is the id's; the number is printed as well, but for a crowd in a small picture,
+ * which numbers would hide: there those alone that are pointed at or selected.
  */
 import { faded } from "./colours.js";
 import { stroke, trace } from "./canvas.js";
 
+/** As many as this in a small picture are a crowd. */
+const CROWD = 9;
 const WHITE = "#f4f4f4";
 /** Of samples: no track and no line has it. */
 const SAMPLE = "#ffd84d";
@@ -206,7 +209,9 @@ function drawTracks(g, tracks, { scale, selection, hover, ink, width }, roomy) {
 	});
 	/** @type {[number, number, number][]} */
 	const placed = [];
+	const named = roomy || tracks.length < CROWD;
 	for (const { id, box } of [...tracks].reverse()) {
+		if (!named && id !== selection && id !== hover) continue;
 		const text = String(id);
 		const wide = Math.max(size + 1, Math.ceil(g.measureText(text).width) + 6);
 		const top = Math.round(box[1] * scale);

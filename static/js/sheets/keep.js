@@ -60,23 +60,39 @@ function save(blob, name) {
 
 /** @param {Context} context */
 export function mountKeep({ store, actions }) {
-	/** The 3D view, as the browser draws it once more for the server. */
-	async function keepView() {
+	/** @param {Blob} png */
+	async function copy(png) {
+		try {
+			await navigator.clipboard.write([new ClipboardItem({ [png.type]: png })]);
+			actions.note("info", "The picture is copied", "");
+		} catch {
+			actions.note(
+				"warn",
+				"The browser does not let the page use the clipboard",
+				"The same picture can be saved: Ctrl+K, picture.",
+			);
+		}
+	}
+
+	/** The 3D view, as the browser draws it once more for the server. @param {string} kind */
+	async function keepView(kind) {
 		const { offsetWidth: width, offsetHeight: height } = one(".stage");
-		actions.note("info", "The 3D view is drawn", "It is saved as soon as it is there.");
+		actions.note("info", "The 3D view is drawn", "It is there in a moment.");
 		const answer = await request(`/api/view/picture.png?width=${width}&height=${height}`).catch(
 			(error) => error,
 		);
 		if (answer instanceof Error)
 			return actions.note("error", answer.message, /** @type {any} */ (answer).hint ?? "");
 		const { sequence, shown } = store.get();
-		save(await answer.blob(), `${sequence?.name ?? "view"}-3d-${Math.max(0, shown)}.png`);
+		const png = await answer.blob();
+		if (kind === "copy") return copy(png);
+		save(png, `${sequence?.name ?? "view"}-3d-${Math.max(0, shown)}.png`);
 	}
 
 	actions.keepPicture = async (what) => {
 		const [name, kind] = what.split(" ");
 		const pane = one(`.${name}`);
-		if (name === "view") return keepView();
+		if (name === "view") return keepView(kind);
 		const svg = svgOf(pane, await recorded(/** @type {any[]} */ (all("canvas", pane))));
 		const { sequence, shown } = store.get();
 		const file = `${sequence?.name ?? "pane"}-${name}-${Math.max(0, shown)}.${kind}`;
@@ -88,6 +104,6 @@ export function mountKeep({ store, actions }) {
 		const canvas = document.createElement("canvas");
 		Object.assign(canvas, { width: pane.clientWidth * SHARP, height: pane.clientHeight * SHARP });
 		canvas.getContext("2d")?.drawImage(image, 0, 0, canvas.width, canvas.height);
-		canvas.toBlob((png) => png && save(png, file));
+		canvas.toBlob((png) => png && (kind === "copy" ? copy(png) : save(png, file)));
 	};
 }

@@ -24,7 +24,10 @@ export const PLACES = [
 		word: "Study",
 		tip: "Many runs at once: which values are better, and which matter",
 		read: () => import("../study/study.js").then(({ mountStudy }) => mountStudy),
-		sign: ({ study }) => (study?.state === "running" ? `${study.done}/${study.trials}` : ""),
+		sign: ({ study }) =>
+			study?.state === "running"
+				? [study.done, study.trials].filter((count) => count !== null).join("/")
+				: "",
 	},
 	{
 		name: "library",

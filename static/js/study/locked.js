@@ -46,7 +46,7 @@ export function lockedParts(study) {
 			"div",
 			{ class: "blk" },
 			h("h3", { class: "h" }, "Search"),
-			line("trials", told.trials),
+			line("trials", study.info.trials ?? "as many as fit"),
 			line("seeds", seeds),
 			line("search", SEARCHES.find(([key]) => key === told.search)?.[1] ?? told.search),
 			told.minutes && line("at most", `${told.minutes} min`),

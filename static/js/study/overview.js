@@ -198,7 +198,7 @@ export function overview({ choose, narrow }) {
 		const cells = [...grid.querySelectorAll(".mp")];
 		try {
 			await scatter(pareto, complete, x, y, told, choose);
-			await bestSoFar(sofar, done, y, now.info.trials);
+			await bestSoFar(sofar, done, y, now.info.trials ?? done.length);
 			for (const [k, range] of ranked.entries()) {
 				const value = top && range.key in top.values ? top.values[range.key] : range.default;
 				const [head, figure] = /** @type {HTMLElement[]} */ ([...cells[k].children]);

@@ -6,12 +6,17 @@ import { lasting, nameOf } from "./words.js";
 export function progressPane({ pause }) {
 	const element = h("section", { class: "pane prog", "aria-label": "Progress" });
 
-	/** @param {Server.Study} now @param {boolean} going whether it is just being started or stopped */
-	function show({ info, status, sentences }, going) {
+	/** @param {Server.Study} now @param {string} going what is just being done with it, if anything */
+	function show({ info, status, definition, sentences }, going) {
 		const running = info.state === "running";
+		const { done, trials } = info;
+		// where the time alone ends it, its share
+		const timed =
+			info.state === "done" ? 1 : Math.min(1, status.seconds / (60 * (definition.minutes ?? 1)));
+		const part = trials === null ? timed : done / Math.max(1, trials);
 		/** @type {Record<string, string>} */
 		const words = { running: "Pause", done: "Done", new: "Start" };
-		const word = going && !running ? "Starting…" : (words[info.state] ?? "Go on");
+		const word = going || (words[info.state] ?? "Go on");
 		const gone = [
 			`${status.runs} runs`,
 			lasting(status.seconds),
@@ -26,19 +31,19 @@ export function progressPane({ pause }) {
 				h(
 					"div",
 					{ class: "big" },
-					h("b", {}, info.done),
-					h("span", { class: "q" }, ` of ${info.trials} trials`),
+					h("b", {}, done),
+					h("span", { class: "q" }, trials === null ? " trials so far" : ` of ${trials} trials`),
 				),
 				h(
 					"span",
 					{
 						class: "bar wide",
-						"--part": info.done / Math.max(1, info.trials),
+						"--part": part,
 						role: "progressbar",
 						"aria-label": "Trials",
-						"aria-valuenow": info.done,
+						"aria-valuenow": trials === null ? Math.round(100 * part) : done,
 						"aria-valuemin": 0,
-						"aria-valuemax": info.trials,
+						"aria-valuemax": trials ?? 100,
 					},
 					h("i"),
 				),
@@ -59,7 +64,7 @@ export function progressPane({ pause }) {
 					class: "btn box tall2",
 					"data-key": "Space",
 					onclick: pause,
-					disabled: going || info.state === "done",
+					disabled: Boolean(going) || info.state === "done",
 				},
 				icon(running ? "i-pause" : "i-play", "s"),
 				word,

@@ -8,6 +8,7 @@ import { progressPane } from "./progress.js";
 import { lasting, lineOf } from "./words.js";
 import { placeOf } from "./where.js";
 
+const TUNE = "Tune in 5 minutes";
 const EVERY_MS = 1000;
 
 /** The choice of a study that is not there yet. */
@@ -49,7 +50,7 @@ export function mountStudy(root, { store, actions }) {
 		"Delete this study with its trials",
 	);
 	const tune = tool(
-		"Tune in 5 minutes",
+		TUNE,
 		"i-play",
 		() => void tuneNow(),
 		"Seek better values for what is open, by what matters most, and check them on other seeds",
@@ -204,7 +205,11 @@ export function mountStudy(root, { store, actions }) {
 	}
 
 	async function tuneNow() {
+		tune.disabled = true;
+		write(/** @type {Node} */ (tune.lastChild), "Starting…");
 		const made = await actions.ask("POST", "studies/tune", {});
+		write(/** @type {Node} */ (tune.lastChild), TUNE);
+		tune.disabled = false;
 		if (!made) return;
 		await refreshList();
 		await open(made.info.name);
@@ -221,14 +226,14 @@ export function mountStudy(root, { store, actions }) {
 		await go(study.info.state === "running" ? "/stop" : "/start", {});
 	}
 
-	/** Whether the server is just starting or stopping it. */
-	let going = false;
+	/** What the server is just asked to do with it. @type {"" | "Starting…" | "Pausing…"} */
+	let going = "";
 	/** @param {"/start" | "/stop"} to @param {Partial<import("./where.js").Where>} place */
 	async function go(to, place) {
-		going = true;
+		going = to === "/start" ? "Starting…" : "Pausing…";
 		if (study) progress.show(study, going);
 		await actions.ask("POST", path(to), place);
-		going = false;
+		going = "";
 		if (study) progress.show(study, going);
 		await refresh();
 	}

@@ -67,5 +67,5 @@ export const STATES = {
 
 /** A study in a line. @param {Server.StudyInfo} study */
 export function lineOf({ name, state, done, trials }) {
-	return `${name}  ·  ${state === "new" ? STATES.new : `${done} of ${many(trials, "trial")}, ${STATES[state]}`}`;
+	return `${name}  ·  ${state === "new" ? STATES.new : `${trials === null ? many(done, "trial") : `${done} of ${many(trials, "trial")}`}, ${STATES[state]}`}`;
 }

@@ -1138,7 +1138,8 @@ declare namespace Server {
 		words: string;
 		/** Trials that ended. */
 		done: number;
-		trials: number;
+		/** All there are to be; null where the time alone ends it. */
+		trials: number | null;
 		/** When it was at work last, seconds since 1970. */
 		touched: number;
 		seconds_left: number | null;
@@ -1157,9 +1158,9 @@ declare namespace Server {
 
 	/** What a study does now. */
 	interface StudyStatus {
-		/** That ended since it was started. */
+		/** That ended, however often it was started. */
 		runs: number;
-		/** Since then. */
+		/** In which it was at work. */
 		seconds: number;
 		seconds_left: number | null;
 		/** Share of the workers' time in which they worked. */

@@ -189,3 +189,21 @@ def test_frusta_say_where_their_pictures_are(server: viser.ViserServer) -> None:
         np.testing.assert_allclose(pixel, (np.array(straight.pinhole.image_size) - 1) / 2, atol=1.0)
         np.testing.assert_allclose(normals[row], straight.rotation[2])
     view.close()
+
+
+def test_a_picture_in_front_of_the_room_hides_little_of_it(server: viser.ViserServer) -> None:
+    of = scene_case.sequence(3)
+    wide = replace(of.cameras[0], intrinsics=np.diag([150.0, 150.0, 1.0]) + 0.0)
+    wide.intrinsics[:2, 2] = 179.5, 143.5
+    wide = replace(wide, distortion=np.zeros(5))
+    of = replace(of, views=(replace(of.views[0], camera=wide), *of.views[1:]))
+    view = Scene(server, scene_case.opened(of))
+    assert view.wait(SECONDS)
+    across = float(np.linalg.norm(of.room.maximum - of.room.minimum))
+    for index, camera in enumerate(of.cameras):
+        chosen = np.arange(3) == index
+        corners = view._frusta.corners(chosen)[:4]
+        width = np.ptp((corners - camera.centre) @ StraightView(camera, 320).rotation[0])
+        assert width <= 0.125 * across + 1e-9
+        assert width > 0.06 * across  # it is seen, too
+    view.close()

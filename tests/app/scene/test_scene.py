@@ -14,7 +14,7 @@ import viser.transforms as tf
 from app.colours import PALETTES
 from app.scene import scene
 from app.scene.geometry import mass_radius
-from app.scene.nodes import linear
+from app.scene.nodes import DISC, crowded, linear
 from app.scene.scene import Scene
 from app.scene.worker import LatestWorker
 from app.state.snapshot import Ghosts
@@ -132,12 +132,21 @@ def test_pools_grow_to_the_need_and_stay(server: viser.ViserServer) -> None:
     grown = set(nodes(server))
     assert len(visible(server, "/cameras")) == 6
     assert len(visible(server, "/labels/people")) == 24
+    label, discs = nodes(server)["/labels/people/00"], nodes(server)["/labels/people_discs"]
+    assert label.font_screen_scale == pytest.approx(crowded(24))
+    assert discs.thickness == pytest.approx(DISC * crowded(24))
     scene_case.show(workbench, few)
     assert view.wait(SECONDS)
     assert set(nodes(server)) == grown
     assert len(visible(server, "/cameras")) == 2
     assert not visible(server, "/labels/people")
     view.close()
+
+
+def test_labels_are_smaller_in_a_crowd() -> None:
+    assert [crowded(count) for count in (0, 1, 14)] == [1.0, 1.0, 1.0]
+    assert 0.7 <= crowded(24) < 0.9
+    assert crowded(400) == 0.6
 
 
 def test_a_step_is_drawn_as_the_run_has_it(server: viser.ViserServer) -> None:

@@ -119,7 +119,11 @@ def test_the_panel_says_it_in_words_and_draws_it() -> None:
     curve = Curve(P_D, "MOTA", (0.2, 0.5, 0.95), (0.913, None, 0.978), whole=True)
     assert words_of(curve) == "0.2 … 0.95: MOTA 0.91 … 0.98"
     assert drawing_of(curve, 0.95).count("<circle") == 1
-    assert 'label[for="x"]' in style_of([(curve, 0.95, ["x"])])
+    style = style_of([(curve, 0.95, ["x"])])
+    assert 'label[for="x"]' in style
+    # the words never make the panel wider, nor are they cut off
+    assert "width: 0; min-width: 100%" in style
+    assert "nowrap" not in style
     flat = Curve(P_D, "tracks", (1, 2), (4.0, 4.0), whole=False)
     assert words_of(flat) == "1 … 2: tracks 4 throughout, computing"
     assert words_of(Curve(P_D, "MOTA", (1, 2), (None, None), whole=True)).startswith("no run")

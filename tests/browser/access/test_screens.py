@@ -105,3 +105,21 @@ def test_everything_is_inside_the_window(
     keep(page, screenshots, f"{size}-{theme}-selected", tmp_path)
     context.close()
     as_at_first(server)
+
+
+@pytest.mark.parametrize("layout", ["tune", "inspect", "compare"])
+def test_every_layout_fits_every_width(flat_page: Page, server: Server, layout: str) -> None:
+    page = flat_page
+    as_at_first(server)
+    page.keyboard.press("Control+k")
+    page.keyboard.type(f"layout {layout}")
+    page.keyboard.press("Enter")
+    for width, height in ((1100, 720), (1280, 720), (1600, 1000), (1920, 1080), (2560, 1440)):
+        page.set_viewport_size({"width": width, "height": height})
+        page.wait_for_timeout(300)
+        assert page.evaluate(OUTSIDE) == [], f"{layout} at {width}"
+        # below 576 pixels the panel of the 3D view would lie over the room
+        assert page.locator(".view").evaluate("e => e.clientWidth") > 576, f"{layout} at {width}"
+        said = page.locator(".status").evaluate("e => e.scrollWidth - e.clientWidth")
+        assert said <= 1, f"the run's state is cut off at {width}"
+    page.evaluate("localStorage.removeItem('page')")

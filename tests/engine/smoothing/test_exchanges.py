@@ -34,10 +34,10 @@ def fitted(places: list[ndarray]) -> Fitted:
     begins = paths.states[paths.starts[:-1]].copy()
     prior = np.diag([100.0] * 3 + [0.7**2] * 3)
     rule = passes.PathMotion(motion.transition, motion.noise, prior)
-    found = passes.smooth_paths(paths.starts, begins, matrices, vectors, rule)
+    found = passes.smooth_paths(paths.starts, begins, matrices, vectors, rule, np.ones(rows))
     return Fitted(
         paths.with_states(found.means, found.covariances),
-        found.fits, found.ahead, found.ahead_covariances, found.traces,
+        found.fits, found.ahead, found.ahead_covariances, found.traces, np.ones(rows),
     )  # fmt: skip
 
 

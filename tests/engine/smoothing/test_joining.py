@@ -12,9 +12,11 @@ from numpy.testing import assert_allclose
 from tracker.filters.models import Motion
 from tracker.kernels.smoothing.presence import Habits, presence
 from tracker.parameters import FusionParams
+from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.identity.joining import chains, join
 from tracker.smoothing.identity.pieces import contested, cut, motion_pairs
 from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.smoother import Fitted
 
 
 def worth_of(
@@ -128,6 +130,15 @@ def together(*paths: Paths) -> Paths:
     )
 
 
+def as_fitted(paths: Paths, restlessness: float = 1.0) -> Fitted:
+    """Paths that are fitted already."""
+    rows = len(paths.states)
+    return Fitted(
+        paths, np.zeros(rows), paths.states, paths.covariances, np.zeros(rows),
+        np.full(rows, restlessness),
+    )  # fmt: skip
+
+
 def test_the_motion_prefers_who_goes_on_as_he_went() -> None:
     # two people side by side; after a gap one is where the first must be, the other beside
     paths = together(
@@ -138,12 +149,13 @@ def test_the_motion_prefers_who_goes_on_as_he_went() -> None:
     )
     prior = np.diag([100.0] * 3 + [0.49] * 3)
     motion = Motion.of(FusionParams(), 0.1)
-    found = motion_pairs(paths, motion, prior, 0.0, longest=20, fastest=0.3)
+    known = Ends.alone(as_fitted(paths), prior)
+    found = motion_pairs(paths, known, motion, prior, 0.0, longest=20, fastest=0.3)
     gain = {(i, j): g for i, j, g in zip(found.earlier, found.later, found.gains, strict=True)}
     assert gain[0, 2] > gain[0, 3] + 3.0
     assert gain[1, 3] > gain[1, 2] + 3.0
     assert found.gaps.tolist() == [5] * len(found.gaps)
-    near = motion_pairs(paths, motion, prior, 0.0, longest=4, fastest=0.3)
+    near = motion_pairs(paths, known, motion, prior, 0.0, longest=4, fastest=0.3)
     assert len(near.gains) == 0
 
 

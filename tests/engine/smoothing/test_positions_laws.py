@@ -38,7 +38,7 @@ def one_walker(steps: int = STEPS, seed: int = 0) -> Sequence:
 def smoother_of(whole: Sequence, parameters: RunParameters = PLAIN) -> Smoother:
     """With the boxes as stage 1 hands them on."""
     run = pipeline.compute(whole, with_values(parameters, {"smoothing_method": "none"}))
-    return Smoother(whole, parameters.fusion, run.views)
+    return Smoother(whole, parameters.fusion, run.views, learning=parameters.smoothing.learning)
 
 
 def alone(smoother: Smoother) -> tuple[Paths, Links]:
@@ -127,6 +127,7 @@ def test_without_boxes_a_path_is_only_predicted(size: int) -> None:
         np.zeros((5, 3, 3)),
         np.zeros((5, 3)),
         passes.PathMotion(transition, noise, prior),
+        np.ones(5),
     )
     assert_allclose(found.means, np.tile(begin, (5, 1)), atol=1e-12)
     assert_allclose(found.covariances[-1], prior + 4 * noise, atol=1e-12)

@@ -66,8 +66,12 @@ def report_html(
     *,
     reference: Evaluation | None = None,
     seed: int | None = None,
+    back: str = "",
 ) -> str:
-    """The report as text; see :func:`write_report`."""
+    """The report as text; see :func:`write_report`.
+
+    ``back`` is the address at which the run can be looked into, where there is one.
+    """
     figures = {
         "figure-time": over_time(evaluation),
         "figure-top": top_view(sequence, tracks, evaluation),
@@ -104,7 +108,7 @@ def report_html(
 <style>{style}</style>
 </head>
 <body>
-{_head(sequence, evaluation, seed)}
+{_head(sequence, evaluation, seed, back)}
 {_headline(evaluation)}
 {body}
 <footer>multiview-phd {__version__}. {_sources()}</footer>
@@ -134,7 +138,7 @@ def _plot(figure: str, label: str) -> str:
     )
 
 
-def _head(sequence: Sequence, evaluation: Evaluation, seed: int | None) -> str:
+def _head(sequence: Sequence, evaluation: Evaluation, seed: int | None, back: str) -> str:
     steps = evaluation.steps
     done = f"{steps} steps" if steps == sequence.frames else f"{steps} of {sequence.frames} steps"
     facts = [done, f"{sequence.fps:g} a second", f"{len(sequence.views)} cameras"]
@@ -147,6 +151,7 @@ def _head(sequence: Sequence, evaluation: Evaluation, seed: int | None) -> str:
         + "".join(f"<p>{escaped(note)}</p>" for note in evaluation.notes)
         + "<nav>"
         + "".join(f'<a href="#{link}">{link.capitalize()}</a>' for link in links)
+        + (f'<a href="{escaped(back)}">Open in the workbench</a>' if back else "")
         + "</nav></header>"
     )
 

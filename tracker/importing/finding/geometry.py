@@ -8,20 +8,9 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.agreement.observed import Pose
+from tracker.checks.level import LEVEL, horizon, leaning, upwards
 from tracker.checks.reading import Reading, pose, upright
-from tracker.checks.readings import upwards
 from tracker.formats.pieces import METRES, Axes, Direction, RawCamera, Unit
-
-LEVEL = 6.0
-"""Degrees: a world that leans less is taken to be level. Boxes tell no better: cameras that look
-down see the top of a head before its middle."""
-
-MOST_ROLL = 4.0
-"""Degrees, root mean square: by more cameras are rolled on purpose, or stand on slanting ground."""
-
-LEAST_TURN = 25.0
-"""Degrees: cameras that are turned less against each other do not tell which way is up."""
 
 _USUAL_WAY = 5.0
 """Metres from a camera to the middle of what it looks at."""
@@ -62,30 +51,6 @@ def read_poses(cameras: Sequence[RawCamera], *, boxes: bool) -> Reading:
     off = [abs(float(np.log(max(METRES[one] * way, 1e-9) / _USUAL_WAY))) for one in units]
     unit = units[int(np.argmin(off))]
     return Reading(direction=best.direction, axes=best.axes, unit=unit, up=up, lean=lean)
-
-
-def horizon(poses: Sequence[Pose]) -> Float[ndarray, " 3"] | None:
-    """The world's direction up, as cameras tell that stand upright: their right is level.
-
-    Returns:
-        A unit vector; None where the cameras are rolled, or look the same way.
-    """
-    if len(poses) < 3:  # two always agree
-        return None
-    rights = np.array([own.rotation[0] for own in poses])
-    _, lengths, axes = np.linalg.svd(rights, full_matrices=False)
-    lengths = lengths / np.sqrt(len(poses))
-    if lengths[2] > np.sin(np.radians(MOST_ROLL)) or lengths[1] < np.sin(np.radians(LEAST_TURN)):
-        return None
-    upward = -np.mean([own.rotation[1] for own in poses], axis=0)
-    return np.asarray(axes[2] * np.sign(axes[2] @ upward))
-
-
-def leaning(upward: Float[ndarray, " 3"], least: float = LEVEL) -> tuple[float, float]:
-    """A direction up as :attr:`Reading.lean`; 0, 0 below so many degrees: as good as level."""
-    if upward[2] > np.cos(np.radians(least)):
-        return 0.0, 0.0
-    return float(upward[0]), float(upward[1])
 
 
 def _focus(cameras: Sequence[RawCamera], reading: Reading) -> Float[ndarray, " 3"]:

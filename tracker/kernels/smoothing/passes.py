@@ -64,11 +64,12 @@ def _carry(
     mean: ndarray,
     covariance: ndarray,
     motion: PathMotion,
+    restlessness: float,
     half: ndarray,
     ahead: ndarray,
     ahead_covariance: ndarray,
 ) -> None:
-    """m⁻ = F m and P⁻ = F P Fᵀ + Q, into the last two; F P stays in ``half``."""
+    """m⁻ = F m and P⁻ = F P Fᵀ + s Q, into the last two; F P stays in ``half``."""
     transition, d = motion.transition, len(mean)
     for a in range(d):
         ahead[a] = 0.0
@@ -81,7 +82,7 @@ def _carry(
                     half[a, b] += transition[a, r] * covariance[r, b]
     for a in range(d):
         for b in range(a + 1):
-            total = motion.noise[a, b]
+            total = restlessness * motion.noise[a, b]
             for r in range(d):
                 total += half[a, r] * transition[b, r]
             ahead_covariance[a, b] = total
@@ -204,6 +205,7 @@ def smooth_paths(
     information: ndarray,
     vectors: ndarray,
     motion: PathMotion,
+    restlessness: ndarray,
 ) -> SmoothedRows:
     """The states of paths given all their boxes ([RTS65]), and how well these fit.
 
@@ -220,6 +222,7 @@ def smooth_paths(
         information: Y (N, 3, 3), one a row.
         vectors: y (N, 3).
         motion: Of all.
+        restlessness: s (N,), by which Q is multiplied on the way to each row.
     """
     rows, d = len(information), len(motion.transition)
     means, covariances = np.empty((rows, d)), np.empty((rows, d, d))
@@ -235,7 +238,7 @@ def smooth_paths(
                 ahead[k], ahead_covariances[k] = begins[path], motion.prior
             else:
                 _carry(
-                    means[k - 1], covariances[k - 1], motion, room.half,
+                    means[k - 1], covariances[k - 1], motion, restlessness[k], room.half,
                     ahead[k], ahead_covariances[k],
                 )  # fmt: skip
             means[k], covariances[k] = ahead[k], ahead_covariances[k]
@@ -282,3 +285,23 @@ def jumps(
             ridge = 1e-9 * np.trace(ahead_covariances[k]) / d
             found[k] = max(offset @ np.linalg.solve(lost + ridge * np.eye(d), offset), 0.0)
     return found
+
+
+@kernel
+def sums_around(starts: ndarray, values: ndarray, kept: float) -> ndarray:
+    """Σ_j κ^{|j − k|} v_j of each row k over the rows j of its path.
+
+    Args:
+        starts: (n + 1,), where each path's rows begin, and the end.
+        values: v (N,).
+        kept: κ, 0 … 1.
+    """
+    before, after = values.copy(), values.copy()
+    for path in range(len(starts) - 1):
+        first, last = starts[path], starts[path + 1]
+        for k in range(first + 1, last):
+            before[k] += kept * before[k - 1]
+        for k in range(last - 2, first - 1, -1):
+            after[k] += kept * after[k + 1]
+    total: ndarray = before + after - values
+    return total

@@ -17,7 +17,7 @@ class SmoothingParams(Params):
     """How often boxes are shared out anew by the smoothed tracks, and the tracks fitted to them."""
 
     learning: Annotated[bool, ui("s, b, f")] = True
-    """Whether people's heights, the cameras' offsets and their noise are learnt on the way."""
+    """Whether people's heights and restlessness and the cameras' offsets and noise are learnt."""
 
     memory: Annotated[float, Field(ge=0.05, le=10.0), ui("τ_z", unit="s", step=0.05, log=True)] = (
         0.25
@@ -48,7 +48,7 @@ class SmoothingParams(Params):
     keeping: Annotated[float, Field(ge=0.0, le=20.0), ui("k", step=0.5)] = 2.0
     """Identities: log odds with which the filter's label joins who is back after longer."""
 
-    rounds: Annotated[int, Field(ge=1, le=5), ui("n_i", step=1)] = 2
+    rounds: Annotated[int, Field(ge=1, le=5), ui("n_i", step=1)] = 3
     """Identities: how often who is who is settled, each time by the tracks of the time before."""
 
     appearance: Annotated[float, Field(ge=0.0, le=5.0), ui("α", step=0.1)] = 1.0

@@ -22,6 +22,7 @@ from tracker.parameters import SmoothingParams
 from tracker.smoothing.identity import cutting, joining, odds, pieces
 from tracker.smoothing.identity import decisions as decided
 from tracker.smoothing.identity.cutting import Tracked
+from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.identity.ties import Seeker, Ties
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.result import Decision, Joined
@@ -29,6 +30,9 @@ from tracker.smoothing.smoother import Shared
 
 _SURE = 1e6
 """Log odds of chains that were found somebody's already."""
+
+_TURNS = 2
+"""How often pieces are joined anew by what their chains say of them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,13 +114,27 @@ def _settled(
     refitted = smoother.fit(cut, links)
     own = Shared(links, shared.chances[:, kept], shared.missed[:, kept], shared.hidden_by[:, kept])
     worths, births, deaths = odds.of_pieces(smoother, refitted, own, parameters)
-    pairs = odds.goes_on(smoother, refitted.paths, links, parameters, looks)
+    alone = Ends.alone(refitted, smoother.prior)
+    pairs = odds.goes_on(smoother, refitted.paths, alone, links, parameters, looks)
     longest = max(round(parameters.longest / smoother.model.step_time), 1)
     now, later = ties.parted(cut, longest)
     following, used = joining.join(
         worths, births, deaths, pairs.earlier, pairs.later, pairs.gains, now
     )
     first = joining.chains(following, used)
+    for _ in range(_TURNS):  # who is joined to whom tells of the ends of the pieces in between
+        whole, rows = pieces.chained(refitted.paths, first, list(range(len(first))))
+        told = alone.in_chains(
+            cut, smoother.fit(whole, pieces.moved_to(links, rows)), rows, smoother.model.motion
+        )
+        pairs = odds.goes_on(smoother, refitted.paths, told, links, parameters, looks)
+        following, used = joining.join(
+            worths, births, deaths, pairs.earlier, pairs.later, pairs.gains, now
+        )
+        again = joining.chains(following, used)
+        if again == first:
+            break
+        first = again
     of_chains = later.of_chains(first, cut)
     if of_chains is None:  # who is tied to somebody far away may not be joined to another meanwhile
         following, used = joining.join(

@@ -13,6 +13,7 @@ from tracker.kernels.smoothing import evidence
 from tracker.parameters import SmoothingParams
 from tracker.smoothing.identity import pieces
 from tracker.smoothing.identity.appearance import Appearance
+from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.identity.pieces import Pairs, chained, same_label
 from tracker.smoothing.lifetimes import independence, misses
 from tracker.smoothing.paths import Links, Paths
@@ -51,6 +52,7 @@ def anew(smoother: Smoother) -> float:
 def goes_on(
     smoother: Smoother,
     paths: Paths,
+    known: Ends,
     links: Links,
     p: SmoothingParams,
     looks: Many[Float[ndarray, "B A"]] | None,
@@ -63,6 +65,7 @@ def goes_on(
     longest = max(round(p.longest / step_time), 1)
     motion = pieces.motion_pairs(
         paths,
+        known,
         smoother.model.motion,
         smoother.prior,
         smoother.log_place,

@@ -10,7 +10,11 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.filters.models import Motion
+from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.paths import Links, Paths
+
+_CHANGES = 0.1
+"""Probability that somebody begins to move as the motion model says while nobody sees him."""
 
 
 def contested(paths: Paths, links: Links) -> Float[ndarray, " N"]:
@@ -109,6 +113,7 @@ class Pairs:
 
 def motion_pairs(
     pieces: Paths,
+    known: Ends,
     motion: Motion,
     prior: Float[ndarray, "d d"],
     log_place: float,
@@ -118,15 +123,17 @@ def motion_pairs(
 ) -> Pairs:
     """The pairs that the motion allows, with the motion's log odds.
 
-    With Λ, η the information that the boxes of the later piece hold of its first state, and
-    N(a, A) the earlier one's last state predicted over the gap,
+    With Λ, η the information of what is from the later piece's beginning on, and N(a, A_s) the
+    earlier one's last state predicted over the gap by a motion with noise s Q,
 
-        gain = log ∫ N(x; a, A) e^{ηᵀx − ½ xᵀΛx} dx − log ∫ p_0(x) e^{ηᵀx − ½ xᵀΛx} dx
+        gain = log Σ_s w_s ∫ N(x; a, A_s) e^{ηᵀx − ½ xᵀΛx} dx − log ∫ p_0(x) e^{ηᵀx − ½ xᵀΛx} dx
 
-    with the density p_0 of a newcomer: anywhere in the room, at a newcomer's speed.
+    with the density p_0 of a newcomer: anywhere in the room, at a newcomer's speed. The person is
+    mostly as restless as before and after, s = √(s_i s_j), and else no less than the motion says.
 
     Args:
         pieces: Each fitted to its own boxes alone.
+        known: Of their ends.
         motion: Of the fusion.
         prior: Covariance of a first state in the fit.
         log_place: What turns its density into that of the room.
@@ -154,18 +161,25 @@ def motion_pairs(
         transitions[k + 1] = motion.transition @ transitions[k]
         noises[k + 1] = motion.transition @ noises[k] @ motion.transition.T + motion.noise
     f = transitions[gaps]
-    a = np.einsum("pij,pj->pi", f, pieces.states[ends[earlier]])
-    spread = f @ pieces.covariances[ends[earlier]] @ f.transpose(0, 2, 1) + noises[gaps]
-    inverse = np.linalg.inv(pieces.covariances[begins])
-    origin = np.linalg.inv(prior)
-    information = inverse - origin
+    a = np.einsum("pij,pj->pi", f, known.ends[earlier])
+    spread = f @ known.covariances[earlier] @ f.transpose(0, 2, 1)
+    own = np.sqrt(known.restlessness[earlier, 1] * known.restlessness[later, 0])
+    told = known.information[later], known.vectors[later]
     centre = pieces.states[begins].copy()
     centre[:, 3:] = 0.0
-    vectors = np.einsum("pij,pj->pi", inverse, pieces.states[begins]) - centre @ origin
-    newcomer = log_integral(centre, np.broadcast_to(prior, inverse.shape), information, vectors)
-    gains = (
-        log_integral(a, spread, information[later], vectors[later]) - newcomer[later] - log_place
+    newcomer = log_integral(
+        centre,
+        np.broadcast_to(prior, known.information.shape),
+        known.information,
+        known.vectors,
     )
+    gains = np.logaddexp(
+        *(
+            np.log(weight) + log_integral(a, spread + s[:, None, None] * noises[gaps], *told)
+            for weight, s in ((1.0 - _CHANGES, own), (_CHANGES, np.maximum(own, 1.0)))
+        )
+    )
+    gains -= newcomer[later] + log_place
     return Pairs(earlier, later, gaps, gains)
 
 

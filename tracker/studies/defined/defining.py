@@ -228,7 +228,8 @@ def _number(fields: _Fields, where: str, key: str, found: Any) -> float:
         return float(value(with_values(RunParameters(), {key: found}), key))
     except ValueError as error:
         words = str(error).removeprefix(f"{key}: ")
-        raise fields.error(where, f"{words} (its definition says how far it goes)") from None
+        told = f"{words}; `multiview-phd parameters` tells how far each goes"
+        raise fields.error(where, told) from None
 
 
 class _Fields:

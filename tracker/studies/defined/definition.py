@@ -107,6 +107,15 @@ class Definition:
                 told[name] = table
         return told | {"parameters": {one.key: one.table() for one in self.varied}}
 
+    @property
+    def by_time_alone(self) -> bool:
+        """Whether there are as many trials as the time allows."""
+        return self.minutes is not None and self.trials >= MOST_TRIALS
+
+    def within(self) -> str:
+        """The bound on its trials, in words after their number."""
+        return f"in {self.minutes:g} minutes" if self.by_time_alone else f"of {self.trials}"
+
     def to_toml(self) -> str:
         """The text of its file."""
         import tomlkit

@@ -59,13 +59,17 @@ class Status:
     """Trials that ended."""
     trials: int = 0
     runs: int = 0
-    """Runs that ended, each counted once."""
+    """Runs that ended in this start, those that were not needed again left out."""
     seconds: float = 0.0
-    """At work, all starts together."""
+    """Since this start."""
     seconds_left: float | None = None
     busy: float | None = None
     """Share of the workers' time, since all were there, in which they worked."""
     workers: list[dict[str, Any]] = field(default_factory=list)
+    all_runs: int = 0
+    """Runs that ended in all starts together."""
+    all_seconds: float = 0.0
+    """At work in all starts together."""
     process: int = 0
     written: float = 0.0
     """Seconds since 1970."""

@@ -185,7 +185,7 @@ class Store:
             words = "the program that ran it was ended; nothing that ended before is lost"
             status = Status(
                 "stopped", words, status.done, status.trials, status.runs, status.seconds,
-                written=status.written,
+                all_runs=status.all_runs, all_seconds=status.all_seconds, written=status.written,
             )  # fmt: skip
         return status
 

@@ -115,7 +115,7 @@ class Writer:
     def say(self, status: Status) -> None:
         """Write down what is being done, for whoever looks; the results are elsewhere."""
         try:
-            with replacing(self._status) as begun:
+            with replacing(self._status, passing=True) as begun:
                 begun.write_text(json.dumps(asdict(status)), encoding="utf-8")
         except OSError as error:
             raise StudyError(

@@ -13,7 +13,6 @@ from tracker import __version__
 from tracker.evaluation.report.tables import escaped
 from tracker.placing import replacing
 from tracker.sequences.sequence import SequenceError
-from tracker.studies.defined.definition import MOST_TRIALS
 from tracker.studies.kept.records import Trial
 from tracker.studies.kept.store import Store
 from tracker.studies.told.commands import track_commands
@@ -129,11 +128,9 @@ def report_html(store: Store) -> str:
         for one in [*figures, *parameter_figures(summary)]
         if one is not None
     )
-    status, within = summary.status, f"of {definition.trials}"
-    if definition.minutes is not None and definition.trials >= MOST_TRIALS:
-        within = f"in {definition.minutes:g} minutes"
+    status = summary.status
     facts = [
-        ("Trials", f"{len(summary.trials)} {within}, {status.state}"),
+        ("Trials", f"{len(summary.trials)} {definition.within()}, {status.state}"),
         ("Seeds", ", ".join(map(str, definition.seeds))),
         ("Search", f"{definition.search}, sampler's seed {definition.seed}"),
         ("Objectives", ", ".join(one.name for one in summary.objectives)),

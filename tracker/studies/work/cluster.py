@@ -33,6 +33,9 @@ ADDRESS = "DASK_SCHEDULER_ADDRESS"
 
 TOPIC = "multiview-phd"
 
+LOOK_SECONDS = 2.0
+"""How often the scheduler is asked who works for it."""
+
 CONNECT_SECONDS = 10.0
 SENDING_SECONDS = 600.0
 
@@ -149,7 +152,8 @@ def check_address(address: str) -> None:
 def _no_scheduler(address: str | None, error: Exception) -> StudyError:
     return StudyError(
         f"there is no Dask scheduler at {address} ({_words(error)}); start one by "
-        "`dask scheduler`, name another address, or leave it out to work on this machine"
+        "`dask scheduler`, or name another address; to work on this machine, leave out "
+        f"--scheduler and ${ADDRESS}"
     )
 
 
@@ -190,6 +194,8 @@ class DaskCrew:
         self._lock = threading.Lock()
         self._sent: set[tuple[str, str]] = set()
         self._cluster: Any = None
+        self._there: dict[str, int] = {}
+        self._looked = float("-inf")
         self._closed = False
         if scheduler is None:
             self._cluster = self._start(
@@ -252,9 +258,13 @@ class DaskCrew:
         return max(1, sum(self._threads().values()))
 
     def _threads(self) -> Mapping[str, int]:
-        with self._asking():
-            workers = self._client.scheduler_info(n_workers=-1).get("workers", {})
-        return {address: int(about.get("nthreads", 1)) for address, about in workers.items()}
+        """Of each worker. The answer takes its time, in which nothing else can be done."""
+        if time.monotonic() - self._looked >= LOOK_SECONDS:
+            with self._asking():
+                workers = self._client.scheduler_info(n_workers=-1).get("workers", {})
+            self._there = {one: int(about.get("nthreads", 1)) for one, about in workers.items()}
+            self._looked = time.monotonic()
+        return self._there
 
     def submit(self, job: Job, priority: int = 0) -> None:
         """Have a job done; of several those of higher priority come first."""
@@ -350,9 +360,16 @@ class DaskCrew:
             sent.result(timeout=SENDING_SECONDS)
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any | None]:
-        """Have something else computed; what is given back has it once it is there."""
+        """Have something else computed; what is given back has it once it is there.
+
+        By the same worker each time, if it is there: one alone loads what that takes.
+        """
+        first = sorted(self._threads())[:1]
         with self._asking():
-            future = self._client.submit(function, *arguments, pure=False, priority=10)
+            future = self._client.submit(
+                function, *arguments, pure=False, priority=10,
+                workers=first or None, allow_other_workers=bool(first),
+            )  # fmt: skip
         return lambda: future.result() if future.status == "finished" else None
 
     def _heard(self, event: tuple[float, Any]) -> None:

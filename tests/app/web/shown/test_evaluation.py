@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import html
 import json
+import re
 import threading
 import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 import pytest
@@ -191,7 +194,14 @@ def test_the_report(client: TestClient) -> None:
     assert "<h1>crossing</h1>" in answer.text
     assert ">reference<" not in answer.text
     change(client, **{P_D: 0.5})
-    assert ">reference<" in client.get("/api/export/report.html").text
+    text = client.get("/api/export/report.html").text
+    assert ">reference<" in text
+    # and it leads back to where it is from, with the parameters that it was found with
+    found = re.search('<a href="([^"]+)">Open in the workbench</a>', text)
+    assert found is not None
+    query = parse_qs(urlsplit(html.unescape(found[1])).query)
+    state = client.get("/api/state").json()
+    assert query == {"seq": [state["sequence"]["opened_as"]], f"p.{P_D}": ["0.5"]}
 
 
 def test_pages_are_told(client: TestClient) -> None:

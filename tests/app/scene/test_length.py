@@ -1,0 +1,70 @@
+"""What a step of the 3D view costs does not grow with the recording."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+import viser
+
+from app.scene.scene import Scene
+from app.web.access.viewer import start_viser
+from tests.app.scene import scene_case
+from tracker.pipeline import Run
+from tracker.sequences.sequence import Sequence
+
+SECONDS = 60.0
+SHORT, LONG = 100, 10_000
+STEP_MS = 16.0
+"""A step of a display of 60 Hz."""
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[viser.ViserServer]:
+    server = start_viser()
+    yield server
+    server.stop()
+
+
+@pytest.fixture(scope="module")
+def runs() -> dict[int, tuple[Sequence, Run]]:
+    """Two recordings of the same room, the second a hundred times as long; their steps repeat."""
+    sequences = {frames: scene_case.sequence(4, frames, f"{frames}") for frames in (SHORT, LONG)}
+    return {frames: (of, scene_case.run(of)) for frames, of in sequences.items()}
+
+
+def least(work: Callable[[int], object], steps: range) -> float:
+    """Seconds of this thread for the quickest of some steps, whatever else the machine does."""
+    taken = []
+    for step in steps:
+        begin = time.thread_time()
+        work(step)
+        taken.append(time.thread_time() - begin)
+    return min(taken)
+
+
+@pytest.mark.parametrize("alone", [False, True])
+def test_a_drawn_step_costs_the_same_however_long_the_recording(
+    server: viser.ViserServer, runs: dict[int, tuple[Sequence, Run]], alone: bool
+) -> None:
+    costs = {}
+    for frames, (of, run) in runs.items():
+        server.scene.reset()
+        server.gui.reset()
+        workbench = scene_case.opened(of, run)
+        view = Scene(server, workbench)
+        workbench.select(1)
+        workbench.set_layers({"others": not alone})
+        assert view.wait(SECONDS)
+        view._worker.close()  # from here on it is drawn in this thread
+
+        def draw(step: int) -> None:
+            workbench.seek(step)  # noqa: B023
+            view._draw_step(workbench.snapshot(), run)  # noqa: B023
+
+        half = frames // 2
+        costs[frames] = 1e3 * least(draw, range(half, half + 40))
+        view.close()
+    assert costs[LONG] < 1.5 * costs[SHORT] + 1.0, costs
+    assert costs[LONG] < STEP_MS, costs

@@ -1,0 +1,129 @@
+"""Who stands is known better than the motion says, and one turn makes nobody restless."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy import ndarray
+from numpy.testing import assert_allclose
+
+from tests.engine.smoothing.test_positions_laws import PLAIN
+from tracker.filters.models import Motion
+from tracker.kernels.smoothing import passes
+from tracker.smoothing.identity.ends import Ends
+from tracker.smoothing.paths import Paths
+from tracker.smoothing.restlessness import restlessness
+from tracker.smoothing.smoother import Fitted
+
+STEP = 0.5
+SIGMA = 0.03
+PRIOR = np.diag([100.0] * 3 + [0.7**2] * 3)
+
+
+def learnt(places: list[ndarray], turns: int = 20) -> Fitted:
+    """People measured at some places, (T, 3) metres each, and how restless they are."""
+    motion = Motion.of(PLAIN.fusion, STEP)
+    states = [np.hstack([own, np.zeros_like(own)]) for own in places]
+    spread = [np.tile(np.eye(6), (len(own), 1, 1)) for own in places]
+    paths = Paths.of(list(range(1, len(places) + 1)), [0] * len(places), states, spread, 6)
+    rows = len(paths.states)
+    matrices = np.tile(np.eye(3) / SIGMA**2, (rows, 1, 1))
+    vectors = paths.states[:, :3] / SIGMA**2
+    begins = paths.states[paths.starts[:-1]].copy()
+    rule = passes.PathMotion(motion.transition, motion.noise, PRIOR)
+    found, told = None, np.ones(rows)
+    for _ in range(turns):
+        found = passes.smooth_paths(paths.starts, begins, matrices, vectors, rule, told)
+        told = restlessness(paths.starts, found, motion.noise, told, STEP)
+    assert found is not None
+    return Fitted(
+        paths.with_states(found.means, found.covariances),
+        found.fits, found.ahead, found.ahead_covariances, found.traces, told,
+    )  # fmt: skip
+
+
+def standing(steps: int, x: float, seed: int) -> ndarray:
+    """Somebody who stands, as he is measured."""
+    return np.array([x, 0.0, 1.0]) + np.random.default_rng(seed).normal(0.0, SIGMA, (steps, 3))
+
+
+def moving(steps: int, seed: int, scale: float = 1.0) -> ndarray:
+    """Somebody who moves as the motion model says, with so many times its noise."""
+    motion, rng = Motion.of(PLAIN.fusion, STEP), np.random.default_rng(seed)
+    states = [np.array([0.0, 0.0, 1.0, 0.5, 0.0, 0.0])]
+    for _ in range(steps - 1):
+        driven = rng.multivariate_normal(np.zeros(6), scale * motion.noise)
+        states.append(motion.transition @ states[-1] + driven)
+    return np.array(states)[:, :3] + rng.normal(0.0, SIGMA, (steps, 3))
+
+
+def test_who_stands_is_not_restless_and_who_moves_as_stated_is() -> None:
+    found = learnt([standing(200, 0.0, 1), moving(200, 2)]).restlessness
+    assert found[:200].max() < 0.2
+    # each step counts in full up to twice the mean: a little less than 1
+    assert 0.5 < np.median(found[200:]) < 1.2
+
+
+def test_more_of_the_same_noise_is_found_in_its_order() -> None:
+    told = [np.median(learnt([moving(300, 3, scale)]).restlessness) for scale in (0.1, 0.3, 1.0)]
+    assert told[0] < 0.6 * told[1] < 0.6 * told[2]
+
+
+def test_one_jump_to_anothers_place_makes_nobody_restless() -> None:
+    still = standing(60, 0.0, 4)
+    jumped = still.copy()
+    jumped[30:, 0] += 0.5
+    found = learnt([jumped])
+    assert found.restlessness.max() < 0.25
+    jump = found.jumps
+    assert np.argmax(jump) in (29, 30, 31)
+    assert jump.max() > 2.0 * learnt([jumped], turns=1).jumps.max()
+
+
+def test_without_boxes_nothing_is_learnt() -> None:
+    motion = Motion.of(PLAIN.fusion, STEP)
+    rule = passes.PathMotion(motion.transition, motion.noise, PRIOR)
+    starts = np.array([0, 5, 6])
+    found = passes.smooth_paths(
+        starts, np.zeros((2, 6)), np.zeros((6, 3, 3)), np.zeros((6, 3)), rule, np.ones(6)
+    )
+    assert_allclose(restlessness(starts, found, motion.noise, np.ones(6), STEP), 1.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.5, 1.0])
+def test_sums_around_are_what_they_say(kept: float) -> None:
+    starts, values = np.array([0, 4, 4, 7]), np.arange(1.0, 8.0)
+    expected = [
+        sum(kept ** abs(j - k) * values[j] for j in range(7) if (j < 4) == (k < 4))
+        for k in range(7)
+    ]
+    assert_allclose(passes.sums_around(starts, values, kept), expected)
+
+
+def test_the_ends_of_a_piece_in_a_chain_are_what_the_rest_of_the_chain_says() -> None:
+    """Cut in the middle of a chain: what is before the cut, and what is from it on, put together
+    again, is what the whole chain says there."""
+    whole = learnt([moving(12, 5)])
+    motion, paths = Motion.of(PLAIN.fusion, STEP), whole.paths
+    # three pieces: of five steps, of one, of six
+    cut = Paths.of(
+        [1, 2, 3], [0, 5, 6],
+        [paths.states[:5], paths.states[5:6], paths.states[6:]],
+        [paths.covariances[:5], paths.covariances[5:6], paths.covariances[6:]],
+        6,
+    )  # fmt: skip
+    own = Fitted(
+        cut, np.zeros(12), paths.states, paths.covariances, np.zeros(12), whole.restlessness
+    )
+    told = Ends.alone(own, PRIOR).in_chains(cut, whole, np.arange(12), motion)
+    for piece, row in ((0, 5), (1, 6)):
+        ahead = motion.transition @ told.ends[piece]
+        spread = motion.transition @ told.covariances[piece] @ motion.transition.T
+        spread += whole.restlessness[row] * motion.noise
+        assert_allclose(ahead, whole.ahead[row], atol=1e-8)
+        information = np.linalg.inv(spread) + told.information[piece + 1]
+        vector = np.linalg.solve(spread, ahead) + told.vectors[piece + 1]
+        assert_allclose(np.linalg.solve(information, vector), paths.states[row], atol=1e-5)
+        assert_allclose(np.linalg.inv(information), paths.covariances[row], atol=1e-6)
+    nobodys = Ends.alone(own, PRIOR).in_chains(cut, whole, np.full(12, -1), motion)
+    assert_allclose(nobodys.ends, Ends.alone(own, PRIOR).ends)
