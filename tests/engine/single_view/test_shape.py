@@ -20,7 +20,7 @@ from tracker.sequences.rendering import render_random
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
 from tracker.single_view.colour.peaks import PeakFinder
-from tracker.single_view.colour.trust import shapes_of_templates, taught_everywhere
+from tracker.single_view.colour.trust import shapes_of_templates, taught_well
 from tracker.single_view.protocol import ViewResult
 from tracker.single_view.shape.channels import Channels
 from tracker.single_view.shape.finder import Shapes, strongest
@@ -219,11 +219,13 @@ def test_a_peak_vouches_for_the_surest_shape_at_its_place_and_says_little_alone(
     assert lone == without.log_ratios[2] < -2.0
 
 
-def test_colours_are_unsure_where_somebody_is_not_taught_in_every_camera(room: Sequence) -> None:
-    cameras = [camera.name for camera in room.cameras]
+def test_colours_are_guessed_where_somebody_is_not_taught_in_every_camera_and_twice_in_one(
+    room: Sequence,
+) -> None:
     first = room.templates[0]
-    whole = replace(room, templates=tuple(replace(first, camera=name) for name in cameras))
-    assert taught_everywhere(whole)
-    assert not taught_everywhere(replace(whole, templates=whole.templates[1:]))
+    each = tuple(replace(first, camera=camera.name) for camera in room.cameras)
+    assert taught_well(replace(room, templates=(*each, first)))
+    assert not taught_well(replace(room, templates=each))
+    assert not taught_well(replace(room, templates=each[1:] + each[1:]))
     another = replace(first, name="another")
-    assert not taught_everywhere(replace(whole, templates=(*whole.templates, another)))
+    assert not taught_well(replace(room, templates=(*each, first, another)))

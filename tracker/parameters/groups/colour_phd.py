@@ -61,8 +61,8 @@ class ColourPeakParams(Params):
         Literal["never", "unsure", "fitting", "always"], ui("S_h", published="never")
     ] = "unsure"
     """Whether people found by shape count as well: where the foreground is not to be believed
-    about somebody, or not everybody has a template in every camera; also where they lie where
-    the templates are; or always."""
+    about somebody, or, if they lie where the templates are, where not everybody has one in every
+    camera and several in one; wherever they lie so; or always."""
 
     shape_odds: Annotated[
         float,

@@ -24,7 +24,7 @@ from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.appearance import Appearance, Scene
 from tracker.single_view.colour.trust import (
     shapes_of_templates,
-    taught_everywhere,
+    taught_well,
     template_trust,
 )
 from tracker.single_view.protocol import CANDIDATES, DROPPED, TRUST
@@ -121,12 +121,13 @@ class PeakFinder:
         """Whether people by shape lie where the templates are."""
         if p.shapes in ("unsure", "fitting") and p.asks_foreground:
             # who is doubted in one camera is sought by shape in all: one alone tells no place
-            wanted = not taught_everywhere(sequence) or any(
+            wanted = any(
                 trust < BELIEVED
                 for camera in range(len(sequence.views))
                 for trust in template_trust(sequence, camera, reader, foreground).values()
             )
-        if p.shapes == "fitting" or wanted:
+        guessed = p.shapes == "unsure" and not taught_well(sequence)
+        if p.shapes == "fitting" or wanted or guessed:
             by_shape = shapes_of_templates(sequence, reader)
             self._fits = by_shape.fit >= FITTING
             wanted = wanted or self._fits

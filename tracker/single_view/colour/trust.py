@@ -8,6 +8,7 @@ not found by shape.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,15 +76,17 @@ def template_trust(
     return trust
 
 
-def taught_everywhere(sequence: Sequence) -> bool:
-    """Whether every person has a template in every camera.
+def taught_well(sequence: Sequence) -> bool:
+    """Whether every person has a template in every camera, and several in one.
 
-    What somebody's colours are in another camera, by another light and from another side, is
-    guessed from those in one.
+    What somebody's colours are in another camera, by another light, is guessed from those in
+    one, and from the other side from those of one side.
     """
-    taught = {(template.name, template.camera) for template in sequence.templates}
+    taught = Counter((template.name, template.camera) for template in sequence.templates)
     names = {template.name for template in sequence.templates}
-    return all((name, camera.name) in taught for name in names for camera in sequence.cameras)
+    cameras = [camera.name for camera in sequence.cameras]
+    counts = [[taught[name, camera] for camera in cameras] for name in names]
+    return all(min(count) > 0 and max(count) > 1 for count in counts)
 
 
 @dataclass(frozen=True, slots=True)
