@@ -41,7 +41,6 @@ START_SIGMA = 10.0
 """Metres: how little is known of a path's first place but by its boxes."""
 
 _MOST_THREADS = 4
-_TURNS = 5  # in which people's restlessness settles
 _LEAST = 0.01  # association probability of a pair worth keeping
 _SURE = 0.9  # association probability of a box that tells of its person's size
 _ODD = 0.4  # half heights: who is so far off is not standing
@@ -107,7 +106,7 @@ class Smoother:
             corrections: Of them *is here* is a measurement of the place.
             learning: Whether people's restlessness is learnt; else they move as stated.
         """
-        self._turns = _TURNS if learning else 0
+        self._learning = learning
         self.parameters = parameters
         self._here = [one for one in corrections if one.kind == "here"]
         self.model = model = FusionModel(sequence, parameters)
@@ -168,7 +167,7 @@ class Smoother:
                 rule,
             )
             found = smooth(restless)
-            for _ in range(self._turns):
+            if self._learning:
                 restless = restlessness(
                     paths.starts, found, motion.noise, restless, self.model.step_time
                 )

@@ -48,7 +48,7 @@ class SmoothingParams(Params):
     keeping: Annotated[float, Field(ge=0.0, le=20.0), ui("k", step=0.5)] = 2.0
     """Identities: log odds with which the filter's label joins who is back after longer."""
 
-    rounds: Annotated[int, Field(ge=1, le=5), ui("n_i", step=1)] = 3
+    rounds: Annotated[int, Field(ge=1, le=5), ui("n_i", step=1)] = 2
     """Identities: how often who is who is settled, each time by the tracks of the time before."""
 
     appearance: Annotated[float, Field(ge=0.0, le=5.0), ui("α", step=0.1)] = 1.0
