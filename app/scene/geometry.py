@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.filters.gaussian_mixture import gate_distance
+from tracker.sequences.sequence import Room
 from tracker.trajectories import Trajectories
 
 DEFAULT_MASS = 0.9
@@ -18,11 +19,23 @@ DEFAULT_MASS = 0.9
 FUTURE_SECONDS = 2.0
 """How far back, and how far ahead, the way of a track is drawn."""
 
+GRID_CELL = 0.5
+"""Metres; twice as much where a room is so large that finer lines would run together."""
+
+LARGE = 12.0
+"""Metres, of the longer side of a large room."""
+
 _CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 _EDGES = np.array(
     [[a, b] for a in range(8) for b in range(a + 1, 8) if (a ^ b).bit_count() == 1], dtype=np.int64
 )
 """Pairs of corners that differ in one coordinate: the twelve edges of a box."""
+
+
+def grid_cell(room: Room) -> float:
+    """Metres between two lines of a room's floor."""
+    longer = float((room.maximum - room.minimum)[:2].max())
+    return GRID_CELL if longer <= LARGE else 2.0 * GRID_CELL
 
 
 def mass_radius(mass: float, dimension: int = 3) -> float:

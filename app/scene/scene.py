@@ -17,7 +17,7 @@ from jaxtyping import Float, UInt8
 from app.colours import PALETTES, Theme
 from app.scene import framing, geometry
 from app.scene.framing import Pose
-from app.scene.room.standing import FrustumNodes, RoomNodes, entrance_edges, grid_cell, pose_through
+from app.scene.room.standing import FrustumNodes, RoomNodes, entrance_edges, pose_through
 from app.scene.tracks.ghosts import GhostNodes
 from app.scene.tracks.people import PeopleNodes, room_taken
 from app.scene.tracks.reference import ReferenceNodes
@@ -334,6 +334,6 @@ def status_html(snapshot: Snapshot, run: Run | None) -> str:
         f'<div class="mvp-status" data-step="{step}" data-state="{state}">'
         f"<p><b>{step}</b> / {sequence.frames - 1} · <b>{step / sequence.fps:.2f}</b> s"
         f"<span>{words}</span></p>"
-        f"<small>grid {grid_cell(sequence.room):g} m · {size} m"
+        f"<small>grid {geometry.grid_cell(sequence.room):g} m · {size} m"
         f" · ellipsoids {mass} %</small></div>"
     )

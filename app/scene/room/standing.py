@@ -18,10 +18,6 @@ from app.scene.room.pictures import StraightView
 from tracker.camera import Camera
 from tracker.sequences.sequence import Room
 
-GRID_CELL = 0.5
-"""Metres; twice as much where a room is so large that finer lines would run together."""
-LARGE = 12.0
-"""Metres, of the longer side of a large room."""
 GRID_MARGIN = 1.0
 """Metres that the floor reaches beyond the volume."""
 RIM_POINTS = 48
@@ -35,12 +31,6 @@ BACKDROP_WIDTH = 960
 """Pixels of the picture of the camera that somebody looks through."""
 FRUSTA = 4
 """Made at once; a sequence with more cameras adds some for good."""
-
-
-def grid_cell(room: Room) -> float:
-    """Metres between two lines of a room's floor."""
-    longer = float((room.maximum - room.minimum)[:2].max())
-    return GRID_CELL if longer <= LARGE else 2.0 * GRID_CELL
 
 
 class RoomNodes:
@@ -80,7 +70,7 @@ class RoomNodes:
         """
         low, high = room.minimum, room.maximum
         height = float(low[2])
-        cell = grid_cell(room)
+        cell = geometry.grid_cell(room)
         margin = max(GRID_MARGIN, 0.5 * float((high - low)[:2].min()))
         for node, lines, shade in zip(
             (self._minor, self._major),
