@@ -7,9 +7,11 @@ what comes in numbers is a batch or a pool that only grows.
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 import viser
@@ -82,6 +84,7 @@ class Meshes:
         vertices: Float[ndarray, "V 3"],
         faces: ndarray,
         *,
+        side: Literal["back", "double"] = "double",
         on_click: Callable[[int], None] | None = None,
     ) -> None:
         """Make the node, hidden.
@@ -90,7 +93,11 @@ class Meshes:
             server: Where the node lives.
             name: Of the node.
             vertices: Of the mesh, its own units.
-            faces: Triangles of indices.
+            faces: Triangles of indices, outward.
+            side: Which side of them is drawn. The copies write depth though one sees through
+                them, and the client draws whole nodes in an order that the angle of view
+                decides: what lies inside a copy is sure to be seen only if its ``back`` alone
+                is drawn.
             on_click: Called with the index of the copy that was clicked.
         """
         self._handle = server.scene.add_batched_meshes_simple(
@@ -103,18 +110,13 @@ class Meshes:
             batched_colors=np.zeros((1, 3), dtype=np.uint8),
             batched_opacities=np.zeros(1),
             lod="off",
-            side="double",
+            side=side,
             cast_shadow=False,
             receive_shadow=False,
             visible=False,
         )
         if on_click is not None:
-            chosen = on_click
-
-            @self._handle.on_click
-            def _(event: viser.SceneNodePointerEvent[viser.BatchedMeshHandle]) -> None:
-                if event.instance_index is not None:
-                    chosen(event.instance_index)
+            self._handle.on_click(passing(on_click))
 
     def show(
         self,
@@ -135,6 +137,114 @@ class Meshes:
         self._handle.batched_scales = np.asarray(scales, dtype=np.float32)
         self._handle.batched_colors = linear(np.asarray(colour, dtype=np.uint8))
         self._handle.batched_opacities = np.asarray(opacities, dtype=np.float32)
+
+
+class Targets:
+    """Many copies of one mesh that nobody sees and that take clicks.
+
+    They hide nothing either: viser's plain meshes write depth however faint they are, those of
+    a glTF whose material blends do not.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        name: str,
+        vertices: Float[ndarray, "V 3"],
+        faces: ndarray,
+        on_click: Callable[[int], None],
+    ) -> None:
+        """Make the node, hidden.
+
+        Args:
+            server: Where the node lives.
+            name: Of the node.
+            vertices: Of the mesh, its own units.
+            faces: Triangles of indices.
+            on_click: Called with the index of the copy that was clicked.
+        """
+        self._handle = server.scene.add_batched_glb(
+            name,
+            unseen(vertices, faces),
+            batched_wxyzs=NO_TURN[None],
+            batched_positions=np.zeros((1, 3)),
+            batched_scales=np.ones((1, 3)),
+            lod="off",
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=False,
+        )
+        self._handle.on_click(passing(on_click))
+
+    def show(self, positions: Float[ndarray, "N 3"], scales: Float[ndarray, "N 3"]) -> None:
+        """Have these copies and no others; no rows hide the node."""
+        self._handle.visible = len(positions) > 0
+        if len(positions) == 0:
+            return
+        turns = np.broadcast_to(NO_TURN, (len(positions), 4))
+        self._handle.batched_positions = np.asarray(positions, dtype=np.float32)
+        self._handle.batched_wxyzs = np.asarray(turns, dtype=np.float32)
+        self._handle.batched_scales = np.asarray(scales, dtype=np.float32)
+
+
+def unseen(vertices: Float[ndarray, "V 3"], faces: ndarray) -> bytes:
+    """A mesh as binary glTF, wholly transparent and from both sides the same."""
+    points = np.asarray(vertices, dtype="<f4")
+    corners = np.asarray(faces, dtype="<u4").reshape(-1)
+    data = points.tobytes() + corners.tobytes()
+    scene = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [
+            {"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]},
+        ],
+        "materials": [
+            {
+                "pbrMetallicRoughness": {"baseColorFactor": [1.0, 1.0, 1.0, 0.0]},
+                "alphaMode": "BLEND",
+                "doubleSided": True,
+            }
+        ],
+        "accessors": [
+            {
+                "bufferView": 0,
+                "componentType": 5126,  # float
+                "type": "VEC3",
+                "count": len(points),
+                "min": points.min(axis=0).tolist(),
+                "max": points.max(axis=0).tolist(),
+            },
+            {
+                "bufferView": 1,
+                "componentType": 5125,  # unsigned int
+                "type": "SCALAR",
+                "count": len(corners),
+            },
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": points.nbytes},
+            {"buffer": 0, "byteOffset": points.nbytes, "byteLength": corners.nbytes},
+        ],
+        "buffers": [{"byteLength": len(data)}],
+    }
+    said = json.dumps(scene).encode()
+    said += b" " * (-len(said) % 4)
+    chunks = b"".join(
+        len(chunk).to_bytes(4, "little") + kind + chunk
+        for kind, chunk in ((b"JSON", said), (b"BIN\0", data))
+    )
+    return b"glTF" + b"".join(n.to_bytes(4, "little") for n in (2, 12 + len(chunks))) + chunks
+
+
+def passing(on_click: Callable[[int], None]) -> Callable[[viser.SceneNodePointerEvent[Any]], None]:
+    """What passes on which copy was clicked."""
+
+    def clicked(event: viser.SceneNodePointerEvent[Any]) -> None:
+        if event.instance_index is not None:
+            on_click(event.instance_index)
+
+    return clicked
 
 
 _SCREEN = np.arange(256) / 255.0

@@ -12,7 +12,7 @@ from numpy import ndarray
 from app.colours import PALETTES, Palette, mix
 from app.scene import geometry
 from app.scene.geometry import FUTURE_SECONDS
-from app.scene.nodes import Lines, Meshes, Tag, Tags
+from app.scene.nodes import Lines, Meshes, Tag, Tags, Targets
 from app.state.snapshot import Trail
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.pipeline import Run
@@ -53,8 +53,8 @@ class PeopleNodes:
         self._selected_box = Lines(server, "/people/selected_box", 2.25)
         cube, sphere = geometry.unit_cube(), geometry.icosphere(2)
         self._feet = Meshes(server, "/people/feet", *geometry.disc())
-        self._figures = Meshes(server, "/people/figures", *geometry.figure())
-        self._bodies = Meshes(server, "/people/bodies", *cube, on_click=self._pick_box)
+        self._figures = Meshes(server, "/people/figures", *geometry.figure(), side="back")
+        self._bodies = Targets(server, "/people/bodies", *cube, self._pick_box)
         self._ellipsoids = Meshes(
             server, "/people/ellipsoids", *sphere, on_click=self._pick_component
         )
@@ -158,7 +158,7 @@ class PeopleNodes:
             node.show(edges[rows].reshape(-1, 2, 3), np.repeat(shades[rows], 12, axis=0)[:, None])
         sizes = np.broadcast_to(half, positions.shape)
         self._box_ids = ids
-        self._bodies.show(positions, sizes, shades, np.where(chosen, 0.12, 0.03))
+        self._bodies.show(positions, sizes)
 
     def _show_figures(
         self,
@@ -177,7 +177,7 @@ class PeopleNodes:
         tall = np.maximum(0.1, positions[:, 2] + half[2] - floor)
         wide = np.broadcast_to(half[:2] * 0.9, (len(ids), 2))
         self._figures.show(
-            feet, np.concatenate([wide, tall[:, None]], axis=1), shades, np.where(chosen, 0.7, 0.5)
+            feet, np.concatenate([wide, tall[:, None]], axis=1), shades, np.where(chosen, 0.8, 0.6)
         )
         feet = feet + np.array([0.0, 0.0, 0.006])  # in front of the floor
         round_ = np.broadcast_to(np.array([*half[:2] * FOOT, 1.0]), positions.shape)

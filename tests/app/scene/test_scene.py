@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import threading
 from collections.abc import Iterator
 from typing import Any
@@ -197,6 +198,30 @@ def test_a_click_selects_and_the_next_one_clears(server: viser.ViserServer) -> N
     people._pick_component(3)  # belongs to no track
     people._pick_box(99)  # was drawn before the click arrived
     assert workbench.snapshot().selection is None
+    view.close()
+
+
+def test_what_takes_the_clicks_on_a_person_hides_nothing(server: viser.ViserServer) -> None:
+    of = scene_case.sequence()
+    workbench = scene_case.opened(of, scene_case.run(of))
+    view = Scene(server, workbench)
+    workbench.seek(30)
+    for bodies in (True, False):
+        workbench.set_layers({"bodies": bodies})
+        assert view.wait(SECONDS)
+        target = nodes(server)["/people/bodies"]
+        assert target.visible
+        assert len(target.batched_positions) == 2
+        # a plain mesh of viser's writes depth at any opacity; three.js has the blending
+        # materials of a glTF not do so
+        assert isinstance(target, viser.BatchedGlbHandle)
+        length = int.from_bytes(target.glb_data[12:16], "little")
+        (material,) = json.loads(target.glb_data[20 : 20 + length])["materials"]
+        assert material["alphaMode"] == "BLEND"
+        assert material["pbrMetallicRoughness"]["baseColorFactor"][3] == 0.0
+        assert nodes(server)["/people/ellipsoids"].visible
+    # the bodies write depth around their ellipsoids: behind these alone
+    assert nodes(server)["/people/figures"].side == "back"
     view.close()
 
 
