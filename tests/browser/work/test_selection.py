@@ -71,9 +71,8 @@ def box_of(server: Server, track: int, camera: int) -> list[float]:
 
 @pytest.mark.parametrize("choose", [by_row, by_lane, by_plot, by_picture, by_3d])
 def test_a_selection_reaches_every_view(
-    request: pytest.FixtureRequest, server: Server, choose: Callable[[Page, Server, int], None]
+    page: Page, server: Server, choose: Callable[[Page, Server, int], None]
 ) -> None:
-    page: Page = request.getfixturevalue("page" if choose is by_3d else "flat_page")
     as_at_first(server)
     ask(server, "POST", "seek", {"step": STEP})
     until(page, lambda: readout(page) == str(STEP), "both people are there")
