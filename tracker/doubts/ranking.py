@@ -163,7 +163,7 @@ class _Site:
         best = self.moves[0]
         if best.kind != "cut":
             return best
-        return next((move for move in self.moves if move.kind == "exchange"), best)
+        return next((one for one in self.moves if one.kind in ("exchange", "crossing")), best)
 
     @staticmethod
     def of(moves: list[Move]) -> _Site:
