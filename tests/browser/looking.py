@@ -142,3 +142,11 @@ def open_kept(page: Page) -> float:
     """Have the run that the library shows in small opened; milliseconds until its lanes show."""
     taken: float = page.evaluate(_OPENED)
     return taken
+
+
+def by_palette(page: Page, words: str) -> None:
+    """Do what a command's words say, once the palette offers it."""
+    page.keyboard.press("Control+k")
+    page.keyboard.type(words)
+    page.locator("dialog[open] [role=option]").first.wait_for()
+    page.keyboard.press("Enter")

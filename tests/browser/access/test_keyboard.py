@@ -7,7 +7,7 @@ from pathlib import Path
 
 from playwright.sync_api import Page, expect
 
-from tests.browser.looking import as_at_first, readout, until
+from tests.browser.looking import as_at_first, by_palette, readout, until
 from tests.browser.serving import Server
 from tests.browser.walkers import FRAMES
 from tracker.export import read_tracks_csv
@@ -101,10 +101,8 @@ def test_from_opening_to_export_without_a_pointer(
     page.keyboard.press("Escape")
     expect(page.get_by_role("dialog")).to_have_count(0)
     # export
-    page.keyboard.press("Control+k")
-    page.keyboard.type("export the tracks")
     with page.expect_download() as download:
-        page.keyboard.press("Enter")
+        by_palette(page, "export the tracks")
     path = tmp_path / "tracks.csv"
     download.value.save_as(path)
     assert len(read_tracks_csv(path).frames) > 0
@@ -128,9 +126,7 @@ def test_single_keys_can_be_switched_off(flat_page: Page) -> None:
 def test_the_palette_does_what_its_words_say(page: Page) -> None:
     expect(page.locator(".lane").first).to_be_visible()  # whoever presses keys sees the page
     page.frame_locator("section.view iframe").locator("canvas").first.wait_for()
-    page.keyboard.press("Control+k")
-    page.keyboard.type("cameras alone")
-    page.keyboard.press("Enter")
+    by_palette(page, "cameras alone")
     expect(page.locator(".app")).to_have_attribute("data-max", "cams")
     expect(page.locator("section.view")).to_be_hidden()
     page.keyboard.press("Escape")

@@ -11,7 +11,7 @@ import cv2
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.looking import as_at_first, ask, readout, until
+from tests.browser.looking import as_at_first, ask, by_palette, readout, until
 from tests.browser.serving import Server
 
 SIZES = {"720p": (1280, 720), "laptop": (1440, 900), "wide": (2560, 1440)}
@@ -111,9 +111,7 @@ def test_everything_is_inside_the_window(
 def test_every_layout_fits_every_width(flat_page: Page, server: Server, layout: str) -> None:
     page = flat_page
     as_at_first(server)
-    page.keyboard.press("Control+k")
-    page.keyboard.type(f"layout {layout}")
-    page.keyboard.press("Enter")
+    by_palette(page, f"layout {layout}")
     for width, height in ((1100, 720), (1280, 720), (1600, 1000), (1920, 1080), (2560, 1440)):
         page.set_viewport_size({"width": width, "height": height})
         page.wait_for_timeout(300)

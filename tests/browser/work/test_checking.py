@@ -10,7 +10,7 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.conftest import opened
-from tests.browser.looking import ask, readout, shown_in_3d, until, viser
+from tests.browser.looking import ask, by_palette, readout, shown_in_3d, until, viser
 from tests.browser.meeting import FRAMES, HIDDEN, write_meeting
 from tests.browser.serving import Server
 
@@ -78,9 +78,7 @@ def test_an_exchange_is_put_right_by_keys_alone(
     assert exchanged(server), "the trap holds"
     with opened(browser, server) as page:
         frame = viser(page)
-        page.keyboard.press("Control+k")
-        page.keyboard.type("next place to check")
-        page.keyboard.press("Enter")
+        by_palette(page, "next place to check")
         expect(places(page).first).to_have_attribute("aria-selected", "true")
         expect(page.get_by_role("tab", name="Place")).to_have_attribute("aria-selected", "true")
         page.keyboard.press("Shift+M")

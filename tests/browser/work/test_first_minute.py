@@ -7,7 +7,7 @@ from pathlib import Path
 
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.looking import as_at_first, ask, readout, until
+from tests.browser.looking import as_at_first, ask, by_palette, readout, until
 from tests.browser.serving import Server
 from tests.long_recording import write_long
 
@@ -25,9 +25,7 @@ def test_reset_all_resets_all(flat_page: Page, server: Server) -> None:
         if way == "button":
             button.click()
         else:
-            page.keyboard.press("Control+k")
-            page.keyboard.type("reset all")
-            page.keyboard.press("Enter")
+            by_palette(page, "reset all")
         server.wait(lambda state: state["changed"] == [])
         expect(page.locator(".note")).to_have_count(0)
 
