@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from tracker.kernels.smoothing.presence import Habits, presence
 from tracker.parameters import FusionParams
 from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.identity.joining import chains, join
-from tracker.smoothing.identity.pieces import contested, cut, motion_pairs
+from tracker.smoothing.identity.pieces import Pairs, contested, cut, motion_gains, near_pairs
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.smoother import Fitted
 
@@ -139,6 +140,13 @@ def as_fitted(paths: Paths, restlessness: float = 1.0) -> Fitted:
     )  # fmt: skip
 
 
+def motion_pairs(paths: Paths, known: Ends, prior: ndarray, longest: int = 20) -> Pairs:
+    """The pairs of pieces with the gains of their motion alone, at 0.1 s a step."""
+    near = near_pairs(paths, longest=longest, fastest=0.3)
+    motion = Motion.of(FusionParams(), 0.1)
+    return replace(near, gains=motion_gains(paths, near, known, motion, prior, 0.0))
+
+
 def test_the_motion_prefers_who_goes_on_as_he_went() -> None:
     # two people side by side; after a gap one is where the first must be, the other beside
     paths = together(
@@ -148,24 +156,22 @@ def test_the_motion_prefers_who_goes_on_as_he_went() -> None:
         straight(4, 14, 1.4, 10, side=1.0),
     )
     prior = np.diag([100.0] * 3 + [0.49] * 3)
-    motion = Motion.of(FusionParams(), 0.1)
     known = Ends.alone(as_fitted(paths), prior)
-    found = motion_pairs(paths, known, motion, prior, 0.0, longest=20, fastest=0.3)
+    found = motion_pairs(paths, known, prior)
     gain = {(i, j): g for i, j, g in zip(found.earlier, found.later, found.gains, strict=True)}
     assert gain[0, 2] > gain[0, 3] + 3.0
     assert gain[1, 3] > gain[1, 2] + 3.0
     assert found.gaps.tolist() == [5] * len(found.gaps)
-    near = motion_pairs(paths, known, motion, prior, 0.0, longest=4, fastest=0.3)
+    near = motion_pairs(paths, known, prior, longest=4)
     assert len(near.gains) == 0
 
 
 def test_boxes_that_err_alike_contradict_each_other_less() -> None:
     paths = together(straight(1, 0, 0.0, 10), straight(2, 11, 1.1, 10, side=0.8))
     prior = np.diag([100.0] * 3 + [0.49] * 3)
-    motion = Motion.of(FusionParams(), 0.1)
     known = Ends.alone(as_fitted(paths), prior)
     gains = [
-        float(motion_pairs(paths, told, motion, prior, 0.0, longest=20, fastest=0.3).gains[0])
+        float(motion_pairs(paths, told, prior).gains[0])
         for told in (known, known.told_by(0.2), known.told_by(1.0))
     ]
     assert gains[1] > gains[0] + 1.0
@@ -179,8 +185,7 @@ def test_as_the_filter_had_it_is_always_possible() -> None:
     )
     prior = np.diag([100.0] * 3 + [0.49] * 3)
     known = Ends.alone(as_fitted(paths), prior)
-    motion = Motion.of(FusionParams(), 0.1)
-    found = motion_pairs(paths, known, motion, prior, 0.0, longest=20, fastest=0.3)
+    found = motion_pairs(paths, known, prior)
     assert list(zip(found.earlier.tolist(), found.later.tolist(), strict=True)) == [(0, 1)]
 
 

@@ -115,7 +115,8 @@ def _settled(
     own = Shared(links, shared.chances[:, kept], shared.missed[:, kept], shared.hidden_by[:, kept])
     worths, births, deaths = odds.of_pieces(smoother, refitted, own, parameters)
     alone = Ends.alone(refitted, smoother.prior)
-    pairs = odds.goes_on(smoother, refitted.paths, alone, links, parameters, looks)
+    goes_on = odds.GoesOn(smoother, refitted.paths, links, parameters, looks)
+    pairs = goes_on.by(alone)
     longest = max(round(parameters.longest / smoother.model.step_time), 1)
     now, later = ties.parted(cut, longest)
     following, used = joining.join(
@@ -127,7 +128,7 @@ def _settled(
         told = alone.in_chains(
             cut, smoother.fit(whole, pieces.moved_to(links, rows)), rows, smoother.model.motion
         )
-        pairs = odds.goes_on(smoother, refitted.paths, told, links, parameters, looks)
+        pairs = goes_on.by(told)
         following, used = joining.join(
             worths, births, deaths, pairs.earlier, pairs.later, pairs.gains, now
         )

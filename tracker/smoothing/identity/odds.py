@@ -49,36 +49,51 @@ def anew(smoother: Smoother) -> float:
     return float(np.log(rate)) + _survival(smoother)[1]
 
 
-def goes_on(
-    smoother: Smoother,
-    paths: Paths,
-    known: Ends,
-    links: Links,
-    p: SmoothingParams,
-    looks: Many[Float[ndarray, "B A"]] | None,
-) -> Pairs:
+class GoesOn:
     """Every pair of pieces of which the second may continue the first, with its gain: by their
     motion over a short gap, and their looks. The label that the filter gave both says nothing
-    more: it came of the same boxes."""
-    step_time, count = smoother.model.step_time, len(paths.labels)
-    survival, _ = _survival(smoother)
-    longest = max(round(p.longest / step_time), 1)
-    motion = pieces.motion_pairs(
-        paths,
-        known.told_by(independence(step_time, p.memory)),
-        smoother.model.motion,
-        smoother.prior,
-        smoother.log_place,
-        longest=longest,
-        fastest=FASTEST * step_time,
-    )
-    told = motion.gains + motion.gaps * survival + _seen_empty(smoother, paths, motion, p.memory)
-    if looks is not None:
-        alike = Appearance(paths, links, smoother.cameras, looks, step_time)
-        told += p.appearance * alike.log_ratio(motion.earlier, motion.later)[0]
-    gains = np.full((count, count), -np.inf)
-    gains[motion.earlier, motion.later] = told
-    return _of_table(gains, paths)
+    more: it came of the same boxes.
+
+    Only the motion depends on what is known of the pieces' ends: the rest is looked into once.
+    """
+
+    def __init__(
+        self,
+        smoother: Smoother,
+        paths: Paths,
+        links: Links,
+        p: SmoothingParams,
+        looks: Many[Float[ndarray, "B A"]] | None,
+    ) -> None:
+        """Look into all that does not depend on the ends."""
+        self._smoother, self._paths = smoother, paths
+        self._share = independence(smoother.model.step_time, p.memory)
+        self._near = near = pieces.near_pairs(
+            paths,
+            longest=max(round(p.longest / smoother.model.step_time), 1),
+            fastest=FASTEST * smoother.model.step_time,
+        )
+        self._empty = _seen_empty(smoother, paths, near, p.memory)
+        self._alike = np.zeros(len(near.earlier))
+        if looks is not None:
+            alike = Appearance(paths, links, smoother.cameras, looks, smoother.model.step_time)
+            self._alike = p.appearance * alike.log_ratio(near.earlier, near.later)[0]
+
+    def by(self, known: Ends) -> Pairs:
+        """The pairs, by what is known of the pieces' ends."""
+        smoother, near = self._smoother, self._near
+        motion = pieces.motion_gains(
+            self._paths,
+            near,
+            known.told_by(self._share),
+            smoother.model.motion,
+            smoother.prior,
+            smoother.log_place,
+        )
+        survival, _ = _survival(smoother)
+        gains = np.full((len(self._paths.labels),) * 2, -np.inf)
+        gains[near.earlier, near.later] = motion + near.gaps * survival + self._empty + self._alike
+        return _of_table(gains, self._paths)
 
 
 def comes_back(

@@ -111,32 +111,11 @@ class Pairs:
         )
 
 
-def motion_pairs(
-    pieces: Paths,
-    known: Ends,
-    motion: Motion,
-    prior: Float[ndarray, "d d"],
-    log_place: float,
-    *,
-    longest: int,
-    fastest: float,
-) -> Pairs:
-    """The pairs that the motion allows, with the motion's log odds.
-
-    With Λ, η the information of what is from the later piece's beginning on, and N(a, A_s) the
-    earlier one's last state predicted over the gap by a motion with noise s Q,
-
-        gain = log Σ_s w_s ∫ N(x; a, A_s) e^{ηᵀx − ½ xᵀΛx} dx − log ∫ p_0(x) e^{ηᵀx − ½ xᵀΛx} dx
-
-    with the density p_0 of a newcomer: anywhere in the room, at a newcomer's speed. The person is
-    mostly as restless as before and after, s = √(s_i s_j), and else no less than the motion says.
+def near_pairs(pieces: Paths, *, longest: int, fastest: float) -> Pairs:
+    """The pairs that may be one person's by when and where they are, with gains of 0.
 
     Args:
-        pieces: Each fitted to its own boxes alone.
-        known: Of their ends.
-        motion: Of the fusion.
-        prior: Covariance of a first state in the fit.
-        log_place: What turns its density into that of the room.
+        pieces: Of tracks.
         longest: Steps of the longest gap.
         fastest: Metres a step that nobody exceeds.
     """
@@ -156,7 +135,37 @@ def motion_pairs(
     for one, other in same_label(pieces):
         goes_on[one] = other
     near |= goes_on[earlier] == later
-    earlier, later, gaps = earlier[near], later[near], gaps[near]
+    return Pairs(earlier[near], later[near], gaps[near], np.zeros(int(near.sum())))
+
+
+def motion_gains(
+    pieces: Paths,
+    pairs: Pairs,
+    known: Ends,
+    motion: Motion,
+    prior: Float[ndarray, "d d"],
+    log_place: float,
+) -> Float[ndarray, " P"]:
+    """The motion's log odds of pairs of pieces.
+
+    With Λ, η the information of what is from the later piece's beginning on, and N(a, A_s) the
+    earlier one's last state predicted over the gap by a motion with noise s Q,
+
+        gain = log Σ_s w_s ∫ N(x; a, A_s) e^{ηᵀx − ½ xᵀΛx} dx − log ∫ p_0(x) e^{ηᵀx − ½ xᵀΛx} dx
+
+    with the density p_0 of a newcomer: anywhere in the room, at a newcomer's speed. The person is
+    mostly as restless as before and after, s = √(s_i s_j), and else no less than the motion says.
+
+    Args:
+        pieces: Each fitted to its own boxes alone.
+        pairs: Of them.
+        known: Of their ends.
+        motion: Of the fusion.
+        prior: Covariance of a first state in the fit.
+        log_place: What turns its density into that of the room.
+    """
+    earlier, later, gaps = pairs.earlier, pairs.later, pairs.gaps
+    begins = pieces.starts[:-1]
     # F^k, and the noise that k steps add
     d = motion.dimension
     most = int(gaps.max(initial=1))
@@ -184,8 +193,7 @@ def motion_pairs(
             for weight, s in ((1.0 - _CHANGES, own), (_CHANGES, np.maximum(own, 1.0)))
         )
     )
-    gains -= newcomer[later] + log_place
-    return Pairs(earlier, later, gaps, gains)
+    return np.asarray(gains - (newcomer[later] + log_place))
 
 
 def log_integral(
