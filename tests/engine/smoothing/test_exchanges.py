@@ -7,38 +7,23 @@ import pytest
 from numpy import ndarray
 from scipy.optimize import linear_sum_assignment
 
+from tests.engine.smoothing.measured import STEP, fitted_to, measured
 from tests.engine.smoothing.test_positions_laws import PLAIN
 from tests.random_rooms import random_room
 from tracker import pipeline
-from tracker.filters.models import Motion
-from tracker.kernels.smoothing import passes
 from tracker.parameters import with_values
 from tracker.pipeline import Run
 from tracker.smoothing.identity.exchanges import exchange_breaks, turn
-from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Fitted
 
-STEP = 0.5
 SIGMA = 0.05
 
 
 def fitted(places: list[ndarray]) -> Fitted:
     """Paths of people measured at some places, (T, 3) metres each."""
-    motion = Motion.of(PLAIN.fusion, STEP)
-    states = [np.hstack([own, np.zeros_like(own)]) for own in places]
-    spread = [np.tile(np.eye(6), (len(own), 1, 1)) for own in places]
-    paths = Paths.of(list(range(1, len(places) + 1)), [0] * len(places), states, spread, 6)
-    rows = len(paths.states)
-    matrices = np.tile(np.eye(3) / SIGMA**2, (rows, 1, 1))
-    vectors = paths.states[:, :3] / SIGMA**2
-    begins = paths.states[paths.starts[:-1]].copy()
-    prior = np.diag([100.0] * 3 + [0.7**2] * 3)
-    rule = passes.PathMotion(motion.transition, motion.noise, prior)
-    found = passes.smooth_paths(paths.starts, begins, matrices, vectors, rule, np.ones(rows))
-    return Fitted(
-        paths.with_states(found.means, found.covariances),
-        found.fits, found.ahead, found.ahead_covariances, found.traces, np.ones(rows),
-    )  # fmt: skip
+    paths, smooth = measured(places, SIGMA)
+    as_stated = np.ones(len(paths.states))
+    return fitted_to(paths, smooth(as_stated), as_stated)
 
 
 def two(steps: int, turn: int) -> list[ndarray]:

@@ -7,6 +7,7 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose
 
+from tests.engine.smoothing.measured import PRIOR, STEP, fitted_to, measured
 from tests.engine.smoothing.test_positions_laws import PLAIN
 from tracker.filters.models import Motion
 from tracker.kernels.smoothing import passes
@@ -15,31 +16,19 @@ from tracker.smoothing.paths import Paths
 from tracker.smoothing.restlessness import restlessness
 from tracker.smoothing.smoother import Fitted
 
-STEP = 0.5
 SIGMA = 0.03
-PRIOR = np.diag([100.0] * 3 + [0.7**2] * 3)
 
 
 def learnt(places: list[ndarray], turns: int = 20) -> Fitted:
     """People measured at some places, (T, 3) metres each, and how restless they are."""
-    motion = Motion.of(PLAIN.fusion, STEP)
-    states = [np.hstack([own, np.zeros_like(own)]) for own in places]
-    spread = [np.tile(np.eye(6), (len(own), 1, 1)) for own in places]
-    paths = Paths.of(list(range(1, len(places) + 1)), [0] * len(places), states, spread, 6)
-    rows = len(paths.states)
-    matrices = np.tile(np.eye(3) / SIGMA**2, (rows, 1, 1))
-    vectors = paths.states[:, :3] / SIGMA**2
-    begins = paths.states[paths.starts[:-1]].copy()
-    rule = passes.PathMotion(motion.transition, motion.noise, PRIOR)
-    found, told = None, np.ones(rows)
+    paths, smooth = measured(places, SIGMA)
+    noise = Motion.of(PLAIN.fusion, STEP).noise
+    found, told = None, np.ones(len(paths.states))
     for _ in range(turns):
-        found = passes.smooth_paths(paths.starts, begins, matrices, vectors, rule, told)
-        told = restlessness(paths.starts, found, motion.noise, told, STEP)
+        found = smooth(told)
+        told = restlessness(paths.starts, found, noise, told, STEP)
     assert found is not None
-    return Fitted(
-        paths.with_states(found.means, found.covariances),
-        found.fits, found.ahead, found.ahead_covariances, found.traces, told,
-    )  # fmt: skip
+    return fitted_to(paths, found, told)
 
 
 def standing(steps: int, x: float, seed: int) -> ndarray:
