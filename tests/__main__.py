@@ -19,11 +19,13 @@ from __future__ import annotations
 import argparse
 import hashlib
 import os
+import re
 import shutil
 import subprocess
 import sys
 import threading
 import time
+import tomllib
 import venv
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -105,11 +107,21 @@ def installing() -> Iterator[None]:
     pip = [PYTHON, "-m", "pip", "install", "--quiet", "--no-compile"]
     subprocess.run([*pip, "--editable", str(ROOT)], check=True)
     yield
-    subprocess.run([*pip, "--editable", f"{ROOT}[test]"], check=True)
+    subprocess.run([*pip, *requirements("test")], check=True)  # the project is there
     # by itself: its own requirements bring a second OpenCV that clashes with the headless one
     subprocess.run([*pip, "--no-deps", "trackeval>=1.3"], check=True)
     STAMP.write_text(wanted, encoding="utf-8")
     tell(f"── installation: {time.monotonic() - begin:.0f} s")
+
+
+def requirements(extra: str) -> list[str]:
+    """What an extra of the project brings, those that it names in their turn too."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    found: list[str] = []
+    for one in project["optional-dependencies"][extra]:
+        own = re.fullmatch(rf"{project['name']}\[([\w,-]+)\]", one)
+        found += [r for name in own[1].split(",") for r in requirements(name)] if own else [one]
+    return found
 
 
 def install() -> None:

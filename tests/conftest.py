@@ -13,6 +13,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 from playwright.sync_api import Browser, sync_playwright
 
+from tracker.kernels.compilation import kernel_folder
+
 # the same examples every time; how long one takes says nothing of whether it is right
 settings.register_profile(
     "repeatable",
@@ -61,6 +63,15 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if long:
         config.hook.pytest_deselected(items=long)
         items[:] = [item for item in items if item not in long]
+
+
+@pytest.fixture
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The cache folder is an empty one; the kernels stay those that the machine has."""
+    folder = tmp_path / "cache"
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(kernel_folder()))
+    monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(folder))
+    return folder
 
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"

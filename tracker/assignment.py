@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
@@ -36,6 +37,26 @@ def linear_sum_assignment(
 
     rows, columns = optimize.linear_sum_assignment(cost, maximize=maximize)
     return rows, columns
+
+
+def pairs_within(
+    apart: Float[ndarray, "rows columns"], reach: float
+) -> tuple[Int[ndarray, " pairs"], Int[ndarray, " pairs"]]:
+    """Pair who is less than a reach apart, one to one, so that the summed distance is least.
+
+    Who is left without a partner counts as far as the reach: else all others would move up to make
+    room for one whom nobody is near.
+
+    Args:
+        apart: Distance of each row from each column.
+        reach: In the same unit.
+
+    Returns:
+        Rows, ascending, and the column of each.
+    """
+    rows, columns = linear_sum_assignment(np.minimum(apart, reach))
+    near = apart[rows, columns] < reach
+    return rows[near], columns[near]
 
 
 def names_by_majority(counts: Sequence[Mapping[int, int]], largest: int) -> list[int]:

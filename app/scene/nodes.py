@@ -84,6 +84,7 @@ class Meshes:
         faces: ndarray,
         *,
         side: Literal["back", "double"] = "double",
+        opacity: float | None = None,
         on_click: Callable[[int], None] | None = None,
     ) -> None:
         """Make the node, hidden.
@@ -94,9 +95,11 @@ class Meshes:
             vertices: Of the mesh, its own units.
             faces: Triangles of indices, outward.
             side: Which side of them is drawn. The copies write depth though one sees through
-                them, and the client draws whole nodes in an order that the angle of view
-                decides: what lies inside a copy is sure to be seen only if its ``back`` alone
-                is drawn.
+                them, unless the ``back`` alone is drawn: these hide nothing
+                (:data:`app.web.access.gateway.BACKS_WRITE_NO_DEPTH`).
+            opacity: Of all copies; without it each has its own. Where it is another one, the
+                client makes the whole node anew, and draws it after those made before, of all
+                whose places are alike.
             on_click: Called with the index of the copy that was clicked.
         """
         self._handle = server.scene.add_batched_meshes_simple(
@@ -107,7 +110,8 @@ class Meshes:
             batched_positions=np.zeros((1, 3)),
             batched_scales=np.ones((1, 3)),
             batched_colors=np.zeros((1, 3), dtype=np.uint8),
-            batched_opacities=np.zeros(1),
+            opacity=opacity,
+            batched_opacities=np.zeros(1) if opacity is None else None,
             lod="off",
             side=side,
             cast_shadow=False,
@@ -122,20 +126,36 @@ class Meshes:
         positions: Float[ndarray, "N 3"],
         scales: Float[ndarray, "N 3"],
         colour: UInt8[ndarray, "N 3"],
-        opacities: Float[ndarray, " N"],
+        opacities: Float[ndarray, " N"] | None = None,
         wxyzs: Float[ndarray, "N 4"] | None = None,
+        *,
+        about: Float[ndarray, " 3"] | None = None,
     ) -> None:
-        """Draw these copies and no others; no rows hide the node."""
+        """Draw these copies and no others; no rows hide the node.
+
+        Args:
+            positions: World metres.
+            scales: Along the axes of the mesh.
+            colour: Red, green, blue, 0 … 255.
+            opacities: 0 … 1, where each copy has its own.
+            wxyzs: Unit quaternions; without them nothing is turned.
+            about: The place of the node itself, world metres: the client draws what is seen
+                through from the furthest node to the nearest.
+        """
         self._handle.visible = len(positions) > 0
         if len(positions) == 0:
             return
         if wxyzs is None:
             wxyzs = np.broadcast_to(NO_TURN, (len(positions), 4))
+        if about is not None:
+            self._handle.position = about
+            positions = positions - about
         self._handle.batched_positions = np.asarray(positions, dtype=np.float32)
         self._handle.batched_wxyzs = np.asarray(wxyzs, dtype=np.float32)
         self._handle.batched_scales = np.asarray(scales, dtype=np.float32)
         self._handle.batched_colors = linear(np.asarray(colour, dtype=np.uint8))
-        self._handle.batched_opacities = np.asarray(opacities, dtype=np.float32)
+        if opacities is not None:
+            self._handle.batched_opacities = np.asarray(opacities, dtype=np.float32)
 
 
 class Targets:

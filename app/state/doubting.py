@@ -9,13 +9,18 @@ from tracker.doubts import Doubt, Queue, queue
 
 _NOTHING = Queue((), 0, "there is no run yet")
 
+_MOST = 1000
+"""Places that are known of queues before."""
+
 
 class Doubting:
-    """Keeps the queue of the run that was asked for last."""
+    """Keeps the queue of the run that was asked for last, and what queues before it had."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._made: tuple[tuple[str, int, bool], Queue] | None = None
+        self._made: tuple[tuple[str, int, bool, tuple[str, ...]], Queue] | None = None
+        self._of = ""
+        self._told: dict[str, Doubt] = {}
 
     def of(self, snapshot: Snapshot) -> Queue:
         """The doubtful places of what is shown, as far as it is computed."""
@@ -23,12 +28,33 @@ class Doubting:
         if run is None:
             return _NOTHING
         complete = run.complete and snapshot.run_state.state != "computing"
-        key = (run.key, run.done // 50, complete)
+        # what was looked at is no part of a run: it is the same run with more of it checked
+        checked = [one for one in snapshot.corrections if one.kind == "checked"]
+        said = [*(one for one in run.corrections if one.kind != "checked"), *checked]
+        key = (run.key, run.done // 50, complete, tuple(one.id for one in said))
         with self._lock:
             if self._made is None or self._made[0] != key:
-                self._made = key, queue(run)
+                self._made = key, queue(run, corrections=said)
+                self._remember(snapshot.sequence_key, self._made[1])
             return self._made[1]
+
+    def _remember(self, sequence: str, made: Queue) -> None:
+        if sequence != self._of:
+            self._of, self._told = sequence, {}
+        for one in made.doubts:
+            self._told.pop(one.id, None)
+            self._told[one.id] = one
+        for old in list(self._told)[:-_MOST]:
+            del self._told[old]
 
     def find(self, snapshot: Snapshot, identity: str) -> Doubt | None:
         """One of them; None where it is not there any more."""
         return next((one for one in self.of(snapshot).doubts if one.id == identity), None)
+
+    def told(self, snapshot: Snapshot, identity: str) -> Doubt | None:
+        """One of them, or of a run before: what somebody says of steps and places who still has
+        it on the page is as true of the run that came meanwhile."""
+        found = self.find(snapshot, identity)
+        with self._lock:
+            known = self._told if self._of == snapshot.sequence_key else {}
+            return found or known.get(identity)

@@ -87,10 +87,13 @@ class ShownRun(Store):
             self._put("run", run_state=RunState(key=key, state="computing", total=total))
 
     def run_waits(self, key: str, message: str) -> None:
-        """The run with this key has not begun, and why."""
+        """The run with this key comes no further for now, and why: it has no speed meanwhile."""
         with self._edit() as now:
             if key == now.run_state.key and message != now.run_state.message:
-                self._put("progress", run_state=replace(now.run_state, message=message))
+                waits = replace(
+                    now.run_state, message=message, steps_per_second=0.0, seconds_left=None
+                )
+                self._put("progress", run_state=waits)
 
     def run_progresses(self, run: Run, progress: Progress) -> None:
         """A run has new steps; from its first call on it is the one that is shown."""

@@ -91,11 +91,14 @@ for (const name of brought) {
 	};
 	actions[name] = early;
 }
-// What is typed before it can offer anything stands in its field.
+// What is typed before it can offer anything stands in its field, and Enter takes the first offer.
+const sought = /** @type {any} */ (one(".palette"));
+sought.addEventListener("keydown", (/** @type {KeyboardEvent} */ { key }) =>
+	sought.toggleAttribute("data-hasty", key === "Enter"),
+);
 actions.palette = () => {
-	const dialog = /** @type {any} */ (one(".palette"));
-	if (dialog.open) return dialog.close();
-	dialog.showModal();
+	if (sought.open) return sought.close();
+	sought.showModal();
 	void readRest();
 };
 mountControls(context);

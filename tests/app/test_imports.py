@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pytest
+
 LATER = {
     "matplotlib": "figures of the experiments",
     "plotly": "the report",
@@ -27,6 +29,7 @@ LATER = {
 """What neither the web nor the engine imports before it is used, and what it is for."""
 
 
+@pytest.mark.full
 def test_the_web_imports_what_the_first_page_needs() -> None:
     told = subprocess.run(
         [sys.executable, "-c", "import app.web.server, sys; print(*sys.modules)"],

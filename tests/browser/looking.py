@@ -109,11 +109,13 @@ def ask(server: Server, method: str, path: str, body: dict | None = None) -> dic
 
 
 def as_at_first(server: Server) -> None:
-    """Defaults, nothing pinned, nothing selected, the first step; and the run of it."""
+    """Defaults, nothing pinned, nothing selected, nobody alone, the first step; and its run."""
     ask(server, "DELETE", "run/pin")
     ask(server, "POST", "parameters/reset", {})
     ask(server, "POST", "select", {"id": None})
     ask(server, "POST", "seek", {"step": 0})
+    # a window that is closed at once takes what it switched last with it
+    ask(server, "PATCH", "layers", {"changes": {"others": True}})
     server.wait_for_run()
 
 

@@ -25,7 +25,8 @@ def test_the_page_and_the_3d_view_recover_where_they_were(page: Page, server: Se
     until(page, lambda: shown_in_3d(scene) == "20", "so is the 3D view")
 
 
-def test_a_new_start_takes_up_where_this_browser_was(page: Page, server: Server) -> None:
+def test_a_new_start_takes_up_where_this_browser_was(flat_page: Page, server: Server) -> None:
+    page = flat_page
     ask(server, "PATCH", "parameters", {"changes": {"fusion.detection_probability": 0.8}})
     server.wait_for_run()
     page.get_by_role("tab", name="Runs").click()

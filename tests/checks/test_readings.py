@@ -15,6 +15,7 @@ from tracker.checks.boxes import listen, raw_cameras
 from tracker.checks.reading import FLIP, Reading, pose, read_boxes, to_camera, upright
 from tracker.checks.readings import Seen, find_meaning
 from tracker.checks.sizes import likely_unit
+from tracker.checks.timing import check_counting
 from tracker.formats.pieces import METRES, RawCamera
 from tracker.sequences.sequence import Sequence
 
@@ -189,3 +190,26 @@ def test_without_boxes_the_room_is_where_views_overlap() -> None:
     assert (found.minimum[:2] < middle).all()
     assert (found.maximum[:2] > middle).all()
     assert found.people == 0
+
+
+def test_with_an_exchange_everything_else_is_tried_again_and_once() -> None:
+    """What boxes are taken for may have looked best for want of the exchange."""
+    sequence = MISTAKES["exchanged"][0](random_room(0, steps=100))
+    meaning = find_meaning(raw_cameras(sequence), seen(sequence))
+    assert meaning is not None
+    tried = [one.reading for one in meaning.tried]
+    assert len(set(tried)) == len(tried)
+    layouts = {one.layout for one in tried if one.order == meaning.reading.order}
+    assert layouts == {"ltwh", "cxcywh"}  # corners would lie before the boxes' beginnings
+
+
+def test_boxes_a_step_before_the_truth_are_counted_from_0() -> None:
+    sequence = random_room(2, steps=200)
+    early = [
+        replace(view, detections=replace(own, frames=np.maximum(own.frames - 1, 0)))
+        for view in sequence.views
+        if (own := view.detections) is not None
+    ]
+    found = check_counting(replace(sequence, views=tuple(early)))
+    assert [str(remedy) for remedy in found.remedies] == ["--first-index 0"]
+    assert check_counting(sequence).status == "good"

@@ -10,9 +10,10 @@ from tests.engine.synthetic import crossing, sequence, walk
 from tracker.corrections import Place
 from tracker.doubts import queue
 from tracker.doubts.clear import Clear
-from tracker.doubts.doubt import Lanes, said
+from tracker.doubts.doubt import Alternative, Lanes, said, unsaid
 from tracker.doubts.linking import Move, Piece
 from tracker.doubts.opinion import Opinion
+from tracker.doubts.ranking import _with_nobody_of_them
 from tracker.doubts.trust import Trust
 from tracker.trajectories import Trajectories, corrected
 
@@ -57,8 +58,6 @@ def test_the_other_run_weighs_a_move_by_who_is_who_there() -> None:
     one, other = (int(track) for track in lanes.ids)
     places = [lanes.place(one, 29), lanes.place(other, 29), lanes.place(other, 30),
               lanes.place(one, 30)]  # fmt: skip
-    from tracker.doubts.doubt import unsaid
-
     swapped: Trajectories = corrected(tracks, unsaid("exchanged", places), 1.0 / 25.0)
     pieces = [
         Piece(track, lanes.place(track, 30), lanes.place(track, 29)) for track in (one, other)
@@ -133,3 +132,49 @@ def test_who_says_that_it_is_as_it_is_changes_nothing() -> None:
             assert all(one.met for one in run.outcomes)
             np.testing.assert_array_equal(run.tracks.ids, plain.tracks.ids)
             np.testing.assert_array_equal(run.tracks.positions, plain.tracks.positions)
+
+
+def test_none_of_those_who_are_told_parts_from_all_of_them() -> None:
+    places = {
+        name: Place(step, x / 3.0, 0.7, 0.9)  # not as round as a correction writes them
+        for name, (step, x) in {
+            "a": (10, 1.0),
+            "b": (12, 2.0),
+            "c": (20, 1.1),
+            "d": (22, 2.2),
+        }.items()
+    }
+    one, other = (Piece(k, places[end], places[end]) for k, end in ((1, "a"), (2, "b")))
+    after, begins = (Piece(k, places[at], places[at]) for k, at in ((1, "c"), (3, "d")))
+    move = Move((one,), (after, begins), "exchange", 0.0)
+    now = Alternative("as it is", 0.5, unsaid("same", (one.end, after.begin)))
+    goes_on = Alternative("1 goes on as 3", 0.3, unsaid("same", (one.end, begins.begin)))
+    came = Alternative("2 goes on", 0.2, unsaid("same", (other.end, after.begin)))
+    none = _with_nobody_of_them(move, now, [goes_on, came])[-1]
+    assert none.words == "none of these"
+    apart = {(a.step, b.step) for told in none.corrections for a, b in told.apart}
+    assert apart == {(10, 20), (10, 22), (12, 20)}
+
+
+def test_two_who_were_parted_anywhere_are_not_asked_for_again() -> None:
+    run = run_of(with_a_gap())
+    join = next(one for one in queue(run).doubts if one.kind == "join")
+    lanes = Lanes(run.tracks)
+    first, second = join.tracks
+    # far from the places that the queue would ask for
+    far = unsaid("different", (lanes.of_row(int(lanes.rows[first][2])),
+                               lanes.of_row(int(lanes.rows[second][-3]))))  # fmt: skip
+    after = run_of(with_a_gap(), said(far))
+    assert [one.met for one in after.outcomes] == [True]
+    assert all(one.kind != "join" for one in queue(after).doubts)
+
+
+def test_who_goes_on_as_another_is_asked_aside_of_the_moment_itself() -> None:
+    run = run_of(sequence([(0, walk((-1.1, 0.0, 1.0), (1.1, 0.0, 1.0), 80))], 80))
+    lanes = Lanes(run.tracks)
+    track = int(lanes.ids[0])
+    clear = Clear(lanes, 1.0 / 25.0, 0.25)
+    assert clear.before(track, 40).step == 30
+    assert clear.after(track, 40).step == 50
+    slow = Clear(lanes, 0.5, 0.25)
+    assert (slow.before(track, 40).step, slow.after(track, 40).step) == (38, 42)

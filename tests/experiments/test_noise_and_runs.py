@@ -117,6 +117,7 @@ def test_a_recording_that_is_not_at_hand(tmp_path: Path) -> None:
     assert runs.recording(Context(data=tmp_path), "cmc9").frames == 10
 
 
+@pytest.mark.full
 def test_a_shortened_room_is_rendered_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(tmp_path))
     told: list[str] = []

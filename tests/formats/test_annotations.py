@@ -11,7 +11,7 @@ import pytest
 
 from tests.formats.rig import SIZE, boxes, cameras, read, walks
 from tracker.checks.reading import read_boxes
-from tracker.formats.pieces import DetectionPiece
+from tracker.formats.pieces import DetectionPiece, FormatError
 from tracker.formats.registry import recognise
 from tracker.formats.source import SourceFile
 
@@ -72,6 +72,63 @@ def test_pascal_voc(tmp_path: Path) -> None:
     piece = _piece(files[0], *files)
     _assert_boxes(piece)
     assert (piece.format, piece.image_size) == ("Pascal VOC XML", SIZE)
+
+
+def _via(frame: int) -> list[dict[str, object]]:
+    """Regions of a frame: rectangles of people, and a point and a chair, which count for none."""
+    regions: list[dict[str, object]] = [
+        {
+            "shape_attributes": {"name": "rect", "x": x, "y": y, "width": w, "height": h},
+            "region_attributes": {"seen": True, "class": "person"},
+        }
+        for x, y, w, h in _of(frame)
+    ]
+    chair = {"name": "circle", "cx": 50, "cy": 60, "r": 10}
+    return [
+        *regions,
+        {"shape_attributes": {"name": "point", "cx": 1, "cy": 2}, "region_attributes": {}},
+        {"shape_attributes": chair, "region_attributes": {"class": "chair"}},
+    ]
+
+
+@pytest.mark.parametrize("form", ["project", "annotations", "version 1", "csv"])
+def test_vgg_image_annotator(tmp_path: Path, form: str) -> None:
+    pictures = {}
+    lines = ["filename,file_size,file_attributes,region_count,region_id,region_shape_attributes,"
+             "region_attributes"]  # fmt: skip
+    for frame in range(STEPS):
+        name, regions = f"cam1/{frame:06d}.jpg", _via(frame)
+        listed = {str(n): one for n, one in enumerate(regions)} if form == "version 1" else regions
+        pictures[f"{name}99"] = {"filename": name, "size": 99, "regions": listed,
+                                 "file_attributes": {}}  # fmt: skip
+        for n, one in enumerate(regions):
+            told = (json.dumps(one[part]) for part in ("shape_attributes", "region_attributes"))
+            cells = ",".join('"' + cell.replace('"', '""') + '"' for cell in told)
+            lines.append(f'{name},99,"{{}}",{len(regions)},{n},{cells}')
+    path = tmp_path / ("via.csv" if form == "csv" else "via.json")
+    project = {"_via_settings": {"ui": {}}, "_via_img_metadata": pictures, "_via_attributes": {}}
+    content = json.dumps(project if form == "project" else pictures)
+    path.write_text("\n".join(lines) if form == "csv" else content)
+    piece = _piece(path)
+    _assert_boxes(piece)
+    assert (piece.format, piece.camera) == ("VGG Image Annotator JSON or CSV", "cam1")
+    assert (piece.first_index, piece.last_frame) == (0, STEPS - 1)
+
+
+def test_shapes_of_vgg_image_annotator_and_what_is_wrong_with_one(tmp_path: Path) -> None:
+    shapes = [
+        {"name": "polygon", "all_points_x": [30, 10, 20], "all_points_y": [5, 25, 45]},
+        {"name": "ellipse", "cx": 50, "cy": 60, "rx": 10, "ry": 20},
+    ]
+    picture = {"filename": "7.jpg", "size": 1, "file_attributes": {}, "regions": [
+        {"shape_attributes": shape, "region_attributes": {}} for shape in shapes]}  # fmt: skip
+    path = tmp_path / "via.json"
+    path.write_text(json.dumps({"7.jpg1": picture}))
+    np.testing.assert_allclose(_piece(path).boxes, [[10, 5, 30, 45], [40, 40, 60, 80]])
+    shapes[1]["rx"] = "wide"
+    path.write_text(json.dumps({"7.jpg1": picture}))
+    with pytest.raises(FormatError, match=r"via.json, 7.jpg rx: expected numbers"):
+        read(path)
 
 
 def _percent(box: list[float]) -> dict[str, float]:

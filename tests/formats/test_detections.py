@@ -215,9 +215,59 @@ def test_blanks_for_commas_and_a_header_that_is_a_comment(tmp_path: Path) -> Non
     lines = ["  ".join([f"{f:.0f}", "7", *map(repr, b), "0.5"]) for f, *b in _rows()]
     path.write_text("\n".join(["# frame id x y w h score", *lines]))
     piece = _detections(path)
-    assert piece.layout == "ltwh"
+    assert piece.layout is None  # x and y are the middle where Ultralytics writes them
     _assert_boxes(piece)
     np.testing.assert_array_equal(piece.scores, 0.5)
+
+
+def test_decimal_commas(tmp_path: Path) -> None:
+    path = tmp_path / "cam1.csv"
+    lines = [";".join(repr(v).replace(".", ",") for v in row) for row in _rows()]
+    text = "\r\n".join(["Frame;Left;Top;Width;Height", *lines])
+    path.write_text(text.replace(",0;", ";", 1), encoding="utf-8-sig")
+    _assert_boxes(_detections(path))
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "cp1252"])
+def test_tables_as_excel_and_older_programs_write_them(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "cam1.txt"
+    lines = ["\t".join(map(repr, [*row, "Gerät für Höhe"])) for row in _rows()]
+    mark = "\ufeff" if encoding == "utf-16-le" else ""
+    text = mark + "\r\n".join(["frame\tleft\ttop\twidth\theight\tnote", *lines])
+    path.write_bytes(text.encode(encoding))
+    _assert_boxes(_detections(path))
+
+
+def test_pictures_by_their_paths_tell_the_camera(tmp_path: Path) -> None:
+    path = tmp_path / "boxes.csv"
+    rows = [
+        f"data/{camera}/frame_{f:05.0f}.jpg,{b[0]!r},{b[1]!r},{b[2]!r},{b[3]!r}"
+        for camera in ("north", "south")
+        for f, *b in _rows()
+    ]
+    path.write_text("\n".join(["image_path,left,top,width,height", *rows]))
+    pieces = [p for p in read(path)[1] if isinstance(p, DetectionPiece)]
+    assert [p.camera for p in pieces] == ["data/north", "data/south"]
+    for piece in pieces:
+        _assert_boxes(piece)
+
+
+def test_times_of_day(tmp_path: Path) -> None:
+    path = tmp_path / "cam1.csv"
+    lines = [f"00:01:{f / 25.0:06.3f},{','.join(map(repr, b))}" for f, *b in _rows()]
+    path.write_text("\n".join(["timecode,left,top,width,height", *lines]))
+    piece = _detections(path)
+    assert piece.fps == pytest.approx(25.0, rel=1e-3)
+    np.testing.assert_array_equal(piece.frames, FRAMES + 60 * 25)
+
+
+def test_a_camera_s_number_is_no_frame(tmp_path: Path) -> None:
+    """Tables without frames, a file a camera, are not taken for a file a frame."""
+    files = [tmp_path / f"cam{number}.csv" for number in (1, 2)]
+    for path in files:
+        path.write_text("left,top,width,height\n1,2,30,40\n5,6,30,40\n")
+    with pytest.raises(FormatError, match=r'cam1\.csv: expected a column "frame"'):
+        read(files[0], *files)
 
 
 @pytest.mark.parametrize("sign", [",", " ", "; "])

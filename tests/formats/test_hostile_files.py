@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import struct
 import time
 import tracemalloc
 import zlib
@@ -56,6 +57,30 @@ HOSTILE: dict[str, bytes] = {
     "huge.json": b'{"sfm_data_version": "0.3", "views": [], "intrinsics": [], "extrinsics": '
     b'[{"key": 0, "value": {"rotation": [[1e308, 1e308, 0], [1e308, 1, 0], [0, 0, 1]], '
     b'"center": [0, 0, 1]}}]}',
+    "names.json": b'{"cam1": {"K' + b"_" * 200_000 + b'": [1, 0, 0, 0, 1, 0, 0, 0, 1]}}',
+    "names.txt": b"K" + b"_" * 200_000 + b" 1 0 0 0 1 0 0 0 1\n",
+    "images.bin": struct.pack("<QI7dI", 2**31, 1, 1, 0, 0, 0, 0, 0, 0, 1) + b"a\0" + b"\xff" * 99,
+    "utf-16.xml": (
+        '<?xml version="1.0"?><!DOCTYPE a [<!ENTITY b "' + "c" * 500 + '">]>'
+        "<opencv_storage><K>&b;</K></opencv_storage>"
+    ).encode("utf-16"),
+    "half.csv": b"\xff\xfef\x00r\x00\x00\xd8",
+    "huge.toml": b"[cam_1]\nsize = [640, 480]\n"
+    b"matrix = [[1e308, 0, 320], [0, 500, 240], [0, 0, 1]]\n"
+    b"distortions = [0, 0, 0, 0]\nrotation = [0, 0, 0]\ntranslation = [0, 0, 3]\n",
+    "far.toml": b"[cam_1]\nsize = [640, 480]\n"
+    b"matrix = [[500, 0, 320], [0, 500, 240], [0, 0, 1]]\n"
+    b"distortions = [0, 0, 0, 0]\nrotation = [0, 0, 0]\ntranslation = [1e308, 0, 3]\n",
+    "turned.toml": b"[cam_1]\nsize = [640, 480]\n"
+    b"matrix = [[500, 0, 320], [0, 500, 240], [0, 0, 1]]\n"
+    b"distortions = [0, 0, 0, 0]\nrotation = [1e300, 0, 0]\ntranslation = [0, 0, 3]\n",
+    "flat.txt": b"1 2 3 4\n2 4 6 8\n1 1 1 1\n",
+    "nowhere.txt": b"0 0 0 0\n0 0 0 0\n0 0 0 0\n",
+    "named.json": b'{"' + b"c" * 5000 + b'": {"K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], '
+    b'"R": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "t": [0, 0, 3], "image_size": [640, 480]}}',
+    "lines.csv": b"frame,left,top,width,height\n" + b"\n" * 10_000_001,
+    "cut.npz": b"PK\x03\x04" + bytes(300),
+    "session.zip": b"PK\x05\x06" + bytes(18),
     "empty.json": b"",
     "empty.xml": b"",
 }
@@ -93,6 +118,15 @@ def _boxes(piece: object) -> object:
         ("short.csv", "columns"),
         ("fractions.csv", "whole number"),
         ("fake.mp4", "cannot be read as a video"),
+        ("huge.toml", "cam_1 K: expected focal lengths from 0.1 to 1e+06 pixels"),
+        ("far.toml", "cam_1 translation: expected numbers of at most 1e+12"),
+        ("turned.toml", "cam_1.rotation: expected a rotation vector in radians, found [1e+300"),
+        ("flat.txt", "flat.txt, projection: its left 3×3 part is singular"),
+        ("nowhere.txt", "nowhere.txt, projection: its left 3×3 part is singular"),
+        ("named.json", "camera 1: expected a name of at most 255 characters, found 5,000"),
+        ("lines.csv", "has 10,000,002 lines, expected at most 10,000,000"),
+        ("cut.npz", "a spoilt .npz"),
+        ("session.zip", "is an archive"),
     ],
 )
 def test_the_sentence_says_what_is_wrong(tmp_path: Path, name: str, words: str) -> None:
@@ -145,3 +179,15 @@ def test_links_out_of_the_folder_are_not_followed(tmp_path: Path) -> None:
 def test_what_is_not_there_is_said() -> None:
     with pytest.raises(FormatError, match="no such file"):
         gather([Path("/nowhere/at/all")])
+
+
+def test_one_spoilt_file_of_several_cameras_costs_no_other(tmp_path: Path) -> None:
+    for number in range(1, 5):
+        rows = "".join(f"{frame},10,20,30,80\n" for frame in range(9))
+        rows = "0,10,20\0\0" if number == 3 else rows
+        (tmp_path / f"cam{number}.csv").write_text(f"frame,left,top,width,height\n{rows}")
+    spoilt, whole = gather([tmp_path])
+    assert spoilt.label == "cam3.csv"
+    assert "cam3.csv: expected text" in spoilt.complaint
+    assert whole.label == "cam1.csv … (3)"
+    assert [piece.source.name for piece in whole.pieces] == ["cam1.csv", "cam2.csv", "cam4.csv"]

@@ -160,3 +160,42 @@ def test_matrices_for_points_in_rows(tmp_path: Path) -> None:
     np.testing.assert_allclose(raw.intrinsics, camera.intrinsics)
     np.testing.assert_allclose(raw.rotation, camera.rotation, atol=1e-12)
     np.testing.assert_allclose(raw.translation, camera.translation)
+
+
+def _mvsnet(pose: np.ndarray, k: np.ndarray, end: str) -> str:
+    rows = "\n".join(" ".join(map(repr, row)) for row in pose.tolist())
+    lens = "\n".join(" ".join(map(repr, row)) for row in k.tolist())
+    return f"extrinsic\n{rows}\n\nintrinsic\n{lens}\n\n{end}\n"
+
+
+@pytest.mark.parametrize("end", ["425.0 2.5", "425.0 2.5 192 935.0"])
+def test_mvsnet(tmp_path: Path, end: str) -> None:
+    for number, camera in enumerate(cameras(distortion=False)):
+        pose = np.eye(4)
+        pose[:3] = np.column_stack([camera.rotation, camera.translation])
+        path = tmp_path / f"{number:08d}_cam.txt"
+        path.write_text(_mvsnet(pose, camera.intrinsics, end))
+        assert read(path)[0] == "MVSNet cam.txt"
+        (raw,) = raw_cameras(path)
+        assert_same(raw, camera)
+    path.write_text(_mvsnet(pose[:3], camera.intrinsics, end))
+    with pytest.raises(FormatError, match="extrinsic: expected 16 numbers"):
+        read(path)
+
+
+def test_middlebury(tmp_path: Path) -> None:
+    rows = []
+    for number, camera in enumerate(cameras(distortion=False), 1):
+        parts = (camera.intrinsics, camera.rotation, camera.translation)
+        values = np.concatenate([part.ravel() for part in parts]).tolist()
+        rows.append(f"templeR{number:04d}.png {' '.join(map(repr, values))}")
+    path = tmp_path / "templeR_par.txt"
+    path.write_text(f"{len(rows)}\n" + "\n".join(rows) + "\n")
+    assert read(path)[0] == "Middlebury _par.txt"
+    found = raw_cameras(path)
+    assert [raw.name for raw in found] == [f"templeR{number:04d}" for number in range(1, 5)]
+    for raw, camera in zip(found, cameras(distortion=False), strict=True):
+        assert_same(raw, camera)
+    path.write_text("47\n" + "\n".join(rows))
+    with pytest.raises(FormatError, match="line 1: expected the count of rows below it, found 47"):
+        read(path)

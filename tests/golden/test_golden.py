@@ -22,11 +22,28 @@ ACCEPT = (
 )
 
 
+ONE_ROOM = "room44-3p"
+"""What the short form looks at: the hardest of the rooms."""
+
+
 def _parameters(pieces: tuple[Piece, ...]) -> list[object]:
-    return [
-        pytest.param(piece, id=piece.name, marks=[pytest.mark.data] if piece.real else [])
-        for piece in pieces
-    ]
+    return [pytest.param(piece, id=piece.name, marks=_marks(piece)) for piece in pieces]
+
+
+def _marks(piece: Piece) -> list[pytest.MarkDecorator]:
+    if piece.real:
+        return [pytest.mark.data]
+    return [] if piece.name == ONE_ROOM else [pytest.mark.full]
+
+
+DRAWS = {
+    (
+        "wildtrack-points-300",
+        "robust jpda jpda.measurements=detections multi_bernoulli",
+    ),
+}
+"""Longer pieces and runs that differ between machines: in a crowd that JPDA sees from one camera
+some joins are draws to the last digits, and linear algebra rounds by the processor."""
 
 
 every_piece = pytest.mark.parametrize("piece", _parameters(PIECES))
@@ -79,7 +96,8 @@ def test_longer_pieces_give_what_they_gave(
     if piece.name in WITH_ALTERNATIVES:
         chosen = alternatives(sequence)
         found |= fingerprints(runs(sequence, piece.steps, chosen), short=True)
-    check(f"{piece.name}-long", found)
+    kept = {run: told for run, told in found.items() if (piece.name, run) not in DRAWS}
+    check(f"{piece.name}-long", kept)
 
 
 @every_piece

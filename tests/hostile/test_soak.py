@@ -19,7 +19,7 @@ from tests.browser.looking import ask
 from tests.browser.serving import Server
 from tests.browser.walkers import write_walkers
 
-SECONDS = float(os.environ.get("MULTIVIEW_PHD_SOAK", "120"))
+SECONDS = float(os.environ.get("MULTIVIEW_PHD_SOAK", "75"))
 PAGES = 4
 SHARE = 0.05
 """By how much the last third may lie above the second."""

@@ -68,6 +68,30 @@ def test_a_calibration_of_another_resolution_is_scaled(tmp_path: Path) -> None:
     _assert_cameras(settled)
 
 
+def test_a_camera_beyond_the_earth_is_refused_with_its_flag(tmp_path: Path) -> None:
+    toml(tmp_path, scale=1e8)
+    detections(tmp_path)
+    with pytest.raises(FormatError, match=r"cam1: expected a camera within 1e\+06 m .* --unit"):
+        settled_of(tmp_path, ImportOptions(unit="m"))
+
+
+def test_of_files_that_nobody_knows_the_first_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / "source"
+    source.mkdir()
+    toml(source)
+    detections(source)
+    (source / f"{'long' * 50}.dat").write_bytes(b"x")
+    for number in range(40):
+        (source / f"{chr(97 + number % 26)}{'x' * number}.dat").write_bytes(b"x")
+    main(["import", str(source), "--dry-run", "--unit", "m"])
+    told = capsys.readouterr().out
+    assert told.count("no format that is read; it is not used") == 30
+    assert "… 11 more" in told
+    assert max(map(len, told.splitlines())) < 200
+
+
 def test_a_calibration_of_another_shape_is_refused(tmp_path: Path) -> None:
     toml(tmp_path, size=(720, 1280))
     videos(tmp_path, frames=3)
@@ -157,6 +181,7 @@ def test_nothing_to_import_says_what_is_missing(tmp_path: Path) -> None:
         (["0", "1", "2"], ["cam1", "cam2", "cam3"], "number", {0: 0, 1: 1, 2: 2}),
         (["north", "east"], ["a1", "a2"], "order", {0: 1, 1: 0}),
         (["A", "B", "C"], ["rec_A_x", "rec_C_x"], "name", {0: 0, 1: 2}),
+        (["LeftSide", "Front"], ["front", "left_side"], "name", {0: 1, 1: 0}),
         (["a", "b"], ["x", "y", "z"], None, None),
     ],
 )
@@ -321,12 +346,68 @@ def test_boxes_in_one_json_settle_as_others(
     assert all(view.detections is not None for view in settled.views)
 
 
+def test_boxes_by_their_middle_are_found_out(tmp_path: Path) -> None:
+    """``x, y, w, h`` are Ultralytics' and Roboflow's names for middle and size."""
+    toml(tmp_path)
+    for camera in cameras():
+        frames, found = boxes(camera, PLACES)
+        found[:, :2] += found[:, 2:] / 2.0
+        rows = [f"{f},{','.join(map(str, b))}" for f, b in zip(frames, found, strict=True)]
+        (tmp_path / f"{camera.name}.csv").write_text("\n".join(["frame,x,y,w,h", *rows]))
+    settled = settled_of(tmp_path)
+    _assert_cameras(settled)
+    assert dict(settled.found)["boxes"].startswith("cxcywh, since")
+    own = settled.views[0].detections
+    assert own is not None
+    _, expected = boxes(cameras()[0], PLACES)
+    np.testing.assert_allclose(own.boxes, expected, atol=1e-6)
+
+
+def test_parts_of_one_camera_s_video_are_told(tmp_path: Path) -> None:
+    toml(tmp_path)
+    detections(tmp_path)
+    videos(tmp_path, size=(64, 36), frames=2)
+    for name in ("GX010012", "GX020012"):
+        (tmp_path / "cam1").mkdir(exist_ok=True)
+        (tmp_path / "cam2.avi").replace(tmp_path / "cam1" / f"{name}.avi")
+        videos(tmp_path, size=(64, 36), frames=2)
+    for camera in cameras():
+        (tmp_path / f"{camera.name}.avi").unlink()
+    (told,) = settled_of(tmp_path).told
+    assert told.startswith("cam1: has 2 videos or folders of pictures (cam1/GX010012, cam1/GX02")
+    assert told.endswith("or say which by --camera cam1=FILE")
+
+
 def test_what_is_missing_is_told(tmp_path: Path) -> None:
     toml(tmp_path)
-    with pytest.raises(FormatError, match="a calibration alone has no steps; add them"):
+    words = r"a calibration alone has no steps; add them \(the cameras are cam1, cam2, cam3"
+    with pytest.raises(FormatError, match=words):
+        settled_of(tmp_path)
+    (tmp_path / "cam1.csv").write_text("scorer,net\nbodyparts,nose\n")
+    with pytest.raises(FormatError, match=r"add them \(cam1\.csv: is a table of joints of Deep"):
         settled_of(tmp_path)
     (tmp_path / "calibration.toml").unlink()
     detections(tmp_path)
     (tmp_path / "calibration.pickle").write_bytes(b"\x80\x04K\x01.")
     with pytest.raises(FormatError, match=r"no calibration was found: .*is a Python pickle"):
+        settled_of(tmp_path)
+
+
+def test_boxes_beyond_any_picture_are_left_out_and_told(tmp_path: Path) -> None:
+    toml(tmp_path)
+    detections(tmp_path)
+    path = tmp_path / "cam1.csv"
+    path.write_text(path.read_text() + "\n3,1e300,-1e300,1e299,1e300")
+    settled = settled_of(tmp_path)
+    _assert_cameras(settled)
+    own = settled.views[0].detections
+    assert own is not None
+    assert np.abs(own.boxes).max() < 1e4
+    assert [told for told in settled.told if "1 of " in told and "1,000,000 pixels" in told]
+
+
+def test_more_cameras_than_anybody_has_are_refused_at_once(tmp_path: Path) -> None:
+    table = {"K": np.eye(3).tolist(), "R": np.eye(3).tolist(), "t": [0.0, 0.0, 1.0]}
+    (tmp_path / "rig.json").write_text(json.dumps({f"c{n}": table for n in range(1001)}))
+    with pytest.raises(FormatError, match=r"rig\.json: has 1,001 cameras, expected at most 1000"):
         settled_of(tmp_path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from app.command.main import main
 from tests.formats.recorded import PLACES, detections, settled_of, toml, videos
 from tests.formats.rig import SIZE, boxes, cameras
 from tracker.checks import check
-from tracker.formats.pieces import FormatError
+from tracker.formats.pieces import FormatError, Unit
 from tracker.importing.gathering import gather
 from tracker.importing.options import ImportOptions
 from tracker.importing.preview import as_sequence
@@ -169,6 +170,36 @@ def test_what_was_told_wrongly_is_mended_by_the_right_flag(
     checks = [for_import(one, settled.reading) for one in check(as_sequence(settled, "told"))]
     told = [str(remedy) for one in checks for remedy in one.remedies]
     assert flags in told
+
+
+@pytest.mark.parametrize(
+    ("counted", "stated", "words"),
+    [
+        (0, 1, "are of frame 0, so frames are counted from 0, not from 1: --first-index 0"),
+        (1, 0, "the one after the last of 60, so frames are counted from 1: --first-index 1"),
+        (5, 0, "outside the 60 of the pictures; --first-index says where counting begins"),
+    ],
+)
+def test_where_counting_begins_was_told_wrongly(
+    tmp_path: Path, counted: Literal[0, 1], stated: Literal[0, 1], words: str
+) -> None:
+    toml(tmp_path)
+    videos(tmp_path)
+    detections(tmp_path, first=counted)
+    settled = settled_of(tmp_path, ImportOptions(first_index=stated))
+    assert sum(words in sentence for sentence in settled.told) == 4
+
+
+@pytest.mark.parametrize(("scale", "unit", "right"), [(1.0, "mm", "m"), (100.0, "mm", "cm")])
+def test_people_smaller_than_a_head_are_told_with_the_unit_that_makes_them_people(
+    tmp_path: Path, scale: float, unit: Unit, right: str
+) -> None:
+    toml(tmp_path, scale=scale)
+    detections(tmp_path)
+    settled = settled_of(tmp_path, ImportOptions(unit=unit))
+    checks = [for_import(one, settled.reading) for one in check(as_sequence(settled, "told"))]
+    told = [str(remedy) for one in checks for remedy in one.remedies]
+    assert f"--unit {right}" in told
 
 
 def test_people_smaller_than_a_hand_are_told(tmp_path: Path) -> None:

@@ -87,6 +87,7 @@ def kill_many_times(tmp_path: Path, kills: int) -> None:
     assert len(kept) > kills / 10
 
 
+@pytest.mark.full
 def test_killed_while_they_write(tmp_path: Path) -> None:
     kill_many_times(tmp_path, 12)
 

@@ -12,8 +12,18 @@ from tests.manual.plots import picture
 from tests.manual.records import results, sweeps
 from tracker.parameters import PARAMETERS
 
+PAGES_OF_PROCESSES = ("command-line.md",)
+"""Made by starting the program once a command."""
 
-@pytest.mark.parametrize("path", made_pages(), ids=lambda path: path.name)
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, marks=[pytest.mark.full] if path.name in PAGES_OF_PROCESSES else [])
+        for path in made_pages()
+    ],
+    ids=lambda path: path.name,
+)
 def test_a_made_page_is_up_to_date(path: Path) -> None:
     assert path.read_text(encoding="utf-8") == made_pages()[path](), (
         f"{path.relative_to(ROOT)} is not what the code and the records say; "

@@ -111,6 +111,19 @@ test("ticks are round and far enough apart", () => {
   }
 });
 
+test("a number under the playhead is left out whole, and no other", () => {
+  const view = { first: 0, last: 1000, width: 1000 };
+  assert.equal(clock.tickSteps(view).major, 100);
+  assert.equal(clock.tickUnder(view, 310, 20), 300);
+  assert.equal(clock.tickUnder(view, 270, 20), 300);
+  for (const between of [250, 332, 268]) assert.equal(clock.tickUnder(view, between, 20), null);
+  // at both ends number and plate are moved inward
+  assert.equal(clock.tickUnder(view, 0, 20), 0);
+  assert.equal(clock.tickUnder(view, 22, 20), 0);
+  assert.equal(clock.tickUnder(view, 999, 20), 1000);
+  assert.equal(clock.tickUnder({ first: 10, last: 1010, width: 1000 }, 12, 20), null);
+});
+
 test("a typed step or time is understood, anything else is not", () => {
   assert.equal(clock.parseStep("264", 25, 1500), 264);
   assert.equal(clock.parseStep(" 10.56 s ", 25, 1500), 264);
@@ -127,6 +140,31 @@ test("the 3D view is left alone longer where steps come late, and sooner again w
   assert.ok(clock.restOf3d(late, 90, 40) > late);
   assert.equal(clock.restOf3d(1400, 90, 40), 1500);
   assert.ok(clock.restOf3d(1000, 40, 40) < 1000);
+});
+
+test("the 3D view takes a fifth of the time at most where one of its frames holds up the page", () => {
+  assert.equal(clock.restAfter3d(16), 0);
+  assert.equal(clock.restAfter3d(300), 1000);
+  assert.equal(clock.restAfter3d(60_000), 8000);
+});
+
+test("who paces another window hears how long the browser was busy with its last frame", async () => {
+  const frames = [];
+  const view = {
+    requestAnimationFrame: (act) => frames.push(act),
+    cancelAnimationFrame: () => {},
+    addEventListener: () => {},
+  };
+  const costs = [];
+  pace(view, (last, cost) => (costs.push(cost), last));
+  const draw = () => frames.splice(0).forEach((act) => act(0));
+  view.requestAnimationFrame(() => {});
+  draw();
+  await new Promise((done) => setTimeout(done, 60));
+  draw(); // the browser is ready for another frame only now
+  view.requestAnimationFrame(() => {});
+  assert.equal(costs[0], 0);
+  assert.ok(costs[1] >= 50, `${costs[1]} ms`);
 });
 
 test("another window draws no more often than it may, and at once when it is touched", async () => {

@@ -16,7 +16,7 @@ import { lensOf } from "../../static/js/draw/picture.js";
 import { magnified } from "../../static/js/cameras/magnify.js";
 import { kindsOf } from "../../static/js/inspector/listed.js";
 import { strands } from "../../static/js/timeline/braid.js";
-import { valueOf } from "../../static/js/sheets/offers.js";
+import { matching, offersOf, valueOf } from "../../static/js/sheets/offers.js";
 import { mosaic } from "../../static/js/cameras/mosaic.js";
 import { viewFrom, viewOf } from "../../static/js/state/views.js";
 import { createStore } from "../../static/js/state/store.js";
@@ -424,4 +424,28 @@ test("the palette takes a value only where it may be one", () => {
   assert.equal(valueOf({ ...number, kind: "int", maximum: 9 }, "2.5"), null);
   assert.equal(valueOf({ kind: "bool", choices: [] }, "off"), false);
   assert.equal(valueOf({ kind: "choice", choices: ["soft", "hard"] }, "ha"), "hard");
+});
+
+test("of two parameters of one name the palette offers the essential one first", () => {
+  const parameters = ["colour_phd", "fusion"].map((group) => ({
+    key: `${group}.survival_probability`,
+    label: "Survival probability",
+    symbol: "p_S",
+    group,
+    essential: group === "fusion",
+  }));
+  const asked = [];
+  const offers = offersOf(
+    {
+      sequences: [],
+      schema: { parameters },
+      server: { shown: parameters.map(({ key }) => key), parameters: {} },
+      link: "open",
+      layouts: {},
+    },
+    {},
+    ({ key }) => asked.push(key),
+  );
+  for (const { run } of matching(offers, "survival")) run();
+  assert.deepEqual(asked, ["fusion.survival_probability", "colour_phd.survival_probability"]);
 });

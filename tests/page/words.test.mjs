@@ -1,7 +1,7 @@
 // How Check and the library word things.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { distinct, unbroken } from "../../static/js/check/words.js";
+import { distinct, joinable, unbroken, whereIs } from "../../static/js/check/words.js";
 import { livesAMinute } from "../../static/js/library/words.js";
 
 test("a number and its unit stay on one line, other words do not", () => {
@@ -24,4 +24,35 @@ test("tracks a minute are of the recording's time, and unknown without a rate", 
   assert.equal(livesAMinute({ targets: 4, steps: 750 }, 25), 8);
   assert.equal(livesAMinute({ targets: 4, steps: 750 }, 0), null);
   assert.equal(livesAMinute({ targets: 0, steps: 0 }, 25), null);
+});
+
+test("a join is offered first with who comes before or after, the least pause first", () => {
+  const tracks = [
+    { id: 1, first: 20, last: 40 },
+    { id: 2, first: 0, last: 99 },
+    { id: 3, first: 60, last: 99 },
+    { id: 4, first: 0, last: 18 },
+  ];
+  const here = { tracks: [1, 2].map((id) => ({ id, position: [id, 0, 1] })) };
+  const found = joinable(1, here, tracks, 30);
+  assert.deepEqual(
+    found.map(({ id, pause }) => [id, pause]),
+    [
+      [4, 2],
+      [3, 20],
+      [2, 0],
+    ],
+  );
+  assert.deepEqual(
+    found.map((other) => whereIs(other, 30, tracks[0])),
+    ["ends 2 steps before its beginning", "begins 20 steps after its end", "1.0 m away"],
+  );
+});
+
+test("somebody who is there at every step is joined with nobody before or after", () => {
+  const tracks = [1, 2].map((id) => ({ id, first: 0, last: 99 }));
+  assert.deepEqual(
+    joinable(1, null, tracks, 30).map(({ id, pause }) => [id, pause]),
+    [[2, 0]],
+  );
 });

@@ -126,6 +126,7 @@ assert grown < 100, grown
 """
 
 
+@pytest.mark.full
 def test_a_huge_picture_is_refused_before_it_is_decoded(tmp_path: Path) -> None:
     picture = np.full((12000, 12000, 3), 90, np.uint8)
     video, image, sparse = tmp_path / "v.avi", tmp_path / "i.jpg", tmp_path / "s.png"

@@ -239,6 +239,7 @@ def test_where_the_cache_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> 
     assert cache_folder() == tmp_path / ".cache" / "multiview-phd"
 
 
+@pytest.mark.full
 def test_a_room_of_a_seed_is_rendered_once_and_listed(monkeypatch: pytest.MonkeyPatch) -> None:
     render_random = rendering.render_random
     seeds = []

@@ -241,14 +241,15 @@ def test_missing_folder_and_missing_file(tmp_path: Path, folder: Path) -> None:
     gone = tmp_path / "rooom"
     assert complaint(gone) == f'{gone}: there is no such folder; did you mean "room"?'
     video = folder / "cam1.mp4"
-    assert (
-        complaint(video) == f"{video}: expected a folder with a sequence.toml in it, found a file"
+    assert complaint(video) == (
+        f"{video}: expected a folder with a sequence.toml in it, found a file; make one of other "
+        f"files by `multiview-phd import {video} -o NEW_FOLDER`"
     )
-    empty = tmp_path / "empty"
+    empty = tmp_path / "an empty one"
     empty.mkdir()
     assert complaint(empty) == (
         f"{empty}: there is no sequence.toml in this folder; "
-        "every sequence folder needs a sequence.toml"
+        f"make one of other files by `multiview-phd import '{empty}' -o NEW_FOLDER`"
     )
     (folder / "sequence.toml").rename(folder / "sequence.tml")
     assert complaint(folder).endswith('this folder; did you mean "sequence.tml"?')

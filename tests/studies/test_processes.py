@@ -13,7 +13,6 @@ import pytest
 from tests.studies.processes import cluster, finish, kill, outcomes, start, wait, workers_of
 from tests.studies.small import definition, recording
 from tracker import pipeline
-from tracker.kernels import compilation
 from tracker.parameters import with_values
 from tracker.sequences.library import open_sequence
 from tracker.studies.kept.store import Store, create
@@ -104,14 +103,13 @@ def test_the_scheduler_is_killed_and_another_goes_on(tmp_path: Path) -> None:
 
 
 def test_a_recording_goes_where_it_cannot_be_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
     """On a worker whose cache is another one, and where the recording is not."""
     place = recording(tmp_path / "recording")
     (_, job), *_ = open_recordings(definition(tmp_path)).jobs({})
     data = recordings.packed(place)
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(compilation.kernel_folder()))
-    monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(tmp_path / "cache"))
+    request.getfixturevalue("own_cache")  # only now: the recording was read with another one
     place.rename(tmp_path / "elsewhere")
     assert working.work(job).became == "unreadable"
     recordings.unpack(job.content, data)

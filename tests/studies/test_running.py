@@ -14,6 +14,7 @@ from tests.studies.small import Serial, definition, made_up, recording, run
 from tracker.parameters import with_values
 from tracker.runs.run import stage_keys
 from tracker.studies.errors import StudyError
+from tracker.studies.found.weighing import Weighing
 from tracker.studies.kept.records import Trial
 from tracker.studies.kept.store import JOURNAL, Store, create
 from tracker.studies.kept.writer import RESULTS
@@ -21,7 +22,6 @@ from tracker.studies.opened import open_recordings
 from tracker.studies.sampling import Sampler
 from tracker.studies.told.report import report_html
 from tracker.studies.told.summary import summary_of
-from tracker.studies.weighing import Weighing
 from tracker.studies.work import working
 from tracker.studies.work.jobs import Job, Outcome
 

@@ -11,7 +11,7 @@ from numpy import ndarray
 
 from tracker.agreement.observed import Pose
 from tracker.camera import Camera
-from tracker.formats.pieces import METRES, Axes, Direction, Layout, RawCamera, Unit, Up
+from tracker.formats.pieces import IN_DEGREES, METRES, Axes, Direction, Layout, RawCamera, Unit, Up
 
 FLIP = np.diag([1.0, -1.0, -1.0])
 """Between OpenCV's camera axes (y down, z ahead) and OpenGL's (y up, z back), either way."""
@@ -33,6 +33,8 @@ class Reading:
     lean: tuple[float, float] = (0.0, 0.0)
     """x and y of the unit vector along which people stand once ``up`` is z: the world of a rig
     whose first camera is the origin leans as that camera does."""
+    turns: str = ""
+    """Of cameras whose rotations are given by angles: how these are composed."""
     order: tuple[int, ...] | None = None
     """Of each camera's boxes and pictures: whose calibration is theirs. None: their own."""
 
@@ -48,7 +50,7 @@ def pose(camera: RawCamera, reading: Reading) -> Pose:
         return Pose(split.rotation, split.centre)
     if camera.rotation is None or camera.translation is None:
         raise ValueError(f'camera "{camera.name}" has no pose: expected R and t, or a projection')
-    rotation = np.asarray(camera.rotation, dtype=float)
+    rotation = np.asarray(camera.turns.get(reading.turns, camera.rotation), dtype=float)
     translation = np.asarray(camera.translation, dtype=float).reshape(3)
     if reading.direction == "camera-to-world":
         rotation, centre = rotation.T, translation
@@ -57,6 +59,19 @@ def pose(camera: RawCamera, reading: Reading) -> Pose:
     if reading.axes == "opengl":
         rotation = FLIP @ rotation
     return Pose(rotation, centre)
+
+
+def turns_of(cameras: Many[RawCamera]) -> tuple[str, ...]:
+    """How the angles of cameras may be composed, the likeliest first; ``""`` where there are none.
+
+    Angles that are radians in one camera are not degrees in another.
+    """
+    told = [camera.turns for camera in cameras if camera.turns]
+    if not told:
+        return ("",)
+    common = [name for name in told[0] if all(name in own for own in told)]
+    radians = [name for name in common if name and not name.endswith(IN_DEGREES)]
+    return tuple(n for n in common if not radians or n in radians or not n)
 
 
 def upright(up: Up) -> Float[ndarray, "3 3"]:

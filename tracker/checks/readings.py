@@ -28,6 +28,7 @@ from tracker.checks.reading import (
     likely_size,
     pose,
     read_boxes,
+    turns_of,
     upright,
 )
 from tracker.checks.sizes import likely_unit
@@ -173,11 +174,10 @@ def find_meaning(
     if not judge.possible:
         return None
     open_ = _restricted(tried or Open(), cameras, seen)
+    parts = (open_.directions, open_.axes, open_.layouts, open_.normalised, turns_of(cameras))
     judged = [
-        judge.turned(Reading(direction=direction, axes=axes, layout=layout, normalised=normalised))
-        for direction, axes, layout, normalised in itertools.product(
-            open_.directions, open_.axes, open_.layouts, open_.normalised
-        )
+        judge.turned(Reading(direction, axes, layout, normalised, turns=turns))
+        for direction, axes, layout, normalised, turns in itertools.product(*parts)
     ]
     judged.sort(key=lambda one: -one.score)
     if open_.orders:
@@ -348,20 +348,27 @@ class Judge:
 def _with_orders(judge: Judge, judged: list[Judged]) -> list[Judged]:
     """With calibrations exchanged, where that fits better than what fits best without."""
     count = len(judge.cameras)
-    found = list(judged)
+    found = {one.reading: one for one in judged}
+
+    def turned(reading: Reading) -> Judged:
+        if reading not in found:
+            found[reading] = judge.turned(reading)
+        return found[reading]
+
     # an exchange and a wrong pose together: the poses' readings are all near nothing then
-    for start in judged[:1] if judged[0].consensus.share >= LEAST_SHARE else judged[:8]:
+    for start in judged[:1] if judged[0].consensus.share >= LEAST_SHARE else judged[:_REFINED]:
         best = start
         for _ in range(1 if count <= EVERY_ORDER else count):
-            own = [
-                judge.turned(replace(best.reading, order=order)) for order in _orders(best, count)
-            ]
-            found += own
+            own = [turned(replace(best.reading, order=order)) for order in _orders(best, count)]
             better = max(own, key=lambda one: one.score, default=best)
             if better.score <= best.score:
                 break
             best = better
-    return sorted(found, key=lambda one: -one.score)
+        if best is not start:
+            # what fitted best without the exchange may have done so for want of it
+            for other in judged[:_REFINED]:
+                turned(replace(other.reading, order=best.reading.order))
+    return sorted(found.values(), key=lambda one: -one.score)
 
 
 def _orders(best: Judged, count: int) -> Iterable[tuple[int, ...]]:

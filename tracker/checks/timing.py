@@ -81,14 +81,16 @@ def check_counting(sequence: Sequence, *, places: bool = True) -> Check:
     behind = steps_behind_truth(sequence) if places else ()
     late = float(np.median(behind)) if behind else 0.0
     # one camera may be late for other reasons: counting is the same in all
-    if len(behind) > 1 and min(behind) > 0.4 and abs(late - 1.0) < 0.4:
-        return warning(
-            name,
-            f"boxes show where people were {late:.1f} steps before, by the ground truth: their "
-            "frames seem to be counted from 1",
-            Remedy("--first-index", "1"),
-            steps=late,
-        )
+    for side, when, right in ((1.0, "before", "1"), (-1.0, "later", "0")):
+        apart = [side * steps for steps in behind]
+        if len(behind) > 1 and min(apart) > 0.4 and abs(late - side) < 0.4:
+            return warning(
+                name,
+                f"boxes show people as they are {abs(late):.1f} steps {when}, by the ground truth: "
+                f"their frames seem to be counted from {right}",
+                Remedy("--first-index", right),
+                steps=late,
+            )
     return good(name, "boxes count from step 0")
 
 

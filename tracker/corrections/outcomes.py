@@ -33,7 +33,7 @@ class _Nobody(Exception):
 class _Tracks:
     def __init__(self, frames: ndarray, ids: ndarray, positions: ndarray, leeway: int) -> None:
         self.frames, self.ids, self.leeway = frames, ids, leeway
-        self.whereabouts = Whereabouts(frames, positions)
+        self.whereabouts = Whereabouts(frames, positions, ids)
         self.positions = positions
 
     def who(self, place: Place) -> int:

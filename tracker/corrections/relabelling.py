@@ -22,7 +22,7 @@ class _Segments:
 
     def __init__(self, frames: ndarray, ids: ndarray, positions: ndarray, leeway: int) -> None:
         self.frames, self.positions = frames, positions
-        self.whereabouts = Whereabouts(frames, positions)
+        self.whereabouts = Whereabouts(frames, positions, ids)
         self.leeway = leeway
         order = np.lexsort((frames, ids))
         _names, begins = np.unique(ids[order], return_index=True)

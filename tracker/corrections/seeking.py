@@ -13,16 +13,26 @@ from tracker.corrections.kinds import REACH, Correction, Place
 class Whereabouts:
     """Where tracks are, to be asked who was at a place."""
 
-    def __init__(self, steps: Int[ndarray, " N"], positions: Float[ndarray, "N 3"]) -> None:
+    def __init__(
+        self,
+        steps: Int[ndarray, " N"],
+        positions: Float[ndarray, "N 3"],
+        owners: Int[ndarray, " N"] | None = None,
+    ) -> None:
         """Prepare for N rows of tracks, in any order.
 
         Args:
             steps: Of each row.
             positions: World metres.
+            owners: Whose each row is, by which who is not there at a step is taken to have gone
+                straight on; without it, to have stood.
         """
         self._order = np.argsort(steps, kind="stable")
         self._steps = steps[self._order]
         self._ground = positions[self._order, :2]
+        self._before = self._after = np.zeros_like(self._ground)
+        if owners is not None:
+            self._before, self._after = _ways(self._steps, self._ground, owners[self._order])
 
     def at(self, step: int) -> slice:
         """The rows of a step, as places in the order of steps."""
@@ -35,16 +45,18 @@ class Whereabouts:
         Args:
             place: Step and position.
             leeway: Steps before and after within which somebody counts who is not there at the
-                very step; each counts as much as ``reach`` over all of them.
+                very step, where he would be then; all of them count half as much as ``reach``.
             reach: Metres.
         """
         low = int(np.searchsorted(self._steps, place.step - leeway))
         high = int(np.searchsorted(self._steps, place.step + leeway, side="right"))
         if low == high:
             return None
-        apart = np.hypot(*(self._ground[low:high] - [place.x, place.y]).T)
-        away = np.abs(self._steps[low:high] - place.step)
-        cost = apart + away * (reach / max(leeway, 1))
+        later = place.step - self._steps[low:high]
+        way = np.where((later > 0)[:, None], self._before[low:high], self._after[low:high])
+        ground = self._ground[low:high] + later[:, None] * way
+        apart = np.hypot(*(ground - [place.x, place.y]).T)
+        cost = apart + np.abs(later) * (0.5 * reach / max(leeway, 1))
         best = int(np.argmin(cost))
         return int(self._order[low + best]) if cost[best] <= reach else None
 
@@ -60,6 +72,20 @@ class Whereabouts:
                 near = np.hypot(*(self._ground[own] - where).T) <= around
                 found[self._order[own]] = near
         return found
+
+
+def _ways(
+    steps: Int[ndarray, " N"], ground: Float[ndarray, "N 2"], owners: Int[ndarray, " N"]
+) -> tuple[Float[ndarray, "N 2"], Float[ndarray, "N 2"]]:
+    """Metres a step by which each row's owner came to it, and went on from it; 0 at an end."""
+    before, after = np.zeros_like(ground), np.zeros_like(ground)
+    order = np.lexsort((steps, owners))
+    one, other = order[:-1], order[1:]
+    same = (owners[one] == owners[other]) & (steps[one] < steps[other])
+    one, other = one[same], other[same]
+    way = (ground[other] - ground[one]) / (steps[other] - steps[one])[:, None]
+    before[other], after[one] = way, way
+    return before, after
 
 
 def mostly_inside(

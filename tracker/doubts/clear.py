@@ -17,6 +17,9 @@ _WIDTHS = 4.0
 _FARTHEST = 2.0 * REACH
 """Metres beyond which nobody is clearer."""
 
+_ASIDE, _FEWEST = 0.4, 2
+"""Seconds, and steps, from a doubtful moment at which a track is on its way from one to another."""
+
 _LONGEST = 5.0
 """Seconds before and after a doubtful moment within which a clear place is looked for."""
 
@@ -40,6 +43,7 @@ class Clear:
         self._lanes, tracks = lanes, lanes.tracks
         self._clear = min(_WIDTHS * width, _FARTHEST)
         self._longest = max(round(_LONGEST / step_time), 1)
+        self._aside = max(round(_ASIDE / step_time), _FEWEST)
         self._apart: Float[ndarray, " N"] = np.full(len(tracks), np.inf)
         for step in np.unique(tracks.frames).tolist():
             own = tracks.at(step)
@@ -56,6 +60,8 @@ class Clear:
         own = rows[(frames <= step) & (frames >= step - self._longest)]
         if not len(own):
             return self._lanes.place(track, step)
+        aside = own[self._lanes.tracks.frames[own] <= step - self._aside]
+        own = aside if len(aside) else own
         apart = self._apart[own]
         clear = np.flatnonzero(apart >= self._clear)
         best = clear[-1] if len(clear) else len(own) - 1 - np.argmax(apart[::-1])
@@ -68,6 +74,8 @@ class Clear:
         own = rows[(frames >= step) & (frames <= step + self._longest)]
         if not len(own):
             return self._lanes.place(track, step, after=True)
+        aside = own[self._lanes.tracks.frames[own] >= step + self._aside]
+        own = aside if len(aside) else own
         apart = self._apart[own]
         clear = np.flatnonzero(apart >= self._clear)
         return self._lanes.of_row(int(own[clear[0] if len(clear) else np.argmax(apart)]))

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Int
 from numpy import ndarray
 
-from tracker.assignment import linear_sum_assignment
+from tracker.assignment import pairs_within
 from tracker.corrections import Place
 from tracker.doubts.doubt import Lanes
 from tracker.doubts.linking import Move, Piece
@@ -52,9 +52,8 @@ class Opinion:
             )
             if not apart.size:
                 continue
-            rows, columns = linear_sum_assignment(np.minimum(apart, 10.0 * _REACH))
-            near = apart[rows, columns] <= _REACH
-            self.ids[own.start + rows[near]] = other.ids[theirs][columns[near]]
+            rows, columns = pairs_within(apart, _REACH)
+            self.ids[own.start + rows] = other.ids[theirs][columns]
 
     def at(self, track: int, place: Place, *, before: bool) -> int:
         """Who it is for the other run, mostly, in the steps up to a place or from it on; -1 for

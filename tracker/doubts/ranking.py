@@ -40,6 +40,9 @@ _SAME_MOMENT = 1.0
 _NEAR = 0.5
 """Metres on the ground within which a place that was answered is the same."""
 
+_ROUNDED = 1e-3
+"""Metres within which a place is the one that a correction was made of."""
+
 
 @dataclass(frozen=True, slots=True)
 class Queue:
@@ -53,13 +56,19 @@ class Queue:
     """By what it was judged."""
 
 
-def queue(run: Run, backwards: Trajectories | None = None) -> Queue:
+def queue(
+    run: Run,
+    backwards: Trajectories | None = None,
+    corrections: Many[Correction] | None = None,
+) -> Queue:
     """The doubtful places of a run, but for those that its corrections settle.
 
     Args:
         run: With all its steps, or as far as it is.
         backwards: The tracks of the recording seen backwards in time, where that was made.
+        corrections: By which a place is settled; those of the run, if none.
     """
+    said = run.corrections if corrections is None else corrections
     run = run.still()
     lanes = Lanes(run.tracks)
     if not len(run.tracks):
@@ -69,10 +78,11 @@ def queue(run: Run, backwards: Trajectories | None = None) -> Queue:
     found = [*linked, *alone.of_tracks(run, lanes), *of_edges(run, lanes, asked)]
     ordered = sorted(found, key=lambda one: (-one.weight, one.first, one.id))
     steps = leeway(run.sequence.step_time)
+    parted = _parted(run)
     told: list[Doubt] = []
     answered = 0
     for one in once_each(ordered, round(_SAME_MOMENT / run.sequence.step_time)):
-        if settled(one, run.corrections, steps):
+        if settled(one, said, steps) or (one.kind == "join" and frozenset(one.tracks) in parted):
             answered += 1
         elif len(told) < MOST:
             told.append(one)
@@ -81,6 +91,16 @@ def queue(run: Run, backwards: Trajectories | None = None) -> Queue:
         how += ", and what the recording says seen backwards in time"
     how += f"; less than {LEAST:.0f} step expected to be wrong is left out"
     return Queue(tuple(told), answered, how)
+
+
+def _parted(run: Run) -> set[frozenset[int]]:
+    """Tracks of which somebody said that they are two people's, wherever along them."""
+    kinds = {one.id: one.kind for one in run.corrections}
+    return {
+        frozenset(one.tracks)
+        for one in run.outcomes
+        if one.met and kinds.get(one.id) == "different"
+    }
 
 
 def once_each(ordered: Iterable[Doubt], pause: int) -> Iterable[Doubt]:
@@ -237,7 +257,7 @@ def _with_nobody_of_them(
         for one in (now, *others)
         for told in one.corrections
         for a, b in told.pairs
-        if a == first or b == last
+        if _is(a, first) or _is(b, last)
     )
     apart = [one for pair in pairs for one in unsaid("different", pair)]
     plain = [one for one in others if one.corrections and one.corrections[0].kind == "different"]
@@ -248,6 +268,11 @@ def _with_nobody_of_them(
     words = "two people" if len(apart) == 1 else "none of these"
     none = Alternative(words, chance, tuple(apart))
     return sorted([*rest, none], key=lambda one: -one.probability)
+
+
+def _is(said: Place, place: Place) -> bool:
+    """Whether what is said is said of a place: a correction rounds it."""
+    return said.step == place.step and bool(np.allclose(said.point, place.point, atol=_ROUNDED))
 
 
 def _as_it_is(move: Move) -> tuple[Correction, ...]:

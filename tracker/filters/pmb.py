@@ -39,6 +39,7 @@ def update(
     detection_probability: Float[ndarray, " n"],
     unexplained_intensity: Float[ndarray, " M"],
     gate: float,
+    resemblance: Float[ndarray, "k M"] | None = None,
 ) -> PmbUpdate:
     """Update every track by the measurements that may be its own ([W15] TOMB/P).
 
@@ -57,6 +58,8 @@ def update(
         detection_probability: p_i of each track.
         unexplained_intensity: ρ_j = κ(z_j) + e_j, clutter and newborns at each measurement.
         gate: Squared Mahalanobis distance beyond which a pair is left out.
+        resemblance: On w_ij of the first k tracks, by how much likelier each is to look as a
+            measurement does than anybody; None where nothing is known of looks.
     """
     updated = marginal_kernels.bernoulli_update(
         tracks.gaussians,
@@ -67,6 +70,7 @@ def update(
         ),
         detection_probability,
         unexplained_intensity,
+        np.ones((0, len(measurements))) if resemblance is None else resemblance,
         gate,
         association.SETTLING,
     )

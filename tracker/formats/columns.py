@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
+from tracker.formats.picture_names import camera_of, number_in
 from tracker.formats.pieces import DetectionPiece, Layout, Piece, TruthPiece, Unit
 from tracker.formats.source import SourceFile
 from tracker.formats.values import shown
@@ -22,9 +23,9 @@ from tracker.formats.values import shown
 WORDS: dict[str, tuple[str, ...]] = {
     "frame": ("frame", "frameid", "frameindex", "framenumber", "frameno", "frameidx", "framenr",
               "imageid", "imgid", "step", "image", "imagename", "filename", "file", "framename",
-              "imageindex"),
+              "imageindex", "imagepath", "imgpath", "filepath", "path", "imgname", "imagefile"),
     "time": ("time", "timestamp", "seconds", "sec", "times", "t", "timesec", "timems",
-             "timestampms"),
+             "timestampms", "timecode"),
     "camera": ("camera", "cam", "cameraid", "camid", "view", "cameraname", "viewid", "viewnum"),
     "left": ("left", "xmin", "x1", "bbleft", "bboxleft", "xtl", "l", "bboxx1", "boxx1", "minx",
              "bboxxmin", "x0"),
@@ -86,12 +87,16 @@ def meanings(names: Sequence[str]) -> dict[str, str]:
 
 
 def layout_of(found: Mapping[str, str]) -> tuple[Layout | None, tuple[str, ...]] | None:
-    """The layout of the box, and the meanings of its columns; None where there is no box."""
-    forms: tuple[tuple[Layout, tuple[str, ...]], ...] = (
+    """The layout of the box, and the meanings of its columns; None where there is no box.
+
+    Under x and y some programs write the left and upper edges, others the middle (Roboflow,
+    Ultralytics' ``xywh``): their layout stays open.
+    """
+    forms: tuple[tuple[Layout | None, tuple[str, ...]], ...] = (
         ("ltwh", ("left", "top", "width", "height")),
         ("xyxy", ("left", "top", "right", "bottom")),
         ("cxcywh", ("cx", "cy", "width", "height")),
-        ("ltwh", ("x", "y", "width", "height")),
+        (None, ("x", "y", "width", "height")),
     )
     for layout, parts in forms:
         if all(part in found for part in parts):
@@ -132,7 +137,8 @@ def read_table(
     fps = None
     if frame is None and "frame" not in found and "time" in found:
         column = found["time"]
-        frames, fps = _frames_of_times(file, column, _numbers(file, column, columns[column]))
+        cells = [_seconds(cell) for cell in columns[column]]
+        frames, fps = _frames_of_times(file, column, _numbers(file, column, cells))
     elif frame is None and "frame" not in found:
         raise file.error(
             'expected a column "frame" (or a number in the name of a file a frame), found the '
@@ -193,11 +199,7 @@ def _detections(
         scores = to_unit(np.where(np.isfinite(scores), scores, 0.0))
     if "class" in found:
         keep &= people([str(cell) for cell in columns[found["class"]]])
-    cameras = np.array(
-        [str(cell) for cell in columns[found["camera"]]]
-        if "camera" in found
-        else [""] * len(frames)
-    )
+    cameras = np.array(_cameras(columns, found, len(frames)))
     for camera in dict.fromkeys(cameras[keep].tolist()) or [""]:
         rows = keep & (cameras == camera) if len(cameras) else keep
         yield DetectionPiece(
@@ -213,6 +215,18 @@ def _detections(
             last_frame=int(frames.max()) if len(frames) else None,
             fps=fps,
         )
+
+
+def _cameras(columns: Mapping[str, Column], found: Mapping[str, str], rows: int) -> list[str]:
+    """Of each row: by its column, or by what the names of its pictures have before the frame."""
+    if "camera" in found:
+        return [str(cell) for cell in columns[found["camera"]]]
+    pictures = columns[found["frame"]] if "frame" in found else ()
+    if pictures and isinstance(pictures[0], str) and number_in(pictures[0]) is not None:
+        named = [camera_of(str(cell)) for cell in pictures]
+        if len(set(named)) > 1:
+            return named
+    return [""] * rows
 
 
 def people(classes: Sequence[str]) -> Bool[ndarray, " D"]:
@@ -262,14 +276,6 @@ def _truth(
     )
 
 
-def number_in(text: str) -> int | None:
-    """The last run of digits of a name: the frame of ``cam1/frame_0012.jpg``."""
-    name = text.replace("\\", "/").rsplit("/", 1)[-1]
-    stem = re.sub(r"\.[A-Za-z]\w{0,4}$", "", name)  # of "cam1.0012.json" the number stays
-    runs = re.findall(r"\d+", stem)
-    return int(runs[-1]) if runs and len(runs[-1]) <= 15 else None
-
-
 def _frames(file: SourceFile, name: str, cells: Column) -> Int[ndarray, " D"]:
     try:
         values = np.asarray(cells, dtype=float)
@@ -313,6 +319,15 @@ def _frames_of_times(
     steps = np.round(apart / np.median(apart))
     fps = float(round(steps.sum() / apart[steps > 0].sum(), 3))
     return np.round(seconds * fps).astype(np.int64), fps
+
+
+def _seconds(cell: Any) -> Any:
+    """A time of day (``00:01:02.5``) as seconds; anything else as it is."""
+    parts = re.fullmatch(r"(?:(\d+):)?(\d+):(\d+(?:[.,]\d*)?)", str(cell).strip())
+    if parts is None:
+        return cell
+    hours, minutes, seconds = parts.groups(default="0")
+    return 3600.0 * float(hours) + 60.0 * float(minutes) + float(seconds.replace(",", "."))
 
 
 def _numbers(

@@ -10,8 +10,10 @@ it at the pixel's corner takes the half pixel off.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Literal
 
 from jaxtyping import Bool, Float, Int
@@ -25,6 +27,12 @@ Up = Literal["x", "y", "z", "-x", "-y", "-z"]
 Lens = Literal["pinhole", "rational", "fisheye"]
 Layout = Literal["ltwh", "xyxy", "cxcywh"]
 """Of a box's four numbers: left, top, width, height; left, top, right, bottom; centre and size."""
+
+INVERSE = "-inverse"
+"""Behind the name of a product of turns: it leads into the camera."""
+
+IN_DEGREES = " in degrees"
+"""Behind the name of a product of turns."""
 
 METRES: dict[Unit, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 """Metres in one of each unit."""
@@ -66,6 +74,9 @@ class RawCamera:
     """As the file has it: t of ``x_camera = R x_world + t``, or the camera's place where the
     direction is camera-to-world. In the convention's unit."""
     convention: Convention = Convention()
+    turns: Mapping[str, Float[ndarray, "3 3"]] = field(default_factory=lambda: MappingProxyType({}))
+    """Of a rotation given by angles all that it may be, by how these are composed; ``rotation`` is
+    the first of them."""
     projection: Float[ndarray, "3 4"] | None = None
     """World (in the convention's unit) to pixels, up to scale."""
 

@@ -7,8 +7,10 @@ from functools import cache
 from importlib.metadata import entry_points
 
 from tracker.formats.calibration import (
+    camera_rows,
     camera_tables,
     kalibr,
+    labelled,
     matlab,
     opencv,
     plain,
@@ -16,10 +18,17 @@ from tracker.formats.calibration import (
     ros,
 )
 from tracker.formats.calibration.capture import qualisys
-from tracker.formats.calibration.datasets import panoptic, tsai, voxelpose
-from tracker.formats.calibration.reconstruction import colmap, metashape, nerfstudio, openmvg
+from tracker.formats.calibration.datasets import middlebury, panoptic, tsai, voxelpose
+from tracker.formats.calibration.reconstruction import (
+    colmap,
+    colmap_binary,
+    metashape,
+    mvsnet,
+    nerfstudio,
+    openmvg,
+)
 from tracker.formats.detections import coco, motchallenge, nested, parquet, table, yolo
-from tracker.formats.detections.annotations import cvat, label_studio, labelme, voc
+from tracker.formats.detections.annotations import cvat, label_studio, labelme, via, voc
 from tracker.formats.detections.poses import openpose
 from tracker.formats.pictures import images, times, video
 from tracker.formats.pieces import FormatError
@@ -37,17 +46,22 @@ FORMATS: tuple[Format, ...] = (
     camera_tables,
     qualisys,
     colmap,
+    colmap_binary,
     nerfstudio,
     metashape,
+    mvsnet,
     openmvg,
     kalibr,
     ros,
     panoptic,
     tsai,
     voxelpose,
+    middlebury,
     projection,
     matlab,
+    labelled,
     plain,
+    camera_rows,
     motchallenge,
     coco,
     yolo,
@@ -55,6 +69,7 @@ FORMATS: tuple[Format, ...] = (
     cvat,
     labelme,
     label_studio,
+    via,
     voc,
     nested,
     table,
@@ -123,4 +138,4 @@ def recognise(
             best = (one, certainty)
     if best[0] is not None:
         return *best, None
-    return *best, refusal(file) or complaint
+    return *best, refusal(file, complaint)

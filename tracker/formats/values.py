@@ -15,6 +15,9 @@ from tracker.formats.source import SourceFile
 ROTATION_TOLERANCE = 2e-3
 """How far R Rᵀ may be from the identity: entries written with three decimals pass."""
 
+MOST_TURNED = 1000.0
+"""Of a rotation vector's numbers: radians, or degrees by mistake."""
+
 LARGEST_SIDE = 65535
 """Pixels."""
 
@@ -95,6 +98,10 @@ def rotation(file: SourceFile, field: str, value: Any) -> Float[ndarray, "3 3"]:
 
     found = numbers(file, field, value)
     if len(found) == 3:
+        if np.abs(found).max() > MOST_TURNED:
+            raise file.error(
+                f"expected a rotation vector in radians, found {shown(found.tolist())}", field
+            )
         return np.asarray(Rotation.from_rotvec(found).as_matrix())
     if len(found) != 9:
         raise file.error(

@@ -210,4 +210,5 @@ def all_boxes(views: Many[ViewResult]) -> CameraBoxes:
         np.concatenate([view.sigmas for view in views], dtype=float),
         np.array(starts),
         np.concatenate([view.clutter_factors for view in views]),
+        np.ones((0, starts[-1])),
     )

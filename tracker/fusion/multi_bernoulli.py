@@ -117,6 +117,9 @@ class MultiBernoulli:
         """Predict one step ahead and update with every camera's boxes, in the cameras' order."""
         p, before = self._parameters, state.tracks
         seen = all_boxes(views)
+        if p.recognition:
+            alike = reidentification.resemblance(state.identities, before.labels, views)
+            seen = seen._replace(resemblance=alike)
         cameras = sight.seeing(views)
         step_model, calibrations = self._with_frame(cameras)
         found = step_kernels.predict_and_update(

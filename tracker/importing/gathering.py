@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tracker.formats.pieces import FormatError, Piece
+from tracker.formats.calibration.possible import check_cameras
+from tracker.formats.pieces import CalibrationPiece, FormatError, Piece
 from tracker.formats.protocol import Certainty, Format
 from tracker.formats.registry import recognise, unforeseen
 from tracker.formats.source import SourceFile
@@ -18,6 +19,9 @@ from tracker.formats.source import SourceFile
 MOST_FILES = 200_000
 MOST_DEPTH = 8
 """Folders within each other."""
+
+_MOST_REFUSED = 200
+"""So many files alike, none of which anybody knows, speak for the rest."""
 
 _LOOKED_AT = 50
 """Members of a series among which the one is sought that stands for all."""
@@ -57,9 +61,62 @@ def gather(sources: Sequence[Path]) -> list[Taken]:
         root = source if source.is_dir() else source.parent
         files, strays = _walk(source, root)
         taken += strays
+        crowds: dict[tuple[Path, str], _Crowd] = {}
         for series in _series(files):
-            taken += _read(series, root)
+            kind = (series[0].parent, series[0].suffix)
+            crowd = crowds.setdefault(kind, _Crowd())
+            if crowd.passes_over(series):
+                continue
+            found = list(_read(series, root))
+            crowd.add(series, known=any(one.format for one in found))
+            taken += found
+        taken += [crowd.told(kind, root) for kind, crowd in crowds.items() if crowd.passed]
     return taken
+
+
+class _Crowd:
+    """Files of one folder with one ending: once hundreds are nobody's, more of them are not opened.
+
+    A file that is smaller or larger than all of those is something else, and is looked at.
+    """
+
+    def __init__(self) -> None:
+        self.passed = 0
+        """Files that were not opened."""
+        self._refused = 0
+        self._known = False
+        self._smallest, self._largest = 0, 0
+
+    def passes_over(self, series: tuple[Path, ...]) -> bool:
+        """Whether a series need not be looked at."""
+        if self._known or self._refused < _MOST_REFUSED:
+            return False
+        sizes = [_size(path) for path in series[:_LOOKED_AT]]
+        if min(sizes) < self._smallest or max(sizes) > self._largest:
+            return False
+        self.passed += len(series)
+        return True
+
+    def add(self, series: tuple[Path, ...], *, known: bool) -> None:
+        """Remember a series that was looked at."""
+        if known:
+            self._known |= self._refused < _MOST_REFUSED
+            return
+        sizes = [_size(path) for path in series[:_LOOKED_AT]]
+        self._smallest = min([*sizes, self._smallest]) if self._refused else min(sizes)
+        self._largest = max([*sizes, self._largest])
+        # of a long series that nobody knows one was opened
+        self._refused += len(series) if len(series) < _LOOKED_AT else 1
+
+    def told(self, kind: tuple[Path, str], root: Path) -> Taken:
+        """What is said of those that were not opened."""
+        folder, suffix = kind
+        where = SourceFile(folder / f"…{suffix}", root).where
+        complaint = (
+            f"{where}: {self._refused:,} of these files are of no format that is read, so "
+            f"{self.passed:,} more of like size were not opened; name those that are wanted"
+        )
+        return Taken(f"{where} ({self.passed:,})", "", Certainty.NO, complaint=complaint)
 
 
 def _walk(source: Path, root: Path) -> tuple[list[Path], list[Taken]]:
@@ -100,7 +157,8 @@ def _stays(path: Path, home: Path) -> bool:
 
 
 def _stray(path: Path, root: Path, why: str) -> Taken:
-    return Taken(SourceFile(path, root).where, "", Certainty.NO, complaint=why)
+    where = SourceFile(path, root).where
+    return Taken(where, "", Certainty.NO, complaint=f"{where}: {why}")
 
 
 def _series(files: Sequence[Path]) -> Iterator[tuple[Path, ...]]:
@@ -130,12 +188,12 @@ def _read(series: tuple[Path, ...], root: Path) -> Iterator[Taken]:
     file = SourceFile(largest, root, series)
     found, certainty, complaint = _recognise(file)
     if found is not None and found.SERIES and len(series) > 1:
-        label = f"{SourceFile(series[0], root).where} … ({len(series)})"
-        yield _pieces(found, certainty, file, label)
+        yield from _series_pieces(found, certainty, file, root)
         return
     for path in series if found is not None or len(series) < _LOOKED_AT else ():
         own = SourceFile(path, root)
-        found, certainty, complaint = _recognise(own)
+        if len(series) > 1:  # else it is the one that was just looked at
+            found, certainty, complaint = _recognise(own)
         if found is not None:
             yield _pieces(found, certainty, own, own.where)
         else:
@@ -161,10 +219,35 @@ def _recognise(file: SourceFile) -> tuple[Format | None, Certainty, str]:
         return None, Certainty.NO, str(error)
 
 
+def _series_pieces(
+    found: Format, certainty: Certainty, file: SourceFile, root: Path
+) -> Iterator[Taken]:
+    """A series; without those of its files that cannot be read by themselves, each told."""
+    series = file.series
+    label = f"{SourceFile(series[0], root).where} … ({len(series)})"
+    taken = _pieces(found, certainty, file, label)
+    if not taken.complaint:
+        yield taken
+        return
+    alone = [SourceFile(path, root) for path in series]
+    each = [_pieces(found, certainty, one, one.where) for one in alone]
+    spoilt = [one for one in each if one.complaint]
+    whole = tuple(path for path, one in zip(series, each, strict=True) if not one.complaint)
+    if not whole or not 0 < len(spoilt) <= _LOOKED_AT:
+        yield taken
+        return
+    yield from spoilt
+    label = f"{SourceFile(whole[0], root).where} … ({len(whole)})"
+    yield _pieces(found, certainty, SourceFile(whole[0], root, whole), label)
+
+
 def _pieces(found: Format, certainty: Certainty, file: SourceFile, label: str) -> Taken:
     try:
         with np.errstate(all="ignore"):  # what overflows is infinite, and refused by its reader
             pieces = tuple(found.read(file))
+            for piece in pieces:
+                if isinstance(piece, CalibrationPiece):
+                    check_cameras(file, piece)
     except Exception as error:  # or a field of a kind that the reader does not foresee
         told = error if isinstance(error, FormatError) else unforeseen(file, found, error)
         return Taken(label, found.NAME, certainty, complaint=str(told), files=file.series)

@@ -26,6 +26,8 @@ class ImportOptions:
     """Where R and t lead."""
     axes: Axes | None = None
     """Of a camera."""
+    turns: str | None = None
+    """How rotations given by three angles are composed: ``zyx`` is R_z R_y R_x."""
     boxes: Layout | None = None
     """What the four numbers of a box mean."""
     normalised: bool | None = None

@@ -7,9 +7,16 @@ from dataclasses import replace
 import numpy as np
 
 from tracker.checks import Check, Remedy
+from tracker.checks.check import warning
 from tracker.checks.level import upwards
 from tracker.checks.reading import UPS, Reading, upright
 from tracker.formats.pieces import METRES, Unit, Up
+
+_LEAST_HEAD = 0.21
+"""Metres: the box of a head is as high; what is smaller is nobody's."""
+
+_LEAST_HEIGHT, _MOST_HEIGHT = 1.0, 2.2
+"""Metres: boxes of people who sit or stand."""
 
 _OTHER = {
     "world-to-camera": "camera-to-world",
@@ -30,7 +37,26 @@ def for_import(check: Check, reading: Reading) -> Check:
         reading: As the files were read to make it.
     """
     found = [_for_import(remedy, reading) for remedy in check.remedies]
-    return replace(check, remedies=tuple(remedy for remedy in found if remedy is not None))
+    told = replace(check, remedies=tuple(remedy for remedy in found if remedy is not None))
+    height = check.numbers.get("height", 0.0)
+    small = check.name == "size of people" and 0.0 < height < _LEAST_HEAD
+    return _larger(told, height, reading.unit) if small and not told.remedies else told
+
+
+def _larger(check: Check, height: float, unit: Unit) -> Check:
+    """People smaller than a head, and the unit of the file in which they are people.
+
+    What is tracked has the size that the boxes show, so that the check itself finds both alike.
+    """
+    for name, metres in METRES.items():
+        tall = height * metres / METRES[unit]
+        if _LEAST_HEIGHT < tall < _MOST_HEIGHT:
+            sentence = (
+                f"boxes are {height:.2g} m tall in the room; with the file's numbers in {name} "
+                f"they are {tall:.2f} m, as people are"
+            )
+            return warning(check.name, sentence, Remedy("--unit", name), height=height)
+    return check
 
 
 def _for_import(remedy: Remedy, reading: Reading) -> Remedy | None:

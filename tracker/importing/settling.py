@@ -16,9 +16,10 @@ from tracker.checks.reading import Reading, pose, read_boxes, to_camera
 from tracker.checks.readings import Open, Seen, find_meaning
 from tracker.formats.pieces import FormatError, Layout, RawCamera
 from tracker.importing.arriving import short_videos
+from tracker.importing.finding.angles import check_turns, chosen_turns, told_turns
 from tracker.importing.finding.calibrations import camera_sets
-from tracker.importing.finding.geometry import read_poses
-from tracker.importing.finding.matching import MatchedCamera, match_all
+from tracker.importing.finding.geometry import check_places, read_poses
+from tracker.importing.finding.matching import MatchedCamera, match_all, nothing_of
 from tracker.importing.finding.people import rate_of, rays_of_all
 from tracker.importing.finding.pictures import picture_sizes, scaled
 from tracker.importing.finding.scale import AS_STANDING, PERSON, paced, resized
@@ -28,6 +29,7 @@ from tracker.importing.finding.times import (
     first_index,
     frames_of,
     settle_times,
+    told_beyond,
 )
 from tracker.importing.finding.truths import settle_truth
 from tracker.importing.gathering import Taken
@@ -37,7 +39,10 @@ from tracker.sequences.sequence import Detections, Entrance, GroundTruth
 ROOM_MARGIN = 1.0
 """Metres on each side: a room that is too large costs little, who is outside is lost."""
 
-_WITHOUT_UNIT = ("COLMAP", "nerfstudio", "Metashape", "OpenMVG")
+FARTHEST = 1e6
+"""Pixels from a picture's corner: a box that lies farther is no one's."""
+
+_WITHOUT_UNIT = ("COLMAP", "nerfstudio", "Metashape", "OpenMVG", "MVSNet", "Middlebury")
 """Formats whose unit is arbitrary."""
 
 
@@ -84,7 +89,7 @@ def settle(taken: Sequence[Taken], options: ImportOptions | None = None) -> Sett
     """
     options = options or ImportOptions()
     sets, told = camera_sets(taken)
-    matched = match_all(taken, sets, options)
+    matched = match_all(taken, sets, options, told)
     told += matched.told + short_videos(taken)
     found: list[tuple[str, str]] = []
     cameras = matched.cameras
@@ -95,11 +100,14 @@ def settle(taken: Sequence[Taken], options: ImportOptions | None = None) -> Sett
         _told(scaled(camera.raw, size), options)
         for camera, size in zip(cameras, sizes, strict=True)
     ]
+    if not any(c.video or c.images or c.detections is not None for c in cameras):
+        raise nothing_of(cameras, taken, told)
     times = settle_times(cameras, matched.truths, options, found)
     boxes = _boxes(cameras, sizes, times, options, found, told)
     arbitrary = matched.format.startswith(_WITHOUT_UNIT)
     reading, raws, boxes, factor = _read(raws, boxes, times, arbitrary, options, found)
     settled = [to_camera(raw, reading, size) for raw, size in zip(raws, sizes, strict=True)]
+    check_places(settled, matched.format)
     detections = [_detections(own) for own in boxes]
     at_steps = _at_steps(detections, times)
     if factor is not None and options.half_extents is not None:
@@ -211,6 +219,8 @@ def _told(raw: RawCamera, options: ImportOptions) -> RawCamera:
         axes=options.axes or raw.convention.axes,
         up=options.up or raw.convention.up,
     )
+    if options.turns is not None and raw.turns:
+        raw = replace(raw, turns=chosen_turns(raw, options.turns))
     if isinstance(options.unit, float):
         return _resized(replace(raw, convention=replace(convention, unit="m")), options.unit)
     unit = options.unit or convention.unit
@@ -256,12 +266,16 @@ def _boxes(
         steps = piece.frames - first
         within = frames_of(camera, time, times.frames)
         there = (steps >= 0) & (steps < within)
-        if not there.all():
+        sane = (np.abs(four) < FARTHEST).all(axis=1)
+        if not sane.all():
             told.append(
-                f"{piece.source.name}: {int((~there).sum())} of {len(there)} boxes are of frames "
-                f"outside the {within} of the pictures; --first-index says where counting begins"
+                f"{piece.source.name}: {int((~sane).sum())} of {len(sane)} boxes lie farther than "
+                f"{FARTHEST:,.0f} pixels away; they are left out"
             )
+        if beyond := told_beyond(piece, first, within):
+            told.append(beyond)
         scores = np.clip(piece.scores, 0.0, 1.0)
+        there &= sane
         own = Detections(steps[there], four[there], scores[there])
         result.append((own, layout))
     return result
@@ -286,7 +300,7 @@ def _read(
         for own, time in zip(boxes, times.cameras, strict=True)
     ]
     unknown = any(own is not None and own[1] is None for own in boxes)
-    layouts: tuple[Layout, ...] = ("ltwh", "xyxy") if unknown else ("ltwh",)
+    layouts: tuple[Layout, ...] = ("ltwh", "xyxy", "cxcywh") if unknown else ("ltwh",)
     convention = raws[0].convention
     meaning = find_meaning(
         raws,
@@ -297,6 +311,7 @@ def _read(
     )
     enough = meaning is not None and meaning.best.consensus.agreeing >= 20
     if meaning is None or not enough:
+        check_turns(raws)
         reading = read_poses(raws, boxes=any(own is not None for own in boxes))
         why = "from where the cameras look; the boxes do not tell"
     else:
@@ -310,6 +325,8 @@ def _read(
         why = f"since {share:.0f} % of the boxes meet so"
         if unknown:
             found.append(("boxes", f"{reading.layout}, {why}; --boxes"))
+    if any(raw.turns for raw in raws):
+        found.append(("angles", f"{told_turns(reading.turns)}, {why}; --euler"))
     if reading.lean != (0.0, 0.0):
         degrees = np.degrees(np.arcsin(np.hypot(*reading.lean)))
         found.append(("level", f"the world is turned by {degrees:.0f}° so that people stand"))

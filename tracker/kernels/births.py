@@ -15,6 +15,11 @@ from tracker.kernels.lens import Calibrations, one_camera
 from tracker.kernels.linear_algebra import factorise, solve, squared_length
 from tracker.kernels.measurement import Target
 
+STEEPEST = 1e8
+"""A box says nothing of a place whose uncertainty adds so many times its own to it: such a place
+lies far aside of what the camera sees, where a lens's polynomial makes a millimetre many pictures,
+and the numbers do not hold both."""
+
 
 class FreeBoxes(NamedTuple):
     """F boxes that nobody explains."""
@@ -135,7 +140,7 @@ def fit_places(
     """Move each seed to the place that explains the nearest free box of every camera best.
 
     Gauss-Newton over the boxes' residuals, bound loosely to the seed; each pass chooses
-    the nearest boxes anew.
+    the nearest boxes anew. A camera that a place lies far aside of is left out.
 
     Args:
         seeds: (N, 3), world metres.
@@ -192,6 +197,7 @@ def fit_places(
                             spread[p, q] = noises[box, p, q] + own[p, q]
                         # no number of a box alone may be beyond the gate
                         near = near and residual[p] ** 2 <= gate * spread[p, p]
+                        near = near and own[p, p] <= STEEPEST * noises[box, p, p]
                     if not near:
                         continue
                     factorise(spread, lower)

@@ -9,7 +9,8 @@ does not depend on it stays. ``NUMBA_CACHE_DIR`` names another place.
 While another process compiles (:func:`while_compiling`), a kernel whose machine code is
 not there yet runs as plain Python: the same source, and so the same numbers, far slower,
 which a room with a few people bears. Those that loop over pixels or samples would take seconds
-a picture; they are :func:`pixel_kernel`, and are always compiled.
+a picture; they are :func:`pixel_kernel`, and are always compiled. So is what is called with a
+large array, such as the rays of all pixels that a room is rendered through.
 """
 
 from __future__ import annotations
@@ -44,6 +45,10 @@ _KERNELS: list[Any] = []
 
 _KEPT_SECONDS = 30 * 86400.0
 """Machine code that was not used for so long is deleted."""
+
+_LARGE = 50_000
+"""Elements of an array for which plain Python takes longer than the compilation, some two seconds
+at 30 microseconds each."""
 
 _config: Any = numba.config
 
@@ -100,7 +105,11 @@ class _Chooser:
 
     def __call__(self, *arguments: Any) -> Callable[..., Any]:
         news = _Elsewhere.news
-        if not _Elsewhere.compiles or (self._looked_at != news and self._is_kept(arguments)):
+        if (
+            not _Elsewhere.compiles
+            or any(isinstance(each, np.ndarray) and each.size > _LARGE for each in arguments)
+            or (self._looked_at != news and self._is_kept(arguments))
+        ):
             return cast(Callable[..., Any], self._compile(*arguments))
         self._looked_at = news
         return by_hand(self._dispatcher)
@@ -240,10 +249,14 @@ def _digest(files: Iterable[Path]) -> str:
 
 
 @cache
+def _version() -> str:
+    """A digest of all files that make part of machine code."""
+    return _digest(p for p in _ROOT.rglob("*.py") if _is_compiled_in(p, p.read_bytes()))
+
+
 def _mark() -> Path:
     """A file that says that all kernels were compiled."""
-    with_kernels = [p for p in _ROOT.rglob("*.py") if _is_compiled_in(p, p.read_bytes())]
-    return kernel_folder() / f"{_digest(with_kernels)}.complete"
+    return kernel_folder() / f"{_version()}.complete"
 
 
 def is_compiled() -> bool:

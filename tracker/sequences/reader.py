@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shlex
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -134,7 +135,9 @@ def _find(folder: Path) -> tuple[Path, str]:
             near = did_you_mean(folder.name, _names(folder.parent))
             raise SequenceError(f"{folder}: there is no such folder{near}")
         if not folder.is_dir():
-            raise SequenceError(f"{folder}: expected a folder with a {FILE} in it, found a file")
+            raise SequenceError(
+                f"{folder}: expected a folder with a {FILE} in it, found a file; {_import(folder)}"
+            )
         folder = folder.resolve()
         if not (folder / FILE).is_file():
             if os.path.lexists(folder / FILE):
@@ -142,7 +145,7 @@ def _find(folder: Path) -> tuple[Path, str]:
                     f"{folder.name}/{FILE}: expected a file, found a folder, a pipe or a link that "
                     "leads nowhere; put the file there"
                 )
-            near = did_you_mean(FILE, _names(folder)) or f"; every sequence folder needs a {FILE}"
+            near = did_you_mean(FILE, _names(folder)) or f"; {_import(folder)}"
             raise SequenceError(f"{folder}: there is no {FILE} in this folder{near}")
         check_own_file(folder)
         return folder, (folder / FILE).read_text(encoding="utf-8-sig")
@@ -156,6 +159,12 @@ def _find(folder: Path) -> tuple[Path, str]:
             f"{folder.name}/{FILE}, line {line}: expected text in UTF-8, found byte "
             f"0x{error.object[error.start]:02x}; save the file as UTF-8"
         ) from None
+
+
+def _import(source: Path) -> str:
+    """What makes a sequence folder of what other programs wrote."""
+    written = shlex.quote(str(source))
+    return f"make one of other files by `multiview-phd import {written} -o NEW_FOLDER`"
 
 
 def given_folder(text: str | Path) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy import ndarray
 from tracker.camera import Camera
 from tracker.filters import models
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.sequences.sequence import Room
+from tracker.sequences.sequence import Room, Sequence
 
 CELLS = 24
 """The picture is cut into about so many cells a side: sizes hardly change within one, and each
@@ -26,6 +27,25 @@ spread: some people sit or bend, and entrances are drawn by eye."""
 
 BELOW_FLOOR = 0.1
 """Metres that a target may reach below the room's volume, whose floor is drawn by eye."""
+
+
+def geometry(sequence: Sequence, camera_index: int) -> Hashable:
+    """Where people can be and how large they look, as part of the name of what is made once.
+
+    The pictures stay the same while a person moves the room's walls; what follows from both
+    does not.
+
+    Args:
+        sequence: The room and the target.
+        camera_index: Whose lens and place.
+    """
+    camera, room = sequence.cameras[camera_index], sequence.room
+    lens = camera.calibration
+    numbers = (
+        *(lens.rotation, lens.translation, lens.intrinsics, lens.distortion),
+        *(room.minimum, room.maximum, sequence.target_half_extents),
+    )
+    return (camera.image_size, *(number.tobytes() for number in numbers))
 
 
 def upright_boxes(

@@ -89,6 +89,12 @@ class ViewResult:
     blind: bool = False
     """Whether the camera had no frame at this step, and so says nothing of who is there."""
 
+    def likenesses_of(self, people: int) -> Float[ndarray, "N P"]:
+        """:attr:`likenesses` to so many people; the same to all where nothing is told of them."""
+        if self.likenesses.shape[1] == people:
+            return self.likenesses
+        return np.full((len(self.boxes), people), 1.0 / people)
+
     @property
     def clutter_factors(self) -> Float[ndarray, " N"]:
         """By how much the intensity of false boxes is lower or higher at each box than at any."""

@@ -38,5 +38,7 @@ class CameraBoxes:
         measurements = model.measured_boxes(boxes, sigmas, factor)
         blind = np.array([view.blind for view in views], dtype=bool)
         starts = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
-        factors = np.concatenate([np.zeros(0), *(view.clutter_factors for view in views)])
+        factors = np.ones(len(boxes))
+        if any(len(view.log_ratios) for view in views):
+            factors = np.concatenate([view.clutter_factors for view in views])
         return CameraBoxes(starts, blind, measurements, boxes, factors)

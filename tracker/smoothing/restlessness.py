@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.kernels.smoothing.passes import SmoothedRows, sums_around
+from tracker.kernels.smoothing.passes import SmoothedRows, drives, sums_around
 
 _HABIT = 8.0
 """Seconds for which somebody stays as restless as he is."""
@@ -48,16 +48,10 @@ def restlessness(
         step_time: Seconds.
     """
     dimension = found.means.shape[1]
-    on_ground = noise.copy()
-    on_ground[2::3] = 0.0
-    on_ground[:, 2::3] = 0.0
-    size = 2.0 * (dimension // 3)
-    inverse = np.linalg.inv(found.ahead_covariances)
-    told = np.einsum("nij,nj->ni", inverse, found.means - found.ahead)
-    spread = inverse @ found.covariances @ inverse - inverse
-    squares = before * size + before**2 * (
-        np.einsum("ni,ij,nj->n", told, on_ground, told) + np.einsum("nij,ji->n", spread, on_ground)
-    )
+    ground = np.flatnonzero(np.arange(dimension) % 3 < 2)
+    on_ground = noise[np.ix_(ground, ground)]
+    size = float(len(ground))
+    squares = before * size + before**2 * drives(found, on_ground, ground)
     squares = np.minimum(squares, _WILD * size * before)
     counts = np.full(len(squares), size)
     begins = starts[:-1]

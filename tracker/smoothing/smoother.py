@@ -107,6 +107,7 @@ class Smoother:
             learning: Whether people's restlessness is learnt; else they move as stated.
         """
         self._learning = learning
+        self._threads = ThreadPoolExecutor(min(len(sequence.views), _MOST_THREADS))
         self.parameters = parameters
         self._here = [one for one in corrections if one.kind == "here"]
         self.model = model = FusionModel(sequence, parameters)
@@ -184,10 +185,7 @@ class Smoother:
 
     def _each_camera(self, work: Callable[[int], _T]) -> list[_T]:
         """What some work gives of each camera: the kernels let go of the interpreter."""
-        if len(self.cameras) < 2:
-            return [work(c) for c in range(len(self.cameras))]
-        with ThreadPoolExecutor(min(len(self.cameras), _MOST_THREADS)) as pool:
-            return list(pool.map(work, range(len(self.cameras))))
+        return list(self._threads.map(work, range(len(self.cameras))))
 
     def _told(
         self,

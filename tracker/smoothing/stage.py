@@ -22,6 +22,7 @@ from tracker.smoothing import lifetimes, reading
 from tracker.smoothing.calibration import Calibration
 from tracker.smoothing.identity import identities, pieces
 from tracker.smoothing.identity.cutting import Tracked
+from tracker.smoothing.identity.people import Seen
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.result import Decision, Joined, Smoothed
 from tracker.smoothing.smoother import Fitted, Shared, Smoother
@@ -119,7 +120,7 @@ class Identities(Positions):
         fitted, shared, learnt = _settled(
             smoother, paths, existences, links, p, None, check, turns=p.iterations
         )
-        looks = _looks(views) if p.appearance > 0.0 else None
+        seen = Seen.of(views) if p.appearance > 0.0 else Seen()
         names = np.where(existences == 1.0, paths.labels[paths.owners], -1)
         for again in range(p.rounds):
             if again:  # who is who tells whose boxes are whose, and those again who is who
@@ -129,7 +130,7 @@ class Identities(Positions):
                 contested = pieces.contested(fitted.paths, shared.links)
             tracked = Tracked(smoother, fitted, shared, contested, existences == 1.0, names)
             said = corrections if again == p.rounds - 1 else ()
-            found = identities.settle(tracked, p, looks, said)
+            found = identities.settle(tracked, p, seen, said)
             check()
             paths, links, names = found.paths, found.links, found.names
             learnt = learnt.of_people(found.origins)
@@ -224,20 +225,3 @@ def _outside(paths: Paths, limits: Mapping[int, tuple[int, int]]) -> Bool[ndarra
             steps = int(paths.firsts[path]) + np.arange(own.stop - own.start)
             away[own] = (steps < first) | (steps > last)
     return away
-
-
-def _looks(views: Many[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B A"]] | None:
-    """A unit vector for each box of each camera, 0 where it has none; None where nobody has."""
-    sizes = {view.looks.shape[1] for step in views for view in step if view.looks.shape[1]}
-    if len(sizes) != 1:
-        return None
-    size = sizes.pop()
-    return [
-        np.concatenate(
-            [
-                step[c].looks if step[c].looks.shape[1] else np.zeros((len(step[c].boxes), size))
-                for step in views
-            ]
-        )
-        for c in range(len(views[0]))
-    ]

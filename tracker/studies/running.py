@@ -17,16 +17,16 @@ from tracker.studies.active import Active, at_work
 from tracker.studies.defined.definition import Definition
 from tracker.studies.defined.space import defaults_of
 from tracker.studies.errors import StudyError
+from tracker.studies.found.proposing import SEARCH_SHARE, Proposer
+from tracker.studies.found.weighing import Weighing
 from tracker.studies.judging import Judge
 from tracker.studies.kept.records import Status, Trial
 from tracker.studies.kept.store import JOURNAL, Store
 from tracker.studies.kept.writer import Writer
 from tracker.studies.opened import Recordings, check_same, open_recordings
 from tracker.studies.pace import Pace
-from tracker.studies.proposing import SEARCH_SHARE, Proposer
 from tracker.studies.sampling import Sampler, first_values
 from tracker.studies.turn import turn
-from tracker.studies.weighing import Weighing
 from tracker.studies.work.cluster import Crew
 from tracker.studies.work.jobs import Job, Outcome
 

@@ -50,6 +50,9 @@ class Import:
         Literal["opencv", "opengl"] | None, arg(help_behavior_hint="(default: found out)")
     ] = None
     """Axes of a camera: y down and z ahead, or y up and z back."""
+    euler: Annotated[str | None, arg(help_behavior_hint="(default: found out)")] = None
+    """How rotations given by three angles are composed: zyx is R = Rz Ry Rx, zyx-inverse its
+    inverse; vector: they are a rotation vector."""
     boxes: Annotated[
         Literal["ltwh", "xyxy", "cxcywh", "ltwh-normalised", "xyxy-normalised", "cxcywh-normalised"]
         | None,

@@ -6,7 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import FlagCreatePairsOff, OmitSubcommandPrefixes, Positional, arg, subcommand
+from tyro.conf import (
+    FlagCreatePairsOff,
+    OmitSubcommandPrefixes,
+    Positional,
+    UseAppendAction,
+    arg,
+    subcommand,
+)
 
 from app.command.arguments.library import LibraryFile
 from tracker.library import KEEP
@@ -54,9 +61,10 @@ class NewStudy:
     file: Annotated[Positional[Path], arg(metavar="STUDY.toml")]
     """The file; it must not exist yet."""
     recording: Annotated[
-        tuple[str, ...], arg(metavar="NAME", help_behavior_hint="(default: room44-3p)")
+        UseAppendAction[tuple[str, ...]],
+        arg(metavar="NAME", help_behavior_hint="(repeatable; default: room44-3p)"),
     ] = ()
-    """Rendered rooms, or folders."""
+    """A rendered room, or a folder."""
 
 
 @dataclass
@@ -155,9 +163,10 @@ class Batch(Where):
     )
     """Named values to start from."""
     set: Annotated[
-        tuple[str, ...], arg(metavar="KEY=VALUE …", help_behavior_hint="(optional)")
+        UseAppendAction[tuple[str, ...]],
+        arg(metavar="KEY=VALUE", help_behavior_hint="(repeatable)"),
     ] = ()
-    """Parameters, as in --set fusion.survival_probability=0.98."""
+    """One parameter, as in --set fusion.survival_probability=0.98."""
     seeds: Annotated[int, arg(metavar="INT")] = 1
     """Runs of each recording, with the seeds 0, 1, …"""
     library: LibraryFile = None
@@ -181,9 +190,10 @@ class Tune(Where, OfStudies):
     minutes: float = 5.0
     """How long it seeks."""
     set: Annotated[
-        tuple[str, ...], arg(metavar="KEY=VALUE …", help_behavior_hint="(optional)")
+        UseAppendAction[tuple[str, ...]],
+        arg(metavar="KEY=VALUE", help_behavior_hint="(repeatable)"),
     ] = ()
-    """Where you are: it is set against these values, and tries them too."""
+    """One value where you are: what it finds is set against these values, and it tries them too."""
     without_truth: FlagCreatePairsOff[bool] = False
     """Do not look at the truth where there is one."""
     save_as: Annotated[str, arg(metavar="NAME")] = "tuned"

@@ -4,11 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
 from app.command.terminal import FAILURE, Bar, CommandError, print_table, say
 from tracker.parameters import ParameterError
+
+if TYPE_CHECKING:
+    from tracker.importing.gathering import Taken
+
+MOST_UNKNOWN = 30
+"""Files that nobody knows, named one by one."""
+
+LONGEST_LABEL = 80
+"""Characters of a file's name in the table."""
 
 SIGNS = {"good": "ok", "warning": "!", "absent": "–"}
 """Of a check's outcome, in the first column."""
@@ -52,15 +61,7 @@ def _import(command: Import) -> int:
             waited.append(file)
 
     taken, _ = gather_whole(sources, wait_for)
-    print_table(
-        ("file", "taken for", "note"),
-        [
-            (one.label, one.format, one.complaint)
-            if one.pieces
-            else (one.label, "–", one.complaint or "no format that is read; it is not used")
-            for one in taken
-        ],
-    )
+    print_table(("file", "taken for", "note"), list(_rows(taken)))
     settled = settle(taken, options)
     print()
     print_table(("found out", "as"), [*settled.found, *(("not used", t) for t in settled.told)])
@@ -77,6 +78,26 @@ def _import(command: Import) -> int:
     say(f"{facts}, written to {command.output}")
     _print_checks(library.open_sequence(str(command.output)), settled.reading)
     return 0
+
+
+def _rows(taken: Sequence[Taken]) -> Iterator[tuple[str, str, str]]:
+    """What each file was taken for; of those that nobody knows the first are named."""
+    unknown = 0
+    for one in taken:
+        # a name that is as long as names can be would push everything aside
+        label = one.label
+        if len(label) > LONGEST_LABEL:
+            label = f"{label[: LONGEST_LABEL // 2]}…{label[-LONGEST_LABEL // 2 + 1 :]}"
+        if one.pieces:
+            yield label, one.format, one.complaint
+        elif one.complaint:
+            yield label, "–", one.complaint
+        else:
+            unknown += 1
+            if unknown <= MOST_UNKNOWN:
+                yield label, "–", "no format that is read; it is not used"
+    if unknown > MOST_UNKNOWN:
+        yield f"… {unknown - MOST_UNKNOWN:,} more", "–", "no format that is read; not used either"
 
 
 def _not_inside(files: Any, sources: Sequence[Path]) -> list[Path]:
@@ -114,6 +135,7 @@ def _options(command: Import) -> Any:
         up=command.up,
         pose=command.pose,
         axes=command.axes,
+        turns=command.euler,
         boxes=boxes,
         normalised=True if normalised else None,
         first_index=first,

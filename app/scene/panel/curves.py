@@ -16,12 +16,17 @@ LINE = "#4c97e0"
 
 
 def words_of(curve: Curve) -> str:
-    """``0.15 … 0.9: MOTA 0.91 … 0.98``, least and greatest, or that it makes no difference."""
+    """``0.15 … 0.9: MOTA 0.91 … 0.98``, or that it makes no difference.
+
+    The scores are the least and the greatest, in this order unless the curve ends lower than it
+    begins: read after the values they say whether it falls.
+    """
     known = [score for score in curve.scores if score is not None]
     if not known:
         return "no run with other values"
     digits = 2 if curve.measure == "MOTA" else 0
-    low, high = (f"{end:.{digits}f}" for end in (min(known), max(known)))
+    bounds = sorted((min(known), max(known)), reverse=known[-1] < known[0])
+    low, high = (f"{end:.{digits}f}" for end in bounds)
     ends = f"{_text(curve.values[0])} … {_text(curve.values[-1])}"
     more = "" if curve.whole else ", computing"
     if low == high:
@@ -73,8 +78,8 @@ def style_of(curves: Iterable[tuple[Curve, Any, list[str]]]) -> str:
             picture = f'background: url("data:image/svg+xml,{svg}") no-repeat left center;'
         rules.append(
             f'{rows} {{ content: "{words_of(curve)}"; width: 0; min-width: 100%; {picture} '
-            f"padding-left: {WIDTH + 6}px; min-height: 16px; font-size: 10px; line-height: 14px; "
-            "box-sizing: border-box; color: var(--mvp-ink-3); }"
+            f"padding-left: {WIDTH + 6}px; margin-top: 4px; min-height: 16px; "  # under the thumb
+            "font-size: 10px; line-height: 14px; box-sizing: border-box; color: var(--mvp-ink-3); }"
         )
     return f"<style>{' '.join(rules)}</style>"
 

@@ -42,12 +42,12 @@ class RoomNodes:
         self._major = Lines(server, "/room/grid_major", 1.0)
         self._volume = Lines(server, "/room/volume", 1.0)
         sphere = geometry.icosphere(2)
-        self._entrances = Meshes(server, "/room/entrances", *sphere)
+        self._entrances = Meshes(server, "/room/entrances", *sphere, opacity=0.05)
         self._rims = Lines(server, "/room/entrance_rims", 1.0)
         self._names = Tags(server, "/labels/entrances", 4, 0.55)
         self._heights = Tags(server, "/labels/heights", 3, 0.6)
         cube = geometry.unit_cube()
-        self._ground = Meshes(server, "/room/ground", *cube)
+        self._ground = Meshes(server, "/room/ground", *cube, opacity=1.0)
         # seen from inside alone: the walls behind are faint faces, those in front are their lines
         self._walls = server.scene.add_mesh_simple(
             "/room/walls",
@@ -87,7 +87,7 @@ class RoomNodes:
         flat = np.array([size[0], size[1], 1e-3])[None]
         tint = np.array([palette.ground], dtype=np.uint8)
         shown = slice(None if floor and volume else 0)
-        self._ground.show(inside[shown], flat[shown], tint[shown], np.ones(1)[shown])
+        self._ground.show(inside[shown], flat[shown], tint[shown])
         self._walls.visible = volume and floor
         if self._walls.visible:
             self._walls.position, self._walls.scale = tuple(middle[0]), tuple(size)
@@ -109,7 +109,7 @@ class RoomNodes:
         radius = geometry.mass_radius(geometry.DEFAULT_MASS, 2)
         axes = np.concatenate([sigmas[:, :2] * radius, np.full((len(sigmas), 1), 1e-3)], axis=1)
         grey = np.broadcast_to(np.array(palette.line, dtype=np.uint8), places.shape)
-        self._entrances.show(places, axes, grey, np.full(len(places), 0.05))
+        self._entrances.show(places, axes, grey)
         self._rims.show(_rims(places, axes), palette.entrance)
         self._names.show([Tag(tuple(place.tolist()), "entrance") for place in places])
 

@@ -25,6 +25,11 @@ NAME_ABOVE = 0.12
 """Metres of a name above its box."""
 FOOT = 1.35
 """How much wider than a person the disc is that he stands on."""
+BODIES, DISCS = (0.6, 0.8), (0.34, 0.55)
+"""Opacities of bodies and of the discs under them: of all, and of the selected one."""
+OPACITY_STEP = 0.05
+"""Opacities of ellipsoids are rounded to these: of weights that hardly change they stay as they
+are, and the client need not make the ellipsoids anew with every step."""
 UNREPORTED_WEIGHT = 0.02
 """Below this a component without a track is not drawn: its ellipsoid would be large and mean
 next to nothing."""
@@ -52,8 +57,14 @@ class PeopleNodes:
         self._boxes = Lines(server, "/people/boxes", 1.5)
         self._selected_box = Lines(server, "/people/selected_box", 2.25)
         cube, sphere = geometry.unit_cube(), geometry.icosphere(2)
-        self._feet = Meshes(server, "/people/feet", *geometry.disc())
-        self._figures = Meshes(server, "/people/figures", *geometry.figure(), side="back")
+        self._feet = [
+            Meshes(server, f"/people/{name}", *geometry.disc(), opacity=opacity)
+            for name, opacity in zip(("feet", "selected_feet"), DISCS, strict=True)
+        ]
+        self._figures = [
+            Meshes(server, f"/people/{name}", *geometry.figure(), side="back", opacity=opacity)
+            for name, opacity in zip(("figures", "selected_figure"), BODIES, strict=True)
+        ]
         self._bodies = Targets(server, "/people/bodies", *cube, self._pick_box)
         self._ellipsoids = Meshes(
             server, "/people/ellipsoids", *sphere, on_click=self._pick_component
@@ -124,7 +135,10 @@ class PeopleNodes:
             kept = [known.get(label) == selected for label in posterior.labels.tolist()]
             posterior = posterior.take(np.array(kept, dtype=bool))
         self._show_components(
-            posterior if layers["ellipsoids"] else GaussianMixture.empty(3), known, selected
+            posterior if layers["ellipsoids"] else GaussianMixture.empty(3),
+            known,
+            selected,
+            middle_of(sequence.room),
         )
         named = boxes or layers["ellipsoids"] or layers["bodies"]
         self.points = np.concatenate(
@@ -176,12 +190,12 @@ class PeopleNodes:
         feet[:, 2] = floor
         tall = np.maximum(0.1, positions[:, 2] + half[2] - floor)
         wide = np.broadcast_to(half[:2] * 0.9, (len(ids), 2))
-        self._figures.show(
-            feet, np.concatenate([wide, tall[:, None]], axis=1), shades, np.where(chosen, 0.8, 0.6)
-        )
-        feet = feet + np.array([0.0, 0.0, 0.006])  # in front of the floor
+        sizes = np.concatenate([wide, tall[:, None]], axis=1)
+        above = feet + np.array([0.0, 0.0, 0.006])  # in front of the floor
         round_ = np.broadcast_to(np.array([*half[:2] * FOOT, 1.0]), positions.shape)
-        self._feet.show(feet, round_, shades, np.where(chosen, 0.55, 0.34))
+        for body, disc, rows in zip(self._figures, self._feet, (~chosen, chosen), strict=True):
+            body.show(feet[rows], sizes[rows], shades[rows], about=middle_of(room))
+            disc.show(above[rows], round_[rows], shades[rows])
 
     def _show_rays(
         self, sequence: Sequence, tracks: Trajectories, now: slice, selected: int | None
@@ -229,7 +243,11 @@ class PeopleNodes:
             node.show(way.segments[rows], shades[rows])
 
     def _show_components(
-        self, mixture: GaussianMixture, ids: Mapping[int, int], selected: int | None
+        self,
+        mixture: GaussianMixture,
+        ids: Mapping[int, int],
+        selected: int | None,
+        middle: Float[ndarray, " 3"],
     ) -> None:
         """Draw Gaussian components as the ellipsoids that hold a stated share of each.
 
@@ -240,6 +258,7 @@ class PeopleNodes:
             mixture: The first three entries of its states are x, y, z in metres.
             ids: Of the labels that are tracks.
             selected: The track that is drawn stronger.
+            middle: Of the room, world metres.
         """
         numbers = np.array([ids.get(label, 0) for label in mixture.labels.tolist()], np.int64)
         drawn = (numbers > 0) | (mixture.weights > UNREPORTED_WEIGHT)
@@ -254,9 +273,16 @@ class PeopleNodes:
         opacities = np.where(numbers > 0, 0.06 + 0.44 * weights, 0.04 + 0.3 * weights)
         if selected is not None:
             opacities = opacities + 0.15 * (numbers == selected)
+        opacities = OPACITY_STEP * np.ceil(opacities / OPACITY_STEP)  # the faintest is still seen
         self._component_ids = numbers
         self._reach = geometry.surfaces(mixture.means[:, :3], wxyzs, axes)
-        self._ellipsoids.show(mixture.means[:, :3], axes, shades, opacities, wxyzs)
+        self._ellipsoids.show(mixture.means[:, :3], axes, shades, opacities, wxyzs, about=middle)
+
+
+def middle_of(room: Room) -> Float[ndarray, " 3"]:
+    """The middle of the volume: bodies, and ellipsoids after them, are drawn when the pictures of
+    the cameras behind them are, and before those in front."""
+    return np.asarray((room.minimum + room.maximum) / 2.0)
 
 
 def room_taken(

@@ -107,7 +107,13 @@ class Draft:
         """Of all videos, pictures and boxes that it is made of."""
         if self.upload is not None:
             return self.upload.size
-        return sum(path.stat().st_size for one in self._known.taken for path in one.files)
+        # as they were when they were read: the page asks again and again
+        return sum(
+            self._read.get(path, (0, 0))[0]
+            for one in self._known.taken
+            if one.pieces
+            for path in one.files
+        )
 
     def wish(self, wish: Wish) -> None:
         """Have it otherwise; what follows is found out anew, where it is more than the name."""

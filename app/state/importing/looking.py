@@ -25,6 +25,7 @@ from tracker.pipeline import Cancelled, compute
 from tracker.runs.fitting import default_parameters, unfit_methods
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
+from tracker.single_view.working.shaking import check_shake
 
 MOST_STEPS = 200
 """Of which pictures are compared; boxes are compared at all steps."""
@@ -100,17 +101,20 @@ def look_into(settled: Settled, name: str, cancelled: Callable[[], bool]) -> Ite
     yield looked
     if mistaken:
         return
-    offsets: tuple[CameraOffset, ...] = ()
-    if len(sequence.views) > 1:
-        with _Stoppable(sequence, cancelled) as reader:
+    with _Stoppable(sequence, cancelled) as reader:
+        offsets: tuple[CameraOffset, ...] = ()
+        if len(sequence.views) > 1:
             offsets = synchronise(sequence, reader=reader, most_steps=MOST_STEPS)
-    _stop_if(cancelled)
-    timing = list(check_time(sequence, found=offsets))
-    found = _for_import((*checks, *timing, *counting), settled)
-    looked = replace(looked, checks=found, offsets=offsets, under_way="first tracks")
-    if agreed is not None and sequence.has_detections:
-        yield looked
-        looked = replace(looked, doors=tuple(_doors(sequence, cancelled)))
+        _stop_if(cancelled)
+        timing = list(check_time(sequence, found=offsets))
+        found = _for_import((*checks, *timing, *counting), settled)
+        looked = replace(looked, checks=found, offsets=offsets, under_way="first tracks")
+        if agreed is not None and sequence.has_detections:
+            yield looked
+            looked = replace(looked, doors=tuple(_doors(sequence, cancelled)))
+        if sequence.has_pictures:
+            yield replace(looked, under_way="cameras' stands")
+            looked = replace(looked, checks=(*found, *check_shake(sequence, reader)))
     yield replace(looked, under_way="")
 
 
@@ -152,6 +156,10 @@ class _Stoppable(FrameReader):
         for picture in super().iterate(*arguments, **named):
             _stop_if(self._cancelled)
             yield picture
+
+    def check(self) -> None:
+        _stop_if(self._cancelled)
+        super().check()
 
 
 def _pairs(sequence: Sequence, agreed: Consensus) -> tuple[Pair, ...]:

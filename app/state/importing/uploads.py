@@ -103,6 +103,10 @@ class Upload:
         """How many were announced."""
         return len(self._files)
 
+    def names(self, most: int) -> list[str]:
+        """Of the announced files, the first so many."""
+        return [file.path for file in self._files[:most]]
+
     def announce(self, files: Sequence[Announced]) -> int:
         """More files are to come; the number of the first of them.
 

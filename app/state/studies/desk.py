@@ -38,6 +38,9 @@ LOG = "log.txt"
 PLACE = "place.json"
 """Where a study that the page started runs."""
 
+START_SECONDS = 30.0
+"""How long a study's process is waited for until it tells that it runs, or why it cannot."""
+
 STOP_SECONDS = 5.0
 ENDING_SECONDS = 20.0
 
@@ -174,7 +177,7 @@ class StudyDesk:
         except OSError as error:
             raise StudyError(f'the study "{store.name}" cannot be started ({error})') from None
         self._started.append(process)
-        until = time.monotonic() + STOP_SECONDS
+        until = time.monotonic() + START_SECONDS
         while time.monotonic() < until and process.poll() is None:
             if store.status().written > before:
                 return

@@ -18,7 +18,7 @@ from typing import Any
 
 from app.errors import sentence
 from app.state.kept.crashes import Crashes, Note
-from app.state.snapshot import Change, Snapshot
+from app.state.snapshot import Change, RunState, Snapshot
 from app.state.workbench import Workbench
 from app.state.workers.compiling import WORDS, Compiling
 from app.state.workers.opening import Opener
@@ -249,7 +249,8 @@ class Jobs:
 
         def on_silence(seconds: float) -> None:
             if not wanted.cancelled.is_set():
-                workbench.run_waits(wanted.key, f"no new step for {seconds:.0f} s")
+                words = silence(workbench.snapshot().run_state, seconds)
+                workbench.run_waits(wanted.key, words)
 
         def on_compiling(done: int, total: int) -> None:
             if total and not wanted.cancelled.is_set():
@@ -340,6 +341,14 @@ class Jobs:
         reader = self._workbench.snapshot().reader
         if reader is not None:
             reader.close()
+
+
+def silence(now: RunState, seconds: float) -> str:
+    """What is said of a run of which nothing was heard for so long: after its last step it looks
+    back over all of them.
+    """
+    what = "hindsight" if 0 < now.total == now.done else "no new step"
+    return f"{what} for {seconds:.0f} s"
 
 
 def _meanwhile(snapshot: Snapshot, seed: int) -> Trajectories | None:

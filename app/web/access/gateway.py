@@ -48,6 +48,37 @@ addEventListener("click", (event) => {
 """viser's labels are plain text with a hint; a click on one opens what the panel says of it,
 in :meth:`app.scene.panel.controls.Controls`, as ``<i id="help-UUID" data-manual="...">``."""
 
+BACKS_WRITE_NO_DEPTH = b"""<script>{
+const gl = WebGL2RenderingContext.prototype;
+const { enable, disable, frontFace, depthMask, drawElementsInstanced } = gl;
+const [BLEND, BACKS] = [gl.BLEND, gl.CW];
+gl.enable = function (what) {
+  if (what === BLEND) this.seenThrough = true;
+  enable.call(this, what);
+};
+gl.disable = function (what) {
+  if (what === BLEND) this.seenThrough = false;
+  disable.call(this, what);
+};
+gl.frontFace = function (which) {
+  this.backs = which === BACKS;
+  frontFace.call(this, which);
+};
+gl.depthMask = function (on) {
+  this.writesDepth = on;
+  depthMask.call(this, on);
+};
+gl.drawElementsInstanced = function (...what) {
+  const without = this.seenThrough && this.backs && this.writesDepth !== false;
+  if (without) depthMask.call(this, false);
+  drawElementsInstanced.apply(this, what);
+  if (without) depthMask.call(this, true);
+};
+}</script>"""
+"""viser's copies of a mesh write depth however much one sees through them, and cannot be told not
+to: a body would hide whatever ellipsoid is behind it. Those of which the backs alone are drawn, as
+bodies are, do not so here."""
+
 INSIDE = b'e.type="module";'
 """Where viser's client, which travels packed, puts itself into its page as a script."""
 
@@ -77,7 +108,7 @@ class Gateway:
 
         page = Path(viser.__file__).parent / "client" / "build" / "index.html"
         head, mark, rest = page.read_bytes().partition(b"<head>")
-        whole = head + mark + HAS_FOCUS + LABELS_LEAD_TO_THE_MANUAL + rest
+        whole = head + mark + HAS_FOCUS + BACKS_WRITE_NO_DEPTH + LABELS_LEAD_TO_THE_MANUAL + rest
         nonce = secrets.token_urlsafe(16)
         said = f'nonce="{nonce}"'.encode()
         self._page = whole.replace(b"<script", b"<script " + said).replace(

@@ -133,9 +133,10 @@ def ghosts(wish: GhostsRequest, bench: Bench, doubts: Doubts) -> AlternativePrev
 
 @router.post("/answers")
 def answer(wish: AnswerRequest, bench: Bench, correct: Correct, doubts: Doubts) -> Corrections:
-    """Say what is true of a doubtful place; that it is as it is, is kept too."""
+    """Say what is true of a doubtful place, of the shown run or of one before it; that it is as
+    it is, is kept too."""
     snapshot = _open(bench)
-    found = _found(doubts, snapshot, wish.doubt)
+    found = _there(doubts.told(snapshot, wish.doubt), wish.doubt)
     chosen = found.alternatives[_alternative(found, wish.alternative)]
     if not chosen.corrections:
         correct.skipped.add(found.id)
@@ -180,7 +181,10 @@ def remove(correction: str, bench: Bench, correct: Correct) -> Corrections:
 
 
 def _found(doubts: Doubting, snapshot: Snapshot, identity: str) -> Doubt:
-    found = doubts.find(snapshot, identity)
+    return _there(doubts.find(snapshot, identity), identity)
+
+
+def _there(found: Doubt | None, identity: str) -> Doubt:
     if found is None:
         raise ApiError(
             404, "no_doubt", f"There is no doubtful place {identity} any more.",

@@ -57,6 +57,8 @@ def corrections_of(snapshot: Snapshot, correcting: Correcting) -> Corrections:
     for one in snapshot.corrections:
         first, last = one.steps
         outcome = found.get(one.id)
+        if one.kind == "checked":  # it asks nothing of a run
+            outcome = Outcome(one.id, True)
         infos.append(
             CorrectionInfo(
                 id=one.id, kind=one.kind, words=one.words, note=one.note,

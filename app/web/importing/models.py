@@ -168,6 +168,8 @@ class ImportInfo(Model):
     """Bytes."""
     bytes: int
     files: list[ImportedFile]
+    coming: list[str]
+    """Files that were announced and are not yet understood, the first of them."""
     offered: list[str]
     """Labels of pictures and boxes that a camera may be given."""
     uploaded: bool

@@ -80,6 +80,7 @@ def _info(draft: Draft) -> ImportInfo:
         received=draft.size if upload is None else upload.received,
         bytes=draft.size,
         files=_files(known),
+        coming=[] if upload is None or known.taken else upload.names(MOST_LISTED),
         offered=list(places(known.taken))[:MOST_LISTED],
         uploaded=upload is not None,
         home=str(draft.home),
@@ -136,7 +137,10 @@ def _files(known: Known) -> list[ImportedFile]:
             format=one.format if one.pieces else "",
             complaint=one.complaint,
         )
-        for one in known.taken[:MOST_LISTED]
+        # among thousands what is used comes first, then what has a reason
+        for one in sorted(known.taken, key=lambda one: (not one.pieces, not one.complaint))[
+            :MOST_LISTED
+        ]
     ]
 
 

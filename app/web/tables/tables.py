@@ -283,7 +283,7 @@ def compare_tables(
     notes = "".join(line(text) for text in (messages.stated_of(evaluation), *evaluation.notes))
     if reference is None:
         words = " · no run to compare with: pin this one, or change a parameter"
-        head = line(Markup("<b>B</b> "), _side("this run", scored), words)
+        head = line(Markup("<b>B</b> "), _side(_shown(snapshot, scored), scored), words)
         return head + _figures(evaluation, every) + notes + identity
     against, other = reference
     evaluator: Evaluator = request.app.state.evaluator
@@ -293,7 +293,7 @@ def compare_tables(
         Markup("<b>A</b> "),
         _side("pinned run" if against == "pinned" else "run before", other),
         Markup(" <b>B</b> "),
-        _side("this run", scored),
+        _side(_shown(snapshot, scored), scored),
         f" · {comparison.steps} steps",
     )
     tables = _differences(comparison, evaluation, every) + _differing(comparison)
@@ -382,6 +382,12 @@ def _measure(figure: Figure) -> Markup:
     words = joined(figure.definition.name, quiet(f" {figure.unit}".rstrip())).html
     title = f"{figure.definition.help}\n{figure.stated}".strip()
     return Markup(f'<span title="{escaped(title)}">{words}</span>')
+
+
+def _shown(snapshot: Snapshot, scored: Scored) -> str:
+    """Whose the figures are: just after a change still those of the run before."""
+    behind = snapshot.run is not None and snapshot.run.key != scored.key
+    return "the run before, this one is being scored" if behind else "this run"
 
 
 def _side(words: str, scored: Scored) -> str:

@@ -117,7 +117,7 @@ KINDS: dict[str, Kind] = {
         "Uncertainty", "m", "Standard deviation of its place on the floor", _uncertainty
     ),
     "detection": Kind(
-        "p_D by camera", "", "That a camera detects it; bright is likely",
+        "Detectability", "", "How likely each camera is to detect it, bright is likely",
         _detection, 1.0, by_camera=True,
     ),
     "error": Kind(

@@ -198,7 +198,7 @@ def _feeding(
         return None
     return models.Feeding(
         box=given[source],
-        weight=round(float(view.weights[source]), 4),
+        weight=float(f"{float(view.weights[source]):.4g}"),
         share=round(float(fused.source_weights[camera, component]), 4),
     )
 

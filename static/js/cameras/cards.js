@@ -44,7 +44,7 @@ export function fillTrackCard(card, track, whole, decisions) {
 							h(
 								"small",
 								{},
-								`, ${Math.round(100 * fed.share)} % sure, weight ${show(Number(fed.weight.toPrecision(2)))}`,
+								`, ${Math.round(100 * fed.share)} % sure, score ${show(Number(fed.weight.toPrecision(2)))}`,
 							),
 						]
 					: ["no box here"]),

@@ -18,16 +18,22 @@ export function mountCheck(root, context) {
 	mountPlace(one("#panel-place"), context, check, crops);
 	mountFeet(context, check);
 
-	// While it is held down V shows how it would be; tapped it stays.
-	let since = 0;
-	document.addEventListener("keydown", (event) => {
-		if (event.key === "v" && !event.repeat && store.get().place === "check")
-			since = event.timeStamp;
-	});
-	document.addEventListener("keyup", (event) => {
-		if (event.key !== "v" || !since) return;
-		if (event.timeStamp - since > 350) check.show(0);
-		since = 0;
+	// Tapped V goes there and back; what is seen while it is held down is gone with it. A key that
+	// is held repeats, however long the page took for its first press.
+	let held = false;
+	document.addEventListener(
+		"keydown",
+		(event) => {
+			if (event.key !== "v" || !event.repeat || store.get().place !== "check") return;
+			held = true;
+			event.stopPropagation();
+		},
+		true,
+	);
+	document.addEventListener("keyup", ({ key }) => {
+		if (key !== "v" || !held) return;
+		held = false;
+		void check.show(0);
 	});
 
 	const { state } = check;

@@ -159,8 +159,12 @@ export function mountCorrecting(context, timeline) {
 			return which ? answer(which) : alone("different", `is two people, cut at step ${shown()}`);
 		},
 		join() {
+			const doubt = here();
 			const which = alternative(/goes on/);
-			if (which) return answer(which);
+			const best = doubt && (state.get().other || proposed(doubt));
+			// Where the place proposes it; what is hardly likely there is nobody's word for it.
+			if (which && doubt?.kind === "join") return answer(which);
+			if (which && best && /goes on/.test(doubt.alternatives[best].words)) return answer(best);
 			const track = who();
 			if (track !== null) menu.others("join", track);
 		},

@@ -87,9 +87,11 @@ export function mountFeet({ store, playback }, check) {
 		feet = on && placing ? spots(null, clicked) : [];
 		build();
 		if (!on || track === null) return;
-		const there = await footprints(track, shown);
+		// The run may be another by the time that this is answered: its picture asks anew.
+		const there = await footprints(track, shown).catch(() => null);
 		if (key !== wanted) return;
-		feet = spots(there, feet);
+		if (!there) wanted = "";
+		else feet = spots(there, feet);
 		build();
 	}
 

@@ -5,7 +5,7 @@ import { resultOf } from "../state/events.js";
 import { commandOf, keyLabel, perform } from "../state/commands.js";
 import { clickOf, pixelOf } from "./feet.js";
 import { checkOf } from "./model.js";
-import { neighbours } from "./words.js";
+import { joinable, neighbours, whereIs } from "./words.js";
 
 /** What the menu has for a track, in its order: a command, its sign, and what it says. */
 const ITEMS = /** @type {const} */ ([
@@ -113,40 +113,52 @@ export function mountMenu(context, timeline, does) {
 	}
 
 	/**
-	 * With whom: those alive there, the nearest first; a click on anybody else is an answer too.
+	 * With whom: to exchange those alive there, the nearest first; to join first those that come
+	 * before or after. A click on anybody else is an answer too.
 	 * @param {"exchange" | "join"} what @param {number} track
 	 */
 	function others(what, track) {
 		const { timeline: lanes, shown } = store.get();
-		const found = neighbours(track, resultOf(store.get()), lanes?.tracks ?? [], Math.max(0, shown));
+		const joins = what === "join";
+		const step = Math.max(0, shown);
+		const found = (joins ? joinable : neighbours)(
+			track,
+			resultOf(store.get()),
+			lanes?.tracks ?? [],
+			step,
+		);
 		if (!found.length)
 			return actions.note("info", "There is nobody else", "It takes a second track.");
 		if (!menu.matches(":popover-open")) middle();
-		const word = what === "join" ? "Join" : "Exchange";
+		const word = joins ? "Join" : "Exchange";
 		const take = (/** @type {number} */ id) => (close(), void does[what](track, id));
+		const own = lanes?.tracks.find(({ id }) => id === track);
+		const ends = found.some((other) => "pause" in other && other.pause);
 		show(
 			`${word} ${track} with`,
-			[`${word} `, idTag(track), " with"],
+			[
+				`${word} `,
+				idTag(track),
+				" with",
+				joins &&
+					own &&
+					!ends &&
+					h(
+						"span",
+						{ class: "sub alone" },
+						`nobody comes before step ${own.first} or after step ${own.last}; ` +
+							`of two who are there at once it is said from step ${step} on`,
+					),
+			],
 			"menu",
 			...found
 				.slice(0, MOST)
-				.map(({ id, metres, steps, first, last }) =>
+				.map((other) =>
 					item(
-						what === "join" ? "i-join" : "i-exchange",
-						[
-							idTag(id),
-							h(
-								"span",
-								{ class: "sub" },
-								metres !== null
-									? ` ${metres.toFixed(1)} m away`
-									: steps
-										? ` ${steps} steps ${first > shown ? "later" : "before"}`
-										: ` steps ${first} – ${last}`,
-							),
-						],
+						joins ? "i-join" : "i-exchange",
+						[idTag(other.id), h("span", { class: "sub" }, ` ${whereIs(other, step, own)}`)],
 						"",
-						() => take(id),
+						() => take(other.id),
 					),
 				),
 		);

@@ -1,5 +1,5 @@
 /** What is doubtful and what was put right, fetched and kept; every part of Check looks at this. */
-import { fetcher, getJson } from "../state/api.js";
+import { ApiError, fetcher, getJson, sendJson } from "../state/api.js";
 import { createStore } from "../state/store.js";
 import { middleOf } from "./words.js";
 
@@ -64,17 +64,22 @@ function createCheck({ store, actions, playback }) {
 			at = doubts.indexOf(same);
 			state.set({ chosen: same });
 		} else if (answered || (chosen && queue.complete && store.get().run?.state === "done")) {
-			// What is done makes room for the next; while a run goes on the shown one stays.
+			// What is done makes room for the next; while a run goes on the shown one stays. Who has
+			// sought elsewhere meanwhile is not called back.
+			const { place, step } = store.get();
+			const away = !answered && chosen && (step < chosen.first || step > chosen.last);
 			answered = false;
 			const next = doubts[Math.min(at, doubts.length - 1)] ?? null;
-			if (store.get().place === "check") choose(next);
+			if (place === "check" && !away) choose(next);
 			else state.set({ ...hide(), chosen: null });
 		}
 	}
 
 	/** How it would be is drawn no more. */
 	function hide() {
-		if (state.get().other) void actions.ask("POST", "corrections/ghosts", { doubt: null });
+		// Where nothing is drawn any more there is nothing to tell either.
+		if (state.get().other)
+			sendJson("POST", "/api/corrections/ghosts", { doubt: null }).catch(() => {});
 		return { other: 0, preview: null, ends: null, placing: null };
 	}
 
@@ -94,15 +99,35 @@ function createCheck({ store, actions, playback }) {
 		if (!chosen?.alternatives[other]) return;
 		if (!other) return state.set({ ...hide(), ends });
 		state.set({ other });
-		const wish = { doubt: chosen.id, alternative: other };
-		const preview = await actions.ask("POST", "corrections/ghosts", wish);
+		const preview = await askOfPlace("/ghosts", { doubt: chosen.id, alternative: other });
 		const now = state.get();
 		if (now.chosen?.id === chosen.id && now.other === other) state.set({ preview });
 	}
 
+	/**
+	 * Ask something of the chosen place. A run that came meanwhile may not have it any more: then
+	 * the queue is read anew, and nobody did anything wrong.
+	 * @param {string} path @param {{doubt: string, alternative: number}} body
+	 */
+	async function askOfPlace(path, body) {
+		try {
+			return await sendJson("POST", `/api/corrections${path}`, body);
+		} catch (error) {
+			if (!(error instanceof ApiError)) throw error;
+			if (error.code !== "no_doubt") actions.note("error", error.message, error.hint ?? "");
+			else actions.note("info", "This place has changed", "The run is another by now: look again.");
+			state.set({ ...hide(), ends: state.get().ends });
+			void refresh();
+			return null;
+		}
+	}
+
 	/** Ask, and take over what is told. @param {"POST" | "DELETE"} method @param {string} path @param {object} [body] */
-	async function ask(method, path, body) {
-		const told = await actions.ask(method, `corrections${path}`, body);
+	const ask = async (method, path, body) =>
+		take(await actions.ask(method, `corrections${path}`, body));
+
+	/** @param {Server.Corrections | null} told  null where it was refused */
+	function take(told) {
 		if (!told) return false;
 		state.set({ ...hide(), told });
 		void refresh();
@@ -153,7 +178,7 @@ function createCheck({ store, actions, playback }) {
 			if (!chosen) return false;
 			answered = true;
 			const { queue } = state.get();
-			const taken = await ask("POST", "/answers", { doubt: chosen.id, alternative });
+			const taken = take(await askOfPlace("/answers", { doubt: chosen.id, alternative }));
 			answered &&= taken;
 			if (taken && queue) {
 				gone.set(chosen.id, queue.run);

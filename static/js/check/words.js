@@ -164,6 +164,43 @@ export function neighbours(id, result, tracks, step) {
 }
 
 /**
+ * Whom a track may be joined with: who begins after its end or ends before its beginning, the least
+ * pause first; then who is there at the same time, as of :func:`neighbours`.
+ * @param {number} id
+ * @param {Server.Step | null} result
+ * @param {Server.TrackLife[]} tracks
+ * @param {number} step
+ */
+export function joinable(id, result, tracks, step) {
+	const own = tracks.find((track) => track.id === id);
+	return neighbours(id, result, tracks, step)
+		.map((other) => ({
+			...other,
+			/** Steps from the end of the one to the beginning of the other; 0 for both at once. */
+			pause: own ? Math.max(0, other.first - own.last, own.first - other.last) : 0,
+		}))
+		.sort((a, b) => Number(!a.pause) - Number(!b.pause) || a.pause - b.pause);
+}
+
+/**
+ * When or how far from somebody another is, in a few words.
+ * @param {{metres: number | null, steps: number, first: number, last: number, pause?: number}} other
+ * @param {number} step  that is shown
+ * @param {Server.TrackLife} [own]
+ */
+export function whereIs({ metres, steps, first, last, pause }, step, own) {
+	const count = (/** @type {number} */ many) => `${many} ${many === 1 ? "step" : "steps"}`;
+	if (pause && own)
+		return first > own.last
+			? `begins ${count(pause)} after its end`
+			: `ends ${count(pause)} before its beginning`;
+	if (metres !== null) return `${metres.toFixed(1)} m away`;
+	return steps
+		? `${count(steps)} ${first > step ? "later" : "before"}`
+		: `steps ${first} – ${last}`;
+}
+
+/**
  * The next place where two people come close, after a step; round again at the end.
  * @param {Doubt[]} doubts @param {number} step
  */

@@ -29,8 +29,13 @@ export function drawRange({ g, row, view, ink }, loaded, done, frames) {
 	if (done > 0) bar("accent", 0, done - 1, y + 3, 3);
 }
 
-/** @param {Pen} pen @param {[number | null, number | null]} range @param {Bookmark[]} [marks] */
-export function drawRuler({ g, row, view, ink }, range, marks = []) {
+/**
+ * @param {Pen} pen
+ * @param {[number | null, number | null]} range
+ * @param {Bookmark[]} marks
+ * @param {number | null} hidden  tick whose number is left out, since the playhead stands there
+ */
+export function drawRuler({ g, row, view, ink }, range, marks, hidden) {
 	const bottom = row.y + row.height;
 	const { major, minor } = tickSteps(view);
 	g.font = `${ink.get("fs-0")} ${ink.font}`;
@@ -46,7 +51,7 @@ export function drawRuler({ g, row, view, ink }, range, marks = []) {
 			ink.get(labelled ? "ink-3" : "bg-4"),
 			1,
 		);
-		if (!labelled) continue;
+		if (!labelled || Math.round(step) === hidden) continue;
 		const text = String(Math.round(step));
 		const half = g.measureText(text).width / 2;
 		g.fillStyle = ink.get("ink-3");

@@ -3,8 +3,8 @@ import { drawFloor } from "../cameras/floor.js";
 import { drawEmptyPicture, drawOverlay } from "./overlay.js";
 import { stroke } from "./canvas.js";
 
-/** Of the loupe, CSS pixels. */
-const RADIUS = 84;
+/** Of the loupe, CSS pixels, and as a share of its cell where that is small. */
+const [RADIUS, OF_CELL] = [84, 0.42];
 
 /**
  * What of a magnified picture is in its cell.
@@ -55,15 +55,16 @@ export function drawPicture(g, { bitmap, maps, faint, floor, view }, scene, { k,
  */
 export function drawLoupe(g, what, scene, { k, left, top }, { x, y }) {
 	const more = Math.max(4, k * 2.5);
+	const radius = Math.min(RADIUS, OF_CELL * Math.min(scene.width, scene.height));
 	const cut = (/** @type {number} */ at, /** @type {number} */ gone) =>
 		Math.round(((at + gone) / k) * more - at);
 	g.save();
 	g.beginPath();
-	g.arc(x, y, RADIUS, 0, 7);
+	g.arc(x, y, radius, 0, 7);
 	g.clip();
 	drawPicture(g, what, scene, { k: more, left: cut(x, left), top: cut(y, top) });
 	g.restore();
 	g.beginPath();
-	g.arc(x, y, RADIUS, 0, 7);
+	g.arc(x, y, radius, 0, 7);
 	stroke(g, "#f4f4f4", 2, [], 0.6);
 }

@@ -96,6 +96,12 @@ export function idTag(id) {
 	return h("span", { class: "id", "--c": `var(--id-${n})`, "--on-id": `var(--on-${n})` }, id);
 }
 
+/** A parameter's symbol with its index set low. @param {string} symbol  such as p_D */
+export function symbolOf(symbol, kind = "sym") {
+	const [letter, index] = symbol.split("_", 2);
+	return h("span", { class: kind }, letter, index ? h("sub", {}, index) : null);
+}
+
 /** @param {number} value  @returns {string} as short as it stays readable */
 export function show(value) {
 	if (Number.isInteger(value)) return String(value);

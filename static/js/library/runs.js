@@ -1,7 +1,7 @@
 /** The table of a recording's runs. */
-import { fill, h, icon } from "../elements/dom.js";
+import { fill, h, icon, symbolOf } from "../elements/dom.js";
 import { grid } from "../elements/grid.js";
-import { figure, livesAMinute, partsOf, when } from "./words.js";
+import { figure, livesAMinute, when } from "./words.js";
 
 /** Figures with a bar: what the bar is from and to, and which end is the better. */
 const FIGURES = /** @type {const} */ ([
@@ -16,19 +16,13 @@ const LIVES = "Tracks/min";
 
 const PILLS = 3;
 
-/** @param {Server.ChangeInfo} change */
-export function symbol({ symbol }) {
-	const [letter, index] = partsOf(symbol);
-	return h("span", { class: "q" }, letter, index ? h("sub", {}, index) : null);
-}
-
 /** @param {Server.KeptRunInfo} run */
 function pills(run) {
 	if (!run.changes.length && !run.corrected) return h("span", { class: "q" }, "–");
 	const all = run.changes.map(({ key, value }) => `${key} ${value}`).join("\n");
 	const shown = run.changes
 		.slice(0, PILLS)
-		.map((change) => h("span", { class: "pc" }, symbol(change), " ", change.value));
+		.map((change) => h("span", { class: "pc" }, symbolOf(change.symbol, "q"), " ", change.value));
 	const more = run.changes.length - PILLS;
 	return h(
 		"span",

@@ -68,6 +68,3 @@ export function has(text, of) {
 		.split(/\s+/)
 		.every((word) => all.includes(word));
 }
-
-/** A parameter's symbol with its index set low: p_D. @param {string} symbol */
-export const partsOf = (symbol) => /** @type {[string, string]} */ (symbol.split("_", 2));

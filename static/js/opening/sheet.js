@@ -258,7 +258,11 @@ export function mountOpening({ store, actions }) {
 		else return;
 		event.preventDefault();
 	});
-	dialog.addEventListener("close", () => clearTimeout(timer));
+	dialog.addEventListener("close", () => {
+		clearTimeout(timer);
+		// What was sought would take the next Escape for itself.
+		if (!info) dialog.innerHTML = shown = "";
+	});
 	return {
 		toggle() {
 			if (dialog.open) return dialog.close();

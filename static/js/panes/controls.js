@@ -73,6 +73,7 @@ export function mountControls({ store, actions, press }) {
 	const typed = asks < 0 ? [] : before.splice(asks + 1);
 	before.forEach(press);
 	one(".palette input").value = typed.map(({ key }) => (key.length === 1 ? key : "")).join("");
+	one(".palette").toggleAttribute("data-hasty", typed.at(-1)?.key === "Enter");
 	const forget = store.on(["server"], ({ server }) => {
 		if (!server) return;
 		forget();

@@ -5,6 +5,8 @@ import { fill, h, icon } from "../elements/dom.js";
 export function mountNotes(root, { store, actions, retry }) {
 	let dismissed = "";
 	let heard = "";
+	/** Whose notes stand there, and what they say. */
+	let standing = "";
 	/** @type {Timer} */
 	let ticking;
 
@@ -85,7 +87,12 @@ export function mountNotes(root, { store, actions, retry }) {
 			};
 			all.push(note(kind, title, text, [remedy ? button(remedy.word, mend) : null, close(gone)]));
 		}
-		fill(root, all);
+		// A run tells ten times a second how far it is: what stands there stays, or the button under a
+		// pointer would be another before it is let go.
+		const whose = [run?.state === "failed" && run.key, ...notes.map(({ id }) => id)];
+		const now = [...whose, ...all.map(({ outerHTML }) => outerHTML)].join();
+		if (now !== standing) fill(root, all);
+		standing = now;
 		clearInterval(ticking);
 		if (link === "lost")
 			ticking = setInterval(() => root.contains(document.activeElement) || render(), 1000);

@@ -66,6 +66,13 @@ export const restOf3d = (wait, elapsed, due) =>
 	elapsed > 1.4 * due ? Math.min(1500, Math.max(400, wait * 1.5)) : wait < 40 ? 0 : wait * 0.985;
 
 /**
+ * How long the 3D view is to be left alone after a frame that held up the page: it takes a fifth of
+ * the time at most, and still follows where there is hardly any.
+ * @param {number} cost  milliseconds from the frame until the browser was ready for another
+ */
+export const restAfter3d = (cost) => Math.min(8000, 4 * Math.max(0, cost - 50));
+
+/**
  * The steps to have ready, nearest first: the step itself, then ahead in the direction of
  * play, then a few behind.
  * @param {number} step
@@ -161,6 +168,24 @@ export function tickSteps({ first, last, width }, pixels = 80) {
 	const power = 10 ** Math.floor(Math.log10(raw));
 	const major = [1, 2, 5, 10].map((k) => k * power).find((k) => k >= raw - 1e-9) ?? 10 * power;
 	return { major, minor: Math.max(1, major / (String(major)[0] === "2" ? 4 : 5)) };
+}
+
+/**
+ * The labelled tick whose number a plate over the axis would cut, or null.
+ * @param {View} view
+ * @param {number} step  that the plate stands at
+ * @param {number} reach  CSS pixels from the middle of the plate to its edge
+ * @param {number} [digit]  CSS pixels across, of a digit at most
+ */
+export function tickUnder(view, step, reach, digit = 7) {
+	const { major } = tickSteps(view);
+	const tick = Math.round(step / major) * major;
+	if (tick < view.first || tick > view.last) return null;
+	const half = (String(tick).length * digit) / 2;
+	// At both ends of the axis a number moves inward.
+	const middle = Math.max(half, Math.min(view.width - half, xOf(tick, view)));
+	const plate = Math.max(reach, xOf(step, view));
+	return Math.abs(middle - plate) < reach + half ? tick : null;
 }
 
 /** Seconds with two decimals. @param {number} step @param {number} fps */

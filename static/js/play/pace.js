@@ -10,7 +10,8 @@ const TOUCHED = 400;
 /**
  * Have a window's animation frames come no earlier than they may.
  * @param {Window} view
- * @param {(last: number) => number} after  when, from when the last one was; the page's clock
+ * @param {(last: number, cost: number) => number} after  when, from when the last one was (the page's
+ * clock) and how long it was until the browser was ready for another
  */
 export function pace(view, after) {
 	const ask = view.requestAnimationFrame.bind(view);
@@ -19,7 +20,7 @@ export function pace(view, after) {
 	const waiting = new Map();
 	/** What the browser calls those that have waited. @type {Map<number, number>} */
 	const asked = new Map();
-	let [last, touched, counted] = [0, -Infinity, 2 ** 31];
+	let [last, cost, touched, counted] = [0, 0, -Infinity, 2 ** 31];
 
 	for (const name of ["pointerdown", "pointermove", "wheel"])
 		view.addEventListener(
@@ -32,7 +33,7 @@ export function pace(view, after) {
 		);
 	view.requestAnimationFrame = (act) => {
 		const now = performance.now();
-		const rest = now - touched < TOUCHED ? 0 : after(last) - now;
+		const rest = now - touched < TOUCHED ? 0 : after(last, cost) - now;
 		if (rest <= 0) return ask(drawn(act));
 		const own = (counted += 1);
 		const then = () => {
@@ -51,7 +52,9 @@ export function pace(view, after) {
 	};
 	/** @param {FrameRequestCallback} act @returns {FrameRequestCallback} */
 	const drawn = (act) => (time) => {
-		last = performance.now();
+		const begun = (last = performance.now());
 		act(time);
+		// What was told to the graphics card is still to be drawn.
+		ask(() => (cost = performance.now() - begun));
 	};
 }

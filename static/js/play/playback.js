@@ -7,7 +7,7 @@
  */
 import { getJson } from "../state/api.js";
 import { createCache } from "./cache.js";
-import { advance, clampStep, playedRange, prefetchWindow, restOf3d } from "./clock.js";
+import { advance, clampStep, playedRange, prefetchWindow, restAfter3d, restOf3d } from "./clock.js";
 import { createPictures, mapNames, pictureName, standIn, PICTURE_BUDGET } from "./pictures.js";
 
 const RESULTS_KEPT = 600;
@@ -39,6 +39,8 @@ export function createPlayback(store, sendSeek) {
 	let lastSent = -1;
 	/** Since when, and for how long, the 3D view is left alone while it plays, milliseconds. */
 	let [sentAt, wait] = [0, 0];
+	/** So long it is left alone at least, since one of its frames held up the page, milliseconds. */
+	let least = 0;
 	/** Whether 3D is drawn without a graphics card, and when there was something new to see. */
 	let [slow, newsAt] = [false, -Infinity];
 	/** Around which step was read last, and since when that is.  */
@@ -177,7 +179,7 @@ export function createPlayback(store, sendSeek) {
 		// Until the new run comes to this step, the one before is faintly better than nothing.
 		const before = state.result;
 		if (computing && before?.computed && before.step === step && state.shown === step) {
-			return { ...frame, result: before, stale: true };
+			return { ...frame, result: before, stale: before.run !== state.run?.key };
 		}
 		return result || lost ? { ...frame, result: result ?? null, stale: false } : null;
 	}
@@ -217,7 +219,7 @@ export function createPlayback(store, sendSeek) {
 			}
 		}
 		// Where it is drawn without a graphics card, 3D takes the time of pictures and overlays.
-		if (state.step !== lastSent && (!state.playing || now - sentAt >= wait)) {
+		if (state.step !== lastSent && (!state.playing || now - sentAt >= Math.max(wait, least))) {
 			lastSent = state.step;
 			sentAt = now;
 			sendSeek(state.step);
@@ -255,10 +257,14 @@ export function createPlayback(store, sendSeek) {
 	});
 
 	return {
-		/** When the 3D view may draw again, having drawn at a time: the page's own clock, milliseconds. */
-		after3d(/** @type {number} */ last) {
+		/**
+		 * When the 3D view may draw again, having drawn at a time: the page's own clock, milliseconds.
+		 * @param {number} last @param {number} cost  of that, until the browser was ready for more
+		 */
+		after3d(last, cost) {
 			const { playing, step, shown } = store.get();
-			if (playing) return last + wait;
+			least = slow ? restAfter3d(cost) : 0;
+			if (playing) return last + Math.max(wait, least);
 			// Pictures that are waited for come first.
 			return slow ? Math.max(newsAt + LAST_3D, step === shown ? 0 : last + SLOW_3D) : 0;
 		},

@@ -9,6 +9,22 @@ import { request } from "../state/api.js";
 /** Of a PNG, pixels a CSS pixel. */
 const SHARP = 2;
 
+/**
+ * The part of a pane's height in which something is seen: its own, or that of the list that it
+ * scrolls in.
+ * @param {Element} part
+ * @param {Element} pane
+ */
+function opening(part, pane) {
+	let { top, bottom } = pane.getBoundingClientRect();
+	for (let owner = part.parentElement; owner && owner !== pane; owner = owner.parentElement) {
+		if (getComputedStyle(owner).overflowY === "visible") continue;
+		const box = owner.getBoundingClientRect();
+		[top, bottom] = [Math.max(top, box.top), Math.min(bottom, box.bottom)];
+	}
+	return { top, bottom };
+}
+
 /** @param {Element} pane @param {(canvas: HTMLCanvasElement) => string} drawn @returns {string} */
 function svgOf(pane, drawn) {
 	const { left, top, width, height } = pane.getBoundingClientRect();
@@ -25,11 +41,24 @@ function svgOf(pane, drawn) {
 	}
 	for (const part of all(".id, .ph, .ph b, .cam-tag, [aria-pressed=true]:not(.cam)", pane)) {
 		const box = part.getBoundingClientRect();
-		const inside = box.width && box.bottom <= top + height + 1;
-		if (part.checkVisibility() && inside)
+		const open = opening(part, pane);
+		const from = Math.max(box.top, open.top);
+		const high = Math.min(box.bottom, open.bottom) - from;
+		if (part.checkVisibility() && box.width && high > 0)
 			marks.push(
-				`<rect x="${box.left - left}" y="${box.top - top}" width="${box.width}" height="${box.height}" rx="2" fill="${getComputedStyle(part).backgroundColor}"/>`,
+				`<rect x="${box.left - left}" y="${from - top}" width="${box.width}" height="${high}" rx="2" fill="${getComputedStyle(part).backgroundColor}"/>`,
 			);
+	}
+	// What the curves look like, before their names.
+	for (const name of all(".lg", pane)) {
+		const sign = getComputedStyle(name, "::before");
+		if (sign.content === "none" || !name.checkVisibility()) continue;
+		const box = name.getBoundingClientRect();
+		const [x, y] = [box.left - left, box.top - top + box.height / 2];
+		const dash = sign.borderTopStyle === "dashed" ? ' stroke-dasharray="3 2"' : "";
+		marks.push(
+			`<path d="M${x} ${y}h${parseFloat(sign.width)}" stroke="${sign.borderTopColor}" stroke-width="${parseFloat(sign.borderTopWidth)}"${dash}/>`,
+		);
 	}
 	const texts = document.createTreeWalker(pane, NodeFilter.SHOW_TEXT);
 	const range = document.createRange();
@@ -37,9 +66,9 @@ function svgOf(pane, drawn) {
 		const owner = node.parentElement;
 		range.selectNodeContents(node);
 		const box = range.getBoundingClientRect();
-		const inside = box.right <= left + width && box.bottom <= top + height && box.top >= top;
-		if (!owner?.checkVisibility() || box.width < 2 || !inside || owner.closest("option, .vh"))
-			continue;
+		if (!owner?.checkVisibility() || box.width < 2 || box.right > left + width) continue;
+		const [open, middle] = [opening(owner, pane), box.top + box.height / 2];
+		if (middle < open.top || middle > open.bottom || owner.closest("option, .vh")) continue;
 		const { color, fontSize, fontWeight, fontFamily } = getComputedStyle(owner);
 		const words = (node.textContent ?? "").replace(/\s+/g, " ");
 		marks.push(

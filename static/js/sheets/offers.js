@@ -33,8 +33,11 @@ export function offersOf(state, actions, edit) {
 		...own,
 		...(schema?.parameters ?? [])
 			.filter(({ key }) => shown.has(key))
+			// Of two of one name the one that the panel shows first is meant.
+			.toSorted((a, b) => Number(b.essential) - Number(a.essential))
 			.map((parameter) => ({
 				title: `${parameter.label} ${parameter.symbol} · ${parameter.group.replace("_", " ")} = ${server?.parameters[parameter.key]}`,
+				symbol: parameter.symbol,
 				keys: [],
 				run: () => edit(parameter),
 			})),

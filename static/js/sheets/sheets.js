@@ -1,7 +1,14 @@
 /** The two dialogs made from the registry of commands: help with its keys, and the palette. */
 import { COMMANDS, keyLabel, perform, search } from "../state/commands.js";
-import { all, fill, h, parts } from "../elements/dom.js";
+import { all, fill, h, parts, symbolOf } from "../elements/dom.js";
 import { matching, offersOf, rangeOf, valueOf } from "./offers.js";
+
+/** What a row of the palette says. @param {Offer} offer */
+function worded({ title, symbol }) {
+	if (!symbol) return [title];
+	const at = title.indexOf(symbol);
+	return [title.slice(0, at), symbolOf(symbol), title.slice(at + symbol.length)];
+}
 
 /** @param {string[]} keys */
 const signs = (keys) => keys.map((key) => h("kbd", {}, keyLabel(key)));
@@ -117,8 +124,7 @@ export function mountSheets({ store, actions }) {
 					onclick: () => run(one),
 					onpointermove: () => index !== at && choose(index),
 				},
-				one.title,
-				h("span", { class: "grow" }),
+				h("span", { class: "grow" }, ...worded(one)),
 				signs(one.keys),
 			);
 		const none = naming
@@ -169,6 +175,7 @@ export function mountSheets({ store, actions }) {
 		palette.showModal();
 		offer();
 	};
-	// Asked for before there was anything to offer.
+	// Asked for before there was anything to offer, and perhaps answered.
 	if (palette.open) offer();
+	if (palette.open && "hasty" in palette.dataset && found.length) run(found[0]);
 }

@@ -46,6 +46,8 @@ export function createActions({ store, seek, send, receive }) {
 	const [past, future] = [[], []];
 	let rememberedAt = -Infinity;
 	let [undoing, turn] = [0, Promise.resolve()];
+	/** Until the server has heard of all layers that were switched. */
+	let switching = Promise.resolve();
 	/** Layers that were on in pictures and off in 3D, or the other way round, before their key. */
 	/** @type {Record<string, (boolean | undefined)[]>} */
 	const mixed = {};
@@ -201,9 +203,16 @@ export function createActions({ store, seek, send, receive }) {
 			store.set({ layers2d: { ...layers2d, [layer]: !layers2d[layer] } });
 		},
 		toggleLayer3d(layer) {
-			const layers3d = { ...store.get().layers3d, [layer]: !store.get().layers3d[layer] };
-			store.set({ layers3d });
-			void actions.ask("PATCH", "layers", { changes: { [layer]: layers3d[layer] } });
+			const { wished3d, layers3d } = store.get();
+			const on = !layers3d[layer];
+			const wished = { ...wished3d, [layer]: on };
+			store.set({ wished3d: wished, layers3d: { ...layers3d, [layer]: on } });
+			// One after the other: the last word counts.
+			switching = switching.then(async () => {
+				await actions.ask("PATCH", "layers", { changes: { [layer]: on } });
+				const { wished3d: now, server } = store.get();
+				if (now === wished) store.set({ wished3d: {}, layers3d: server?.layers ?? {} });
+			});
 		},
 
 		// runs and parameters

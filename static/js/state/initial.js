@@ -65,6 +65,7 @@ export function initialState() {
 		listed: "all",
 		bookmarks: [],
 		layers3d: {},
+		wished3d: {},
 		plots: [],
 		layouts: {},
 		large: null,

@@ -80,7 +80,9 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 				fps: sequence?.fps ?? 25,
 				cameras: sequence?.cameras ?? [],
 			});
-		store.set({ server, run: server.run, layers3d: server.layers });
+		// Another's news may come before the answer to what was just switched here.
+		const layers3d = { ...server.layers, ...store.get().wished3d };
+		store.set({ server, run: server.run, layers3d });
 		// The first word on the theme is this browser's, later ones are everybody's.
 		if (before) store.set({ theme: server.theme });
 		else if (server.theme !== store.get().theme)

@@ -6,7 +6,7 @@ import { lockedParts } from "./locked.js";
 import { objectiveCards } from "./objective.js";
 import { parameterRanges, rangeOf } from "./ranges.js";
 import { placeOf, runsOn } from "./where.js";
-import { nameOf, symbolOf, valueOf } from "./words.js";
+import { nameOf, valueOf } from "./words.js";
 
 /** @import { Range } from "./ranges.js" */
 /**

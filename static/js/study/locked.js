@@ -1,7 +1,7 @@
 /** What a study that is there tries: it cannot change. */
-import { h } from "../elements/dom.js";
+import { h, symbolOf } from "../elements/dom.js";
 import { SEARCHES, rangesBlock, tag } from "./fields.js";
-import { nameOf, symbolOf, valueOf } from "./words.js";
+import { nameOf, valueOf } from "./words.js";
 
 /** @param {Server.Study} study */
 export function lockedParts(study) {

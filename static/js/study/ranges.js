@@ -1,7 +1,7 @@
 /** How far each parameter is varied. */
-import { choices, h, icon } from "../elements/dom.js";
+import { choices, h, icon, symbolOf } from "../elements/dom.js";
 import { numberField, rangesBlock } from "./fields.js";
-import { symbolOf, valueOf } from "./words.js";
+import { valueOf } from "./words.js";
 
 /** @import { Wish } from "./form.js" */
 /** @typedef {{low: number | null, high: number | null, log: boolean, choices: any[] | null}} Range */

@@ -3,7 +3,7 @@ import { choices, fill, h, icon, write } from "../elements/dom.js";
 import { getJson } from "../state/api.js";
 import { bestTrials } from "./best.js";
 import { definition } from "./form.js";
-import { overview } from "./overview.js";
+import { overview } from "./figures/overview.js";
 import { progressPane } from "./progress.js";
 import { lasting, lineOf } from "./words.js";
 import { placeOf } from "./where.js";

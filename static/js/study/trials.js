@@ -1,6 +1,6 @@
 /** The table of trials, best first: what the figures show, in numbers. */
-import { fill, h } from "../elements/dom.js";
-import { differenceOf, figureOf, symbolOf, titledOf, valueOf } from "./words.js";
+import { fill, h, symbolOf } from "../elements/dom.js";
+import { differenceOf, figureOf, titledOf, valueOf } from "./words.js";
 
 /** Rows that are shown; the export has all. */
 const MOST_ROWS = 200;

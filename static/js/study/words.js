@@ -1,5 +1,5 @@
 /** How a study words things. Touches no page. */
-import { many, partsOf } from "../library/words.js";
+import { many } from "../library/words.js";
 import { h, show } from "../elements/dom.js";
 
 /** How long something takes. @param {number | null} seconds */
@@ -14,12 +14,6 @@ export function lasting(seconds) {
 
 /** A recording by the last part of its path. @param {string} place */
 export const nameOf = (place) => place.split(/[\\/]/).filter(Boolean).at(-1) ?? place;
-
-/** A symbol with its index set low. @param {string} symbol */
-export function symbolOf(symbol) {
-	const [letter, index] = partsOf(symbol);
-	return h("span", { class: "sym" }, letter, index ? h("sub", {}, index) : null);
-}
 
 /** A value of a parameter, as short as it stays readable. @param {any} value */
 export const valueOf = (value) =>

@@ -1,5 +1,5 @@
 /** The timeline: one axis for range bar, ruler, lanes and strips, and one playhead over them. */
-import { bucketOf, panned, secondsOf, stepAt, xOf, zoomed } from "../play/clock.js";
+import { bucketOf, panned, secondsOf, stepAt, tickUnder, xOf, zoomed } from "../play/clock.js";
 import { fill, h, idTag, parts, write } from "../elements/dom.js";
 import { hatch, prepare } from "../draw/canvas.js";
 import { drawLanes, drawRange, drawRuler } from "../draw/lanes.js";
@@ -8,6 +8,9 @@ import { isAlone, ordered, resultOf, scoresOf, trueCount } from "../state/events
 import { faded, palette } from "../draw/colours.js";
 import { shownDone } from "../play/playback.js";
 import { mountTransport } from "./transport.js";
+
+/** CSS pixels from the playhead to the edge of its plate, and of the rim around that. */
+const PLATE = 20;
 
 /**
  * @param {HTMLElement} root
@@ -52,6 +55,8 @@ export function mountTimeline(root, context) {
 	let view = { first: 0, last: 1, width: 1 };
 	let asked = false;
 	let spoken = 0;
+	/** The tick whose number the playhead would cut. @type {number | null} */
+	let numberUnder = null;
 	/** @type {TimelineSeam} */
 	const seam = {
 		plot,
@@ -176,7 +181,7 @@ export function mountTimeline(root, context) {
 		});
 		seam.marks?.(check, lanesRow, { tracks: shownTracks(), scroll: lanes.scrollTop });
 		drawRange(over, playback.loadedSteps(), done, frames);
-		drawRuler(ruler, range, store.get().bookmarks);
+		drawRuler(ruler, range, store.get().bookmarks, numberUnder);
 		// Each plot has its row, whether there is something to plot or not.
 		const scores = scoresOf(store.get());
 		if (!braided.hidden && scores)
@@ -200,7 +205,7 @@ export function mountTimeline(root, context) {
 		}
 	}
 
-	/** The playhead moves by transform alone; nothing is drawn again while it plays. */
+	/** The playhead moves by transform alone; what is under it is drawn again where it cuts a number. */
 	function placeHead() {
 		const { shown, step, sequence, frames, fps, playing } = store.get();
 		const result = resultOf(store.get());
@@ -210,6 +215,11 @@ export function mountTimeline(root, context) {
 		head.style.transform = `translateX(${Math.round(x)}px)`;
 		write(readout, String(at));
 		readout.style.marginLeft = `${Math.max(0, 17 - x)}px`;
+		const under = head.hidden ? null : tickUnder(view, at, PLATE);
+		if (under !== numberUnder) {
+			numberUnder = under;
+			draw();
+		}
 		wanted.hidden = step === shown || Math.abs(xOf(step, view) - x) < 2;
 		wanted.style.transform = `translateX(${Math.round(xOf(step, view))}px)`;
 		if (seekBar.valueAsNumber !== step) seekBar.value = String(step);

@@ -33,7 +33,13 @@ type Lens = { k: number; left: number; top: number };
 type Bookmark = { step: number; note: string };
 
 /** A line of the palette. */
-type Offer = { title: string; keys: string[]; run: () => void };
+type Offer = {
+	title: string;
+	/** In the title, and set as in formulas where it is read. */
+	symbol?: string;
+	keys: string[];
+	run: () => void;
+};
 
 type ApiFailure = { code: string; detail: string; hint?: string | null };
 
@@ -107,6 +113,8 @@ interface PageState {
 	follow: boolean;
 	layers2d: Record<string, boolean>;
 	layers3d: Record<string, boolean>;
+	/** Layers in 3D that were switched here and that the server has not confirmed. */
+	wished3d: Record<string, boolean>;
 	/** Whether steps are left out where painting is slower than the clock. */
 	realTime: boolean;
 	/** Whether the nearest picture stands for one that is missing. */

@@ -472,6 +472,8 @@ declare namespace Server {
 		received: number;
 		bytes: number;
 		files: ImportedFile[];
+		/** Files that were announced and are not yet understood, the first of them. */
+		coming: string[];
 		/** Labels of pictures and boxes that a camera may be given. */
 		offered: string[];
 		/** Whether the files were sent by a page. */

@@ -18,6 +18,7 @@ from app.command.flags import Track, parse
 from tests.app.conftest import Runs
 from tests.app.folders import write_crossing
 from tracker import export, parameters, pipeline
+from tracker.kernels import compilation
 from tracker.parameters import PARAMETERS, ParameterError
 from tracker.pipeline import Run
 from tracker.sequences.reader import read_sequence
@@ -73,18 +74,18 @@ def test_methods_and_presets(run: Runs, crossing: Path, tmp_path: Path) -> None:
     assert out.read_text(encoding="utf-8") == engine_csv(crossing, tmp_path / "own.csv", changes)
 
 
+@pytest.mark.full
 def test_stage_1_is_kept_for_the_next_run_unless_told_otherwise(
-    run: Runs, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Runs, data: Path, tmp_path: Path, own_cache: Path
 ) -> None:
-    monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(tmp_path / "cache"))
     out = tmp_path / "tracks.csv"
     line = ("track", data / "numbers", "-o", out, "--colour-phd.samples", "60")
     status, _, stderr = run(*line, "--no-cache")
     assert status == 0
-    assert not (tmp_path / "cache" / "stages").exists()
+    assert not (own_cache / "stages").exists()
     first = out.read_text(encoding="utf-8")
     assert "was kept" not in run(*line)[2]
-    assert len(list((tmp_path / "cache" / "stages").rglob("*.npz"))) == 1
+    assert len(list((own_cache / "stages").rglob("*.npz"))) == 1
     out.unlink()
     status, _, stderr = run(*line)
     assert (status, "stage 1 was kept from an earlier run" in stderr) == (0, True)
@@ -184,7 +185,11 @@ def test_wrong_usage(run: Runs, arguments: list[str]) -> None:
     assert run(*arguments)[0] == 2
 
 
-def test_a_failure_is_one_line(run: Runs, crossing: Path, tmp_path: Path) -> None:
+@pytest.mark.full
+def test_a_failure_is_one_line(
+    run: Runs, crossing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compilation, "is_compiled", lambda: True)  # else that is told as well
     broken = write_crossing(tmp_path / "broken", 5)
     (broken / "right.csv").write_text("frame,left,top\n0,1,2\n")
     out = tmp_path / "x.csv"
@@ -204,6 +209,7 @@ def test_a_failure_is_one_line(run: Runs, crossing: Path, tmp_path: Path) -> Non
         assert not out.exists()
 
 
+@pytest.mark.full
 def test_a_surprise_is_one_line_too_unless_asked(
     run: Runs, crossing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -345,6 +351,7 @@ def test_render_refuses_what_it_cannot_do(run: Runs, tmp_path: Path) -> None:
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.full
 def test_render_draws_a_room_by_its_seed(
     run: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -424,6 +431,7 @@ def test_whoever_has_read_enough_is_no_failure() -> None:
     assert done.stdout.startswith("key")
 
 
+@pytest.mark.full
 def test_whoever_reads_nothing_is_no_failure() -> None:
     # what is short waits in a buffer, and would only be missed at the interpreter's end
     buffered = {name: text for name, text in os.environ.items() if name != "PYTHONUNBUFFERED"}
@@ -437,3 +445,24 @@ def test_a_port_that_cannot_be_is_wrong_usage(run: Runs, port: str) -> None:
     status, stdout, stderr = run("serve", "--port", port)
     assert (status, stdout) == (2, "")
     assert f"--port: expected 0 (any that is free) to 65535, got {port}" in stderr
+
+
+@pytest.mark.parametrize(
+    ("line", "option", "values"),
+    [
+        (
+            ["track", "room", "-o", "a.csv"],
+            "set",
+            ("fusion.clutter_rate=2", "fusion.motion=random_walk"),
+        ),
+        (["batch", "room"], "set", ("fusion.clutter_rate=2", "fusion.motion=random_walk")),
+        (["tune", "room"], "set", ("fusion.clutter_rate=2", "fusion.motion=random_walk")),
+        (["study", "new", "study.toml"], "recording", ("one", "other")),
+    ],
+)
+def test_an_option_given_twice_loses_neither(
+    line: list[str], option: str, values: tuple[str, ...]
+) -> None:
+    given = [word for one in values for word in (f"--{option}", one)]
+    command: Any = parse([*line, *given])
+    assert getattr(getattr(command, "action", command), option) == values

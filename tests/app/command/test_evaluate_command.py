@@ -107,6 +107,7 @@ def test_wrong_usage(run: Runs, arguments: list[str]) -> None:
     assert run("evaluate", *arguments)[0] == 2
 
 
+@pytest.mark.full
 def test_without_a_track_file_it_says_how_far_other_looks_agree(run: Runs, crossing: Path) -> None:
     status, stdout, stderr = run("evaluate", crossing, "--json")
     assert status == 0

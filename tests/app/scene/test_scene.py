@@ -163,7 +163,8 @@ def test_a_step_is_drawn_as_the_run_has_it(server: viser.ViserServer) -> None:
     assert drawn["/people/truth"].visible
     posterior = shown.fused[30].posterior
     ball = drawn["/people/ellipsoids"]
-    np.testing.assert_allclose(ball.batched_positions, posterior.means, rtol=1e-6)
+    middle = (of.room.minimum + of.room.maximum) / 2.0
+    np.testing.assert_allclose(ball.batched_positions + middle, posterior.means, atol=1e-6)
     assert (np.diff(ball.batched_opacities[1:3]) < 0.0).all()
     # the drawn surface is the one of the whole covariance
     turn = tf.SO3(np.asarray(ball.batched_wxyzs[0], dtype=float)).as_matrix()
@@ -220,8 +221,36 @@ def test_what_takes_the_clicks_on_a_person_hides_nothing(server: viser.ViserServ
         assert material["alphaMode"] == "BLEND"
         assert material["pbrMetallicRoughness"]["baseColorFactor"][3] == 0.0
         assert nodes(server)["/people/ellipsoids"].visible
-    # the bodies write depth around their ellipsoids: behind these alone
+    # bodies write no depth either, as long as their backs alone are drawn
     assert nodes(server)["/people/figures"].side == "back"
+    view.close()
+
+
+def test_the_client_makes_bodies_once_and_draws_their_ellipsoids_after_them(
+    server: viser.ViserServer,
+) -> None:
+    of = scene_case.sequence()
+    workbench = scene_case.opened(of, scene_case.run(of))
+    view = Scene(server, workbench)
+    drawn = nodes(server)
+    faint = set()
+    once = ("figures", "selected_figure", "feet", "selected_feet")
+    for step, selected in ((10, None), (30, None), (31, 2), (32, 2)):
+        workbench.seek(step)
+        workbench.select(selected)
+        assert view.wait(SECONDS)
+        # other opacities make the client's copies new, and what is newer is drawn later
+        for name in (*(f"/people/{name}" for name in once), "/room/entrances", "/room/ground"):
+            assert drawn[name].batched_opacities is None
+        assert drawn["/people/selected_figure"].visible == (selected is not None)
+        shades = drawn["/people/ellipsoids"].batched_opacities
+        np.testing.assert_allclose(shades * 20.0, np.rint(shades * 20.0), atol=1e-5)
+        faint.add(shades.min())
+    assert min(faint) > 0.0
+    # of nodes at one place the older is drawn first
+    np.testing.assert_array_equal(
+        drawn["/people/figures"].position, drawn["/people/ellipsoids"].position
+    )
     view.close()
 
 
@@ -273,7 +302,8 @@ def test_a_person_stands_on_the_floor_in_the_colour_of_the_label(
     now = shown.tracks.at(30)
     body = nodes(server)["/people/figures"]
     top = shown.tracks.positions[now][:, 2] + scene_case.HALF[2]
-    np.testing.assert_allclose(body.batched_positions[:, 2], scene_case.ROOM.minimum[2])
+    low = body.batched_positions[:, 2] + body.position[2]
+    np.testing.assert_allclose(low, scene_case.ROOM.minimum[2], atol=1e-6)
     np.testing.assert_allclose(body.batched_scales[:, 2], top, rtol=1e-6)
     discs = nodes(server)["/labels/people_discs"]
     expected = linear(PALETTES["dark"].of(shown.tracks.ids[now]))

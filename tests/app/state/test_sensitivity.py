@@ -118,6 +118,8 @@ def test_what_is_no_parameter_is_refused(curves: Sensitivity) -> None:
 def test_the_panel_says_it_in_words_and_draws_it() -> None:
     curve = Curve(P_D, "MOTA", (0.2, 0.5, 0.95), (0.913, None, 0.978), whole=True)
     assert words_of(curve) == "0.2 … 0.95: MOTA 0.91 … 0.98"
+    falling = Curve(P_D, "MOTA", (0.2, 0.5, 0.95), (0.95, 0.978, 0.913), whole=True)
+    assert words_of(falling) == "0.2 … 0.95: MOTA 0.98 … 0.91"
     assert drawing_of(curve, 0.95).count("<circle") == 1
     style = style_of([(curve, 0.95, ["x"])])
     assert 'label[for="x"]' in style

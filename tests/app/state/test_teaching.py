@@ -19,7 +19,6 @@ from app.web.views import results
 from tests.app.conftest import ADDRESS, connect, run_is, wait_until
 from tests.browser.walkers import write_walkers
 from tracker import pipeline
-from tracker.kernels.compilation import kernel_folder
 from tracker.sequences.reader import FILE, read_sequence
 
 BOX = {"camera": "cam1", "step": 5, "left": 40, "top": 30, "width": 24, "height": 48}
@@ -197,6 +196,7 @@ def test_entrances_are_suggested_by_the_tracks(client: TestClient) -> None:
     assert "teach/entrances/suggested" in client.get("/api/tables/teach").text
 
 
+@pytest.mark.full
 def test_saving_keeps_a_backup_and_reopens_to_the_same_run(
     client: TestClient, walkers: Path
 ) -> None:
@@ -280,11 +280,9 @@ def test_what_is_not_saved_is_there_again_after_another_sequence(
 
 
 def test_what_is_not_saved_outlives_the_server(
-    walkers: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    walkers: Path, tmp_path: Path, own_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MULTIVIEW_PHD_SETTINGS", str(tmp_path / "settings"))
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(kernel_folder()))  # they are the machine's
-    monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(tmp_path / "cache"))
     settings = Settings(sequence=str(walkers), with_viser=False, keep_on_disk=True)
 
     @contextmanager

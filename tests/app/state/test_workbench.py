@@ -9,6 +9,7 @@ import pytest
 
 from app.state.snapshot import LAYERS, Change, Command, Event, Notice, clamp
 from app.state.workbench import Workbench
+from app.state.workers.jobs import silence
 from tracker import pipeline
 from tracker.parameters import PARAMETERS, PRESETS, ParameterError, value
 from tracker.pipeline import Progress, Run
@@ -204,6 +205,18 @@ def test_news_of_a_superseded_run_are_dropped(bench: Workbench) -> None:
     assert now.run is None
     assert now.run_state.state == "computing"
     assert now.run_state.key == new.key
+
+
+def test_a_run_that_is_silent_has_no_speed_and_says_what_it_does(bench: Workbench) -> None:
+    run = run_of(bench)
+    bench.run_begins(run.key)
+    bench.run_progresses(run, progress(60))
+    assert bench.snapshot().run_state.steps_per_second > 0.0
+    for done, words in ((60, "no new step for 7 s"), (120, "hindsight for 7 s")):
+        bench.run_progresses(run, progress(done))
+        bench.run_waits(run.key, silence(bench.snapshot().run_state, 7.2))
+        state = bench.snapshot().run_state
+        assert (state.message, state.steps_per_second, state.seconds_left) == (words, 0.0, None)
 
 
 def test_a_failure_shows_the_last_good_run_again(bench: Workbench) -> None:

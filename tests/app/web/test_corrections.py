@@ -215,6 +215,49 @@ def test_how_it_would_be_is_shown_until_it_is_no_more(
     assert desk.app.state.workbench.snapshot().ghosts is None  # type: ignore[attr-defined]
 
 
+def test_what_is_answered_of_the_run_before_counts_in_the_one_that_came_meanwhile(
+    desk: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lanes = Lanes(desk.app.state.workbench.snapshot().run.tracks)  # type: ignore[attr-defined]
+    track = tracks(desk)[0]["id"]
+    places = (lanes.place(track, 59), lanes.place(track, 60, after=True))
+    now = Alternative("as it is", 0.5, unsaid("same", places))
+    two = Alternative("two people", 0.5, unsaid("different", places))
+    made = Doubt(
+        "cut", "two people?", "told", 59, 60, (track,), places, 0.5, 60, (now, two)
+    )  # fmt: skip
+    queues = iter([Queue((made,), 0, "a test")])
+    nothing = Queue((), 0, "a test")
+    monkeypatch.setattr("app.state.doubting.queue", lambda run, corrections: next(queues, nothing))
+    desk.patch("/api/parameters", json={"changes": {"fusion.survival_probability": 0.97}})
+    settled(desk)
+    (shown,) = desk.get(f"{PLACE}/queue").json()["doubts"]
+    desk.patch("/api/parameters", json={"changes": {"fusion.survival_probability": 0.98}})
+    settled(desk)
+    assert desk.get(f"{PLACE}/queue").json()["doubts"] == []
+    assert desk.get(f"{PLACE}/queue/{shown['id']}/1").status_code == 404, "of other tracks"
+    answer = desk.post(f"{PLACE}/answers", json={"doubt": shown["id"], "alternative": 1})
+    assert answer.status_code == 200, answer.text
+    assert [one["kind"] for one in settled(desk)["corrections"]] == ["different"]
+
+
+def test_what_is_checked_leaves_the_queue_though_the_run_stays_the_same(
+    desk: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tracker.doubts.ranking.LEAST", 0.0)
+    monkeypatch.setattr("tracker.doubts.meetings._CLOSE", 8.0)
+    desk.patch("/api/parameters", json={"changes": {"fusion.survival_probability": 0.97}})
+    settled(desk)
+    first, last = 0, desk.app.state.workbench.snapshot().sequence.frames - 1  # type: ignore[attr-defined]
+    assert desk.get(f"{PLACE}/queue").json()["doubts"] != []
+    wish = {"kind": "checked", "first": first, "last": last}
+    (told,) = desk.post(PLACE, json={"corrections": [wish]}).json()["corrections"]
+    assert told["met"] is True
+    assert desk.get(f"{PLACE}/queue").json()["doubts"] == []
+    desk.post(f"{PLACE}/undo")
+    assert desk.get(f"{PLACE}/queue").json()["doubts"] != []
+
+
 def test_a_name_that_is_dropped_is_gone_before_the_run_is_another(desk: TestClient) -> None:
     wish = {"kind": "name", "tracks": [tracks(desk)[0]["id"]], "name": "Anna", "step": 30}
     desk.post(PLACE, json={"corrections": [wish]})

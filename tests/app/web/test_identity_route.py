@@ -17,6 +17,7 @@ from tracker.sequences.library import open_sequence
 from tracker.without_truth import Estimate
 
 
+@pytest.mark.full
 def test_a_finished_run_is_looked_at_in_other_ways(client: TestClient) -> None:
     assert "Check identities" in client.get("/api/tables/compare").text
     begun = client.post("/api/identity").json()

@@ -9,6 +9,8 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
@@ -16,6 +18,8 @@ from app.web.importing.models import ImportInfo
 from app.web.importing.sheet.draft import draft_sheet
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
+from tests.engine.pictures.shaken import SIZE as SHAKEN_SIZE
+from tests.engine.pictures.shaken import shaken
 from tests.formats.recorded import PLACES, detections, settled_of, toml, videos
 from tracker.importing import bringing
 from tracker.importing.writing import write
@@ -151,6 +155,25 @@ def test_pictures_of_cameras_are_shown(client: TestClient, tmp_path: Path) -> No
     names = {one["name"]: one for one in info["checks"]}
     assert "only lenses, places of the cameras and motion" in names["boxes meet in 3D"]["sentence"]
     assert {"lenses", "cameras above the floor", "views overlap"} <= set(names)
+    assert names["cameras hold still"]["status"] == "good"
+
+
+def test_a_camera_that_shakes_is_named(client: TestClient, tmp_path: Path) -> None:
+    folder = tmp_path / "filmed"
+    folder.mkdir()
+    toml(folder, size=SHAKEN_SIZE)
+    pictures = shaken(np.random.default_rng(3), 2.0)
+    videos(folder, size=SHAKEN_SIZE, frames=len(pictures))
+    code = cv2.VideoWriter.fourcc(*"MJPG")
+    writer = cv2.VideoWriter(str(folder / "cam2.avi"), code, 20.0, SHAKEN_SIZE)
+    for picture in pictures:
+        writer.write(picture)
+    writer.release()
+    info = _settled(client, _send(client, folder))
+    found = [one for one in info["checks"] if one["name"] == "cameras hold still"]
+    assert [one["status"] for one in found] == ["warning"]
+    assert 'camera "cam2" shakes by' in found[0]["sentence"]
+    assert "Camera &quot;cam2&quot; shakes by" in info["sheet"]
 
 
 def test_a_folder_of_the_disk_is_not_copied(client: TestClient, files: Path, data: Path) -> None:
@@ -169,6 +192,7 @@ def test_a_folder_of_the_disk_is_not_copied(client: TestClient, files: Path, dat
     assert again == {"draft": None, "first": 0, "recording": str(data / "walk-2")}
 
 
+@pytest.mark.full
 def test_a_folder_that_is_still_being_copied_is_waited_for(
     client: TestClient, files: Path, data: Path
 ) -> None:

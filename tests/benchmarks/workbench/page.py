@@ -82,7 +82,7 @@ LANES = """async ([lanes, steps, runs]) => {
     drawLanes(pen(34, 40 * 14), { tracks, pinned: [], scroll: 0, laneHeight: 14, done: steps,
       selection: 3, hover: null, switches: [], decisions: [] });
     drawRange(pen(0, 14), [1, 2, 3], steps, steps);
-    drawRuler(pen(14, 20), [null, null]);
+    drawRuler(pen(14, 20), [null, null], [], null);
     times.push(performance.now() - begin);
   }
   canvas.remove();

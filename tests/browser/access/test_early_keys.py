@@ -61,6 +61,19 @@ def test_the_palette_takes_words_before_it_has_offers(held: Held) -> None:
     expect(page.get_by_role("option", name="dark").first).to_be_visible()
 
 
+@pytest.mark.parametrize("file", ["main", "later"])
+def test_enter_that_comes_before_the_offers_takes_the_first(held: Held, file: str) -> None:
+    page, release = held("", f"**/js/{file}.js")
+    if file == "later":
+        page.locator(".cam").first.wait_for()
+    page.keyboard.press("Control+k")
+    page.keyboard.type("cameras alone")
+    page.keyboard.press("Enter")
+    release()
+    expect(page.locator(".app")).to_have_attribute("data-max", "cams")
+    expect(page.get_by_role("dialog", name="Commands")).to_be_hidden()
+
+
 def test_somebody_is_placed_though_the_key_came_early(held: Held) -> None:
     page, release = held("#check", "**/js/main.js")
     page.keyboard.press("Shift+H")

@@ -89,11 +89,17 @@ def test_an_exchange_is_put_right_by_keys_alone(
         sign = page.get_by_role("link", name="Check").locator(".count")
         before = int(sign.inner_text())
         page.keyboard.press("v")  # how it would be
-        expect(
-            page.get_by_role("group", name="Shown").get_by_role("button").nth(1)
-        ).to_have_attribute("aria-pressed", "true")
+        would = page.get_by_role("group", name="Shown").get_by_role("button").nth(1)
+        expect(would).to_have_attribute("aria-pressed", "true")
         if screenshots:
             page.screenshot(path=screenshots / "check-would-be.png")
+        page.keyboard.press("v")
+        expect(would).to_have_attribute("aria-pressed", "false")
+        for _ in range(3):  # a key that is held repeats
+            page.keyboard.down("v")
+            expect(would).to_have_attribute("aria-pressed", "true")
+        page.keyboard.up("v")
+        expect(would).to_have_attribute("aria-pressed", "false")
         page.keyboard.press("Shift+X")
         expect(page.get_by_role("listbox", name="Corrections").get_by_role("option")).to_have_count(
             1
@@ -148,6 +154,31 @@ def test_who_is_right_is_confirmed_and_who_is_skipped_goes(check: Page, server: 
     if left:
         check.keyboard.press("Shift+K")
         until(check, lambda: places(check).count() < left, "what is skipped is gone")
+
+
+def test_who_is_there_all_the_time_is_joined_from_a_step_on(check: Page, server: Server) -> None:
+    check.locator(".lane").first.click()
+    check.keyboard.press("Shift+J")  # at a place that does not propose to join
+    menu = check.get_by_role("menu", name="Join")
+    expect(menu.get_by_role("menuitem")).to_have_count(1)
+    head = check.locator(".menu.corrects .menu-head")
+    expect(head).to_contain_text("nobody comes before step 0")
+    expect(head).to_contain_text(f"from step {readout(check)} on")
+    told = head.locator(".alone")
+    assert told.evaluate("one => one.scrollWidth <= one.clientWidth"), "the whole sentence is there"
+    menu.get_by_role("menuitem").first.click()
+    until(check, lambda: len(corrections(server)["corrections"]) == 1, "it is said")
+    assert corrections(server)["corrections"][0]["kind"] == "same"
+
+
+def test_a_place_that_a_run_no_longer_has_is_no_error(check: Page, server: Server) -> None:
+    places(check).first.click()
+    gone = {"code": "no_doubt", "title": "Not Found", "status": 404, "detail": "There is none."}
+    check.route("**/api/corrections/ghosts", lambda route: route.fulfill(status=404, json=gone))
+    check.keyboard.press("v")
+    expect(check.get_by_text("This place has changed")).to_be_visible()
+    expect(check.get_by_text("There is none.")).to_have_count(0)
+    check.unroute("**/api/corrections/ghosts")
 
 
 def test_the_menu_of_a_lane_works_in_tune_too(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -164,7 +165,9 @@ def test_the_palette_sets_a_parameter_and_goes_to_a_track(flat_page: Page, serve
     as_at_first(server)
     page.keyboard.press("Control+k")
     page.keyboard.type("detection probability fusion")
-    expect(page.locator("dialog[open] [role=option]").first).to_contain_text("p_D · fusion")
+    expect(page.locator("dialog[open] [role=option]").first).to_contain_text(
+        "Detection probability pD · fusion"
+    )
     page.keyboard.press("Enter")
     page.keyboard.type("7")
     expect(page.locator("dialog[open] [role=listbox]")).to_contain_text("… 1")
@@ -215,6 +218,29 @@ def test_a_pane_is_kept_as_it_is_drawn(flat_page: Page, server: Server, tmp_path
     boxes = [track for camera in told for track in camera["tracks"] if track["visible"]]
     labels = [text.text for text in cameras.findall(".//svg//text", spaces)]
     assert sorted(labels) == sorted(str(track["id"]) for track in boxes)
+    drawn = ElementTree.parse(keep("timeline as svg")).getroot()
+    kinds = ("truth", "location", "number")
+    signs = [
+        page.locator(f".lg.{kind}").first.evaluate(
+            "name => getComputedStyle(name, '::before').borderTopColor"
+        )
+        for kind in kinds
+    ]
+    strokes = [path.get("stroke") for path in drawn.findall("{http://www.w3.org/2000/svg}path")]
+    assert all(sign in strokes for sign in signs)
+    # of lanes that scroll, those that are seen
+    lanes = page.locator(".lanes")
+    own = [str(track["id"]) for track in server.get("/api/timeline").json()["tracks"]]
+
+    def ids() -> Counter[str | None]:
+        root = ElementTree.parse(keep("timeline as svg")).getroot()
+        words = root.findall("{http://www.w3.org/2000/svg}text")
+        return Counter(word.text for word in words if word.text in own)
+
+    whole = ids()
+    lanes.evaluate("all => (all.style.height = all.children[0].offsetHeight + 'px')")
+    assert whole - ids() == Counter(page.locator(".lane .id").all_inner_texts()[1:])
+    lanes.evaluate("all => (all.style.height = '')")
     timeline = cv2.imread(str(keep("timeline as png")))
     assert timeline is not None
     box = page.locator(".time").bounding_box()

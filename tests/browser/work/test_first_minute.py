@@ -47,6 +47,26 @@ def test_undo_is_offered_only_where_there_is_something_to_undo(
     as_at_first(server)
 
 
+def test_a_note_under_the_pointer_stays_while_a_run_goes_on(
+    flat_page: Page, server: Server
+) -> None:
+    page = flat_page
+    as_at_first(server)
+    page.evaluate("localStorage.removeItem('page')")
+    page.add_init_script("localStorage.page = '{}'")
+    page.reload()
+    close = page.locator(".note", has_text="graphics card").get_by_role("button", name="Dismiss")
+    close.evaluate("button => (button.isTheOne = true)")
+    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
+    expect(page.locator("#tab-changes .count")).to_have_text("1")
+    server.wait_for_run()
+    expect(page.locator(".status")).to_contain_text("smoothed")
+    assert close.evaluate("button => button.isTheOne")
+    close.click()
+    expect(close).to_have_count(0)
+    as_at_first(server)
+
+
 def test_who_did_not_open_the_other_recording_is_told_with_the_way_back(
     flat_page: Page, server: Server, tmp_path: Path
 ) -> None:

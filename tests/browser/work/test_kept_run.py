@@ -38,7 +38,8 @@ def page(browser: Browser, server: Server) -> Iterator[Page]:
         yield page
 
 
-def test_a_kept_run_is_painted_at_once(page: Page, server: Server) -> None:
+def test_a_kept_run_is_painted_at_once(flat_page: Page, server: Server) -> None:
+    page = flat_page
     page.get_by_role("link", name="Library").click()
     expect(page.locator("tr[data-run]")).to_have_count(2)
     page.locator('tr[data-run="1"]').click()

@@ -43,7 +43,6 @@ def test_pictures_overlays_readout_and_3d_show_the_same_step(page: Page, server:
     until(page, lambda: numbers_in_pictures(page) == [FRAMES - 1] * 2, "its pictures")
 
 
-@pytest.mark.main_job
 def test_dragging_the_timeline_scrubs_everything(page: Page) -> None:
     scene = viser(page)
     clear_overlays(page)

@@ -78,7 +78,8 @@ def test_dropped_files_become_tracks(
     expect(sheet.locator("tbody tr")).to_have_count(4)
     expect(sheet.locator("tbody tr").first).to_contain_text("cam1.avi")
     expect(sheet.locator("tbody tr").first).to_contain_text("60 frames · 20 fps · 640 × 360")
-    expect(sheet).to_contain_text("session/notes.txt is not used")
+    expect(sheet.locator(".told")).to_contain_text("session/notes.txt is not used")
+    expect(sheet.locator(".told")).to_be_in_viewport()
     expect(sheet.get_by_role("group", name="Unit").locator("[aria-pressed=true]")).to_have_text(
         "cm"
     )
@@ -96,11 +97,35 @@ def test_dropped_files_become_tracks(
     assert (folder / "data/living room/files/session/cam1.avi").is_file()
 
 
+def test_four_cameras_fit_a_small_screen(page: Page, files: Path) -> None:
+    """Room, checks and target are seen whole, without scrolling, and nothing stands beside them."""
+    (files / "notes.txt").unlink()
+    page.set_viewport_size({"width": 1280, "height": 720})
+    drop(page, files)
+    settled(page)
+    beyond = page.evaluate(
+        """() => [...document.querySelectorAll("dialog.opener, dialog.opener *")]
+            .filter((e) => /auto|scroll|hidden/.test(getComputedStyle(e).overflowY))
+            .filter((e) => e.scrollHeight > e.clientHeight + 1 || e.scrollWidth > e.clientWidth + 1)
+            .map((e) => `${e.className}: ${e.innerText}`)"""
+    )
+    assert beyond == []
+    stray = page.evaluate(
+        """() => [...document.querySelector("dialog.opener").childNodes]
+            .map((node) => (node.nodeType === Node.TEXT_NODE ? node.data.trim() : ""))
+            .join("")"""
+    )
+    assert stray == ""
+    page.get_by_role("button", name="Cancel").click()
+    expect(page.locator("dialog.opener")).to_contain_text("Open a recording")
+
+
 @pytest.mark.data
 @pytest.mark.parametrize("name", ["pose2sim-multi", "wildtrack-60"])
 def test_folders_of_others_are_tracked_within_minutes(
-    page: Page, server: Server, foreign: Path, name: str
+    flat_page: Page, server: Server, foreign: Path, name: str
 ) -> None:
+    page = flat_page
     """From the drop to the last track, with what their makers give and nothing told."""
     begin = time.monotonic()
     drop(page, foreign / name)
@@ -118,7 +143,8 @@ def test_folders_of_others_are_tracked_within_minutes(
     assert server.get("/api/timeline").json()["tracks"]
 
 
-def test_what_is_changed_is_looked_into_again(page: Page, files: Path) -> None:
+def test_what_is_changed_is_looked_into_again(flat_page: Page, files: Path) -> None:
+    page = flat_page
     drop(page, files)
     settled(page)
     sheet = page.locator("dialog.opener")
@@ -128,6 +154,17 @@ def test_what_is_changed_is_looked_into_again(page: Page, files: Path) -> None:
     page.locator("h2", has_text="Import").click()
     page.keyboard.press("Control+z")
     expect(sheet.get_by_role("button", name="Apply --pose world-to-camera")).to_have_count(0)
+    settled(page)
+    sheet.get_by_role("group", name="Unit").get_by_role("button", name="mm").click()
+    sheet.get_by_role("button", name="Apply --unit cm").click()
+    expect(sheet.get_by_role("button", name="Apply --unit cm")).to_have_count(0)
+    sheet.get_by_label("Boxes", exact=True).select_option("xyxy")
+    first = sheet.locator("tbody tr").first
+    expect(first).to_contain_text("none of its boxes is left as they are read")
+    expect(sheet).to_contain_text("0 of 4 cameras ready, 4 things to decide")
+    first.get_by_role("button", name="As found").click()
+    expect(first).to_contain_text("boxes a step · table")
+    expect(first).to_contain_text("ready")
     settled(page)
     seated = sheet.locator(".choice", has_text="Seated")
     seated.click()
@@ -150,7 +187,8 @@ def test_what_is_changed_is_looked_into_again(page: Page, files: Path) -> None:
     expect(sheet).to_contain_text("Open a recording")
 
 
-def test_the_sheet_opens_what_is_there(page: Page, server: Server, folder: Path) -> None:
+def test_the_sheet_opens_what_is_there(flat_page: Page, server: Server, folder: Path) -> None:
+    page = flat_page
     page.keyboard.press("Control+o")
     sheet = page.locator("dialog.opener")
     own = sheet.locator(".rec", has_text="numbers")
@@ -168,12 +206,13 @@ def test_the_sheet_opens_what_is_there(page: Page, server: Server, folder: Path)
     expect(sheet).not_to_be_visible()
     server.wait(lambda now: now["sequence"]["opened_as"].endswith("others"))
     page.keyboard.press("Control+o")
-    expect(sheet).to_be_visible()
+    expect(sheet.get_by_label("Find by name")).to_have_value("")
     page.keyboard.press("Escape")
     expect(sheet).not_to_be_visible()
 
 
-def test_a_path_is_looked_into_by_enter(page: Page, files: Path, folder: Path) -> None:
+def test_a_path_is_looked_into_by_enter(flat_page: Page, files: Path, folder: Path) -> None:
+    page = flat_page
     shutil.copytree(files, folder / "data/by-path")
     page.keyboard.press("Control+o")
     page.locator("#open-path").fill("by-path")
@@ -184,11 +223,13 @@ def test_a_path_is_looked_into_by_enter(page: Page, files: Path, folder: Path) -
     page.get_by_role("button", name="Cancel").click()
 
 
-def test_an_upload_is_stopped_cleanly(page: Page, files: Path, folder: Path) -> None:
+def test_an_upload_is_stopped_cleanly(flat_page: Page, files: Path, folder: Path) -> None:
+    page = flat_page
     page.route("**/files/**", lambda route: None)  # nothing of it ever arrives
     drop(page, files)
     sheet = page.locator("dialog.opener")
     expect(sheet.get_by_role("progressbar", name="Upload")).to_be_visible()
+    expect(sheet.locator(".in-files")).to_contain_text("session/cam1.avi")
     sheet.get_by_role("button", name="Stop").click()
     expect(sheet).to_contain_text("Open a recording")
     assert not list((folder / "data").glob(".import-*"))
@@ -209,7 +250,8 @@ def test_a_foreign_recording_is_dropped_and_tracked(
     assert server.wait_for_run()["run"]["done"] == 100
 
 
-def test_nothing_serious_stands_in_the_way_of_anybody(page: Page, files: Path) -> None:
+def test_nothing_serious_stands_in_the_way_of_anybody(flat_page: Page, files: Path) -> None:
+    page = flat_page
     page.emulate_media(reduced_motion="reduce")  # colours are judged when they have come to rest
     page.keyboard.press("Control+o")
     expect(page.locator(".rec").first).to_be_visible()

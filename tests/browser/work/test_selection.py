@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from tests.browser.looking import as_at_first, ask, readout, shown_in_3d, until, until_still, viser
 from tests.browser.serving import Server
@@ -71,8 +71,11 @@ def box_of(server: Server, track: int, camera: int) -> list[float]:
 
 @pytest.mark.parametrize("choose", [by_row, by_lane, by_plot, by_picture, by_3d])
 def test_a_selection_reaches_every_view(
-    page: Page, server: Server, choose: Callable[[Page, Server, int], None]
+    request: pytest.FixtureRequest, server: Server, choose: Callable[[Page, Server, int], None]
 ) -> None:
+    # the others come the same way as that of a picture
+    with_3d = choose in (by_picture, by_3d)
+    page: Page = request.getfixturevalue("page" if with_3d else "flat_page")
     as_at_first(server)
     ask(server, "POST", "seek", {"step": STEP})
     until(page, lambda: readout(page) == str(STEP), "both people are there")
@@ -103,6 +106,36 @@ def test_a_selection_reaches_every_view(
     server.wait(lambda state: state["selection"] is None)
     expect(page.locator("#panel-tracks tr[aria-selected=true]")).to_have_count(0)
     expect(page.locator(".lane[aria-pressed=true]")).to_have_count(0)
+
+
+def test_others_stay_away_whatever_is_told_before_the_answer(
+    flat_page: Page, server: Server
+) -> None:
+    page = flat_page
+    as_at_first(server)
+    ask(server, "PATCH", "trail", {"seconds": 4})
+    ask(server, "POST", "seek", {"step": STEP})
+    until(page, lambda: readout(page) == str(STEP), "both people are there")
+    by_lane(page, server, 1)
+    server.wait(lambda state: state["selection"] == 1)
+    kept: list[Route] = []
+    page.route("**/api/layers", lambda route: kept.append(route))
+    page.keyboard.press("f")
+    until(page, lambda: len(kept) == 1, "the server is asked")
+    expect(page.locator(".lane")).to_have_count(1)
+    ask(server, "PATCH", "trail", {"seconds": 15})  # news of something else
+    expect(page.get_by_label("Length of the trails")).to_have_value("15")
+    expect(page.locator(".lane")).to_have_count(1)
+    page.keyboard.press("f")
+    expect(page.locator(".lane")).to_have_count(2)
+    assert len(kept) == 1  # the second waits for the first: it is to be the last word
+    kept[0].continue_()
+    until(page, lambda: len(kept) == 2, "the server is asked again")
+    server.wait(lambda state: not state["layers"]["others"])
+    kept[1].continue_()
+    server.wait(lambda state: state["layers"]["others"])
+    expect(page.locator(".lane")).to_have_count(2)
+    ask(server, "PATCH", "trail", {"seconds": 4})
 
 
 def test_shift_and_a_click_look_through_the_camera(page: Page, server: Server) -> None:

@@ -36,8 +36,9 @@ def drag(page: Page, begin: tuple[float, float], end: tuple[float, float], pause
 
 
 def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(
-    page: Page, server: Server, tmp_path: Path
+    flat_page: Page, server: Server, tmp_path: Path
 ) -> None:
+    page = flat_page
     expect(page.locator(".lane").first).to_be_visible(timeout=30_000)
     page.keyboard.press("Home")
     for _ in range(2):

@@ -32,7 +32,11 @@ def tracks(existences: list[float], seed: int = 0) -> GaussianMixture:
 
 
 def update(
-    before: GaussianMixture, boxes: ndarray, p_d: float | ndarray = 0.9, rho: float = 0.05
+    before: GaussianMixture,
+    boxes: ndarray,
+    p_d: float | ndarray = 0.9,
+    rho: float = 0.05,
+    resemblance: ndarray | None = None,
 ) -> pmb.PmbUpdate:
     """One linear camera."""
     return pmb.update(
@@ -43,6 +47,7 @@ def update(
         detection_probability=np.broadcast_to(np.asarray(p_d, dtype=float), (before.size,)).copy(),
         unexplained_intensity=np.full(len(boxes), rho),
         gate=np.inf,
+        resemblance=resemblance,
     )
 
 
@@ -95,6 +100,19 @@ def test_two_people_and_one_box_are_exact(seed: int) -> None:
     assert_allclose(found.marginals.unexplained, columns, atol=1e-5)
     expected = rows[:, 1] + rows[:, 0] * r * (1 - p_d) / missed
     assert_allclose(found.tracks.weights, expected, atol=1e-5)
+
+
+@given(st.integers(0, 10_000))
+def test_looks_multiply_the_likelihood_of_those_who_are_known_by_them(seed: int) -> None:
+    before, rng = tracks([0.9, 0.6], seed), np.random.default_rng(seed)
+    box, alike = rng.normal(0.0, 0.5, (1, 2)), rng.uniform(0.1, 3.0, (1, 1))
+    r, p_d = before.weights, 0.9
+    detected = (r * p_d)[:, None] * likelihood(before, box)
+    detected[0] *= alike[0]
+    rows, columns = exact(1 - r * p_d, detected, np.full(1, 0.05))
+    found = update(before, box, p_d, resemblance=alike)
+    assert_allclose(found.marginals.detected, rows[:, 1:], atol=1e-5)
+    assert_allclose(found.marginals.unexplained, columns, atol=1e-5)
 
 
 @given(st.lists(st.floats(0.001, 1.0), min_size=1, max_size=4), st.floats(0.0, 0.999))

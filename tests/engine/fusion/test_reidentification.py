@@ -12,7 +12,7 @@ from numpy import ndarray
 
 from tests.engine.standing import RECOMMENDED, fuse, ids_of, line, watch
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion.labels.reidentification import Identities, reidentify
+from tracker.fusion.labels.reidentification import Identities, reidentify, resemblance
 from tracker.fusion.multi_bernoulli import MultiBernoulli
 from tracker.fusion.protocol import Associations
 from tracker.single_view.protocol import ViewResult
@@ -79,6 +79,30 @@ def test_two_tracks_that_were_exchanged_are_exchanged_back() -> None:
             break
     assert renamed == {1: 2, 2: 1}
     watched(names, [2, 1], [SECOND, FIRST], 40)
+
+
+def test_who_is_known_by_his_colours_is_likelier_to_make_a_box_that_has_them() -> None:
+    names = watched(Identities.none(), [1, 2], [FIRST, SECOND], 40)
+    view = ViewResult.of_boxes(np.ones((3, 4)), np.ones(3), np.ones((3, 4)))
+    view = replace(view, likenesses=np.array([FIRST, SECOND, EITHER]))
+    alike = resemblance(names, np.array([2, 1, 9]), [view, view])
+    assert alike.shape == (3, 6)
+    own = np.exp(names.looks[1]) / np.exp(names.looks[1]).sum()
+    assert alike[0, :3] == pytest.approx(
+        [0.5 + 1.0 * own @ seen for seen in (FIRST, SECOND, EITHER)]
+    )
+    assert alike[0, 1] > 1.3
+    assert alike[0, 0] < 0.7
+    assert alike[1, 0] > 1.3
+    assert alike[2] == pytest.approx(1.0), "nothing is known of a newcomer"
+    assert alike[:, 2] == pytest.approx(1.0), "nor of a box that has anybody's colours"
+
+
+def test_without_pictures_nobody_is_known_by_looks() -> None:
+    view = ViewResult.of_boxes(np.ones((2, 4)), np.ones(2), np.ones((2, 4)))
+    assert resemblance(Identities.none(), np.array([1]), [view]).shape == (0, 2)
+    names = watched(Identities.none(), [1, 2], [FIRST, SECOND], 20)
+    assert resemblance(names, np.array([1, 2]), [view]) == pytest.approx(1.0)
 
 
 def test_people_who_look_alike_keep_their_labels() -> None:

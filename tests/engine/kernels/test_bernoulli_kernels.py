@@ -48,6 +48,7 @@ def test_one_call_is_all_its_parts(
         ExpectedBoxes(expected.expected, expected.boxes, expected.depths, expected.valid),
         camera.calibration.image_size,
         np.full(len(boxes), CLUTTER),
+        np.ones((0, len(boxes))),
         CameraRule(GATE, True, P_D, 0.5, NEAR, STRENGTH, 0.2, 1e-6, 200, TOLD),
     )
 

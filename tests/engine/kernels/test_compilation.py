@@ -158,18 +158,14 @@ def test_what_was_not_used_for_long_is_deleted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    compilation._mark.cache_clear()
     long_ago = time.time() - compilation._KEPT_SECONDS - 60.0
     for name in ("0123456789abcdef", "fedcba9876543210", "somebody-elses"):
         (tmp_path / name).mkdir()
     for name in ("0123456789abcdef", "somebody-elses"):
         os.utime(tmp_path / name, (long_ago, long_ago))
-    try:
-        assert not compilation.is_compiled()
-        compilation.mark_compiled()
-        assert compilation.is_compiled()
-    finally:
-        compilation._mark.cache_clear()
+    assert not compilation.is_compiled()
+    compilation.mark_compiled()
+    assert compilation.is_compiled()
     left = sorted(path.name for path in tmp_path.iterdir() if path.is_dir())
     assert left == ["fedcba9876543210", "somebody-elses"]
 

@@ -88,6 +88,7 @@ def one_by_one(
             ExpectedBoxes(expected.expected, expected.boxes, expected.depths, expected.valid),
             camera.calibration.image_size,
             np.full(len(values), CLUTTER[c]),
+            np.ones((0, len(values))),
             RULE,
         )
         p_d, by, best, share = found.record
@@ -150,7 +151,11 @@ def test_one_call_is_all_cameras(
         20,
         undetected.gaussians,
         step.CameraBoxes(
-            np.concatenate(boxes), np.concatenate(sigmas), starts, np.ones(starts[-1])
+            np.concatenate(boxes),
+            np.concatenate(sigmas),
+            starts,
+            np.ones(starts[-1]),
+            np.ones((0, starts[-1])),
         ),
         step.StepModel(
             transition=TRANSITION,

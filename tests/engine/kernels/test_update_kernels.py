@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -175,6 +177,31 @@ def reference_fit(
         covariance = np.linalg.inv(information)
         place = covariance @ pull
     return place, covariance, chosen
+
+
+def test_a_camera_says_nothing_of_a_place_far_aside_of_what_it_sees() -> None:
+    """The lens's polynomial grows there by the fifth power: a millimetre is many pictures."""
+    camera = replace(CAMERAS[0], distortion=np.array([-0.18, 0.03, 0.0, 0.0, 0.0]))
+    model = TargetModel(np.array([0.02, 0.02, 0.02]), "box")
+    right, _, forward = camera.rotation
+    starts = np.array([camera.centre + 2.0 * right + depth * forward for depth in (0.1, 0.15)])
+    expected = model.expected(camera, starts)
+    assert expected.valid.all()
+    assert np.abs(expected.jacobians).max(axis=(1, 2)).min() > 1e7
+    box = expected.values[:1] * [0.0, 1.0, 1.0]  # as high, and in the picture
+    places, covariances, sources, fits = birth_kernels.fit_places(
+        starts,
+        Measurements(box, 9.0 * np.eye(3)[None]),
+        np.ones(1, dtype=bool),
+        np.array([0, 1]),
+        model.target(3),
+        stacked((camera,)),
+        birth_kernels.Refinement(start_sigma=1.0, passes=3, gate=21.0),
+    )
+    assert (sources == -1).all()
+    assert not fits.any()
+    assert_allclose(places, starts)
+    assert_allclose(covariances, np.broadcast_to(np.eye(3), (2, 3, 3)))
 
 
 @pytest.mark.parametrize("kind", ["centre", "box", "box_and_width"])

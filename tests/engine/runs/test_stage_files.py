@@ -157,6 +157,7 @@ def _write_and_read(folder: Path, seconds: float) -> int:
     return read
 
 
+@pytest.mark.full
 def test_two_processes_share_a_folder(tmp_path: Path) -> None:
     context = multiprocessing.get_context("spawn")
     with context.Pool(2) as pool:

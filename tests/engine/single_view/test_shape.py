@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -19,11 +20,12 @@ from tracker.sequences.reader import read_sequence
 from tracker.sequences.rendering import render_random
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
+from tracker.single_view.colour.evidence import colour_ratios
 from tracker.single_view.colour.peaks import PeakFinder
 from tracker.single_view.colour.trust import shapes_of_templates, taught_well
 from tracker.single_view.protocol import ViewResult
 from tracker.single_view.shape.channels import Channels
-from tracker.single_view.shape.finder import Shapes, strongest
+from tracker.single_view.shape.finder import ShapeFinder, Shapes, strongest
 from tracker.single_view.shape.windows import ABOVE, BELOW, WIDTH, Windows
 
 STEPS = 45
@@ -113,6 +115,34 @@ def test_another_exposure_neither_moves_nor_differs_and_a_person_does_both() -> 
     assert mean(8) > motion + 60.0
     assert mean(9) > activity
     assert spread == 0.0
+
+
+def test_whoever_only_watches_knows_as_much_of_what_moved(room: Sequence) -> None:
+    with FrameReader(room) as reader:
+        finder = ShapeFinder(room, 0, reader)
+        pictures = [
+            picture for picture in map(partial(reader.picture, 0), range(20)) if picture is not None
+        ]
+    looked, watched = finder.start(), finder.start()
+    for picture in pictures[:-1]:
+        looked, _ = finder.find(looked, picture, 0.5, 0.3)
+        watched = finder.watch(watched, picture)
+    _, found = finder.find(looked, pictures[-1], 0.5, 0.3)
+    _, same = finder.find(watched, pictures[-1], 0.5, 0.3)
+    _, fresh = finder.find(finder.start(), pictures[-1], 0.5, 0.3)
+    np.testing.assert_array_equal(found.odds, same.odds)
+    assert len(found.odds) != len(fresh.odds) or np.abs(found.odds - fresh.odds).max() > 0.1
+
+
+def test_a_finder_is_made_once_for_a_room_and_anew_where_its_walls_are_moved(
+    room: Sequence,
+) -> None:
+    smaller = replace(room.room, maximum=room.room.maximum - [1.0, 0.0, 0.0])
+    with FrameReader(room) as reader:
+        first = ShapeFinder.of(room, 0, reader)
+        assert ShapeFinder.of(room, 0, reader) is first
+        assert ShapeFinder.of(room, 1, reader) is not first
+        assert ShapeFinder.of(replace(room, room=smaller), 0, reader) is not first
 
 
 def test_who_walks_is_found_by_shape_alone(room: Sequence) -> None:
@@ -212,8 +242,11 @@ def test_a_peak_vouches_for_the_surest_shape_at_its_place_and_says_little_alone(
     passed = finder._passed(scene, found, np.concatenate([box, away]), distances, person)
     without = finder._passed(scene, found, away, distances[:1], person[:1])
     sure, part, lone = passed.log_ratios
-    assert sure >= 0.0 > without.log_ratios[0]
+    assert sure > without.log_ratios[0]
     assert part == without.log_ratios[1] < 0.0
+    # a peak whose colours are hardly a template's speaks against it, on whatever foreground
+    poor = finder._passed(scene, found, np.concatenate([box, away]), distances + 0.6, person)
+    assert poor.log_ratios[0] < without.log_ratios[0]
     # of a person whom shapes show, a peak without one is little
     assert finder._by_shape[0] > 0.9
     assert lone == without.log_ratios[2] < -2.0
@@ -229,3 +262,16 @@ def test_colours_are_guessed_where_somebody_is_not_taught_in_every_camera_and_tw
     assert not taught_well(replace(room, templates=each[1:] + each[1:]))
     another = replace(first, name="another")
     assert not taught_well(replace(room, templates=(*each, first, another)))
+
+
+def test_colours_speak_for_a_shape_by_a_peak_and_against_it_by_its_own_box() -> None:
+    vouched = np.array([[True, False], [False, True], [False, False], [False, False]])
+    of_peaks, of_shapes = np.array([0.3, 0.6]), np.array([0.9, 0.9, 0.3, 0.9])
+    ratios = colour_ratios(vouched, of_peaks, of_shapes, sigma=0.1)
+    np.testing.assert_allclose(ratios, [1.5, -1.5, 0.0, -1.0])
+    # a wider likelihood tells less
+    np.testing.assert_allclose(colour_ratios(vouched, of_peaks, of_shapes, 0.2)[:2], [0.75, -0.75])
+    assert colour_ratios(np.zeros((0, 2), bool), of_peaks, np.zeros(0), 0.1).shape == (0,)
+    np.testing.assert_allclose(
+        colour_ratios(np.zeros((2, 0), bool), np.zeros(0), of_shapes[2:], 0.1), [0.0, -1.0]
+    )

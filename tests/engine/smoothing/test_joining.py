@@ -213,3 +213,52 @@ def test_a_cut_leaves_the_clear_rows_where_they_were() -> None:
     assert np.diff(pieces.starts).tolist() == [2, 2, 1, 3]
     assert_allclose(pieces.states, paths.states[kept])
     assert pieces.steps.tolist() == paths.steps[kept].tolist()
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_best_chains_of_which_each_is_one_person_throughout(seed: int) -> None:
+    rng = np.random.default_rng(100 + seed)
+    count, kinds = int(rng.integers(2, 5)), 3
+    numbers = {
+        "worths": rng.normal(6.0, 3.0, count),
+        "births": rng.normal(-4.0, 1.0, count),
+        "deaths": rng.normal(-4.0, 1.0, count),
+    }
+    gain = np.where(
+        np.triu(rng.random((count, count)) < 0.8, 1), rng.normal(1.0, 5.0, (count, count)), -np.inf
+    )
+    people = -rng.exponential(8.0, (count, kinds))
+    people -= people.max(axis=1, keepdims=True)
+    earlier, later = np.nonzero(np.isfinite(gain))
+
+    def value(following: tuple[int, ...], used: tuple[bool, ...]) -> float:
+        total = worth_of(following, used, numbers, gain)
+        if np.isfinite(total):
+            for chain in chains(np.array(following), np.array(used)):
+                total += people[chain].sum(axis=0).max()
+        return float(total)
+
+    best = max(
+        value(one, there)
+        for one in itertools.product(range(-1, count), repeat=count)
+        for there in itertools.product((False, True), repeat=count)
+    )
+    following, used = join(
+        numbers["worths"], numbers["births"], numbers["deaths"], earlier, later,
+        gain[earlier, later], people=people,
+    )  # fmt: skip
+    assert best - value(tuple(following.tolist()), tuple(used.tolist())) <= 1.0
+
+
+def test_who_has_whose_colours_outweighs_how_they_moved() -> None:
+    """Two who meet: motion has each go on as the other, through a piece that shows nobody's."""
+    first, second, alone = [0.0, -20.0, -20.0], [-20.0, 0.0, -20.0], [0.0, 0.0, 0.0]
+    pairs = {(0, 2): 1.0, (2, 4): 3.0, (2, 5): 0.0, (1, 3): 1.0, (3, 5): 3.0, (3, 4): 0.0}
+    earlier, later = np.array(list(pairs)).T
+    plain = np.full(6, 30.0), np.full(6, -5.0), np.full(6, -5.0), earlier, later
+    gains = np.array(list(pairs.values()))
+    people = np.array([first, second, alone, alone, second, first])
+    following, used = join(*plain, gains)
+    assert chains(following, used) == [[0, 2, 4], [1, 3, 5]]
+    following, used = join(*plain, gains, people=people)
+    assert chains(following, used) == [[0, 2, 5], [1, 3, 4]]

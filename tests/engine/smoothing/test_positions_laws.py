@@ -13,6 +13,7 @@ from scipy.optimize import least_squares
 
 from tests.engine.synthetic import CAMERAS, crossing, sequence, walk
 from tracker import pipeline
+from tracker.filters.models import Motion
 from tracker.kernels.smoothing import passes
 from tracker.parameters import RunParameters, with_values
 from tracker.sequences.sequence import Detections, Sequence
@@ -246,3 +247,26 @@ def test_nobody_is_reported_before_the_first_or_after_the_last_evidence(
         # the gap in the middle is filled from both sides
         assert len(run.tracks) == last - min(seen) + 1
         assert set(run.tracks.ids.tolist()) == {1}
+
+
+@pytest.mark.parametrize("precision", [1e5, 1e7, 1e9])
+@pytest.mark.parametrize("step", [1 / 60, 0.5])
+def test_boxes_however_precise_leave_covariances_positive(step: float, precision: float) -> None:
+    rng = np.random.default_rng(7)
+    motion = Motion.of(PLAIN.fusion, step)
+    rule = passes.PathMotion(motion.transition, motion.noise, np.diag([100.0] * 3 + [0.5] * 3))
+    for _ in range(20):
+        rows, place = 30, rng.uniform(-3.0, 3.0, 3)
+        information = np.zeros((rows, 3, 3))
+        for row in np.flatnonzero(rng.random(rows) < 0.7):
+            for _ in range(int(rng.integers(1, 3))):  # each camera knows nothing along its ray
+                ray = rng.normal(size=3)
+                ray /= np.linalg.norm(ray)
+                information[row] += precision * (np.eye(3) - np.outer(ray, ray))
+        begin = np.append(place + rng.normal(size=3), np.zeros(3))
+        found = passes.smooth_paths(
+            np.array([0, rows]), begin[None], information, information @ place, rule,
+            np.full(rows, 10.0 ** rng.uniform(-3.0, 0.0)),
+        )  # fmt: skip
+        assert np.linalg.eigvalsh(found.covariances).min() > 0.0
+        assert_allclose(found.means[:, :3], np.tile(place, (rows, 1)), atol=1.0)

@@ -79,6 +79,17 @@ def test_without_boxes_nothing_is_learnt() -> None:
     assert_allclose(restlessness(starts, found, motion.noise, np.ones(6), STEP), 1.0, atol=1e-6)
 
 
+def test_drives_are_what_they_say() -> None:
+    found = measured([standing(5, 0.0, 1), moving(7, 2)], SIGMA)[1](np.ones(12))
+    axes = np.array([0, 1, 3, 4])
+    noise = Motion.of(PLAIN.fusion, STEP).noise[np.ix_(axes, axes)]
+    inverse = np.linalg.inv(found.ahead_covariances)
+    pulls = np.einsum("nab,nb->na", inverse, found.means - found.ahead)
+    told = np.einsum("na,nb->nab", pulls, pulls) + inverse @ found.covariances @ inverse - inverse
+    expected = np.sum(noise * told[:, axes[:, None], axes], axis=(1, 2))
+    assert_allclose(passes.drives(found, noise, axes), expected, rtol=1e-6, atol=1e-9)
+
+
 @pytest.mark.parametrize("kept", [0.0, 0.5, 1.0])
 def test_sums_around_are_what_they_say(kept: float) -> None:
     starts, values = np.array([0, 4, 4, 7]), np.arange(1.0, 8.0)

@@ -39,6 +39,9 @@ ON_PICTURES = tuple(
 BOXES_RECORDING = "cmc1"
 """A recording with such boxes, and without pictures."""
 
+QUICK_STEPS = 320
+"""All three people are there, and have hidden each other."""
+
 FIGURES = ("mota", "idf1", "ospa", "position_error", "found_share")
 
 FUSION = "multi_bernoulli"
@@ -99,7 +102,7 @@ def _scenes(context: Context, notes: list[str]) -> list[tuple[Sequence, int]]:
     names = (fig1.ROOM,) if context.quick else sequences.ROOMS
     scenes = []
     for name in names:
-        room = runs.room(context, name, fig1.QUICK_STEPS if context.quick else None)
+        room = runs.room(context, name, QUICK_STEPS if context.quick else None)
         scenes.append((room, room.frames))
     for name in (cameras.RECORDING, BOXES_RECORDING):
         try:

@@ -10,11 +10,11 @@ from jaxtyping import Int
 from numpy import ndarray
 
 from tracker import pipeline
-from tracker.assignment import linear_sum_assignment
+from tracker.assignment import pairs_within
 from tracker.corrections import Correction, Place
 from tracker.corrections.kinds import leeway
 from tracker.doubts import Doubt, queue
-from tracker.doubts.doubt import said
+from tracker.doubts.doubt import Lanes, said
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.parameters import RunParameters
 from tracker.pipeline import Run
@@ -39,18 +39,37 @@ class Truthful:
             step_time: Seconds.
         """
         self._truth, self._gate, self._tracks = truth, gate, tracks
+        self._lanes = Lanes(tracks)
         self._moment = leeway(step_time) + 1
         self._people: dict[int, Int[ndarray, " K"]] = {}
 
     def who(self, place: Place) -> int | None:
-        """Whose the track at a place is; None for nobody's."""
+        """Whose the track at a place is, mostly, in the second before and after; None for nobody's.
+
+        Whose box it is at the very step a film of the moment tells, and no single picture: of two
+        people side by side the nearer one is now the one and now the other.
+        """
         own = self._tracks.at(place.step)
         if own.start == own.stop:
             return None
         apart = np.hypot(*(self._tracks.positions[own, :2] - [place.x, place.y]).T)
         best = int(np.argmin(apart))
-        person = int(self._at(place.step)[best])
-        return person if person >= 0 and apart[best] <= self._gate else None
+        if apart[best] > self._gate:
+            return None
+        rows = self._lanes.rows[int(self._tracks.ids[own.start + best])]
+        steps = self._tracks.frames[rows]
+        around = rows[np.abs(steps - place.step) < self._moment]
+        people = np.array([self._of_row(row) for row in around.tolist()])
+        names, counts = np.unique(people, return_counts=True)
+        here = self._of_row(own.start + best)
+        most = names[counts == counts.max()]
+        person = here if here in most else int(most[0])
+        return person if person >= 0 else None
+
+    def _of_row(self, row: int) -> int:
+        """The person of a row of the tracks, -1 for none."""
+        step = int(self._tracks.frames[row])
+        return int(self._at(step)[row - self._tracks.at(step).start])
 
     def untracked(self, place: Place) -> bool:
         """Whether somebody is at a place whom no track has."""
@@ -71,10 +90,9 @@ class Truthful:
             own, theirs = self._tracks.at(step), self._truth.at(step)
             between = self._tracks.positions[own, None, :2] - self._truth.positions[theirs, :2]
             apart = np.hypot(between[..., 0], between[..., 1])
-            rows, columns = linear_sum_assignment(np.minimum(apart, 10.0 * self._gate))
-            near = apart[rows, columns] <= self._gate
+            rows, columns = pairs_within(apart, self._gate)
             found = np.full(len(apart), -1, dtype=np.int64)
-            found[rows[near]] = self._truth.ids[theirs][columns[near]]
+            found[rows] = self._truth.ids[theirs][columns]
             self._people[step] = found
         return self._people[step]
 
@@ -90,11 +108,10 @@ class Truthful:
         if one.kind in ("came", "left"):
             return self._at_an_end(one.places[0], before=one.kind == "came")
         who = {place: self.who(place) for place in one.places}
-        if None in who.values():
-            return False
-        return all(who[a] == who[b] for a, b in one.pairs) and all(
-            who[a] != who[b] for a, b in one.apart
-        )
+        same = [who[a] is not None and who[a] == who[b] for a, b in one.pairs]
+        # somebody and nobody are not one person either
+        apart = [who[a] != who[b] for a, b in one.apart]
+        return all(same) and all(apart)
 
     def wrong(self, doubt: Doubt) -> bool:
         """Whether the run is wrong there."""
@@ -102,12 +119,21 @@ class Truthful:
         return not (now and all(self.holds(one) for one in now))
 
     def answer(self, doubt: Doubt) -> tuple[Correction, ...]:
-        """What is true of a doubtful place, of what is offered; nothing where that cannot be
-        said."""
-        for one in doubt.alternatives:
-            if one.corrections and all(self.holds(told) for told in one.corrections):
-                return said(one.corrections)
-        return ()
+        """What is true of a doubtful place, of what is offered the one that says most; nothing
+        where that cannot be said."""
+        true = [
+            one.corrections
+            for one in doubt.alternatives
+            if one.corrections and all(self.holds(told) for told in one.corrections)
+        ]
+        if not true:
+            return ()
+        as_it_is = doubt.alternatives[0].corrections
+        return said(
+            as_it_is
+            if as_it_is in true
+            else max(true, key=lambda told: sum(len(one.pairs) for one in told))
+        )
 
 
 @dataclass(frozen=True, slots=True)

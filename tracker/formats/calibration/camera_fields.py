@@ -6,8 +6,7 @@ follow OpenCV's papers and examples, one camera a table or a suffix a camera.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -15,11 +14,15 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.formats.pieces import Convention, RawCamera
+from tracker.formats.calibration import euler
+from tracker.formats.calibration.camera_words import count, fields_by_camera
+from tracker.formats.calibration.euler import KINDS, NAMED_AXES
+from tracker.formats.pieces import Convention, Direction, RawCamera
 from tracker.formats.source import SourceFile
 from tracker.formats.values import (
     image_size,
     intrinsics,
+    is_rotation,
     lens,
     matrix,
     number,
@@ -28,70 +31,48 @@ from tracker.formats.values import (
     vector,
 )
 
-MEANINGS: dict[str, tuple[str, ...]] = {
-    "K": ("k", "m", "mtx", "cameramatrix", "cammatrix", "intrinsicmatrix", "intrinsics",
-          "intrinsic", "matrix", "intri", "calibrationmatrix"),
-    "D": ("d", "dist", "distortion", "distortions", "distortioncoefficients", "distcoeffs",
-          "distcoeff", "distcoef", "distcoefs", "distortioncoeffs", "kc", "distortionvector"),
-    "radial": ("rdistort", "radialdistortion"),
-    "tangential": ("tdistort", "tangentialdistortion"),
-    "R": ("r", "rot", "rotation", "rotationmatrix", "rvec", "rotationvector", "rotvec",
-          "rodrigues", "rmat", "rmatrix"),
-    "T": ("t", "tvec", "translation", "translationvector", "trans", "tvecs"),
-    "P": ("p", "projection", "projectionmatrix", "pmat", "projmatrix"),
-    "RT": ("rt", "extrinsic", "extrinsics", "extrinsicmatrix", "worldtocamera", "w2c"),
-    "size": ("size", "imagesize", "imgsize", "resolution", "imsize", "imageresolution"),
-    "width": ("width", "imagewidth", "w", "imgwidth"),
-    "height": ("height", "imageheight", "h", "imgheight"),
-    "name": ("name", "cameraname", "cam", "id", "serial", "cameraid", "camid"),
-    "fisheye": ("fisheye", "fisheyemodel", "isfisheye"),
-}  # fmt: skip
-"""The words, without case and underscores, for each part of a camera."""
+_POSES = ("RT", "inverse", "matrix_world", "pose")
+"""Parts that are a whole pose, a 3×4 or a 4×4 matrix."""
 
-_BY_WORD = {word: meaning for meaning, words in MEANINGS.items() for word in words}
+_LENS_PARTS = ("image_size", "intrinsics", "distortion", "lens")
 
 STEREO_WORLD = "1"
 """Of the two cameras of a stereo calibration the one whose axes are the world's."""
 
 
-def split(key: str) -> tuple[str, str] | None:
-    """What a field's name means, and the camera it names: ``K_cam1`` → ``("K", "cam1")``."""
-    places = [len(key), *(m.start() for m in re.finditer(r"[_\-]|(?<=\D)\d", key))]
-    for place in sorted(set(places), reverse=True):
-        meaning = _BY_WORD.get(re.sub(r"[_\-\s]", "", key[:place]).lower())
-        if meaning is not None:
-            return meaning, key[place:].lstrip("_-")
-    return None
-
-
 def by_camera(table: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """The fields of every camera that the names of a flat table tell apart."""
-    cameras: dict[str, dict[str, Any]] = {}
-    for key, value in table.items():
-        found = split(key)
-        if found is None:
-            continue
-        meaning, camera = found
-        fields = cameras.setdefault(camera, {})
-        # a rotation may be there twice, as a matrix and as a vector
-        if meaning not in fields or _length(value) > _length(fields[meaning]):
-            fields[meaning] = value
+    cameras = fields_by_camera(table)
     if {"1", "2"} <= cameras.keys() and "" in cameras and "T" in cameras[""]:
         return _stereo(cameras)
-    if len(cameras) > 1 and "" in cameras:
-        shared = cameras.pop("")  # the picture's size, or nothing of a camera
-        cameras = {name: {**shared, **fields} for name, fields in cameras.items()}
+    own = {name: fields for name, fields in cameras.items() if name and is_camera(fields)}
+    if own:  # what names no camera is the picture's size, or nothing of a camera
+        return {name: {**cameras.get("", {}), **fields} for name, fields in own.items()}
     return {name: fields for name, fields in cameras.items() if is_camera(fields)}
 
 
 def is_camera(fields: Mapping[str, Any]) -> bool:
     """Whether there is a lens or a pose among the fields, of the right count of numbers."""
-    return (
-        _length(fields.get("K")) == 9
-        or (_length(fields.get("R")) in (3, 9) and _length(fields.get("T")) == 3)
-        or _length(fields.get("P")) == 12
-        or _length(fields.get("RT")) in (12, 16)
+    turned = (
+        count(fields.get("R")) in (3, 9)
+        or count(fields.get("quaternion")) == 4
+        or any(count(fields.get(kind)) == 3 for kind in KINDS)
     )
+    moved = any(count(fields.get(place)) == 3 for place in ("T", "centre", "place"))
+    return (
+        count(fields.get("K")) in (9, 16)
+        or (turned and moved)
+        or count(fields.get("P")) == 12
+        or any(_is_pose(fields.get(part)) for part in _POSES)
+    )
+
+
+def _is_pose(value: Any) -> bool:
+    """Whether twelve or sixteen numbers begin with a rotation; rows of angles do not."""
+    if count(value) not in (12, 16):
+        return False
+    numbers = value.replace(",", " ").split() if isinstance(value, str) else value
+    return is_rotation(np.asarray(numbers, dtype=float).reshape(-1, 4)[:3, :3])
 
 
 def camera(
@@ -114,8 +95,9 @@ def camera(
         size = image_size(file, at("size"), both)
     transposed = _is_transposed(fields.get("K"))
     k = None
-    if _length(fields.get("K")) == 9:
-        given = matrix(file, at("K"), fields["K"], 3, 3)
+    if count(fields.get("K")) in (9, 16):
+        side = 3 if count(fields["K"]) == 9 else 4
+        given = matrix(file, at("K"), fields["K"], side, side)[:3, :3]
         k = intrinsics(file, at("K"), given.T if transposed else given)
     if size is not None and k is not None and "size" in fields:
         size = _width_first(size, k)
@@ -125,16 +107,14 @@ def camera(
         _distortion(file, name, fields),
         fisheye=_is_set(fields.get("fisheye")),
     )
-    turned = translation = projection = None
-    if "R" in fields and "T" in fields:
-        turned = rotation(file, at("R"), fields["R"])
-        if transposed and _length(fields["R"]) == 9:
-            turned = turned.T
-        translation = vector(file, at("T"), fields["T"], 3, "x y z")
-    elif "RT" in fields:
-        rows = 4 if _length(fields["RT"]) == 16 else 3
-        pose = matrix(file, at("[R|t]"), fields["RT"], rows, 4)
-        turned, translation = rotation(file, at("[R|t]"), pose[:3, :3]), pose[:3, 3]
+    turned, translation, convention = _pose(file, at, fields, convention)
+    by_angles: Mapping[str, Float[ndarray, "3 3"]] = {}
+    if turned is None:
+        by_angles, translation, convention = _turned(file, at, fields, convention)
+        turned = next(iter(by_angles.values()), None)
+    if transposed and turned is not None and count(fields.get("R")) == 9:
+        turned = turned.T
+    projection = None
     # beside K a 3×4 matrix is that of a rectified picture
     if k is None and turned is None and "P" in fields:
         projection = matrix(file, at("P"), fields["P"], 3, 4)
@@ -147,13 +127,95 @@ def camera(
         rotation=turned,
         translation=translation,
         convention=convention,
+        turns=by_angles,
         projection=projection,
     )
 
 
+def _turned(
+    file: SourceFile, at: Callable[[str], str], fields: Mapping[str, Any], convention: Convention
+) -> tuple[Mapping[str, Float[ndarray, "3 3"]], Float[ndarray, " 3"] | None, Convention]:
+    """The rotations that a camera's angles may be, and its place, where these are its pose."""
+    place = next((part for part in ("place", "centre", "T") if count(fields.get(part)) == 3), None)
+    if place is None:
+        return {}, None, convention
+    named = next((kind for kind in NAMED_AXES if kind in fields), None)
+    by_angles = euler.turns(file, at("angles"), fields, inverse=place != "T")
+    if not by_angles:
+        return {}, None, convention
+    moved = vector(file, at(place), fields[place], 3, "x y z")
+    if named is not None:
+        convention = replace(convention, direction="camera-to-world", axes="opengl")
+    elif place != "T":
+        convention = replace(convention, direction="camera-to-world")
+    return by_angles, moved, convention
+
+
+_Pose = tuple[Float[ndarray, "3 3"] | None, Float[ndarray, " 3"] | None, Convention]
+
+
+def _pose(
+    file: SourceFile, at: Callable[[str], str], fields: Mapping[str, Any], convention: Convention
+) -> _Pose:
+    """Rotation and translation, and what their fields' names say of how they are meant."""
+    part = next((name for name in _POSES if _is_pose(fields.get(name))), None)
+    turned = None
+    if "R" in fields and count(fields["R"]) != 4:
+        turned = rotation(file, at("R"), fields["R"])
+    elif "quaternion" in fields or "R" in fields:
+        turned = _of_quaternion(file, at, fields)
+    if turned is not None and "T" in fields:
+        return turned, vector(file, at("T"), fields["T"], 3, "x y z"), convention
+    if part is not None:
+        rows = 4 if count(fields[part]) == 16 else 3
+        pose = matrix(file, at(part), fields[part], rows, 4)
+        leads: Direction | None = convention.direction if part == "RT" else None
+        axes = convention.axes
+        if part in ("inverse", "matrix_world"):
+            leads = "camera-to-world"
+        if part == "matrix_world":  # as Blender has it
+            axes = "opengl"
+        return (
+            rotation(file, at(part), pose[:3, :3]),
+            pose[:3, 3],
+            replace(convention, direction=leads, axes=axes),
+        )
+    if turned is not None and "centre" in fields:
+        centre = vector(file, at("centre"), fields["centre"], 3, "x y z")
+        return turned, -turned @ centre, replace(convention, direction="world-to-camera")
+    if turned is not None and "place" in fields:
+        place = vector(file, at("position"), fields["place"], 3, "x y z")
+        return turned, place, replace(convention, direction="camera-to-world")
+    return None, None, convention
+
+
+def _of_quaternion(
+    file: SourceFile, at: Callable[[str], str], fields: Mapping[str, Any]
+) -> Float[ndarray, "3 3"]:
+    """The rotation of a quaternion whose order its name says.
+
+    Raises:
+        FormatError: If it does not, or all four are zero.
+    """
+    from scipy.spatial.transform import Rotation  # a server starts without it
+
+    order = fields.get("quaternion order")
+    four = vector(file, at("rotation"), fields.get("quaternion", fields.get("R")), 4, "w x y z")
+    if order is None:
+        raise file.error(
+            "expected a 3×3 matrix, a rotation vector, or a quaternion whose name says its order "
+            "(quaternion_wxyz or quaternion_xyzw), found 4 numbers",
+            at("rotation"),
+        )
+    if not np.linalg.norm(four) > 1e-6:
+        raise file.error("expected a quaternion, found one of zeros", at("rotation"))
+    xyzw = np.roll(four, -1) if order == "wxyz" else four
+    return np.asarray(Rotation.from_quat(xyzw).as_matrix())
+
+
 def _is_transposed(k: Any) -> bool:
     """Whether K is written for points in rows, as MATLAB, DANNCE and JARVIS have it; R is then."""
-    if _length(k) != 9:
+    if count(k) != 9:
         return False
     given = np.asarray(k if not isinstance(k, str) else k.replace(",", " ").split(), dtype=float)
     found = given.reshape(3, 3)
@@ -192,11 +254,16 @@ def cameras(file: SourceFile, values: Any, convention: Convention) -> Iterator[R
     """Every camera of a tree of tables and lists: flat with suffixes, or a table a camera."""
     found = [camera(file, name, fields, convention) for name, fields in _tables(values, "", 0)]
     lenses = {one.name: one for one in found if one.rotation is None and one.projection is None}
-    poses = {one.name: one for one in found if one.rotation is not None and one.intrinsics is None}
+    # Multical calls the pose of a camera by the one it leads from, too: "cam2_to_cam1"
+    poses = {
+        one.name.partition("_to_")[0]: one
+        for one in found
+        if one.rotation is not None and one.intrinsics is None
+    }
     if lenses.keys() == poses.keys() and len(lenses) + len(poses) == len(found):
         # one table of the lenses and one of the poses
         yield from (
-            replace(lenses[name], rotation=pose.rotation, translation=pose.translation)
+            replace(pose, name=name, **{part: getattr(lenses[name], part) for part in _LENS_PARTS})
             for name, pose in poses.items()
         )
     else:
@@ -243,16 +310,4 @@ def _stereo(cameras: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
 
 def _is_set(value: Any) -> bool:
     """A flag: true, or a number other than 0."""
-    return bool(np.any(np.asarray(value, dtype=float))) if _length(value) else value is True
-
-
-def _length(value: Any) -> int:
-    """How many numbers a list of any nesting, or a text of numbers, has; 0 for anything else."""
-    if value is None or isinstance(value, Mapping):
-        return 0
-    if isinstance(value, str):
-        value = value.replace(",", " ").split()
-    try:
-        return int(np.asarray(value, dtype=float).size)
-    except (ValueError, TypeError):
-        return 0
+    return bool(np.any(np.asarray(value, dtype=float))) if count(value) else value is True

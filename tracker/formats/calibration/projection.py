@@ -56,6 +56,11 @@ def read(file: SourceFile) -> Iterator[Piece]:
 def _camera(file: SourceFile, name: str, matrix: Float[ndarray, "3 n"]) -> RawCamera:
     if not np.isfinite(matrix).all():
         raise file.error("expected finite numbers", f"camera {name}")
+    if matrix.shape == (3, 3) and is_rotation(matrix):
+        raise file.error(
+            "is a rotation alone, expected [R | t] or a lens; save K, R and t of a camera "
+            "together as .npz"
+        )
     if matrix.shape == (3, 3):
         return RawCamera(name, intrinsics=intrinsics(file, f"camera {name}".strip(), matrix))
     if is_rotation(matrix[:, :3]):

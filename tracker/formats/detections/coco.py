@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from pathlib import PurePosixPath
 from typing import Any
 
 import numpy as np
 
-from tracker.formats.columns import number_in, people, to_unit
+from tracker.formats.columns import people, to_unit
 from tracker.formats.detections.poses.body import read_people
+from tracker.formats.picture_names import camera_of, number_in
 from tracker.formats.pieces import DetectionPiece, Piece
 from tracker.formats.protocol import Certainty, Kind
 from tracker.formats.source import SourceFile
@@ -62,14 +62,6 @@ def read(file: SourceFile) -> Iterator[Piece]:
         by_camera.setdefault(camera_of(name), []).append((name, image, record))
     for camera, rows in (by_camera or {"": []}).items():
         yield _piece(file, camera, rows, classes)
-
-
-def camera_of(name: str) -> str:
-    """The folder of an image, or what is before the frame's number in its name."""
-    path = PurePosixPath(name.replace("\\", "/"))
-    if path.parent.name:
-        return path.parent.as_posix()
-    return re.sub(r"[\W_]*\d+\D*$", "", path.stem)
 
 
 def _piece(

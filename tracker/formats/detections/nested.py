@@ -9,7 +9,6 @@ frames are the numbers of which there are most.
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -18,9 +17,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tracker.formats.columns import Column, layout_of, meanings, number_in, plain, read_table
-from tracker.formats.detections.coco import camera_of
+from tracker.formats.columns import Column, layout_of, meanings, plain, read_table
 from tracker.formats.detections.table import flat
+from tracker.formats.picture_names import camera_of, is_camera_number, number_in
 from tracker.formats.pieces import DetectionPiece, Piece
 from tracker.formats.protocol import Certainty, Kind
 from tracker.formats.source import SourceFile
@@ -258,7 +257,7 @@ def _levels(rows: Sequence[_Row]) -> _Levels | None:
         numbered = [
             level
             for level, names in enumerate(keys)
-            if all(_frame(name) is not None and not _is_camera_number(name) for name in names)
+            if all(_frame(name) is not None and not is_camera_number(name) for name in names)
         ]
         several = [level for level in numbered if len(keys[level]) > 1]
         plainly = [n for n in numbered if all(str(name).isdigit() for name in keys[n])]
@@ -283,11 +282,6 @@ def _are_people(rows: Sequence[_Row], keys: Sequence[set[Key]], level: int, fram
     innermost = level == len(keys) - 1 and frame < level
     among = any(row.among for row in rows)
     return innermost and not among and all(str(name).isdigit() for name in keys[level])
-
-
-def _is_camera_number(name: Key) -> bool:
-    """``cam1``, in which the number is no frame's."""
-    return isinstance(name, str) and re.fullmatch(r"(cam|view)\D*\d+", name.lower()) is not None
 
 
 def _is_camera(name: str) -> bool:

@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.formats.columns import number_in, people
+from tracker.formats.columns import people
+from tracker.formats.picture_names import number_in
 from tracker.formats.pieces import DetectionPiece
 from tracker.formats.source import SourceFile
 

@@ -16,7 +16,8 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from tracker.formats.columns import Column, is_table, layout_of, meanings, number_in, read_table
+from tracker.formats.columns import Column, is_table, layout_of, meanings, read_table
+from tracker.formats.picture_names import is_camera_number, number_in
 from tracker.formats.pieces import FormatError, Piece
 from tracker.formats.protocol import Certainty, Kind
 from tracker.formats.source import SourceFile
@@ -30,6 +31,9 @@ SERIES = True
 _FIVE = ["frame", "1", "2", "3", "4"]
 """The header that five columns are given which have none: the four numbers of a box, meant
 somehow."""
+
+
+_DECIMAL_COMMA = re.compile(r"\A(\s*-?\d+),(\d+\s*)\Z")
 
 
 def recognise(file: SourceFile) -> Certainty:
@@ -53,7 +57,9 @@ def read(file: SourceFile) -> Iterator[Piece]:
     """One piece a camera; of a series of files a frame, all together."""
     parts = [_columns(file.member(path)) for path in file.series]
     alone = [bool({"frame", "time"} & meanings(list(columns)).keys()) for columns, _ in parts]
-    if len(parts) == 1 or any(alone):
+    # cam1.csv, cam2.csv … without frames are no frames either
+    of_cameras = all(is_camera_number(path.stem) for path in file.series)
+    if len(parts) == 1 or any(alone) or of_cameras:
         for path, (columns, frames) in zip(file.series, parts, strict=True):
             member = file.member(path)
             if columns:
@@ -110,6 +116,8 @@ def _columns(file: SourceFile) -> tuple[dict[str, Column], list[int] | None]:
             raise file.error(
                 f"row {line}: expected {len(names)} columns as in the header, found {len(row)}"
             )
+    if delimiter != ",":
+        rows = [[_DECIMAL_COMMA.sub(r"\1.\2", cell) for cell in row] for row in rows]
     cells = list(zip(*rows[1:], strict=True)) or [()] * len(names)
     if names == _FIVE:
         return {"frame": cells[0], "box": list(zip(*cells[1:], strict=True))}, None

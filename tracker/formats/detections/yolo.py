@@ -14,7 +14,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tracker.formats.columns import number_in, people
+from tracker.formats.columns import people
+from tracker.formats.picture_names import number_in
 from tracker.formats.pieces import DetectionPiece, Piece
 from tracker.formats.protocol import Certainty, Kind
 from tracker.formats.source import SourceFile

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tracker.formats.columns import number_in
+from tracker.formats.picture_names import number_in
 from tracker.formats.pieces import Piece, TruthPiece
 from tracker.formats.protocol import Certainty, Kind
 from tracker.formats.source import SourceFile

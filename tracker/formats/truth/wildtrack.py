@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tracker.formats.columns import number_in
+from tracker.formats.picture_names import number_in
 from tracker.formats.pieces import DetectionPiece, Piece, TruthPiece
 from tracker.formats.protocol import Certainty, Kind
 from tracker.formats.source import SourceFile

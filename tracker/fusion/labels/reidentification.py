@@ -19,6 +19,10 @@ from tracker.single_view.protocol import ViewResult
 _NEVER = -1e3
 """Instead of the log probability of a pair that may not be: e to this is 0 beside any other."""
 
+_DOUBT_AT_ONCE = 0.5
+"""Probability that a box's colours tell nothing of whose it is at its step: where they mislead, as
+in another light, they do so step after step."""
+
 _DEFAULTS = FusionParams()
 
 
@@ -101,6 +105,44 @@ def reidentify(
     return relabelled, Identities(np.array(order, dtype=np.int64), rows, owners)
 
 
+def resemblance(
+    identities: Identities, labels: Int[ndarray, " n"], views: Many[ViewResult]
+) -> Float[ndarray, "k B"]:
+    """By how much likelier the person of each track is to look as each box does than anybody:
+
+        ε + (1 − ε) G Σ_g π_g p_g(z)
+
+    with ε = 0.5, so that the boxes of two people whose rays meet somewhere are not taken for one
+    person's there; 1 where nothing is told, and without rows where of no track anything is known.
+
+    Args:
+        identities: Of the step before.
+        labels: Of the tracks.
+        views: The boxes of all cameras, one after another.
+    """
+    count = sum(len(view.boxes) for view in views)
+    people = identities.looks.shape[1]
+    if not people or not len(identities.labels) or not count:
+        return np.ones((0, count))
+    looks = _known(identities, labels, people)
+    told = np.exp(looks - looks.max(axis=1, keepdims=True))
+    told /= told.sum(axis=1, keepdims=True)
+    likenesses = np.concatenate([view.likenesses_of(people) for view in views])
+    return np.asarray(_DOUBT_AT_ONCE + (1.0 - _DOUBT_AT_ONCE) * people * (told @ likenesses.T))
+
+
+def _known(
+    identities: Identities, labels: Int[ndarray, " n"], people: int
+) -> Float[ndarray, "n G"]:
+    """log π of some labels, up to a constant each; 0 where nothing is known of one."""
+    found = np.zeros((len(labels), people))
+    if len(identities.labels):
+        place = identities.labels.searchsorted(labels).clip(max=len(identities.labels) - 1)
+        known = identities.labels.take(place) == labels
+        found[known] = identities.looks.take(place.compress(known), 0)
+    return found
+
+
 def _looked(
     identities: Identities,
     posterior: GaussianMixture,
@@ -113,13 +155,8 @@ def _looked(
 ) -> tuple[Int[ndarray, " K"], Float[ndarray, "K G"]]:
     """The labels that are there or waited for, ascending, and log π of each after this step."""
     labels = np.unique(np.concatenate([posterior.labels, waiting]))
-    before = np.zeros((len(labels), people))
-    if len(identities.labels):
-        place = identities.labels.searchsorted(labels).clip(max=len(identities.labels) - 1)
-        known = identities.labels.take(place) == labels
-        before[known] = identities.looks.take(place.compress(known), 0)
     leak = min(step_time / p.recognition_swap, 1.0)
-    beliefs = np.exp(before)
+    beliefs = np.exp(_known(identities, labels, people))
     looks = np.log((1.0 - leak) * beliefs / beliefs.sum(axis=1, keepdims=True) + leak / people)
     # a camera without a picture tells nothing
     tellers = np.array([view.likenesses.shape[1] == people for view in views])

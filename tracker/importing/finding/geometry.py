@@ -3,17 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from tracker.camera import Camera
 from tracker.checks.level import LEVEL, horizon, leaning, upwards
-from tracker.checks.reading import Reading, pose, upright
-from tracker.formats.pieces import METRES, Axes, Direction, RawCamera, Unit
+from tracker.checks.reading import Reading, pose, turns_of, upright
+from tracker.formats.pieces import METRES, Axes, Direction, FormatError, RawCamera, Unit
+from tracker.sequences.fields import LARGEST
 
 _USUAL_WAY = 5.0
 """Metres from a camera to the middle of what it looks at."""
+
+
+def check_places(cameras: Sequence[Camera], calibration: str) -> None:
+    """Refuse cameras so far away that no sequence takes them.
+
+    Args:
+        cameras: In metres.
+        calibration: What their file was recognised as.
+
+    Raises:
+        FormatError: Naming the camera.
+    """
+    for camera in cameras:
+        if not np.abs(camera.translation).max() <= LARGEST:
+            raise FormatError(
+                f"{calibration}, {camera.name}: expected a camera within {LARGEST:g} m of the "
+                f"origin, found one at {np.abs(camera.translation).max():.4g} m; --unit mm or cm "
+                "says what its numbers are, or take the offset of the coordinates off"
+            )
 
 
 def read_poses(cameras: Sequence[RawCamera], *, boxes: bool) -> Reading:
@@ -34,7 +56,12 @@ def read_poses(cameras: Sequence[RawCamera], *, boxes: bool) -> Reading:
         directions = (convention.direction,)
     if convention.axes is not None:
         axes = (convention.axes,)
-    readings = [Reading(direction=d, axes=a) for a in axes for d in directions]
+    readings = [
+        Reading(direction=d, axes=a, turns=t)
+        for t in turns_of(cameras)[:1]  # where they look does not tell which it is
+        for a in axes
+        for d in directions
+    ]
     best = max(readings, key=lambda reading: _converging(cameras, reading))
     poses = [pose(camera, best) for camera in cameras]
     level = None if boxes else horizon(poses)
@@ -50,7 +77,7 @@ def read_poses(cameras: Sequence[RawCamera], *, boxes: bool) -> Reading:
         units = (convention.unit,)
     off = [abs(float(np.log(max(METRES[one] * way, 1e-9) / _USUAL_WAY))) for one in units]
     unit = units[int(np.argmin(off))]
-    return Reading(direction=best.direction, axes=best.axes, unit=unit, up=up, lean=lean)
+    return replace(best, unit=unit, up=up, lean=lean)
 
 
 def _focus(cameras: Sequence[RawCamera], reading: Reading) -> Float[ndarray, " 3"]:

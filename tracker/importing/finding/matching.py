@@ -16,7 +16,7 @@ from tracker.formats.pieces import (
     VideoPiece,
 )
 from tracker.importing.finding.calibrations import CameraSet
-from tracker.importing.finding.names import How, match
+from tracker.importing.finding.names import How, match, words_of
 from tracker.importing.gathering import Taken
 from tracker.importing.options import ImportOptions
 
@@ -61,17 +61,28 @@ class Matched:
     """Sentences about what is not used."""
 
 
-def match_all(taken: Sequence[Taken], sets: Sequence[CameraSet], options: ImportOptions) -> Matched:
+def match_all(
+    taken: Sequence[Taken],
+    sets: Sequence[CameraSet],
+    options: ImportOptions,
+    incomplete: Sequence[str] = (),
+) -> Matched:
     """Give every camera its video or pictures and its boxes.
 
     Cameras with neither are left out where others have some.
+
+    Args:
+        taken: All files.
+        sets: Cameras with lens and pose.
+        options: What is told.
+        incomplete: Why other cameras are of no use.
 
     Raises:
         FormatError: If a flag names a camera or a file that is not there.
     """
     told: list[str] = []
     videos, detections, truths = _by_kind(taken)
-    complaints = [one.complaint for one in taken if one.complaint and not one.pieces]
+    complaints = [*incomplete, *(t.complaint for t in taken if t.complaint and not t.pieces)]
     labels = [label for label, _ in videos] or [label for label, _ in detections]
     chosen = _choose(sets, labels, complaints)
     for other in sets:
@@ -202,11 +213,30 @@ def _match_pictures(cameras: list[MatchedCamera], pictures: _Pictures, told: lis
     if found is not None and found[1] == "order" and not _sizes_fit(free, pictures, found[0]):
         found = None
     pairs, how = found or ({}, "name")
+    left = [label for place, (label, _) in enumerate(pictures) if place not in pairs]
+    several = _in_folders_of(free, left)
+    told += [
+        f"{name}: has {len(own)} videos or folders of pictures ({', '.join(own[:3])}); join parts "
+        f"of one recording into one file, or say which by --camera {name}=FILE"
+        for name, own in several.items()
+    ]
+    explained = {label for own in several.values() for label in own}
     for place, (label, piece) in enumerate(pictures):
         if place in pairs:
             _give_pictures(free[pairs[place]], piece, how)
-        else:
+        elif label not in explained:
             told.append(f"{label}: belongs to no camera of the calibration; --camera NAME=FILE")
+
+
+def _in_folders_of(cameras: Sequence[MatchedCamera], labels: Sequence[str]) -> dict[str, list[str]]:
+    """Of pictures that belong to none, those of which several lie in the folder of a camera."""
+    found: dict[str, list[str]] = {}
+    for camera in cameras:
+        own = words_of(camera.raw.name)
+        there = [x for x in labels if any(words_of(part) == own for part in x.split("/")[:-1])]
+        if len(there) > 1:
+            found[camera.raw.name] = there
+    return found
 
 
 def _times(taken: Sequence[Taken]) -> list[tuple[str, TimesPiece]]:
@@ -292,3 +322,16 @@ def _by_pictures(
     if found is None:
         return None
     return {label: named[camera][0] for label, camera in found[0].items()}, found[1]
+
+
+def nothing_of(
+    cameras: Sequence[MatchedCamera], taken: Sequence[Taken], told: Sequence[str]
+) -> FormatError:
+    """Why a calibration is alone: what is wrong with the file that could have been of a camera."""
+    complaints = [one.complaint for one in taken if one.complaint and not one.pieces] or list(told)
+    names = ", ".join(camera.raw.name for camera in cameras[:3])
+    first = complaints[0] if complaints else f"the cameras are {names} …"
+    return FormatError(
+        "neither videos, pictures nor boxes of these cameras were found, and a calibration "
+        f"alone has no steps; add them ({first})"
+    )

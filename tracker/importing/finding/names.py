@@ -21,6 +21,11 @@ def words_of(text: str) -> list[str]:
     return [str(int(part)) if part.isdigit() else part for part in parts]
 
 
+def _joined(text: str) -> list[str]:
+    """The same with letters that stand beside each other as one: ``LeftSide``, ``left_side``."""
+    return words_of(re.sub(r"(?<=[A-Za-z])[\W_]+(?=[A-Za-z])", "", text))
+
+
 def short_names(labels: Sequence[str]) -> list[str]:
     """Labels without the whole words that all of them begin or end with."""
     if len(labels) < 2:
@@ -55,6 +60,7 @@ def match(
     ways: tuple[tuple[How, Callable[[], dict[int, int]]], ...] = (
         ("name", lambda: _by(names, labels, lambda n, x: words_of(n) == words_of(x))),
         ("name", lambda: _by(names, short, lambda n, x: words_of(n) == words_of(x))),
+        ("name", lambda: _by(names, short, lambda n, x: _joined(n) == _joined(x))),
         ("name", lambda: _by(names, labels, _within)),
         ("name", lambda: _by(short_names(names), short, lambda n, x: words_of(n) == words_of(x))),
         ("number", lambda: _by_number(names, short)),

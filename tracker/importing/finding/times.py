@@ -90,11 +90,6 @@ def settle_times(
         ]
         frames = max(lasts, default=-1) + 1
         found.append(("frames", f"{frames}, up to the last that the boxes name"))
-    if not frames and all(c.detections is None for c in cameras):
-        raise FormatError(
-            "neither videos, pictures nor boxes of these cameras were found, and a calibration "
-            "alone has no steps; add them"
-        )
     if not 0 < frames <= MOST_FRAMES:
         raise FormatError(
             f"expected 1 to {MOST_FRAMES:,} steps in videos, pictures or boxes, found {frames}"
@@ -162,12 +157,41 @@ def first_index(piece: DetectionPiece, options: ImportOptions, frames: int | Non
     """The number of the first frame in a file of boxes."""
     if options.first_index is not None:
         return options.first_index
-    if piece.first_index is not None:
-        return piece.first_index
+    # a frame that is called 0 says more than what is usual in a format
     if len(piece.frames) == 0 or piece.frames.min() == 0:
         return 0
+    if piece.first_index is not None:
+        return piece.first_index
     last = max(int(piece.frames.max()), piece.last_frame or 0)
     return 1 if piece.frames.min() == 1 and (frames is None or last >= frames) else 0
+
+
+def told_beyond(piece: DetectionPiece, first: int, frames: int) -> str:
+    """A sentence about boxes of frames that are not there; empty where all are.
+
+    Args:
+        piece: The boxes.
+        first: The number of the first frame, as it is taken.
+        frames: How many there are.
+    """
+    steps = piece.frames - first
+    before, behind = int((steps < 0).sum()), int((steps >= frames).sum())
+    if not before and not behind:
+        return ""
+    if before and not behind and int(steps.min()) == -1:
+        return (
+            f"{piece.source.name}: {before} of {len(steps)} boxes are of frame {first - 1}, so "
+            f"frames are counted from {first - 1}, not from {first}: --first-index {first - 1}"
+        )
+    if behind and not before and first == 0 and int(steps.max()) == frames:
+        return (
+            f"{piece.source.name}: {behind} of {len(steps)} boxes are of frame {frames}, the one "
+            f"after the last of {frames}, so frames are counted from 1: --first-index 1"
+        )
+    return (
+        f"{piece.source.name}: {before + behind} of {len(steps)} boxes are of frames outside the "
+        f"{frames} of the pictures; --first-index says where counting begins"
+    )
 
 
 def frames_of(camera: MatchedCamera, time: CameraTime, steps: int) -> int:

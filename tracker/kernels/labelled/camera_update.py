@@ -135,6 +135,7 @@ def update_by_camera(
     seen: ExpectedBoxes,
     image_size: ndarray,
     clutter: ndarray,
+    resemblance: ndarray,
     rule: CameraRule,
 ) -> CameraUpdate:
     """The update of n tracks, and of the U people never yet detected, by one camera's M boxes.
@@ -151,6 +152,7 @@ def update_by_camera(
         seen: What the camera should see of U + n.
         image_size: (2,) width and height, pixels.
         clutter: κ (M,).
+        resemblance: As :func:`tracker.kernels.labelled.marginals.bernoulli_update`.
         rule: How the boxes are taken.
     """
     size, count = len(undetected.weights), len(measurements.values)
@@ -205,6 +207,7 @@ def update_by_camera(
         measurements,
         hidden.detection_probabilities,
         clutter / (1.0 - newcomer),
+        resemblance,
         rule.gate,
         Settling(rule.tolerance, rule.iterations),
     )

@@ -75,6 +75,7 @@ def bernoulli_update(
     measurements: Measurements,
     detection_probabilities: ndarray,
     unexplained: ndarray,
+    resemblance: ndarray,
     gate: float,
     settling: Settling,
 ) -> UpdatedBernoullis:
@@ -86,6 +87,8 @@ def bernoulli_update(
         measurements: M of them.
         detection_probabilities: (n,).
         unexplained: (M,), intensity of clutter and newcomers at each measurement, > 0.
+        resemblance: (k, M) with k up to n, by how much likelier each of the first k tracks is to
+            look as each measurement does than anybody; others are not known by their looks.
         gate: Squared Mahalanobis distance.
         settling: Of :func:`tracker.kernels.association.belief_propagation.belief_propagation`.
     """
@@ -107,6 +110,8 @@ def bernoulli_update(
         terms[pair] = (
             existences[i] * detection_probabilities[i] * math.exp(found.log_likelihoods[pair])
         )
+        if i < len(resemblance):
+            terms[pair] *= resemblance[i, measured[pair]]
         detected[i, measured[pair]] += terms[pair]
     marginals = belief_propagation(missed, detected, unexplained, settling)
     rows = marginals.rows

@@ -30,6 +30,9 @@ class CameraBoxes(NamedTuple):
     """(C + 1,), where each camera's boxes begin, and the end."""
     clutter_factors: ndarray
     """(B,), on κ: by what each looks like, it is the likelier false the larger this is."""
+    resemblance: ndarray
+    """(n, B), by how much likelier each track of the step before is to look as each box does than
+    anybody; (0, B) where nothing is known of looks."""
 
 
 class StepModel(NamedTuple):
@@ -175,6 +178,7 @@ def predict_and_update(
             ),
             camera.image_size,
             model.clutter[c] * seen.clutter_factors[own],
+            np.ascontiguousarray(seen.resemblance[:, own]),
             rule,
         )
         existences, means, covariances = found.existences, found.means, found.covariances

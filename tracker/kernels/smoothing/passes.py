@@ -50,9 +50,9 @@ class _Room(NamedTuple):
     inverse: ndarray
     """(3, 3)."""
     told: ndarray
-    """(3, 3), (I + Y P_pp)⁻¹ Y."""
+    """(3, 3), S."""
     side: ndarray
-    """(d, 3), P_p."""
+    """(d, 3), W."""
     half: ndarray
     """(d, d)."""
     lower: ndarray
@@ -110,35 +110,44 @@ def _inverse(matrix: ndarray, inverse: ndarray) -> float:
 def _update(y: ndarray, v: ndarray, mean: ndarray, covariance: ndarray, room: _Room) -> float:
     """Mean and covariance by what a row's boxes say, in place.
 
+    With P_pp = L Lᵀ, W = P_p L⁻ᵀ and S = I + Lᵀ Y L it is P⁺ = P − W (I − S⁻¹) Wᵀ: S is symmetric
+    and at least I, however large Y and P are, and so nothing of P⁺ is lost in rounding.
+
     Returns:
         log ∫ N(x; m, P) exp(vᵀx − ½ xᵀYx) dx, by the matrix determinant lemma.
     """
-    inverse, told, side, half, _ = room
+    inverse, told, side, half, lower = room
     d = len(mean)
+    factorise(covariance[:3, :3], lower[:3, :3])
     for a in range(d):
         for b in range(3):
-            side[a, b] = covariance[a, b]
+            total = covariance[a, b]
+            for r in range(b):
+                total -= side[a, r] * lower[b, r]
+            side[a, b] = total / lower[b, b]
     for a in range(3):
-        for b in range(3):
-            told[a, b] = 1.0 if a == b else 0.0
-            for r in range(3):
-                told[a, b] += y[a, r] * side[r, b]
-    determinant = _inverse(told, inverse)
-    for a in range(3):
-        for b in range(3):
-            told[a, b] = 0.0
-            for r in range(3):
-                told[a, b] += inverse[a, r] * y[r, b]
-    for a in range(d):
         for b in range(3):
             half[a, b] = 0.0
+            for r in range(b, 3):
+                half[a, b] += y[a, r] * lower[r, b]
+    for a in range(3):
+        for b in range(a + 1):
+            total = 1.0 if a == b else 0.0
+            for r in range(a, 3):
+                total += lower[r, a] * half[r, b]
+            told[a, b] = total
+            told[b, a] = total
+    determinant = _inverse(told, inverse)
+    for a in range(d):
+        for b in range(3):
+            half[a, b] = side[a, b]
             for r in range(3):
-                half[a, b] += side[a, r] * told[r, b]
+                half[a, b] -= side[a, r] * inverse[r, b]
     for a in range(d):
         for b in range(a + 1):
-            total = 0.5 * (covariance[a, b] + covariance[b, a])
+            total = covariance[a, b]
             for r in range(3):
-                total -= 0.5 * (half[a, r] * side[b, r] + half[b, r] * side[a, r])
+                total -= half[a, r] * side[b, r]
             covariance[a, b] = total
             covariance[b, a] = total
     fixed, found = 0.0, 0.0
@@ -285,6 +294,41 @@ def jumps(
             ridge = 1e-9 * np.trace(ahead_covariances[k]) / d
             found[k] = max(offset @ np.linalg.solve(lost + ridge * np.eye(d), offset), 0.0)
     return found
+
+
+@kernel
+def drives(found: SmoothedRows, noise: ndarray, axes: ndarray) -> ndarray:
+    """tr Q (λ λᵀ + P⁻⁻¹ P P⁻⁻¹ − P⁻⁻¹) of each row, with λ = P⁻⁻¹ (m − m⁻).
+
+    Args:
+        found: The rows.
+        noise: Q (g, g), of some axes of the state.
+        axes: (g,), which ones.
+    """
+    d, size = found.means.shape[1], len(axes)
+    lower, columns = np.zeros((d, d)), np.empty((size, d))
+    unit, pulled, pulls = np.zeros(d), np.empty(d), np.empty(size)
+    drive = np.zeros(len(found.means))
+    for k in range(len(drive)):
+        factorise(found.ahead_covariances[k], lower)
+        for g in range(size):
+            unit[axes[g]] = 1.0
+            solve(lower, unit, columns[g])
+            unit[axes[g]] = 0.0
+            pulls[g] = 0.0
+            for a in range(d):
+                pulls[g] += columns[g, a] * (found.means[k, a] - found.ahead[k, a])
+        for g in range(size):
+            for a in range(d):
+                pulled[a] = 0.0
+                for b in range(d):
+                    pulled[a] += found.covariances[k, a, b] * columns[g, b]
+            for h in range(size):
+                told = pulls[g] * pulls[h] - columns[g, axes[h]]
+                for a in range(d):
+                    told += pulled[a] * columns[h, a]
+                drive[k] += noise[g, h] * told
+    return drive
 
 
 @kernel

@@ -132,7 +132,7 @@ class FusionParams(Params):
     """How long a person whom no camera sees may be gone and still come back under the same id."""
 
     recognition: Annotated[bool, ui("π", published=False)] = True
-    """Multi-Bernoulli: whether the id is given back to who looks like a person with templates."""
+    """Multi-Bernoulli: whether colours say whose box it is, and give an id back to who has left."""
 
     measurement_sigma: Annotated[float, Field(ge=0.1, le=10.0), ui("σ_v", step=0.1, log=True)] = 1.0
     """Factor on the noise that the single-view stage states for its boxes."""

@@ -18,7 +18,7 @@ from tracker.pictures.colour import ColourSpaceName, KernelName
 from tracker.pictures.foreground import ForegroundModel, integral, learn, shape_scores
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.box_sizes import BoxSizes
+from tracker.single_view.box_sizes import BoxSizes, geometry
 from tracker.single_view.colour.carrying import with_carried
 from tracker.single_view.colour.templates import read_templates
 from tracker.single_view.colour.trust import template_trust
@@ -84,13 +84,8 @@ class Appearance:
         self.model = read_templates(sequence, colour_space, histogram_kernel, reader)
         camera, room, half_extents = view.camera, sequence.room, sequence.target_half_extents
         # no parameter has a say in it, so that a moved slider does not wait for it again
-        lens = camera.calibration
-        numbers = (
-            *(lens.rotation, lens.translation, lens.intrinsics, lens.distortion),
-            *(room.minimum, room.maximum, half_extents),
-        )
         self.sizes = reader.once(
-            ("sizes", camera.image_size, *(number.tobytes() for number in numbers)),
+            ("sizes", geometry(sequence, camera_index)),
             lambda: BoxSizes.of(camera, room, half_extents),
         )
         self._size_jitter = size_jitter

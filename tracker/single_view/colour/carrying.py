@@ -19,7 +19,7 @@ from tracker.pictures import colour
 from tracker.pictures.colour import ColourSpaceName, KernelName
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template
-from tracker.single_view.box_sizes import upright_boxes
+from tracker.single_view.box_sizes import geometry, upright_boxes
 from tracker.single_view.colour.templates import template_picture
 
 DEPTHS = 400
@@ -108,8 +108,9 @@ def with_carried(
         reader: Of the pictures.
     """
     what = [(t.name, t.camera, t.frame, t.box.tobytes()) for t in sequence.templates]
+    where = [geometry(sequence, camera) for camera in range(len(sequence.cameras))]
     carried = reader.once(
-        ("carried templates", space, kernel, *what),
+        ("carried templates", space, kernel, *what, *where),
         lambda: _carried(sequence, space, kernel, reader),
     )
     return replace(sequence, templates=(*sequence.templates, *carried)) if carried else sequence

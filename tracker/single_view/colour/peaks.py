@@ -22,6 +22,7 @@ from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.appearance import Appearance, Scene
+from tracker.single_view.colour.evidence import colour_ratios
 from tracker.single_view.colour.trust import (
     shapes_of_templates,
     taught_well,
@@ -43,10 +44,6 @@ templates say: boxes drawn by hand around heads and trunks share 0.4 to 0.5, aro
 
 SHAPE_OVERLAP = 0.3
 """Windows of the shapes that share more than this of what both cover are of one person."""
-
-COLOUR_RATIO = 1.0
-"""Logarithm of how much likelier a shape is somebody's where the colours are a template's: about
-three of four of such places are people, and one of two others."""
 
 _SHAPES = ShapesParams()
 
@@ -131,7 +128,7 @@ class PeakFinder:
             by_shape = shapes_of_templates(sequence, reader)
             self._fits = by_shape.fit >= FITTING
             wanted = wanted or self._fits
-        self._shapes = ShapeFinder(sequence, camera_index, reader) if wanted else None
+        self._shapes = ShapeFinder.of(sequence, camera_index, reader) if wanted else None
         self._instead = np.zeros(len(self._appearance.model.names))
         """How far the shape stands in for the foreground about each person, 0 … 1."""
         self._shape_numbers = shapes
@@ -218,9 +215,10 @@ class PeakFinder:
         """People by shape, surer where a peak is of the same, and peaks where there is no shape.
 
         A peak vouches for the surest shape at its place: others there are parts of the same
-        person. Of a peak without any ln (t Λ + 1 - t) tells what it means that nobody would take
-        it for a person, where t says how far the shapes are to be believed about whose colours
-        it has; that it lies on the foreground is no excuse, for so do parts of people and shadows.
+        person. What the colours say of a shape multiplies what the shape says; that they lie on the
+        foreground is no excuse for a poor one, for so do parts of people, shadows and plants. Of a
+        peak without any shape ln (t Λ + 1 - t) tells what it means that nobody would take it for
+        a person, where t says how far the shapes are to be believed about whose colours it has.
         """
         s = self._shape_numbers
         near = self._near(found, peaks)
@@ -229,24 +227,24 @@ class PeakFinder:
         behind = self._behind(found, peaks, person, vouched)
         alone = np.flatnonzero(~near.any(axis=0) | behind)
         vouched &= ~behind
-        seen = self._trusted(person)  # by the foreground, which took each peak for somebody
+        own = self._nearest(scene, found.boxes)
         ratios = log_ratios(found.log_odds, s.even_odds, s.odds_weight, s.largest_ratio)
-        ratios = ratios + COLOUR_RATIO * vouched.any(axis=1)
-        ratios = _at_least(ratios, np.where(vouched, seen, 0.0).max(axis=1, initial=0.0))
+        ratios += colour_ratios(vouched, distances, own, self._parameters.likelihood_sigma)
         least = log_ratios(np.array(s.passed_odds), s.even_odds, s.odds_weight, s.largest_ratio)
         told = self._by_shape[person[alone]]
         of_alone = np.log(told * np.exp(least) + 1.0 - told)
-        of_alone = _at_least(of_alone, np.where(behind[alone], seen[alone], 0.0))
+        # of who is hidden behind another's shape the foreground takes the peak for somebody
+        seen = np.where(behind[alone], self._trusted(person[alone]), 0.0)
         return Passed(
             np.concatenate([found.boxes, peaks[alone]]),
-            self._likelihood(np.concatenate([self._nearest(scene, found.boxes), distances[alone]])),
+            self._likelihood(np.concatenate([own, distances[alone]])),
             np.concatenate(
                 [
                     shape_sigmas(found.boxes, self._half_extents, s),
                     self.sigmas(peaks[alone]),
                 ]
             ),
-            np.concatenate([ratios, of_alone]),
+            np.concatenate([ratios, _at_least(of_alone, seen)]),
         )
 
     @staticmethod

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from jaxtyping import Float
@@ -21,6 +22,7 @@ from tracker.parameters import ForegroundParams
 from tracker.pictures.foreground import box_shares, integral, learn
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template
+from tracker.single_view.box_sizes import geometry
 from tracker.single_view.colour.templates import template_picture
 from tracker.single_view.shape.finder import ShapeFinder
 
@@ -127,25 +129,26 @@ def _by_shape(sequence: Sequence, template: Template, reader: Pictures) -> tuple
     if template.camera not in names:
         return 0.0, 0.0
     camera = names.index(template.camera)
-    what = (template.camera, template.frame, template.box.tobytes())
+    what = (template.camera, template.frame, template.box.tobytes(), geometry(sequence, camera))
 
     def look() -> tuple[float, float]:
-        finder = reader.once(
-            ("shape finder", camera), lambda: ShapeFinder(sequence, camera, reader)
-        )
-        state, seen = finder.start(), (0.0, 0.0)
-        box = Boxes.from_left_top(template.box[None])
+        finder = ShapeFinder.of(sequence, camera, reader)
+        state = finder.start()
         # the pictures before show what moves
-        for step in range(max(0, template.frame - PICTURES_BEFORE), template.frame + 1):
-            picture = reader.picture(camera, step)
-            if picture is None:
-                continue
-            state, found = finder.find(state, picture, PASSED, OVERLAP)
-            if step == template.frame:
-                there = Boxes(found.boxes).left_top
-                shared = box_overlaps(there, template.box[None]).max(initial=0.0)
-                seen = float(expit(found.support(box.centred)[0])), float(shared)
-        return seen
+        before = min(template.frame, PICTURES_BEFORE)
+        pictures = reader.iterate(camera, template.frame - before)
+        for picture in islice(pictures, before):
+            reader.check()
+            if picture is not None:
+                state = finder.watch(state, picture)
+        picture = template_picture(reader, camera, template.frame)
+        if picture is None:
+            return 0.0, 0.0
+        _, found = finder.find(state, picture, PASSED, OVERLAP)
+        there = Boxes(found.boxes).left_top
+        shared = box_overlaps(there, template.box[None]).max(initial=0.0)
+        support = found.support(Boxes.from_left_top(template.box[None]).centred)
+        return float(expit(support[0])), float(shared)
 
     return reader.once(("template by shape", what), look)
 

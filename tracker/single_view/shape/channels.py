@@ -84,6 +84,10 @@ class Channels:
         """Nothing was seen yet."""
         return ChannelState((), None)
 
+    def watch(self, state: ChannelState, picture: UInt8[ndarray, "h w 3"]) -> ChannelState:
+        """The state after a picture in which nobody is sought: what moves, and no channels."""
+        return self._watch(state, self._reduced(square_roots(picture)))[0]
+
     def step(
         self, state: ChannelState, picture: UInt8[ndarray, "h w 3"]
     ) -> tuple[ChannelState, Int32[ndarray, "h1 w1 C"]]:
@@ -92,13 +96,7 @@ class Channels:
         shown = cv2.LUT(empty, square_roots(tone_curve(empty, picture)))
         roots = self._reduced(square_roots(picture))
         difference = _largest(cv2.absdiff(roots, self._reduced(shown)))
-        smooth = cv2.GaussianBlur(roots, (0, 0), BLUR)
-        before = (*state.before, smooth)
-        motion = _moved(before[0], smooth)
-        activity = state.activity
-        if activity is None:
-            activity = np.zeros(motion.shape, dtype=np.float32)
-        activity = self._fading * activity + (1.0 - self._fading) * motion.astype(np.float32)
+        after, motion, activity = self._watch(state, roots)
         found = gradients(roots)
         mean = cv2.blur(found.magnitudes, (self._around, self._around))
         edges = np.minimum(_EDGE * found.magnitudes / (mean + _CALM), 255.0).astype(np.uint8)
@@ -112,7 +110,20 @@ class Channels:
             axis=2,
         )
         sums: Int32[ndarray, "h1 w1 C"] = channel_sums(found.bins, edges, planes)
-        return ChannelState(before[-self._lag :], activity), sums
+        return after, sums
+
+    def _watch(
+        self, state: ChannelState, roots: UInt8[ndarray, "h1 w1 3"]
+    ) -> tuple[ChannelState, UInt8[ndarray, "h1 w1"], Float32[ndarray, "h1 w1"]]:
+        """The next state, the difference from a moment ago, and its fading mean."""
+        smooth = cv2.GaussianBlur(roots, (0, 0), BLUR)
+        before = (*state.before, smooth)
+        motion = _moved(before[0], smooth)
+        activity = state.activity
+        if activity is None:
+            activity = np.zeros(motion.shape, dtype=np.float32)
+        activity = self._fading * activity + (1.0 - self._fading) * motion.astype(np.float32)
+        return ChannelState(before[-self._lag :], activity), motion, activity
 
     def _reduced(self, picture: UInt8[ndarray, "h w *c"]) -> UInt8[ndarray, "h2 w2 *c"]:
         return np.asarray(cv2.resize(picture, self._size, interpolation=cv2.INTER_AREA))

@@ -11,6 +11,7 @@ from numpy import ndarray
 from tracker.pictures.foreground import learn_background
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
+from tracker.single_view.box_sizes import geometry
 from tracker.single_view.shape.channels import Channels, ChannelState
 from tracker.single_view.shape.trees import Trees
 from tracker.single_view.shape.windows import Windows
@@ -77,9 +78,36 @@ class ShapeFinder:
         self._edges = (self._windows.edges + 0.5) * [across, down, across, down] - 0.5
         self._trees = Trees.read()
 
+    @staticmethod
+    def of(sequence: Sequence, camera_index: int, reader: Pictures) -> ShapeFinder:
+        """The one of a camera, made when it is first asked for: it keeps nothing of what it sees.
+
+        Args:
+            sequence: Whose camera, upright.
+            camera_index: Which one.
+            reader: Of its pictures.
+        """
+        return reader.once(
+            ("shape finder", camera_index, sequence.step_time, geometry(sequence, camera_index)),
+            lambda: ShapeFinder(sequence, camera_index, reader),
+        )
+
     def start(self) -> ChannelState | None:
         """The state before the first picture."""
         return None if self._channels is None else self._channels.initial()
+
+    def watch(
+        self, state: ChannelState | None, picture: UInt8[ndarray, "h w 3"]
+    ) -> ChannelState | None:
+        """The state after a picture in which nobody is sought: without windows and their trees.
+
+        Args:
+            state: After the picture before.
+            picture: BGR.
+        """
+        if self._channels is None or state is None:
+            return state
+        return self._channels.watch(state, picture)
 
     def find(
         self,

@@ -101,7 +101,7 @@ class ShapeSource:
         """
         self._parameters = parameters
         self._half_extents = sequence.target_half_extents
-        self._finder = ShapeFinder(sequence, camera_index, reader)
+        self._finder = ShapeFinder.of(sequence, camera_index, reader)
 
     def start(self) -> ChannelState | None:
         """The state before the first step."""

@@ -91,7 +91,8 @@ class Appearance:
             step_time: Seconds.
         """
         fewest = max(_FEWEST, round(_ENOUGH / step_time))
-        own = links.take(_clean(links, cameras, looks))
+        seen = [np.asarray(vectors.any(axis=1)) for vectors in looks]
+        own = links.take(clean(links, cameras, seen))
         steps, owners = pieces.steps[own.rows], pieces.owners[own.rows]
         middle = ((pieces.firsts + pieces.lasts) / 2.0)[owners]
         apart = _APART / step_time
@@ -138,14 +139,19 @@ class Appearance:
         return np.asarray((ratio * known).sum(axis=1)), known.any(axis=1)
 
 
-def _clean(links: Links, cameras: Many[CameraBoxes], looks: Many[ndarray]) -> Bool[ndarray, " L"]:
-    """Links of boxes that are surely somebody's, touch no other box, and have looks."""
-    clean = links.shares > _OWN
+def clean(
+    links: Links, cameras: Many[CameraBoxes], seen: Many[Bool[ndarray, " B"]] | None = None
+) -> Bool[ndarray, " L"]:
+    """Links of boxes that are surely somebody's and touch no other box; of each camera only those
+    of which there is something to see, where that is told."""
+    found = links.shares > _OWN
     for c, camera in enumerate(cameras):
-        good = box_kernels.alone(camera.boxes, camera.starts) & looks[c].any(axis=1)
+        good = box_kernels.alone(camera.boxes, camera.starts)
+        if seen is not None:
+            good &= seen[c]
         own = links.cameras == c
-        clean[own] &= good[links.boxes[own]]
-    return np.asarray(clean)
+        found[own] &= good[links.boxes[own]]
+    return np.asarray(found)
 
 
 def _gather(

@@ -45,11 +45,20 @@ class Tracked:
     """The filter's label of each row, -1 where it had nobody."""
 
 
-def cut(
-    tracked: Tracked, p: SmoothingParams, seeker: Seeker
-) -> tuple[Paths, Int[ndarray, " M"], Int[ndarray, " N"]]:
-    """The pieces under the filter's labels, the row that each of their rows was, and why each row
-    was left out: 0 for not, 1 contested, 2 jump, 3 away or not seen."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Cuts:
+    """Where N rows are cut by themselves, whatever a person says of them."""
+
+    reasons: Int[ndarray, " N"]
+    """Why each row is left out: 0 for not, 1 contested, 2 jump, 3 away or not seen."""
+    clear: Bool[ndarray, " N"]
+    """The rows that are kept."""
+    breaks: Bool[ndarray, " N"]
+    """Rows before which a path is cut even where both sides are clear."""
+
+
+def cuts(tracked: Tracked, p: SmoothingParams) -> Cuts:
+    """Where tracks are cut by themselves."""
     smoother, fitted, shared = tracked.smoother, tracked.fitted, tracked.shared
     step_time, paths = smoother.model.step_time, fitted.paths
     rows = len(paths.states)
@@ -74,23 +83,33 @@ def cut(
     breaks |= exchange_breaks(
         fitted, reach=1.0 + FASTEST * step_time, least=p.exchange, apart=too_long
     )
-    breaks |= seeker.breaks()
     clear = _between(paths, fed & (reasons == 0)) & (reasons == 0)
     begins, between = _of_two(paths, tracked.names)
-    breaks |= begins
-    clear &= ~between
+    return Cuts(reasons, clear & ~between, breaks | begins)
+
+
+def cut(tracked: Tracked, plain: Cuts, seeker: Seeker) -> tuple[Paths, Int[ndarray, " M"]]:
+    """The pieces under the filter's labels, and the row that each of their rows was.
+
+    Args:
+        tracked: What is cut.
+        plain: Where it is by itself.
+        seeker: Where corrections cut it.
+    """
+    paths, owners = tracked.fitted.paths, tracked.fitted.paths.owners
+    clear, breaks = plain.clear.copy(), plain.breaks | seeker.breaks()
     cut, kept = pieces.cut(paths, clear, breaks)
     # a short piece says little of who it is; where it is all there is it stays
     lengths = np.diff(cut.starts)
     of = owners[kept[cut.starts[:-1]]]
     longest = np.zeros(len(paths.labels), dtype=np.int64)
     np.maximum.at(longest, of, lengths)
-    shortest = round(_SHORTEST / step_time)
+    shortest = round(_SHORTEST / tracked.smoother.model.step_time)
     short = (lengths < shortest) & (longest[of] >= shortest)
     short[list(seeker.meant(cut, kept))] = False
     clear[kept[np.repeat(short, lengths)]] = False
     cut, kept = pieces.cut(paths, clear, breaks)
-    return replace(cut, labels=_named(cut, tracked.names[kept])), kept, reasons
+    return replace(cut, labels=_named(cut, tracked.names[kept])), kept
 
 
 def _of_two(

@@ -64,7 +64,7 @@ class Ends:
     def in_chains(
         self, pieces: Paths, chains: Fitted, rows: Int[ndarray, " M"], motion: Motion
     ) -> Ends:
-        """By all boxes of the chains that the pieces were joined to.
+        """By all boxes of the chains of several pieces.
 
         A piece of one step says nothing of where its person goes; the pieces before and after
         it do. What is known before the next row is undone by one step of the motion,
@@ -74,8 +74,8 @@ class Ends:
         Args:
             pieces: The pieces.
             chains: Fitted to their boxes.
-            rows: Of the chains, for each row of the pieces; -1 for those that are nobody's, who
-                stay as they are.
+            rows: Of the chains, for each row of the pieces; -1 for pieces in no such chain,
+                which stay as they are.
             motion: Of both.
         """
         firsts, lasts = rows[pieces.starts[:-1]], rows[pieces.starts[1:] - 1]

@@ -11,7 +11,7 @@ from collections.abc import Sequence as Many
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 from numpy import ndarray
 
 from tracker.assignment import names_by_majority
@@ -23,6 +23,9 @@ from tracker.smoothing.identity import cutting, joining, odds, pieces
 from tracker.smoothing.identity import decisions as decided
 from tracker.smoothing.identity.cutting import Tracked
 from tracker.smoothing.identity.ends import Ends
+from tracker.smoothing.identity.people import Seen, told_of_people
+from tracker.smoothing.identity.people import of_chains as people_of_chains
+from tracker.smoothing.identity.program import Cut
 from tracker.smoothing.identity.ties import Seeker, Ties
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.result import Decision, Joined
@@ -30,6 +33,10 @@ from tracker.smoothing.smoother import Shared
 
 _SURE = 1e6
 """Log odds of chains that were found somebody's already."""
+
+_CAREFUL = 3
+"""How often only those corrections are made to hold of which no earlier one speaks of the same
+people; then all that do not hold: dozens that hang together would take as many turns."""
 
 _TURNS = 2
 """How often pieces are joined anew by what their chains say of them."""
@@ -56,7 +63,7 @@ class Settled:
 def settle(
     tracked: Tracked,
     parameters: SmoothingParams,
-    looks: Many[Float[ndarray, "B A"]] | None,
+    seen: Seen,
     corrections: Many[Correction] = (),
 ) -> Settled:
     """Cut and join.
@@ -67,70 +74,84 @@ def settle(
     Args:
         tracked: By the filter, or as settled before.
         parameters: When to cut, and what holds together.
-        looks: A unit vector for each box of each camera; None where there is none.
+        seen: What the boxes look like.
         corrections: What a person said of who is who.
     """
     leeway = corrections_leeway(tracked.smoother.model.step_time)
     waiting = [one for one in corrections if one.pairs or one.apart]
+    plain = cutting.cuts(tracked, parameters)
+    turn = 0
     while True:
         obeyed = [one for one in corrections if one not in waiting]
-        found = _settled(tracked, parameters, looks, obeyed, leeway)
-        unmet = _unmet(found.paths, waiting, leeway)
+        found = _settled(tracked, parameters, seen, obeyed, leeway, plain)
+        unmet = _unmet(found.paths, waiting, leeway, careful=turn < _CAREFUL)
         if not unmet:
             return found
-        waiting = [one for one in waiting if one not in unmet]
+        waiting, turn = [one for one in waiting if one not in unmet], turn + 1
 
 
-def _unmet(paths: Paths, waiting: Many[Correction], leeway: int) -> list[Correction]:
-    """Those that do not hold, but for what may hold once an earlier one at those steps does."""
+def _unmet(
+    paths: Paths, waiting: Many[Correction], leeway: int, *, careful: bool
+) -> list[Correction]:
+    """Those that do not hold; where one is careful, but for what may hold once an earlier one does
+    that speaks of the same people: whom somebody meets later depends on who he was before."""
     if not waiting:
         return []
     told = outcomes(
         paths.steps, paths.labels[paths.owners], paths.states[:, :3], waiting, leeway=leeway
     )
     found: list[Correction] = []
+    touched: set[int] = set()
     for one, outcome in zip(waiting, told, strict=True):
-        first, last = one.steps
-        if not outcome.met and all(
-            other.steps[1] + leeway < first or last + leeway < other.steps[0] for other in found
-        ):
+        if outcome.met:
+            continue
+        if careful and not outcome.tracks:  # of whom nobody was found that may be anybody
+            return found or [one]
+        if not careful or touched.isdisjoint(outcome.tracks):
             found.append(one)
+        touched |= set(outcome.tracks)
     return found
 
 
 def _settled(
     tracked: Tracked,
     parameters: SmoothingParams,
-    looks: Many[Float[ndarray, "B A"]] | None,
+    seen: Seen,
     corrections: Many[Correction],
     leeway: int,
+    plain: cutting.Cuts,
 ) -> Settled:
     """Cut and join with all of some corrections."""
     smoother, fitted, shared = tracked.smoother, tracked.fitted, tracked.shared
     seeker = Seeker(fitted, corrections, leeway)
-    cut, kept, reasons = cutting.cut(tracked, parameters, seeker)
+    cut, kept = cutting.cut(tracked, plain, seeker)
     ties = seeker.ties(cut, kept)
     links = pieces.moved(shared.links, kept, len(fitted.paths.states))
     refitted = smoother.fit(cut, links)
     own = Shared(links, shared.chances[:, kept], shared.missed[:, kept], shared.hidden_by[:, kept])
     worths, births, deaths = odds.of_pieces(smoother, refitted, own, parameters)
     alone = Ends.alone(refitted, smoother.prior)
-    goes_on = odds.GoesOn(smoother, refitted.paths, links, parameters, looks)
+    goes_on = odds.GoesOn(smoother, refitted.paths, links, parameters, seen.looks)
     pairs = goes_on.by(alone)
+    people = told_of_people(refitted.paths, links, smoother, seen, parameters.appearance)
     longest = max(round(parameters.longest / smoother.model.step_time), 1)
     now, later = ties.parted(cut, longest)
+    cuts: list[Cut] = []
     following, used = joining.join(
-        worths, births, deaths, pairs.earlier, pairs.later, pairs.gains, now
+        worths, births, deaths, pairs.earlier, pairs.later, pairs.gains, now, people, cuts
     )
     first = joining.chains(following, used)
     for _ in range(_TURNS):  # who is joined to whom tells of the ends of the pieces in between
-        whole, rows = pieces.chained(refitted.paths, first, list(range(len(first))))
+        several = [chain for chain in first if len(chain) > 1]
+        if not several:
+            break
+        whole, rows = pieces.chained(refitted.paths, several, list(range(len(several))))
         told = alone.in_chains(
             cut, smoother.fit(whole, pieces.moved_to(links, rows)), rows, smoother.model.motion
         )
         pairs = goes_on.by(told)
         following, used = joining.join(
-            worths, births, deaths, pairs.earlier, pairs.later, pairs.gains, now
+            worths, births, deaths, pairs.earlier, pairs.later, pairs.gains, now, people, cuts
         )
         again = joining.chains(following, used)
         if again == first:
@@ -139,15 +160,16 @@ def _settled(
     of_chains = later.of_chains(first, cut)
     if of_chains is None:  # who is tied to somebody far away may not be joined to another meanwhile
         following, used = joining.join(
-            worths, births, deaths, pairs.earlier, pairs.later, pairs.gains, ties
+            worths, births, deaths, pairs.earlier, pairs.later, pairs.gains, ties, people, cuts
         )
         first = joining.chains(following, used)
         of_chains = Ties(apart=ties.apart).of_chains(first, cut) or Ties()
     # what goes on by its motion tells more of its looks than each piece alone
-    back = odds.comes_back(smoother, refitted.paths, links, first, parameters, looks)
+    back = odds.comes_back(smoother, refitted.paths, links, first, parameters, seen.looks)
     following, _ = joining.join(
         np.full(len(first), _SURE), births[[c[0] for c in first]], deaths[[c[-1] for c in first]],
         back.earlier, back.later, back.gains, of_chains,
+        people_of_chains(people, first),
     )  # fmt: skip
     chains = [
         [piece for number in numbers for piece in first[number]]
@@ -155,7 +177,7 @@ def _settled(
     ]
     pairs = pairs.with_more(back.of_ends(first))
     labels = _labels(cut, chains)
-    decisions = decided.cuts(cut, fitted.paths, kept, reasons, chains, labels)
+    decisions = decided.cuts(cut, fitted.paths, kept, plain.reasons, chains, labels)
     decisions += decided.joins(cut, pairs, chains, labels, odds.anew(smoother), set(ties.together))
     paths, rows = pieces.chained(refitted.paths, chains, labels)
     lengths = np.diff(cut.starts)

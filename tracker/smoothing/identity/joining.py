@@ -2,24 +2,25 @@
 
 [ZLN08] Zhang, Li, Nevatia, "Global data association for multi-object tracking using network
 flows", CVPR 2008.
-[DFJ54] Dantzig, Fulkerson, Johnson, "Solution of a large-scale traveling-salesman problem",
-Operations Research 2(4), 1954.
 """
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
-from scipy.optimize import Bounds, LinearConstraint, linear_sum_assignment, milp
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from scipy.optimize import linear_sum_assignment
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import breadth_first_order, connected_components
 
+from tracker.smoothing.identity import program
 from tracker.smoothing.identity.ties import Ties
 
 _FREE = Ties()
+
+_LITTLE = 1.0
+"""What colours may speak against the likeliest chains before others are sought: so far from the
+best of all are these at most."""
 
 
 def join(
@@ -30,6 +31,8 @@ def join(
     later: Int[ndarray, " P"],
     gains: Float[ndarray, " P"],
     ties: Ties = _FREE,
+    people: Float[ndarray, "n G"] | None = None,
+    cuts: list[program.Cut] | None = None,
 ) -> tuple[Int[ndarray, " n"], Bool[ndarray, " n"]]:
     """The most likely set of chains of pieces, exactly; of those that obey the ties, if any.
 
@@ -43,11 +46,8 @@ def join(
     nobody's, to itself), a column for how each comes about. Pieces that no chain of possible
     pairs connects are solved apart.
 
-    Ties are linear inequalities of the same program. Who is tied together is in one chain: of
-    what i's chain has without j, S, something goes on out of S, Σ_{u∈S, v∉S} x_uv ≥ 1. Who is
-    apart is not: of the joins on the way from i to j one is not made, Σ x_uv ≤ L − 1. They are
-    added where a solution breaks them, until none does, as the subtours of a travelling
-    salesman are [DFJ54].
+    What a person said, and that each chain looks like one of the people with templates
+    throughout, makes an integer program of it: :func:`tracker.smoothing.identity.program.solved`.
 
     Args:
         worths: Log odds of each piece's evidence against clutter.
@@ -58,12 +58,18 @@ def join(
         gains: Log odds of being one person's.
         ties: What must hold; of pieces that no pair connects, a pair is made with no odds of
             its own.
+        people: Of each piece, how much less likely its colours are each of G people's than its
+            likeliest one's: log, at most 0.
+        cuts: What solutions for the same pieces and ties broke so far: it is looked after from
+            the beginning. More are added.
 
     Returns:
         The piece that each is followed by, -1 for none, and whether it is somebody's.
     """
     count = len(worths)
     following, used = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=bool)
+    people = np.zeros((count, 1)) if people is None else people
+    cuts = [] if cuts is None else cuts
     if not count:
         return following, used
     if ties:
@@ -92,7 +98,10 @@ def join(
         table[inner, size + inner] = worths[own] + deaths[own]
         table[size + inner, inner] = births[own]
         table[size:, size:] = 0.0
-        goes_on = _solved(table, _within(ties, own, place), size)
+        known = [(kind, place[some].tolist()) for kind, some in cuts if (group[some] == g).all()]
+        before = len(known)
+        goes_on = _solved(table, _within(ties, own, place), people[own], known)
+        cuts += [(kind, own[some].tolist()) for kind, some in known[before:]]
         for row, column in enumerate(goes_on):
             used[own[row]] = column != row
             if column < size and column != row:
@@ -110,16 +119,19 @@ def _with_ties(
 ) -> tuple[Int[ndarray, " Q"], Int[ndarray, " Q"], Float[ndarray, " Q"]]:
     """The pairs, with those that ties need and without those that they forbid.
 
-    What goes on from i, tied to j, is j or lies between them; and so is what comes before j.
+    What goes on from i, tied to j, is j or on a way of pairs from i to j; and so is what comes
+    before j.
     """
     keep = ~np.isin(later, list(ties.firsts)) & ~np.isin(earlier, list(ties.lasts))
     together = set(ties.together)
     for k in np.flatnonzero(~keep).tolist():
         keep[k] = (int(earlier[k]), int(later[k])) in together
+    from_each = _ways(earlier[keep], later[keep], ties, len(births))
+    to_each = from_each.T.tocsr()
     for i, j in ties.together:
-        between = ties.between[i, j]
-        keep &= (earlier != i) | (later == j) | np.isin(later, between)
-        keep &= (later != j) | (earlier == i) | np.isin(earlier, between)
+        between = _reached(from_each, i) & _reached(to_each, j)
+        keep &= (earlier != i) | (later == j) | between[later]
+        keep &= (later != j) | (earlier == i) | between[earlier]
     earlier, later, gains = earlier[keep], later[keep], gains[keep]
     there = set(zip(earlier.tolist(), later.tolist(), strict=True))
     more = np.array([pair for pair in ties.together if pair not in there], dtype=np.int64)
@@ -129,6 +141,22 @@ def _with_ties(
         np.concatenate([later, begins]),
         np.concatenate([gains, deaths[ends] + births[begins]]),
     )
+
+
+def _ways(
+    earlier: Int[ndarray, " P"], later: Int[ndarray, " P"], ties: Ties, count: int
+) -> csr_array:
+    """The pairs as a graph, with those of ties."""
+    ends, begins = np.array(ties.together, dtype=np.int64).reshape(-1, 2).T
+    rows, columns = np.concatenate([earlier, ends]), np.concatenate([later, begins])
+    return coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count)).tocsr()
+
+
+def _reached(ways: csr_array, piece: int) -> Bool[ndarray, " n"]:
+    """Whom ways lead to from a piece, itself among them."""
+    found = np.zeros(ways.shape[0], dtype=bool)
+    found[breadth_first_order(ways, piece, return_predecessors=False)] = True
+    return found
 
 
 def _within(ties: Ties, own: Int[ndarray, " k"], place: Int[ndarray, " n"]) -> Ties:
@@ -153,8 +181,14 @@ def _goes_on(ties: Ties, table: Float[ndarray, "m m"], size: int) -> None:
         table[size + j, j] = -np.inf
 
 
-def _solved(table: Float[ndarray, "m m"], ties: Ties, size: int) -> list[int]:
-    """The column of each of the first ``size`` rows in the best assignment that obeys the ties."""
+def _solved(
+    table: Float[ndarray, "m m"],
+    ties: Ties,
+    people: Float[ndarray, "k G"],
+    cuts: list[program.Cut],
+) -> list[int]:
+    """The column of each of the first k rows in the best assignment that obeys the ties."""
+    size = len(people)
     for piece in ties.somebody:
         table[piece, piece] = -np.inf
     for piece in ties.nobody:
@@ -166,75 +200,19 @@ def _solved(table: Float[ndarray, "m m"], ties: Ties, size: int) -> list[int]:
     never = -1e3 - 4.0 * size * np.abs(table[possible]).max()
     _, columns = linear_sum_assignment(np.where(possible, table, never), True)
     goes_on: list[int] = columns[:size].tolist()
-    if not _broken(goes_on, ties, size):
+    if not program.broken(goes_on, ties, size) and _to_gain(goes_on, people) < _LITTLE:
         return goes_on
-    # how a piece goes on, and where it does not follow another its beginning
-    possible[size:, size:] = False
-    edges = np.argwhere(possible)
-    at_row, at_column = edges[:, 0], edges[:, 1]
-    count = len(edges)
-    out, into = np.flatnonzero(at_row < size), np.flatnonzero(at_column < size)
-    once = coo_array(
-        (
-            np.ones(len(out) + len(into)),
-            (np.concatenate([at_row[out], size + at_column[into]]), np.concatenate([out, into])),
-        ),
-        shape=(2 * size, count),
-    ).tocsr()
-    inequalities: list[tuple[ndarray, float, float]] = []
-    inner = (at_row < size) & (at_column < size) & (at_row != at_column)
-    while broken := _broken(goes_on, ties, size):
-        for kind, some in broken:
-            if kind == "together":
-                leaves = np.isin(at_row, some) & ~np.isin(at_column, some) & inner
-                inequalities.append((leaves.astype(float), 1.0, np.inf))
-            else:
-                way = [i * (2 * size) + j for i, j in itertools.pairwise(some)]
-                on_it = np.isin(at_row * (2 * size) + at_column, way) & inner
-                inequalities.append((on_it.astype(float), -np.inf, len(way) - 1.0))
-        rows = np.stack([row for row, _, _ in inequalities])
-        found = milp(
-            -table[at_row, at_column],
-            integrality=np.ones(count, dtype=np.int64),
-            bounds=Bounds(0.0, 1.0),
-            constraints=[
-                LinearConstraint(once, 1.0, 1.0),
-                LinearConstraint(
-                    rows,
-                    np.array([low for _, low, _ in inequalities]),
-                    np.array([high for _, _, high in inequalities]),
-                ),
-            ],
-            options={"mip_rel_gap": 0.0},
-        )
-        if found.x is None:
-            raise RuntimeError(f"ties that can all hold were found impossible: {found.message}")
-        chosen = found.x > 0.5
-        for row, column in edges[chosen & (at_row < size)].tolist():
-            goes_on[row] = column
-    return goes_on
+    return program.solved(table, possible, ties, people, columns, cuts)
 
 
-def _broken(goes_on: list[int], ties: Ties, size: int) -> list[tuple[str, list[int]]]:
-    """The ties that a solution breaks: of those together the chain that lacks the other from the
-    first on, of those apart the way between them."""
-
-    def chain(piece: int) -> list[int]:
-        found = [piece]
-        while goes_on[found[-1]] < size and goes_on[found[-1]] != found[-1]:
-            found.append(goes_on[found[-1]])
-        return found
-
-    broken = []
-    for i, j in ties.together:
-        if j not in (own := chain(i)):
-            broken.append(("together", own))
-    for i, j in ties.apart:
-        for one, other in ((i, j), (j, i)):
-            own = chain(one)
-            if other in own[1:]:
-                broken.append(("apart", own[: own.index(other) + 1]))
-    return broken
+def _to_gain(goes_on: list[int], people: Float[ndarray, "k G"]) -> float:
+    """By how much the colours speak against these chains: other chains can gain no more."""
+    told = 0.0
+    following = np.array([column if column < len(people) else -1 for column in goes_on])
+    used = following != np.arange(len(people))
+    for chain in chains(np.where(used, following, -1), used):
+        told -= float(people[chain].sum(axis=0).max())
+    return told
 
 
 def chains(following: Int[ndarray, " n"], used: Bool[ndarray, " n"]) -> list[list[int]]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from collections.abc import Sequence as Many
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -37,8 +37,6 @@ class Ties:
     """Pieces before which their person was not there."""
     lasts: frozenset[int] = frozenset()
     """Pieces after which their person was not there."""
-    between: Mapping[tuple[int, int], tuple[int, ...]] = field(default_factory=dict)
-    """Of each pair of :attr:`together` the pieces that lie between them in time."""
 
     def __bool__(self) -> bool:
         return bool(self.together or self.apart or self.somebody or self.nobody
@@ -53,7 +51,7 @@ class Ties:
         """
         near = tuple((i, j) for i, j in self.together if cut.firsts[j] - cut.lasts[i] <= longest)
         far = tuple(pair for pair in self.together if pair not in near)
-        return replace(self, together=near), Ties(far, self.apart, between=self.between)
+        return replace(self, together=near), Ties(far, self.apart)
 
     def limits(self, chains: Many[Many[int]], cut: Paths) -> dict[int, tuple[int, int]]:
         """The first and the last step at which the people of some chains may be: who is not
@@ -126,7 +124,7 @@ class Seeker:
         self._fitted, self._corrections, self._leeway = fitted, corrections, leeway
         self._jumps = fitted.jumps if any(one.kind == "different" for one in corrections) else None
         self._steps, self._owners = paths.steps, paths.owners
-        self._whereabouts = Whereabouts(self._steps, paths.states[:, :3])
+        self._whereabouts = Whereabouts(self._steps, paths.states[:, :3], self._owners)
         self._rows = {
             place: self._whereabouts.nearest(place, leeway=0 if one.kind == "here" else leeway)
             for one in corrections
@@ -316,10 +314,6 @@ def possible(
         somebody |= one.somebody
     members = {tuple(group) for group in groups.values()}
     together = [pair for group in sorted(members) for pair in itertools.pairwise(group)]
-    between = {
-        (i, j): tuple(np.flatnonzero((firsts > lasts[i]) & (lasts < firsts[j])).tolist())
-        for i, j in together
-    }
     sure = {piece for group in members for piece in group} | came | left | somebody
     return Ties(
         tuple(together),
@@ -328,5 +322,4 @@ def possible(
         frozenset(nobody),
         frozenset(came),
         frozenset(left),
-        between,
     )

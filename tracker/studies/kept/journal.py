@@ -102,21 +102,33 @@ def storage(journal: Any, *, minimized: bool | None) -> Any:
     from optuna.storages import JournalStorage
     from optuna.trial import TrialState
 
-    if minimized is None:
-        return JournalStorage(journal)
-    sign = 1.0 if minimized else -1.0
-
     class Storage(JournalStorage):
-        """Of the trials that ended TPE is given the best and the last ones."""
+        """Neither what waits to be tried nor what ended is sought among all trials each time."""
+
+        _waits = True  # what an earlier start left, until it is looked for
+
+        def create_new_trial(self, study_id: int, template_trial: Any = None) -> int:
+            self._waits |= template_trial is not None
+            number: int = super().create_new_trial(study_id, template_trial)
+            return number
 
         def get_all_trials(
             self, study_id: int, deepcopy: bool = True, states: Container[Any] | None = None
         ) -> list[Any]:
+            if states == (TrialState.WAITING,):
+                if not self._waits:
+                    return []
+                waiting: list[Any] = super().get_all_trials(study_id, deepcopy, states)
+                self._waits = bool(waiting)
+                return waiting
             found: list[Any] = super().get_all_trials(study_id, deepcopy, states)
-            if states is None or TrialState.COMPLETE not in states or len(found) <= BEST + LAST:
+            if minimized is None or states is None or TrialState.COMPLETE not in states:
+                return found
+            if len(found) <= BEST + LAST:
                 return found
             last = found[-LAST:]
             early = [one for one in found[:-LAST] if one.state == TrialState.COMPLETE]
+            sign = 1.0 if minimized else -1.0
             best = heapq.nsmallest(BEST, early, key=lambda one: sign * one.value)
             return sorted([*best, *last], key=lambda one: one.number)
 

@@ -30,7 +30,10 @@ def cameras_table(info: ImportInfo) -> Markup:
         class_="cams-in",
         aria_label="Cameras",
     )
-    return element("div", table, _left_out(info), unused(info), class_="cams-scroll")
+    # what is not used stays in sight however many cameras there are
+    scroll = element("div", table, _left_out(info), class_="cams-scroll")
+    told = unused(info)
+    return scroll if told is None else joined(scroll, told)
 
 
 def _left_out(info: ImportInfo) -> Markup | None:
@@ -45,17 +48,24 @@ def unused(info: ImportInfo) -> Markup | None:
     """Files that are not used, and why."""
     told = [one.complaint or f"{one.label} is not used" for one in info.files if not one.format]
     words = " · ".join([*told, *info.told])
-    return element("p", words, class_="small unused") if words else None
+    if not words:
+        return None
+    return element("p", words, class_="small unused told", title=words, tabindex=0)
 
 
 def ready(info: ImportInfo, camera: ImportedCamera) -> bool:
     """Whether nothing is to be decided about a camera."""
     late = camera.offset is not None and camera.offset.sure
-    return not late and not _misses_boxes(info, camera)
+    return not (late or _misses_boxes(info, camera) or _without_size(camera))
 
 
 def _misses_boxes(info: ImportInfo, camera: ImportedCamera) -> bool:
     return not camera.detections and any(other.detections for other in info.cameras)
+
+
+def _without_size(camera: ImportedCamera) -> bool:
+    """Whether the way its boxes are read leaves none of them."""
+    return bool(camera.detections) and camera.boxes_per_step == 0.0
 
 
 def _row(info: ImportInfo, number: int) -> Markup:
@@ -71,7 +81,7 @@ def _row(info: ImportInfo, number: int) -> Markup:
     picture = element("img", src=address, alt="") if camera.video else None
     shot = element("span", blank, picture, class_="shot")
     frames = f"{camera.frames} frames · {camera.fps:g} fps · " if camera.frames else ""
-    boxes = f"{camera.boxes_format} · {camera.boxes_per_step:g} boxes a step"
+    boxes = f"{camera.boxes_per_step:g} boxes a step · {camera.boxes_format}"
     missing = _misses_boxes(info, camera)
     none = element("span", "none found", class_="missing" if missing else "small")
     cells: list[Markup] = [
@@ -79,7 +89,7 @@ def _row(info: ImportInfo, number: int) -> Markup:
         _two(camera.video or "no video", f"{frames}{camera.width} × {camera.height}"),
         _two(camera.calibration, f"{camera.key} · {info.unit} → m"),
         _sync(info, number),
-        _two(camera.detections, boxes)
+        _two(_short(info, camera.detections), boxes, camera.detections)
         if camera.detections
         else joined(none, small("a video only" if camera.video else "")),
         _state(info, camera, number),
@@ -87,9 +97,20 @@ def _row(info: ImportInfo, number: int) -> Markup:
     return element("tr", [element("td", cell) for cell in cells])
 
 
-def _two(first: str, second: str) -> Markup:
+def _short(info: ImportInfo, label: str) -> str:
+    """A file without its folders, as far as cameras stay told apart."""
+    parts = label.split("/")
+    others = {camera.detections for camera in info.cameras} - {label}
+    for count in range(1, len(parts)):
+        end = parts[-count:]
+        if all(other.split("/")[-count:] != end for other in others):
+            return "/".join(end)
+    return label
+
+
+def _two(first: str, second: str, whole: str = "") -> Markup:
     return joined(
-        element("span", first, class_="cut", title=first),
+        element("span", first, class_="cut", title=whole or first),
         element("span", second, class_="small cut", title=second),
     )
 
@@ -129,6 +150,10 @@ def _state(info: ImportInfo, camera: ImportedCamera, number: int) -> Markup:
         wish = {"offsets": {**info.wish.offsets, camera.key: -late / info.fps}}
         words = f"starts {abs(late):.0f} frames {'late' if late > 0 else 'early'}"
         return _fault(words, wishing(f"Apply {late:.0f}".replace("-", "−"), wish))
+    if _without_size(camera):
+        again = wishing("As found", {"boxes": None, "normalised": None, "first_index": None})
+        otherwise = info.wish.boxes or info.wish.first_index is not None
+        return _fault("none of its boxes is left as they are read", again if otherwise else None)
     if _misses_boxes(info, camera):
         leave = wishing("Leave out", {"left_out": [*info.wish.left_out, camera.key]}, "")
         offered = [("", "Choose…"), *((one, one) for one in info.offered)]

@@ -60,6 +60,10 @@ def _files(info: ImportInfo) -> Markup:
         element("p", element("b", one.label), " ", one.complaint or one.format or "is not used")
         for one in info.files
     ]
+    rows += [
+        element("p", element("span", name, class_="cut", title=name), class_="coming")
+        for name in info.coming
+    ]
     return element("div", rows, class_="in-scroll in-files", tabindex=0)
 
 
@@ -75,6 +79,7 @@ def _copying(info: ImportInfo) -> str:
 def _foot(info: ImportInfo) -> Markup:
     odd = sum(one.status == "warning" for one in info.checks)
     done = sum(ready(info, camera) for camera in info.cameras)
+    odd = max(odd, len(info.cameras) - done)
     things = f"{odd} thing{'' if odd == 1 else 's'} to decide" if odd else "nothing to decide"
     words = {
         "uploading": "Uploading",

@@ -26,6 +26,9 @@ AXES = "xyz"
 UPS = ("x", "y", "z", "-x", "-y", "-z")
 FOUND = "as found"
 
+LONGEST_PLACE = 30
+"""Signs of the folder of recordings; of a longer one the end is shown."""
+
 MOST_LISTED = 6
 """Cameras whose pairs are listed one by one; those of more stand in a square."""
 
@@ -81,7 +84,7 @@ def room_part(info: ImportInfo) -> Markup:
         element("div", _label("Up", _why(info, "up")), segment("Up", UPS, info.up, "up")),
         element(
             "div",
-            _label("Unit of the file", _why(info, "unit")),
+            _label("File's unit", _why(info, "unit")),
             segment("Unit", ("mm", "cm", "m"), info.unit, "unit"),
         ),
         _choice("Poses", "pose", wish.pose, info.pose, ("world-to-camera", "camera-to-world")),
@@ -118,11 +121,10 @@ def _entrances(info: ImportInfo) -> Markup | None:
         return None
     if used:
         use = wishing("Use none", {"entrances": []})
-        return element("div", _label("Entrances", f"{len(used)} used"), use)
+        return element("div", f"{len(used)} entrances used", use, class_="lab")
     one = len(found) == 1
-    note = f"found: {len(found)} where tracks begin and end"
     use = wishing("Use it" if one else f"Use all {len(found)}", {"entrances": found})
-    return element("div", _label("Entrances", note), use)
+    return element("div", "Entrances, where tracks begin", use, class_="lab")
 
 
 def _choice(
@@ -174,8 +176,8 @@ def _line(status: str, name: str, words: str, *more: Cell) -> Markup:
     sign, kind = SIGNS[status]
     name = name[:1].upper() + name[1:]
     words = words[:1].upper() + words[1:]
-    return element("div", icon(sign, kind), element("b", name), element("p", words), *more,
-                   class_="chk")  # fmt: skip
+    told = element("p", element("b", name), " ", words)
+    return element("div", icon(sign, kind), told, *more, class_="chk")
 
 
 def _pairs(info: ImportInfo) -> Markup | None:
@@ -321,13 +323,17 @@ def _chosen(
 
 def _kept(info: ImportInfo) -> Markup:
     free = f"{size_text(info.free)} free there"
+    home = info.home
+    if len(home) > LONGEST_PLACE:
+        home = f"…{home[1 - LONGEST_PLACE :]}"
     if info.uploaded:
-        return element("p", f"{size_text(info.bytes)} uploaded to {info.home}, {free}.")
+        words = f"{size_text(info.bytes)} uploaded to {home}, {free}."
+        return element("p", words, title=info.home)
     copies = info.wish.copy_files
     return element(
         "div",
         _chosen("Link", "", not copies, {"copy_files": False}, "The videos stay where they are."),
         _chosen("Copy", size_text(info.bytes), copies, {"copy_files": True},
-                f"Into {info.home}, {free}."),
+                f"Into {home}, {free}."),
         class_="choices",
     )  # fmt: skip

@@ -28,7 +28,7 @@ UNDERSTOOD = (
     ),
     (
         "Detections",
-        "MOTChallenge, YOLO, COCO, OpenPose, CVAT, LabelMe, JSON, CSV; none is fine too",
+        "MOTChallenge, YOLO, COCO, OpenPose, CVAT, LabelMe, VIA, JSON, CSV; none is fine too",
     ),
 )
 DAY = 86400.0

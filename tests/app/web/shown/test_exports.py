@@ -38,6 +38,7 @@ def test_the_shown_run(client: TestClient) -> None:
         assert any(name.endswith("gt.txt") for name in archive.namelist())
 
 
+@pytest.mark.full
 def test_a_kept_run_as_a_video(data: Path, tmp_path: Path) -> None:
     settings = Settings(
         sequence="numbers", data=data, with_viser=False, library=tmp_path / "library.sqlite3"

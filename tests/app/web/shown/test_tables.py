@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from fastapi import FastAPI
 from hypothesis import given
 from hypothesis import strategies as st
 from starlette.testclient import TestClient
 
+from app.state.workbench import Workbench
 from app.web.server import Settings, create_app
 from app.web.tables import markup
 from tests.app.conftest import ADDRESS, is_evaluated, run_is, wait_until
@@ -125,6 +128,21 @@ def test_what_a_parameter_would_change_is_listed(client: TestClient) -> None:
     assert stage == "fusion"
     assert name.startswith("Extraction threshold")
     assert -1.0 <= float(score) <= 1.0
+
+
+def test_figures_of_the_run_before_do_not_pass_for_the_shown_one(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wait_until(is_evaluated(client))
+    assert "<b>B</b> this run, " in get(client, "compare")
+    application = client.app
+    assert isinstance(application, FastAPI)
+    bench: Workbench = application.state.workbench
+    now = bench.snapshot()
+    assert now.scores.shown is not None
+    before = replace(now.scores, shown=replace(now.scores.shown, key="of another"))
+    monkeypatch.setattr(bench, "snapshot", lambda: replace(now, scores=before))
+    assert "<b>B</b> the run before, this one is being scored, " in get(client, "compare")
 
 
 def test_the_comparison_is_the_evaluations(client: TestClient) -> None:

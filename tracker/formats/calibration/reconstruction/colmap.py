@@ -132,34 +132,59 @@ def _is_lenses(file: SourceFile) -> bool:
     return bool(rows) and _LENS.fullmatch(rows[0]) is not None
 
 
-_Lens = tuple[tuple[int, int], Float[ndarray, "3 3"], Float[ndarray, " n"], Lens]
+ColmapLens = tuple[tuple[int, int], Float[ndarray, "3 3"], Float[ndarray, " n"], Lens]
 
 
-def _lenses(file: SourceFile) -> dict[str, _Lens]:
-    found: dict[str, _Lens] = {}
+def _lenses(file: SourceFile) -> dict[str, ColmapLens]:
+    found: dict[str, ColmapLens] = {}
     for row in _rows(file.lines()):
         key, model, width, height, *parameters = row.split()
-        field = f"camera {key}"
-        names = MODELS.get(model, ("", ()))[1]
-        values = numbers(file, field, parameters)
-        if names and len(values) != len(names):
-            raise file.error(
-                f"expected {len(names)} parameters of {model}, found {len(values)}", field
-            )
-        by_name = dict(zip(names, values.tolist(), strict=False))
-        size = image_size(file, field, [width, height])
-        found[key] = (size, *model_lens(file, field, model, by_name))
+        found[key] = read_lens(file, key, model, [width, height], parameters)
     return found
 
 
-def _camera(file: SourceFile, row: str, lenses: dict[str, _Lens]) -> RawCamera:
+def read_lens(
+    file: SourceFile, key: str, model: str, size: list[str], parameters: list[str]
+) -> ColmapLens:
+    """The size of the pictures and the lens of a camera by its number, model and parameters.
+
+    Raises:
+        FormatError: If OpenCV has no such model, or it has another count of parameters.
+    """
+    field = f"camera {key}"
+    names = MODELS.get(model, ("", ()))[1]
+    values = numbers(file, field, parameters)
+    if names and len(values) != len(names):
+        raise file.error(f"expected {len(names)} parameters of {model}, found {len(values)}", field)
+    by_name = dict(zip(names, values.tolist(), strict=False))
+    return (image_size(file, field, size), *model_lens(file, field, model, by_name))
+
+
+def _camera(file: SourceFile, row: str, lenses: dict[str, ColmapLens]) -> RawCamera:
+    words = row.split(maxsplit=9)
+    return posed(file, words[9], words[1:8], words[8], lenses)
+
+
+def posed(
+    file: SourceFile, name: str, pose: list[str], key: str, lenses: dict[str, ColmapLens]
+) -> RawCamera:
+    """The camera of an image.
+
+    Args:
+        file: For the messages.
+        name: Of the image.
+        pose: Quaternion w x y z and translation.
+        key: Of its lens.
+        lenses: All of them.
+
+    Raises:
+        FormatError: If its lens is not there, or the pose is none.
+    """
     from scipy.spatial.transform import Rotation  # a server starts without it
 
-    words = row.split(maxsplit=9)
-    name, key = words[9], words[8]
-    w, x, y, z, *translation = numbers(file, f"image {name}", words[1:8]).tolist()
+    w, x, y, z, *translation = numbers(file, f"image {name}", pose).tolist()
     if key not in lenses:
-        raise file.error(f"camera {key} is not in cameras.txt", f"image {name}")
+        raise file.error(f"camera {key} is not among the lenses", f"image {name}")
     size, k, distortion, kind = lenses[key]
     return RawCamera(
         name=PurePosixPath(name).with_suffix("").as_posix(),

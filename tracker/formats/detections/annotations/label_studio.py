@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tracker.formats.columns import number_in, people
-from tracker.formats.detections.coco import camera_of
+from tracker.formats.columns import people
+from tracker.formats.picture_names import camera_of, number_in
 from tracker.formats.pieces import DetectionPiece, Piece
 from tracker.formats.protocol import Certainty, Kind
 from tracker.formats.source import SourceFile

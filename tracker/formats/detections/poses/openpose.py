@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from tracker.formats.columns import number_in
 from tracker.formats.detections.poses.body import read_people
+from tracker.formats.picture_names import number_in
 from tracker.formats.pieces import DetectionPiece, Piece
 from tracker.formats.protocol import Certainty, Kind
 from tracker.formats.source import SourceFile

@@ -1,8 +1,8 @@
 /** The figures of a study: its trials, what matters, each parameter. */
-import { fill, h, write } from "../elements/dom.js";
+import { fill, h, write, symbolOf } from "../../elements/dom.js";
 import { MOST_PARAMETERS, against, bestSoFar, scatter } from "./charts.js";
 import { clear } from "./plotting.js";
-import { figureOf, symbolOf } from "./words.js";
+import { figureOf } from "../words.js";
 
 /** @import { Measure } from "./charts.js" */
 

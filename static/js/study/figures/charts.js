@@ -1,6 +1,6 @@
 /** The figures of a study; the table says the same in words. */
 import { core, draw, inks, layoutOf, marks, onClick, points, upright } from "./plotting.js";
-import { figureOf, titledOf, valueOf } from "./words.js";
+import { figureOf, titledOf, valueOf } from "../words.js";
 
 /** Trials that are shown against each parameter: a place for each. */
 export const MOST_PARAMETERS = 6;

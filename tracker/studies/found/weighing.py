@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from tracker.studies import importance
 from tracker.studies.defined.definition import Varied
+from tracker.studies.found import importance
 from tracker.studies.kept.records import Trial
 from tracker.studies.work.cluster import Crew
 

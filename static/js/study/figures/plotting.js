@@ -1,5 +1,5 @@
 /** How the figures of a study are drawn by Plotly: colours, axes, points and marks of trials. */
-import { fill, h } from "../elements/dom.js";
+import { fill, h } from "../../elements/dom.js";
 
 /**
  * Where elements of these names stand Plotly writes no style sheets of its own, which the page's

@@ -1,0 +1,1 @@
+"""What a study has found: which parameters matter, and the values it proposes."""
