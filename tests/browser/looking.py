@@ -10,7 +10,7 @@ import cv2
 import httpx2
 import numpy as np
 from numpy import ndarray
-from playwright.sync_api import FloatRect, Frame, Page
+from playwright.sync_api import Error, FloatRect, Frame, Page
 
 from tests.browser.serving import Server
 from tests.conftest import PATIENCE
@@ -23,7 +23,7 @@ def viser(page: Page) -> Frame:
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         for frame in page.frames:
-            if "/viser/" in frame.url and frame.query_selector(".mvp-status[data-step]"):
+            if "/viser/" in frame.url and shown_in_3d(frame) is not None:
                 return frame
         page.wait_for_timeout(100)
     raise AssertionError(f"the 3D view did not connect within {PATIENCE} s")
@@ -95,9 +95,12 @@ def readout(page: Page) -> str:
 
 
 def shown_in_3d(frame: Frame) -> str | None:
-    """The step that the 3D view says it shows."""
-    status = frame.query_selector(".mvp-status")
-    return status.get_attribute("data-step") if status else None
+    """The step that the 3D view says it shows; none while it is being loaded."""
+    try:
+        status = frame.query_selector(".mvp-status")
+        return status.get_attribute("data-step") if status else None
+    except Error:  # loaded again in between: after a loss the page does so by itself
+        return None
 
 
 def ask(server: Server, method: str, path: str, body: dict | None = None) -> dict:

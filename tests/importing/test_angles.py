@@ -96,14 +96,14 @@ FORMS: dict[str, tuple[Callable[[Camera], dict[str, Any]], str]] = {
 
 
 def lay_out(folder: Path, form: str, *, seen: bool = True) -> None:
+    """Calibration and boxes; or too few boxes to tell anything."""
     tables = {}
     for camera in rolled():
         tables[camera.name] = {"K": camera.intrinsics.tolist(), **FORMS[form][0](camera)}
         frames, four = boxes(camera, PLACES)
-        if seen:
-            rows = [f"{f},{','.join(map(str, box))}" for f, box in zip(frames, four, strict=True)]
-            text = "\n".join(["frame,left,top,width,height", *rows])
-            (folder / f"{camera.name}.csv").write_text(text)
+        rows = [f"{f},{','.join(map(str, box))}" for f, box in zip(frames, four, strict=True)]
+        text = "\n".join(["frame,left,top,width,height", *(rows if seen else ["0,5,5,20,40"])])
+        (folder / f"{camera.name}.csv").write_text(text)
     (folder / "rig.json").write_text(json.dumps(tables))
 
 
@@ -127,9 +127,6 @@ def test_an_order_that_is_stated_is_believed(tmp_path: Path) -> None:
 
 def test_without_boxes_the_order_is_asked_for(tmp_path: Path) -> None:
     lay_out(tmp_path, "into the camera", seen=False)
-    few = "frame,left,top,width,height\n0,5,5,20,40\n"
-    for camera in rolled():
-        (tmp_path / f"{camera.name}.csv").write_text(few)
     with pytest.raises(FormatError, match=r"in which order they turn; --euler says it \(zyx, "):
         settled_of(tmp_path)
     settled = settled_of(tmp_path, ImportOptions(turns="xzy-inverse", unit="m"))

@@ -40,6 +40,8 @@ class Wish:
     boxes: Layout | None = None
     normalised: bool | None = None
     first_index: int | None = None
+    turns: str | None = None
+    """How rotations given by three angles are composed."""
     fps: float | None = None
     swap: tuple[tuple[str, str], ...] = ()
     left_out: tuple[str, ...] = ()
@@ -81,6 +83,7 @@ def options_of(wish: Wish, taken: Sequence[Taken]) -> ImportOptions:
         boxes=wish.boxes,
         normalised=wish.normalised,
         first_index=first,
+        turns=wish.turns,
         fps=wish.fps,
         cameras=_files(wish, taken),
         swap=wish.swap,

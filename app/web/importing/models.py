@@ -51,6 +51,8 @@ class ImportWish(Model):
     boxes: Layout | None = None
     normalised: bool | None = None
     first_index: Literal[0, 1] | None = None
+    turns: str | None = Field(default=None, max_length=40)
+    """How rotations given by three angles are composed."""
     fps: float | None = Field(default=None, gt=0.0, le=1000.0)
     swap: list[tuple[str, str]] = Field(default_factory=list, max_length=200)
     left_out: list[str] = Field(default_factory=list, max_length=200)
@@ -183,6 +185,10 @@ class ImportInfo(Model):
     up: str
     pose: str
     axes: str
+    turns: str
+    """How rotations given by three angles were taken; empty where there are none."""
+    open_turns: list[tuple[str, str]]
+    """How they may be composed: what is wished, and words; what the names leave open."""
     room: tuple[Vector, Vector] | None
     suggested: tuple[Vector, Vector] | None
     half_extents: Vector | None

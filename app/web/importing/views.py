@@ -26,7 +26,8 @@ from app.web.importing.models import (
 from app.web.importing.sheet.draft import draft_sheet
 from tracker.checks import Check
 from tracker.checks.synchronisation import CameraOffset
-from tracker.formats.pieces import DetectionPiece
+from tracker.formats.pieces import CalibrationPiece, DetectionPiece
+from tracker.importing.finding.angles import open_turns, told_product, told_turns
 
 if TYPE_CHECKING:
     from app.state.importing.looking import Looked
@@ -86,6 +87,7 @@ def _info(draft: Draft) -> ImportInfo:
         home=str(draft.home),
         free=shutil.disk_usage(draft.home).free,
         **_recording(settled),
+        open_turns=_open_turns(known),
         cameras=[] if settled is None else [_camera(view, known) for view in settled.views],
         checks=[] if looked is None else [_check(one, known.wish) for one in looked.checks],
         pairs=[] if looked is None else _pairs(looked),
@@ -102,9 +104,9 @@ def _info(draft: Draft) -> ImportInfo:
 def _recording(settled: Settled | None) -> dict[str, Any]:
     if settled is None:
         return {
-            "fps": 0.0, "frames": 0, "unit": "", "up": "", "pose": "", "axes": "", "room": None,
-            "suggested": None, "half_extents": None, "suggested_half_extents": None, "truth": 0,
-            "has_boxes": False, "found": [], "told": [],
+            "fps": 0.0, "frames": 0, "unit": "", "up": "", "pose": "", "axes": "", "turns": "",
+            "room": None, "suggested": None, "half_extents": None, "suggested_half_extents": None,
+            "truth": 0, "has_boxes": False, "found": [], "told": [],
         }  # fmt: skip
     room, own = settled.room, settled.suggested
     return {
@@ -113,6 +115,7 @@ def _recording(settled: Settled | None) -> dict[str, Any]:
         "unit": settled.reading.unit,
         "pose": settled.reading.direction,
         "axes": settled.reading.axes,
+        "turns": _turns(settled),
         "up": settled.reading.up,
         "room": (_vector(room.minimum), _vector(room.maximum)),
         "suggested": (_vector(own.minimum), _vector(own.maximum)),
@@ -123,6 +126,19 @@ def _recording(settled: Settled | None) -> dict[str, Any]:
         "found": list(settled.found),
         "told": list(settled.told),
     }
+
+
+def _turns(settled: Settled) -> str:
+    by_angles = any(view.matched.raw.turns for view in settled.views)
+    return told_turns(settled.reading.turns) if by_angles else ""
+
+
+def _open_turns(known: Known) -> list[tuple[str, str]]:
+    pieces = [piece for one in known.taken for piece in one.pieces]
+    names = open_turns(
+        [raw for piece in pieces if isinstance(piece, CalibrationPiece) for raw in piece.cameras]
+    )
+    return [(name, told_product(name)) for name in names]
 
 
 def _vector(values: np.ndarray) -> tuple[float, float, float]:

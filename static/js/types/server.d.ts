@@ -487,6 +487,10 @@ declare namespace Server {
 		up: string;
 		pose: string;
 		axes: string;
+		/** How rotations given by three angles were taken; empty where there are none. */
+		turns: string;
+		/** How they may be composed: what is wished, and words; what the names leave open. */
+		open_turns: [string, string][];
 		room: [[number, number, number], [number, number, number]] | null;
 		suggested: [[number, number, number], [number, number, number]] | null;
 		half_extents: [number, number, number] | null;
@@ -526,6 +530,8 @@ declare namespace Server {
 		boxes: "ltwh" | "xyxy" | "cxcywh" | null;
 		normalised: boolean | null;
 		first_index: 0 | 1 | null;
+		/** How rotations given by three angles are composed. */
+		turns: string | null;
 		fps: number | null;
 		swap: [string, string][];
 		left_out: string[];

@@ -21,6 +21,7 @@ from tests.app.conftest import ADDRESS, run_is, wait_until
 from tests.engine.pictures.shaken import SIZE as SHAKEN_SIZE
 from tests.engine.pictures.shaken import shaken
 from tests.formats.recorded import PLACES, detections, settled_of, toml, videos
+from tests.importing.test_angles import lay_out
 from tracker.importing import bringing
 from tracker.importing.writing import write
 from tracker.pipeline import Cancelled
@@ -138,6 +139,24 @@ def test_a_wish_is_looked_into_and_can_be_taken_back(client: TestClient, files: 
     wrong = _wish(client, info, names={"cam1": "cam2"})
     assert (wrong["phase"], 'found "cam2" twice' in wrong["error"]) == ("failed", True)
     assert _wish(client, info, names={})["phase"] == "settled"
+
+
+def test_angles_of_which_nothing_tells_the_order_are_asked_for(
+    client: TestClient, tmp_path: Path
+) -> None:
+    folder = tmp_path / "rig"
+    folder.mkdir()
+    lay_out(folder, "into the camera", seen=False)
+    info = _settled(client, _send(client, folder))
+    assert info["phase"] == "failed"
+    assert "in which order they turn" in info["error"]
+    assert ["zyx", "Rz Ry Rx"] in info["open_turns"]
+    assert 'aria-label="Angles"' in info["sheet"]
+    assert "xzy-inverse" in [name for name, _ in info["open_turns"]]
+    info = _wish(client, info, turns="xzy-inverse", unit="m")
+    assert (info["phase"], info["turns"]) == ("settled", "Rx Rz Ry, into the camera in radians")
+    wrong = _wish(client, info, turns="sideways")
+    assert (wrong["phase"], "expected --euler" in wrong["error"]) == ("failed", True)
 
 
 def test_pictures_of_cameras_are_shown(client: TestClient, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from app.web.importing.sheet.building import (
     size_text,
 )
 from app.web.importing.sheet.cameras import cameras_table, ready
-from app.web.importing.sheet.settings import checks_part, room_part, target_part
+from app.web.importing.sheet.settings import angles_choice, checks_part, room_part, target_part
 from app.web.tables.markup import Markup, joined
 
 
@@ -25,7 +25,8 @@ def can_be_written(info: ImportInfo) -> bool:
 
 def draft_sheet(info: ImportInfo) -> str:
     """All of it."""
-    body = [_files(info)]
+    asked = angles_choice(info)
+    body = [_files(info), element("div", asked, class_="in-asked") if asked else None]
     if info.cameras:
         parts = (room_part(info), checks_part(info), target_part(info))
         body = [cameras_table(info), element("div", *parts, class_="in-body")]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from app.web.importing.models import ImportedCheck, ImportedPair, ImportInfo
 from app.web.importing.sheet.building import (
@@ -90,6 +90,7 @@ def room_part(info: ImportInfo) -> Markup:
         _choice("Poses", "pose", wish.pose, info.pose, ("world-to-camera", "camera-to-world")),
         _choice("Axes", "axes", wish.axes, info.axes, ("opencv", "opengl")),
         _choice("Boxes", "boxes", wish.boxes, "", ("ltwh", "xyxy", "cxcywh")),
+        angles_choice(info),
         _choice("First frame", "first_index", wish.first_index, "", (0, 1)),
         _entrances(info),
         element("div", _label("Floor seen by", "cameras"),
@@ -127,11 +128,24 @@ def _entrances(info: ImportInfo) -> Markup | None:
     return element("div", "Entrances, where tracks begin", use, class_="lab")
 
 
+def angles_choice(info: ImportInfo) -> Markup | None:
+    """How rotations given by three angles are composed, where their names leave it open."""
+    if len(info.open_turns) < 2:
+        return None
+    return _choice("Angles", "turns", info.wish.turns, info.turns, info.open_turns)
+
+
 def _choice(
-    words: str, what: str, wished: object, found: str, values: Sequence[str | int]
+    words: str,
+    what: str,
+    wished: object,
+    found: str,
+    values: Iterable[str | int | tuple[str, str]],
 ) -> Markup:
+    """A choice among values, each with words of its own or called as it is."""
     plain = f"{found} (found)" if found and wished is None else FOUND
-    choices = [("", plain), *((str(value), str(value)) for value in values)]
+    pairs = (one if isinstance(one, tuple) else (str(one), str(one)) for one in values)
+    choices = [("", plain), *pairs]
     mark = "#" if what == "first_index" else "$"
     now = "" if wished is None else str(wished)
     return element(
