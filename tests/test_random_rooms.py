@@ -75,6 +75,7 @@ def test_pictures_and_files_are_the_same_again(tmp_path: Path, rendered: Path) -
     assert not read_sequence(tmp_path / "again").has_detections
 
 
+@pytest.mark.full
 def test_a_room_opens_as_any_sequence(rendered: Path) -> None:
     sequence, choices = read_sequence(rendered), choose(SEED)
     assert len(sequence.views) == choices.cameras
@@ -197,6 +198,7 @@ def test_boxes_are_cut_at_the_border_and_absent_outside() -> None:
     assert seen.framed[0, 1, 0] == 0.0
 
 
+@pytest.mark.full
 def test_who_sits_and_who_lies_is_lower_than_who_stands() -> None:
     choices = replace(
         choose(8), cameras=2, image_size=(320, 240), behaviours=("rises", "sits", "lies", "walks")

@@ -109,6 +109,7 @@ def test_constant_velocity_is_kept_in_time() -> None:
 # ── occlusion ─────────────────────────────────────────────────────────────────
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("step", [264, 280, 295])
 def test_person_2_hides_3_in_both_cameras(studio: Studio, step: int) -> None:
     visible = studio.draw(step, step + 1).visible[0]
@@ -216,6 +217,7 @@ def test_shadows_are_dark_under_the_ball_only() -> None:
 # ── the folder ────────────────────────────────────────────────────────────────
 
 
+@pytest.mark.full
 def test_the_folder_is_an_ordinary_sequence(rendered: Path, scenes: dict[str, Scene]) -> None:
     sequence = read_sequence(rendered)
     assert sequence.name == "room24-2p"

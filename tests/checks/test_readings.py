@@ -42,6 +42,7 @@ def test_nothing_is_odd_in_a_good_room(seed: int) -> None:
     assert [str(each) for each in found if each.status == "warning"] == []
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", MISTAKES)
 def test_each_usual_mistake_is_named_with_its_remedy(name: str) -> None:
     make, remedy = MISTAKES[name]
@@ -49,6 +50,7 @@ def test_each_usual_mistake_is_named_with_its_remedy(name: str) -> None:
     assert sum(named) >= len(ROOMS) - 1
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("height", [0.25, 1.25, 1.7])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_heads_and_people_who_sit_raise_no_alarm(seed: int, height: float) -> None:
@@ -56,12 +58,14 @@ def test_heads_and_people_who_sit_raise_no_alarm(seed: int, height: float) -> No
     assert [str(each) for each in found if each.status == "warning"] == []
 
 
+@pytest.mark.full
 def test_a_crowd_raises_no_alarm_and_is_read_rightly() -> None:
     crowd = random_room(3, people=20, cameras=4, steps=100)
     assert warnings(crowd) == []
     assert warnings(MISTAKES["camera to world"][0](crowd)) == ["--pose camera-to-world"]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", ROOMS)
 def test_all_at_once_is_found_out(seed: int) -> None:
     """Inverted OpenGL poses in centimetres of a world with y up, and corners of boxes."""
@@ -134,6 +138,7 @@ def test_up_becomes_z(up: str) -> None:
     assert np.linalg.det(turn) == pytest.approx(1.0)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("height", [0.25, 0.9, 1.2, 1.7])
 @pytest.mark.parametrize("unit", METRES)
 def test_the_unit_follows_from_how_tall_and_far_people_are(unit: str, height: float) -> None:
@@ -160,6 +165,7 @@ def test_a_camera_without_a_pose_is_told() -> None:
         pose(RawCamera("cam1"), Reading())
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", ROOMS)
 def test_room_and_people_are_suggested(seed: int) -> None:
     from tracker.agreement.observed import rays_of

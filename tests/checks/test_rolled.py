@@ -60,6 +60,7 @@ def rolled_room(seed: int, degrees: float) -> Sequence:
     return replace(room, views=tuple(views))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("degrees", [0.0, 90.0, -90.0, 180.0, 25.0])
 @pytest.mark.parametrize("seed", [11, 12])
 def test_rolled_cameras_raise_no_alarm(seed: int, degrees: float) -> None:
@@ -70,6 +71,7 @@ def test_rolled_cameras_raise_no_alarm(seed: int, degrees: float) -> None:
     assert told.given.consensus.height == pytest.approx(1.7, rel=0.03)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("degrees", [90.0, 180.0, 25.0])
 @pytest.mark.parametrize("name", [name for name in MISTAKES if name != "counted from 1"])
 def test_mistakes_are_named_in_rolled_cameras(name: str, degrees: float) -> None:

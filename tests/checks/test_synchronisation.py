@@ -32,6 +32,7 @@ def test_a_late_camera_is_found_from_boxes(seed: int, late: float) -> None:
     assert against_the_first(found) == pytest.approx(expected, abs=1.0)
 
 
+@pytest.mark.full
 def test_several_late_cameras_of_a_crowd_are_found_together() -> None:
     late = (0.0, 1.3, 0.0, -0.7, 0.0)
     sequence = random_room(11, cameras=5, fps=10.0, steps=300, people=12, late=late)
@@ -40,6 +41,7 @@ def test_several_late_cameras_of_a_crowd_are_found_together() -> None:
     assert [offset.sure for offset in found] == [False, True, False, True, False]
 
 
+@pytest.mark.full
 def test_a_late_camera_is_told_with_its_remedy_and_nothing_is_applied() -> None:
     sequence = random_room(5, cameras=4, fps=25.0, steps=400, people=3, late=(0, 0, 12 / 25))
     told = [each for each in check(sequence) if each.status == "warning"]
@@ -60,6 +62,7 @@ def test_the_curve_has_its_peak_at_the_offset() -> None:
     assert curve.offsets[int(np.nanargmax(curve.agreement))] == pytest.approx(12.0, abs=1.0)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", range(4))
 def test_boxes_of_other_people_give_no_sure_offset(seed: int) -> None:
     sequence, other = random_room(seed, cameras=3), random_room(seed + 50, cameras=3)

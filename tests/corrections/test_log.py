@@ -39,6 +39,7 @@ def corrections(draw: st.DrawFn) -> Correction:
     return make(kind=kind, time=draw(_TIMES), note=draw(_NOTES), **values)
 
 
+@pytest.mark.full
 @given(st.lists(corrections(), max_size=6))
 def test_a_log_is_read_as_it_was_written(told: list[Correction]) -> None:
     kept: list[Correction] = []

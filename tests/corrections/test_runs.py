@@ -65,6 +65,7 @@ def same_tracks(one: Run, other: Run) -> bool:
     )
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("fusion", "smoothing"), list(itertools.product(FUSIONS, SMOOTHINGS)))
 def test_who_was_away_is_the_same_person_where_somebody_says_so(
     fusion: str, smoothing: str
@@ -82,6 +83,7 @@ def test_who_was_away_is_the_same_person_where_somebody_says_so(
     assert len(set(both.tracks.ids.tolist())) == 3
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("fusion", "smoothing"), list(itertools.product(FUSIONS, SMOOTHINGS)))
 def test_somebody_is_where_somebody_says_so(fusion: str, smoothing: str) -> None:
     whole = with_a_gap()
@@ -95,6 +97,7 @@ def test_somebody_is_where_somebody_says_so(fusion: str, smoothing: str) -> None
     assert len(rows) == (before.tracks.frames == 45).sum() + 1
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("fusion", FUSIONS)
 def test_a_place_is_a_measurement_of_its_accuracy(fusion: str) -> None:
     whole = two_walkers()
@@ -110,6 +113,7 @@ def test_a_place_is_a_measurement_of_its_accuracy(fusion: str) -> None:
     assert found[2] == pytest.approx(y, abs=0.01)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("fusion", "smoothing"), list(itertools.product(FUSIONS, SMOOTHINGS)))
 def test_nobody_is_where_somebody_says_so(fusion: str, smoothing: str) -> None:
     whole = with_a_gap()

@@ -129,6 +129,7 @@ def result(**more: Any) -> Result:
     )
 
 
+@pytest.mark.full
 def test_numbers_and_figure_are_written(experiment: Experiment, tmp_path: Path) -> None:
     def draw() -> Any:
         from tracker.experiments.laboratory import drawing

@@ -79,6 +79,7 @@ def test_fusing_again_with_all_cameras_gives_the_same_tracks(crossing: Sequence)
     np.testing.assert_array_equal(again.ids, run.filtered.ids)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("cameras", [[0], [1], [2, 0]])
 def test_fusing_again_is_a_run_of_the_sequence_with_these_cameras(
     crossing: Sequence, cameras: list[int]

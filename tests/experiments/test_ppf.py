@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.testing import assert_array_equal
 
 from tracker.experiments import Context
@@ -97,6 +98,7 @@ def test_the_filters_that_are_compared_differ_in_the_filter_alone() -> None:
     assert {p.single_view for p in compared.values()} == {"pseudo_particle"}
 
 
+@pytest.mark.full
 def test_of_two_alike_one_filter_follows_both_and_the_other_one(tmp_path: Path) -> None:
     clip = shortened(CLIPS["2BALL"](), 60)
     truth = np.array([clip.boxes(step) for step in range(60)])

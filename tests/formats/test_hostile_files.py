@@ -86,6 +86,7 @@ HOSTILE: dict[str, bytes] = {
 }
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_hostile_file_gives_nothing_but_a_sentence(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_bytes(HOSTILE[name])
@@ -143,6 +144,7 @@ def test_pictures_that_are_none_are_told(tmp_path: Path) -> None:
     assert "000.jpg: cannot be read as a picture (64 bytes); expected a whole JPEG" in one.complaint
 
 
+@pytest.mark.full
 def test_a_small_matlab_file_that_unpacks_to_gigabytes_is_refused(tmp_path: Path) -> None:
     packed = zlib.compress(b"\0" * 100_000_000, 9)
     head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"

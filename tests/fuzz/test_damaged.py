@@ -35,11 +35,13 @@ def bases(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return make_bases(tmp_path_factory.mktemp("bases"))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("base", strategies.BASES)
 def test_a_good_folder_runs(bases: dict[str, Path], tmp_path: Path, base: str) -> None:
     assert try_case(bases[base], [], tmp_path) == ""
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("case", CORPUS, ids=lambda case: case["why"])
 def test_what_fell_once_stands(bases: dict[str, Path], tmp_path: Path, case: Any) -> None:
     try_case(bases[case["base"]], [Damage(**one) for one in case["damages"]], tmp_path)

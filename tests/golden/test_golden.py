@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 
 from tests.golden import files
-from tests.golden.combinations import alternatives, combinations, runs
+from tests.golden.combinations import Combination, alternatives, combinations, runs
 from tests.golden.exact import WITH_ALTERNATIVES
 from tests.golden.fingerprint import fingerprints
 from tests.golden.pieces import PIECES, Piece
+from tracker.parameters import RunParameters
 
 MOST_LINES = 40
 
@@ -23,7 +24,7 @@ ACCEPT = (
 
 
 ONE_ROOM = "room44-3p"
-"""What the short form looks at: the hardest of the rooms."""
+"""What the short form looks at, with the default methods: the hardest of the rooms."""
 
 
 def _parameters(pieces: tuple[Piece, ...]) -> list[object]:
@@ -33,7 +34,7 @@ def _parameters(pieces: tuple[Piece, ...]) -> list[object]:
 def _marks(piece: Piece) -> list[pytest.MarkDecorator]:
     if piece.real:
         return [pytest.mark.data]
-    return [] if piece.name == ONE_ROOM else [pytest.mark.full]
+    return [pytest.mark.full]
 
 
 DRAWS = {
@@ -83,6 +84,18 @@ def test_every_stage_gives_what_it_gave(
 ) -> None:
     sequence = piece.open(data)
     check(piece.name, fingerprints(runs(sequence, piece.steps, combinations(sequence))))
+
+
+def test_the_default_methods_give_what_they_gave_in_the_hardest_room() -> None:
+    piece = next(piece for piece in PIECES if piece.name == ONE_ROOM)
+    sequence = piece.open(Path())
+    names = {combination.view_name for combination in combinations(sequence)}
+    default = Combination("robust", RunParameters().single_view, RunParameters().fusion_method)
+    assert default.view_name in names
+    found = fingerprints(runs(sequence, piece.steps, [default]))
+    kept = files.read(piece.name)
+    differ = files.differences(piece.name, {name: kept[name] for name in found}, found)
+    assert not differ, "\n".join([*differ[:MOST_LINES], "", ACCEPT])
 
 
 @pytest.mark.long

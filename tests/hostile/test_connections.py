@@ -197,6 +197,7 @@ def test_two_hundred_connections_that_ask_nothing_are_dropped(
     running.answers_soon()
 
 
+@pytest.mark.full
 def test_more_connections_than_are_meant_are_turned_away(
     running: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:

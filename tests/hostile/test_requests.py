@@ -27,6 +27,7 @@ def refused(answer: Any) -> dict[str, Any]:
     return problem
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("number", [*HUGE, 0, -1])
 def test_there_is_no_such_run(refusing: TestClient, number: int) -> None:
     for method, path in [
@@ -69,6 +70,7 @@ def test_a_preset_has_a_name_that_can_be_seen(refusing: TestClient) -> None:
         refused(refusing.post("/api/presets", json={"name": name}))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("value", [10**400, -(10**400), "9" * 5000, [], {}, None, "\0", [[1]]])
 def test_no_parameter_takes_what_it_does_not_take(refusing: TestClient, value: Any) -> None:
     for key in (*PARAMETERS, *METHODS):

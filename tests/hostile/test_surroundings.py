@@ -125,6 +125,7 @@ def test_a_run_that_was_kept_stays_though_the_clock_went_back(tmp_path: Path) ->
         assert library.result(kept[-1]).run.id == kept[-1]
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("backwards")
 def test_a_study_tells_every_trial_though_the_clock_goes_back(tmp_path: Path) -> None:
     store = create(definition(tmp_path, trials=12, prune=False), tmp_path / "studies")

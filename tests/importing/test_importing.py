@@ -27,6 +27,7 @@ def _assert_cameras(settled: Settled, tolerance: float = 1e-6) -> None:
         np.testing.assert_allclose(view.camera.rotation, camera.rotation, atol=tolerance)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("unit", "scale"), [("m", 1.0), ("cm", 100.0), ("mm", 1000.0)])
 def test_the_unit_follows_from_the_height_of_people(
     tmp_path: Path, unit: str, scale: float
@@ -57,6 +58,7 @@ def test_poses_of_ones_own_the_other_way_round(tmp_path: Path) -> None:
         _assert_cameras(settled_of(tmp_path, ImportOptions(pose="world-to-camera", axes="opencv")))
 
 
+@pytest.mark.full
 def test_a_calibration_of_another_resolution_is_scaled(tmp_path: Path) -> None:
     toml(tmp_path, size=(2560, 1440))
     videos(tmp_path)
@@ -197,6 +199,7 @@ def test_short_names_keep_what_tells_files_apart() -> None:
     assert short_names(["v/cam01/x", "v/cam02/x"]) == ["cam01", "cam02"]
 
 
+@pytest.mark.full
 def test_the_command_prints_what_it_takes_files_for(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -255,6 +258,7 @@ def test_foreign_recordings_open_without_a_flag(foreign: Path, tmp_path: Path, n
     assert HALF_EXTENTS[2] == pytest.approx(float(sequence.target_half_extents[2]), abs=0.06)
 
 
+@pytest.mark.full
 def test_a_video_of_another_rate_keeps_its_own(tmp_path: Path) -> None:
     toml(tmp_path)
     videos(tmp_path)

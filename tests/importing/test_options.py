@@ -50,6 +50,7 @@ def test_parts_of_the_picture_may_reach_beyond_it(tmp_path: Path) -> None:
         assert np.median(view.detections.boxes[:, 3]) > 50.0
 
 
+@pytest.mark.full
 def test_exchanged_calibrations_are_named_and_mended_by_a_flag(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -82,6 +83,7 @@ def test_swap_names_cameras_that_are_there(tmp_path: Path) -> None:
         settled_of(tmp_path, ImportOptions(swap=(("door", "cam1"),)))
 
 
+@pytest.mark.full
 def test_time_stamps_say_when_frames_were_taken(tmp_path: Path) -> None:
     """One camera begins half a second late and leaves out every third frame."""
     files, out = tmp_path / "files", tmp_path / "out"
@@ -136,6 +138,7 @@ def test_what_is_known_better_is_taken(tmp_path: Path) -> None:
     assert frames.frames.max() == 51
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -152,6 +155,7 @@ def test_what_cannot_be_taken_is_told(tmp_path: Path, options: ImportOptions, wo
         settled_of(tmp_path, options)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("options", "flags"),
     [
@@ -172,6 +176,7 @@ def test_what_was_told_wrongly_is_mended_by_the_right_flag(
     assert flags in told
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("counted", "stated", "words"),
     [
@@ -190,6 +195,7 @@ def test_where_counting_begins_was_told_wrongly(
     assert sum(words in sentence for sentence in settled.told) == 4
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("scale", "unit", "right"), [(1.0, "mm", "m"), (100.0, "mm", "cm")])
 def test_people_smaller_than_a_head_are_told_with_the_unit_that_makes_them_people(
     tmp_path: Path, scale: float, unit: Unit, right: str
@@ -202,6 +208,7 @@ def test_people_smaller_than_a_head_are_told_with_the_unit_that_makes_them_peopl
     assert f"--unit {right}" in told
 
 
+@pytest.mark.full
 def test_people_smaller_than_a_hand_are_told(tmp_path: Path) -> None:
     toml(tmp_path)
     detections(tmp_path)

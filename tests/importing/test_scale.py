@@ -9,6 +9,7 @@ from tests.random_rooms import random_room
 from tracker.importing.finding.scale import PERSON, paced, resized
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", [21, 22, 23])
 @pytest.mark.parametrize(("height", "factor"), [(1.7, 1.0), (0.72, 0.7 / 1.7), (0.25, 0.25 / 1.7)])
 def test_who_would_run_is_smaller(seed: int, height: float, factor: float) -> None:

@@ -49,6 +49,7 @@ def bundle(tmp_path: Path) -> tuple[Path, Result]:
     return path, result
 
 
+@pytest.mark.full
 def test_everything_comes_back(bundle: tuple[Path, Result], tmp_path: Path) -> None:
     path, result = bundle
     back = unpack_bundle(path, tmp_path / "elsewhere")
@@ -72,6 +73,7 @@ def test_everything_comes_back(bundle: tuple[Path, Result], tmp_path: Path) -> N
     assert (tmp_path / "elsewhere" / "tracks.csv").is_file()
 
 
+@pytest.mark.full
 def test_a_camera_without_a_picture_is_blind_elsewhere_too(tmp_path: Path) -> None:
     folder = write_crossing(tmp_path / "crossing", 60)
     sequence = read_sequence(folder)

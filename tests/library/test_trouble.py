@@ -144,6 +144,7 @@ def try_flipped(path: Path, folder: Path, tries: int) -> None:
     assert complaints > tries / 10  # else the damage was none
 
 
+@pytest.mark.full
 def test_flipped_bytes(path: Path, tmp_path: Path) -> None:
     try_flipped(path, tmp_path, 60)
 

@@ -121,6 +121,7 @@ def test_people_are_drawn_where_they_are_in_their_colours() -> None:
             assert np.abs(near.astype(int) - blue_green_red).sum(axis=1).min() < 40
 
 
+@pytest.mark.full
 def test_memory_is_flat(tmp_path: Path) -> None:
     peaks = []
     for frames in (30, 120):

@@ -58,6 +58,7 @@ def test_a_picture_says_its_number(number: int) -> None:
     assert number_in(numbered_picture(number)) == number
 
 
+@pytest.mark.full
 def test_forwards(reader: FrameReader) -> None:
     for step in range(FRAMES):
         assert [number_at(reader, camera, step) for camera in (0, 1)] == [FIRST + step] * 2

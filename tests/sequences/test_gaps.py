@@ -45,6 +45,7 @@ def spoil_cut(path: Path) -> None:
     os.truncate(path, path.stat().st_size // 3)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("spoil", [spoil_gone, spoil_cut])
 def test_a_video_spoilt_after_opening_is_told_and_nothing_is_kept(
     folder: Path, tmp_path: Path, spoil: Callable[[Path], None]
@@ -98,6 +99,7 @@ def test_a_spoilt_picture_is_kept_for_this_start_only(folder: Path, tmp_path: Pa
     assert not list(files.glob("*"))
 
 
+@pytest.mark.full
 def test_a_short_video_is_told_on_opening_and_counted(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -116,12 +118,14 @@ def test_a_short_video_is_told_on_opening_and_counted(
     assert output.is_file()
 
 
+@pytest.mark.full
 def test_whole_recordings_are_strictly_well(folder: Path, tmp_path: Path) -> None:
     words = ["track", str(folder), "-o", str(tmp_path / "t.csv"), "--strict", "--keep", "0"]
     assert cli.main([*words, "--single-view", "association_matrix", "--no-cache"]) == 0
     assert "incomplete" not in (tmp_path / "t.csv").read_text(encoding="utf-8")
 
 
+@pytest.mark.full
 def test_a_deleted_image_shifts_no_other(tmp_path: Path) -> None:
     folder = write_sequence(tmp_path / "seq", frames=STEPS, container="images")
     (folder / "cam1" / "00009.jpg").unlink()

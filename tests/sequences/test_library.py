@@ -88,6 +88,7 @@ def flip(path: Path) -> None:
     path.write_bytes(data)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("spoil", [cut, flip])
 @pytest.mark.parametrize("name", ["sequence.toml", "cam1.mp4", "ground_truth.csv", SUMS])
 def test_a_cached_room_that_is_not_what_was_rendered_is_rendered_again(
@@ -133,6 +134,7 @@ def test_a_name_that_no_file_can_have_gets_a_sentence(name: str, tmp_path: Path)
         assert str(told.value).isprintable()
 
 
+@pytest.mark.full
 def test_a_bad_folder_takes_no_other_from_the_list(tmp_path: Path) -> None:
     good = write_sequence(tmp_path / "good", frames=2, container=None)
     text = (good / "sequence.toml").read_text(encoding="utf-8")

@@ -169,6 +169,7 @@ COMPLAINTS = tomllib.loads(Path(__file__).with_name("complaints.toml").read_text
 ]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("case", COMPLAINTS, ids=lambda case: case["message"][5:60])
 def test_what_is_wrong_is_said_in_these_words(folder: Path, case: dict[str, str]) -> None:
     edit(folder, case["old"], case["new"], case["file"])

@@ -41,6 +41,7 @@ def corrected(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.full
 def test_a_run_obeys_the_recordings_corrections_as_track_does(
     corrected: Path, tmp_path: Path
 ) -> None:

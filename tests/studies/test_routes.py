@@ -105,6 +105,7 @@ def test_the_time_goes_by_the_workers_that_are_wanted(
     assert refused["error"].startswith("scheduler: expected an address as tcp://10.0.0.1:8786")
 
 
+@pytest.mark.full
 def test_a_study_goes_on_where_it_ran(
     client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -139,6 +140,7 @@ def test_where_the_time_alone_ends_it_no_number_of_trials_is_told(
     assert command_words(store, Status("running", done=1, trials=5)) == "1 of 5 trials"
 
 
+@pytest.mark.full
 def test_what_is_on_the_sliders_is_held_and_tried(client: TestClient) -> None:
     changes = {"fusion.clutter_rate": 12, "fusion.acceleration_sigma": 2.5}
     client.patch("/api/parameters", json={"changes": changes})
@@ -153,6 +155,7 @@ def test_what_is_on_the_sliders_is_held_and_tried(client: TestClient) -> None:
     assert 'there is a study "mine" already' in again.json()["detail"]
 
 
+@pytest.mark.full
 def test_trials_are_read_used_and_kept(client: TestClient, tmp_path: Path) -> None:
     define(client, trials=30)
     store = find("mine", tmp_path / "studies")
@@ -183,6 +186,7 @@ def test_trials_are_read_used_and_kept(client: TestClient, tmp_path: Path) -> No
     assert client.get("/api/studies/mine/export/study.json").json()["best"] == best
 
 
+@pytest.mark.full
 def test_what_is_not_there_is_told(client: TestClient) -> None:
     for path in ("/api/studies/nothing", "/api/studies/nothing/trials"):
         answer = client.get(path)

@@ -255,6 +255,7 @@ def test_what_needs_a_truth_is_told_where_there_is_none(tmp_path: Path) -> None:
         run(store, Serial())
 
 
+@pytest.mark.full
 def test_two_studies_of_one_name_are_told(tmp_path: Path) -> None:
     store = study(tmp_path)
     assert study(tmp_path).folder == store.folder
@@ -276,6 +277,7 @@ def test_a_recording_that_changed_since_is_told(tmp_path: Path) -> None:
         run(store, Serial(made_up(near)))
 
 
+@pytest.mark.full
 def test_the_time_ends_it(tmp_path: Path) -> None:
     store = study(tmp_path, trials=10_000, minutes=0.01)
     status = run(store, Serial(made_up(near)))

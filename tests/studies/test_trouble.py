@@ -30,6 +30,7 @@ def study(folder: Path, **fields: object) -> Store:
     return create(definition(folder, **fields), folder / "studies")
 
 
+@pytest.mark.full
 def test_a_full_disk_is_told_and_gone_on_from(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -82,6 +82,7 @@ def test_from_a_bad_start_it_comes_back_to_the_defaults(tmp_path: Path) -> None:
     assert (row["before"], row["after"]) == (10.0, 3.0)
 
 
+@pytest.mark.full
 def test_a_method_that_draws_nothing_is_told(tmp_path: Path) -> None:
     store = study(tmp_path)
     run(store, Serial())  # boxes: the tracks are the same for every seed

@@ -34,6 +34,7 @@ def engine_csv(crossing: Path, path: Path, changes: dict[str, Any], seed: int = 
     return path.read_text(encoding="utf-8")
 
 
+@pytest.mark.full
 def test_track_writes_the_engines_tracks(run: Runs, crossing: Path, tmp_path: Path) -> None:
     out = tmp_path / "tracks.csv"
     status, stdout, stderr = run("track", crossing, "-o", out, "--seed", 3)
@@ -46,6 +47,7 @@ def test_track_writes_the_engines_tracks(run: Runs, crossing: Path, tmp_path: Pa
     assert len(export.read_tracks_csv(out).frames) > 100
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -66,6 +68,7 @@ def test_parameters_by_set_and_by_flag(
     assert out.read_text(encoding="utf-8") == engine_csv(crossing, tmp_path / "own.csv", changes)
 
 
+@pytest.mark.full
 def test_methods_and_presets(run: Runs, crossing: Path, tmp_path: Path) -> None:
     out = tmp_path / "tracks.csv"
     chosen = ["--single-view", "none", "--fusion", "sequential_phd", "--preset", "published"]
@@ -154,6 +157,7 @@ def test_help_names_every_flag_with_range_and_default(run: Runs) -> None:
         assert " ".join(parameter.help.split()) in text
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -177,6 +181,7 @@ def test_a_wrong_value_is_wrong_usage(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "arguments",
     [[], ["fly"], ["track"], ["track", "room"], ["track", "room", "-o", "x", "--wrong"]],
@@ -410,6 +415,7 @@ def test_help_is_there_at_once_and_without_the_engine() -> None:
         assert command in done.stdout
 
 
+@pytest.mark.full
 def test_python_m_app_is_the_same_program() -> None:
     done = subprocess.run(
         [sys.executable, "-m", "app", "parameters"], capture_output=True, text=True

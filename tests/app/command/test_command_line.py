@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
+import pytest
 from starlette.testclient import TestClient
 
 from app.command.flags import Track, parse
@@ -12,6 +13,7 @@ from tests.app.conftest import Runs, run_is, wait_until
 from tracker import parameters
 
 
+@pytest.mark.full
 def test_it_gives_the_same_file(client: TestClient, run: Runs, tmp_path: Path) -> None:
     changes = {"fusion.detection_probability": 0.9, "fusion_method": "sequential_phd"}
     state = client.patch("/api/parameters", json={"changes": changes}).json()

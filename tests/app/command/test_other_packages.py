@@ -206,6 +206,7 @@ def test_another_version_of_the_package_makes_other_results(tmp_path: Path) -> N
     assert len({one["single_view"] for one in keys}) == 3
 
 
+@pytest.mark.full
 def test_its_parameters_have_flags_and_are_listed(tmp_path: Path) -> None:
     installed(tmp_path, POINTS)
     listed = python(tmp_path, "-m", "app", "parameters")
@@ -220,6 +221,7 @@ def test_its_parameters_have_flags_and_are_listed(tmp_path: Path) -> None:
     assert "|calm" in helped.stdout
 
 
+@pytest.mark.full
 def test_what_cannot_be_used_is_told_and_left_out(tmp_path: Path) -> None:
     installed(tmp_path, {"single_view": {**POINTS["single_view"], **BROKEN}})
     done = python(

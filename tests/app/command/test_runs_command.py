@@ -26,6 +26,7 @@ def asked(run: Runs, *arguments: object) -> list | dict:
     return told
 
 
+@pytest.mark.full
 def test_track_keeps_its_run(run: Runs, crossing: Path, path: Path, tmp_path: Path) -> None:
     line = ["track", crossing, "-o", tmp_path / "tracks.csv", "--library", path]
     line += ["--set", "fusion.clutter_rate=1.5"]
@@ -41,6 +42,7 @@ def test_track_keeps_its_run(run: Runs, crossing: Path, path: Path, tmp_path: Pa
     assert told["parameters"]["fusion"]["clutter_rate"] == 1.5
 
 
+@pytest.mark.full
 def test_keep_0_keeps_nothing(run: Runs, crossing: Path, path: Path, tmp_path: Path) -> None:
     line = ["track", crossing, "-o", tmp_path / "tracks.csv", "--library", path]
     assert run(*line, "--keep", "0")[0] == 0
@@ -48,6 +50,7 @@ def test_keep_0_keeps_nothing(run: Runs, crossing: Path, path: Path, tmp_path: P
     assert run(*line, "--keep", "-1")[0] == 2
 
 
+@pytest.mark.full
 def test_a_damaged_library_does_not_keep_track_from_its_work(
     run: Runs, crossing: Path, path: Path, tmp_path: Path
 ) -> None:
@@ -74,6 +77,7 @@ def test_runs_are_named_starred_deleted_and_taken_back(run: Runs, path: Path) ->
     assert asked(run, "list", "--recording", "nowhere", *at) == []
 
 
+@pytest.mark.full
 def test_a_kept_run_is_exported_as_track_writes_it(
     run: Runs, crossing: Path, path: Path, tmp_path: Path
 ) -> None:

@@ -143,6 +143,7 @@ def test_a_crash_before_anybody_could_come_is_not_repeated(tmp_path: Path) -> No
     assert (status, len(rows)) == (128 + signal.SIGABRT, 1)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
 def test_an_end_on_purpose_is_one(tmp_path: Path, name: str) -> None:
     status, rows, told = starts(tmp_path / "starts", "later", name)

@@ -44,6 +44,7 @@ def least(work: Callable[[int], object], steps: range) -> float:
     return min(taken)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("alone", [False, True])
 def test_a_drawn_step_costs_the_same_however_long_the_recording(
     server: viser.ViserServer, runs: dict[int, tuple[Sequence, Run]], alone: bool

@@ -47,6 +47,7 @@ time.sleep(30)
 """
 
 
+@pytest.mark.full
 def test_a_sequence_is_shown_at_once_and_run_when_its_loops_over_pixels_are_there(
     uncompiled: None, monkeypatch: pytest.MonkeyPatch, data: Path
 ) -> None:

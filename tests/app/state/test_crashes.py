@@ -41,6 +41,7 @@ def start(folder: Path, draft: Path | str, number: int) -> None:
     assert done.returncode == -number, done.stderr
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGABRT])
 def test_the_draft_of_a_crash_is_put_aside(tmp_path: Path, draft: Path, number: int) -> None:
     folder = tmp_path / "starts"
@@ -55,6 +56,7 @@ def test_the_draft_of_a_crash_is_put_aside(tmp_path: Path, draft: Path, number: 
     assert Crashes(folder).tidy() == []
 
 
+@pytest.mark.full
 def test_a_crash_with_what_is_saved_takes_no_draft(tmp_path: Path, draft: Path) -> None:
     start(tmp_path / "starts", "", signal.SIGSEGV)
     (told,) = Crashes(tmp_path / "starts").tidy()
@@ -62,6 +64,7 @@ def test_a_crash_with_what_is_saved_takes_no_draft(tmp_path: Path, draft: Path) 
     assert draft.is_file()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("number", [0, signal.SIGKILL, signal.SIGTERM])
 def test_an_end_or_a_kill_is_no_crash(tmp_path: Path, draft: Path, number: int) -> None:
     start(tmp_path / "starts", draft, number)

@@ -143,6 +143,7 @@ def test_twenty_changes_end_in_one_run_equal_to_the_engines(
     assert slow["runs"] == runs, "nothing may run after the last"
 
 
+@pytest.mark.full
 def test_changes_from_many_threads_still_end_in_the_stores_parameters(
     desk: Desk, slow: dict[str, int]
 ) -> None:
@@ -164,6 +165,7 @@ def test_changes_from_many_threads_still_end_in_the_stores_parameters(
     assert_same_tracks(desk.now.run, engine(desk))
 
 
+@pytest.mark.full
 def test_a_superseded_run_stops_soon(desk: Desk, slow: dict[str, int]) -> None:
     desk.open()
     desk.bench.set_parameters({P_D: 0.7}, "test")
@@ -203,6 +205,7 @@ def test_a_parameter_that_nothing_depends_on_starts_nothing(
     assert desk.now.run_state.state == "done"
 
 
+@pytest.mark.full
 def test_cancel_keeps_the_steps_and_goes_on_when_asked(desk: Desk, slow: dict[str, int]) -> None:
     desk.open()
     desk.bench.set_parameters({P_D: 0.7}, "test")

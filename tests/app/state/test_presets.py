@@ -91,6 +91,7 @@ def test_a_value_that_is_no_parameter_any_more_is_told_when_it_is_taken(tmp_path
         workbench.apply_preset("old")
 
 
+@pytest.mark.full
 def test_the_routes(client: TestClient) -> None:
     client.patch("/api/parameters", json={"changes": {P_D: 0.6}})
     state = client.post("/api/presets", json={"name": "night / cam 2"}).json()

@@ -61,6 +61,7 @@ def complaint(answer: Any) -> str:
     return str(error["detail"])
 
 
+@pytest.mark.full
 def test_the_first_template_makes_the_colour_methods_usable(client: TestClient) -> None:
     before = state(client)
     assert before["teaching"] == {
@@ -81,6 +82,7 @@ def test_the_first_template_makes_the_colour_methods_usable(client: TestClient) 
         done(client)
 
 
+@pytest.mark.full
 def test_a_run_used_again_brings_its_templates_back(client: TestClient) -> None:
     before, first = state(client), tracks(client)
     client.patch("/api/parameters", json={"changes": {"single_view": "colour_phd"}})
@@ -183,6 +185,7 @@ def test_a_box_that_sticks_out_is_cut_at_the_border(client: TestClient) -> None:
     assert template.box.tolist() == [0.0, 120.0, 14.0, 24.0]
 
 
+@pytest.mark.full
 def test_entrances_are_suggested_by_the_tracks(client: TestClient) -> None:
     entrance = state(client)["sequence"]["room"]["entrances"][0]
     words = complaint(client.post("/api/teach/entrances/suggested"))
@@ -265,6 +268,7 @@ def test_discard_is_the_file_again_and_undo_knows_what_was_discarded(client: Tes
     assert client.post("/api/teach/restore", json={"key": key}).json()["teaching"]["unsaved"] == 1
 
 
+@pytest.mark.full
 def test_what_is_not_saved_is_there_again_after_another_sequence(
     client: TestClient, walkers: Path
 ) -> None:
@@ -279,6 +283,7 @@ def test_what_is_not_saved_is_there_again_after_another_sequence(
     done(client)
 
 
+@pytest.mark.full
 def test_what_is_not_saved_outlives_the_server(
     walkers: Path, tmp_path: Path, own_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

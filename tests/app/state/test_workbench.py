@@ -46,6 +46,7 @@ def test_values_are_taken_all_or_none(bench: Workbench) -> None:
     assert bench.snapshot().parameters_origin == "test"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("key", [k for k, p in PARAMETERS.items() if p.minimum is not None])
 def test_numbers_of_the_sliders_are_moved_into_their_range(bench: Workbench, key: str) -> None:
     parameter = PARAMETERS[key]

@@ -75,6 +75,7 @@ def test_nothing_open(empty: TestClient) -> None:
     assert_error(empty.post("/api/view", json={"camera": 0}), 422, "bad_parameter", "below 0")
 
 
+@pytest.mark.full
 def test_schema_has_every_parameter_with_all_a_slider_needs(client: TestClient) -> None:
     schema = client.get("/api/schema").json()
     assert [p["key"] for p in schema["parameters"]] == list(parameters.PARAMETERS)
@@ -92,6 +93,7 @@ def test_schema_has_every_parameter_with_all_a_slider_needs(client: TestClient) 
     assert set(schema["presets"]) == set(parameters.PRESETS)
 
 
+@pytest.mark.full
 def test_sequences_lists_the_data_folder(client: TestClient, data: Path) -> None:
     broken = data / "broken"
     broken.mkdir()
@@ -153,6 +155,7 @@ def test_a_step_that_is_not_there(client: TestClient) -> None:
     assert_error(client.get("/api/step/now"), 422, "bad_request", "step")
 
 
+@pytest.mark.full
 def test_the_timeline_counts_what_the_engine_reports(client: TestClient, crossing: Path) -> None:
     sequence = read_sequence(crossing)
     run = pipeline.compute(sequence, pipeline.default_parameters(sequence))
@@ -203,6 +206,7 @@ def test_the_csv_is_the_engines(client: TestClient, crossing: Path, tmp_path: Pa
     assert len(list(csv.DictReader(rows))) == len(run.tracks) > 0
 
 
+@pytest.mark.full
 def test_parameters_are_set_and_what_differs_is_told(client: TestClient) -> None:
     state = client.patch("/api/parameters", json={"changes": {P_D: 0.9}}).json()
     assert state["parameters"][P_D] == 0.9
@@ -214,6 +218,7 @@ def test_parameters_are_set_and_what_differs_is_told(client: TestClient) -> None
     assert client.post("/api/parameters/reset").json()["changed"] == []
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -235,6 +240,7 @@ def test_a_value_that_does_not_fit(
     assert client.get("/api/state").json()["parameters"] == before["parameters"]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("method", "path", "json", "status"),
     [
@@ -271,6 +277,7 @@ def test_a_failure_of_our_own_has_the_one_shape_too(
         assert_error(client.get("/api/schema"), 500, "internal", "RuntimeError", "a bug")
 
 
+@pytest.mark.full
 def test_playhead_selection_layers_view(client: TestClient) -> None:
     assert client.post("/api/seek", json={"step": 500}).json()["playhead"] == FRAMES - 1
     assert client.post("/api/select", json={"id": 3}).json()["selection"] == 3
@@ -284,6 +291,7 @@ def test_playhead_selection_layers_view(client: TestClient) -> None:
     assert_error(client.post("/api/theme", json={"theme": "red"}), 422, "bad_request", "theme")
 
 
+@pytest.mark.full
 def test_opening_what_cannot_be_opened_leaves_what_was_open(client: TestClient) -> None:
     answer = client.post("/api/sequence", json={"name": "nonsense"})
     assert_error(answer, 422, "cannot_open", "nonsense")
@@ -293,6 +301,7 @@ def test_opening_what_cannot_be_opened_leaves_what_was_open(client: TestClient) 
     assert state["run"]["state"] == "done"
 
 
+@pytest.mark.full
 def test_pictures_are_those_of_their_step(client: TestClient) -> None:
     state = client.post("/api/sequence", json={"name": "numbers"}).json()
     wait_until(lambda: client.get("/api/state").json()["sequence"]["name"] == "numbers")
@@ -316,6 +325,7 @@ def test_pictures_are_those_of_their_step(client: TestClient) -> None:
     assert client.get(f"/api/picture/{key}/0/0.jpg?w=4").status_code == 422
 
 
+@pytest.mark.full
 def test_pictures_asked_for_at_once_are_decoded_once(
     client: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -344,6 +354,7 @@ def test_pictures_asked_for_at_once_are_decoded_once(
     assert len(encoded) == 1
 
 
+@pytest.mark.full
 def test_the_page_and_its_files_are_checked_by_their_etag(client: TestClient) -> None:
     for path in ("/", "/static/js/main.js"):
         answer = client.get(path)
@@ -354,6 +365,7 @@ def test_the_page_and_its_files_are_checked_by_their_etag(client: TestClient) ->
     assert "script-src 'self';" in client.get("/").headers["content-security-policy"]
 
 
+@pytest.mark.full
 def test_every_route_is_documented(client: TestClient) -> None:
     document = client.get("/openapi.json").json()
     documented = {
@@ -378,6 +390,7 @@ def test_every_route_is_documented(client: TestClient) -> None:
             assert model.get("description"), name
 
 
+@pytest.mark.full
 def test_the_page_of_the_routes_loads_nothing_from_another_host(client: TestClient) -> None:
     page = client.get("/docs").text
     assert "//" not in page.replace("<!--", "").split("<script>")[0]

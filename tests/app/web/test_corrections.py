@@ -75,6 +75,7 @@ def settled(client: TestClient) -> dict[str, Any]:
     return answer
 
 
+@pytest.mark.full
 def test_a_cut_is_obeyed_kept_taken_back_and_said_again(desk: TestClient, own: Path) -> None:
     before = tracks(desk)
     one = max(before, key=lambda life: life["last"] - life["first"])
@@ -101,6 +102,7 @@ def test_a_cut_is_obeyed_kept_taken_back_and_said_again(desk: TestClient, own: P
     assert (key["count"], key["unmet"]) == (1, 0)
 
 
+@pytest.mark.full
 def test_what_can_be_taken_back_survives_a_start(own: Path) -> None:
     with started(own) as client:
         lives = tracks(client)
@@ -119,6 +121,7 @@ def test_what_can_be_taken_back_survives_a_start(own: Path) -> None:
         assert client.post(f"{PLACE}/undo").status_code == 409
 
 
+@pytest.mark.full
 def test_after_another_slider_a_correction_still_holds(desk: TestClient) -> None:
     one = max(tracks(desk), key=lambda life: life["last"] - life["first"])
     step = (one["first"] + one["last"]) // 2
@@ -129,6 +132,7 @@ def test_after_another_slider_a_correction_still_holds(desk: TestClient) -> None
     assert [c["met"] for c in settled(desk)["corrections"]] == [True]
 
 
+@pytest.mark.full
 def test_what_cannot_be_is_refused_with_a_sentence(desk: TestClient, own: Path) -> None:
     lives = tracks(desk)
     two = [life["id"] for life in lives[:2]]
@@ -160,6 +164,7 @@ def test_a_malformed_log_is_told_and_the_recording_stays_usable(own: Path) -> No
     assert "hier" in (own / "corrections.toml").read_text()
 
 
+@pytest.mark.full
 def test_the_queue_is_answered_previewed_and_skipped(
     desk: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -215,6 +220,7 @@ def test_how_it_would_be_is_shown_until_it_is_no_more(
     assert desk.app.state.workbench.snapshot().ghosts is None  # type: ignore[attr-defined]
 
 
+@pytest.mark.full
 def test_what_is_answered_of_the_run_before_counts_in_the_one_that_came_meanwhile(
     desk: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -241,6 +247,7 @@ def test_what_is_answered_of_the_run_before_counts_in_the_one_that_came_meanwhil
     assert [one["kind"] for one in settled(desk)["corrections"]] == ["different"]
 
 
+@pytest.mark.full
 def test_what_is_checked_leaves_the_queue_though_the_run_stays_the_same(
     desk: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -258,6 +265,7 @@ def test_what_is_checked_leaves_the_queue_though_the_run_stays_the_same(
     assert desk.get(f"{PLACE}/queue").json()["doubts"] != []
 
 
+@pytest.mark.full
 def test_a_name_that_is_dropped_is_gone_before_the_run_is_another(desk: TestClient) -> None:
     wish = {"kind": "name", "tracks": [tracks(desk)[0]["id"]], "name": "Anna", "step": 30}
     desk.post(PLACE, json={"corrections": [wish]})
@@ -268,6 +276,7 @@ def test_a_name_that_is_dropped_is_gone_before_the_run_is_another(desk: TestClie
     assert answer.json()["names"] == {}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.95])
 def test_one_point_of_a_person_in_two_pictures_says_where_the_middle_is(
     desk: TestClient, share: float
@@ -285,6 +294,7 @@ def test_one_point_of_a_person_in_two_pictures_says_where_the_middle_is(
     assert told["places"][0] == pytest.approx([30, 0.1, -0.2, middle], abs=2e-3)
 
 
+@pytest.mark.full
 def test_only_what_was_checked_counts_as_truth(desk: TestClient, own: Path, run: Runs) -> None:
     assert desk.get(f"{PLACE}/truth.csv").status_code == 409
     wish = [

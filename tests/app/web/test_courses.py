@@ -72,6 +72,7 @@ def test_nobody_has_no_courses(run: pipeline.Run) -> None:
     assert courses_of(run, None, 999, list(KINDS), Window.of(STEPS)).courses == []
 
 
+@pytest.mark.full
 def test_the_error_is_that_of_the_evaluation(client: TestClient) -> None:
     told = client.get("/api/courses/1?kind=error&kind=nothing").json()
     assert [course["name"] for course in told["courses"]] == ["error"]

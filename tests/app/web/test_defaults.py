@@ -66,6 +66,7 @@ def test_the_page_is_told_which_methods_cannot_work_here_and_why(client: TestCli
     assert "jpda" not in after["unfit"]["single_view"], "it depends on the values, too"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("changes", "asks"),
     [

@@ -121,6 +121,7 @@ def test_files_that_are_sent_become_a_recording(
     wait_until(lambda: last() == ("living room", "recent", 4))
 
 
+@pytest.mark.full
 def test_a_wish_is_looked_into_and_can_be_taken_back(client: TestClient, files: Path) -> None:
     info = _settled(client, _send(client, files))
     other = _wish(client, info, pose="camera-to-world")
@@ -177,6 +178,7 @@ def test_pictures_of_cameras_are_shown(client: TestClient, tmp_path: Path) -> No
     assert names["cameras hold still"]["status"] == "good"
 
 
+@pytest.mark.full
 def test_a_camera_that_shakes_is_named(client: TestClient, tmp_path: Path) -> None:
     folder = tmp_path / "filmed"
     folder.mkdir()
@@ -195,6 +197,7 @@ def test_a_camera_that_shakes_is_named(client: TestClient, tmp_path: Path) -> No
     assert "Camera &quot;cam2&quot; shakes by" in info["sheet"]
 
 
+@pytest.mark.full
 def test_a_folder_of_the_disk_is_not_copied(client: TestClient, files: Path, data: Path) -> None:
     inside = files.rename(data / "walk")
     videos(inside, frames=60)
@@ -238,6 +241,7 @@ def test_a_folder_that_is_still_being_copied_is_waited_for(
     wait_until(lambda: (data / "walk-2").exists())
 
 
+@pytest.mark.full
 def test_entrances_and_methods_are_chosen_on_the_sheet(
     client: TestClient, files: Path, data: Path
 ) -> None:
@@ -272,6 +276,7 @@ def test_entrances_and_methods_are_chosen_on_the_sheet(
     assert state["teaching"]["unsaved"] == 0
 
 
+@pytest.mark.full
 def test_a_recording_is_open_before_its_copies_are_there(
     client: TestClient, files: Path, data: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -307,6 +312,7 @@ def test_a_recording_is_open_before_its_copies_are_there(
     assert client.get("/api/state").json()["sequence"]["key"] == key
 
 
+@pytest.mark.full
 def test_copying_can_be_stopped(client: TestClient, files: Path, data: Path) -> None:
     inside = files.rename(data / "walk")
     videos(inside, size=(320, 180), frames=60)
@@ -331,6 +337,7 @@ def test_copying_can_be_stopped(client: TestClient, files: Path, data: Path) -> 
     assert read_sequence(folder).frames == 60
 
 
+@pytest.mark.full
 def test_pairs_of_many_cameras_stand_in_a_square(client: TestClient, files: Path) -> None:
     info = _settled(client, _send(client, files))
     assert "pair-grid" not in info["sheet"]
@@ -358,6 +365,7 @@ def test_pairs_of_many_cameras_stand_in_a_square(client: TestClient, files: Path
     assert all("cam3 – " in one for one in listed)
 
 
+@pytest.mark.full
 def test_an_import_that_is_given_up_leaves_nothing(
     client: TestClient, files: Path, data: Path
 ) -> None:
@@ -368,6 +376,7 @@ def test_an_import_that_is_given_up_leaves_nothing(
     wait_until(lambda: not list(data.iterdir()))
 
 
+@pytest.mark.full
 def test_what_cannot_be_imported_is_told(client: TestClient, data: Path, tmp_path: Path) -> None:
     outside = client.post("/api/import/path", json={"path": str(tmp_path)}).json()
     assert "expected files below the data folder" in outside["detail"]

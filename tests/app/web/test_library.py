@@ -45,6 +45,7 @@ def runs_of(client: TestClient, name: str = "crossing") -> list[dict]:
     return client.get(f"/api/library/recordings/{known[0]}/runs").json()["runs"] if known else []
 
 
+@pytest.mark.full
 def test_finished_runs_are_kept_with_their_figures(kept: TestClient) -> None:
     changed, default = runs_of(kept)
     assert default["changes"] == []
@@ -62,6 +63,7 @@ def test_finished_runs_are_kept_with_their_figures(kept: TestClient) -> None:
     assert (never["id"], never["runs"]) == (None, 0)
 
 
+@pytest.mark.full
 def test_a_preview_has_the_distance_to_the_truth_in_small(kept: TestClient) -> None:
     changed, _ = runs_of(kept)
     ospa = kept.get("/api/evaluation/series").json()["ospa"]
@@ -70,6 +72,7 @@ def test_a_preview_has_the_distance_to_the_truth_in_small(kept: TestClient) -> N
     assert "OSPA over time" in kept.get(f"/api/library/runs/{changed['id']}/drawn").text
 
 
+@pytest.mark.full
 def test_a_recording_that_was_moved_is_found_again(data: Path, path: Path, tmp_path: Path) -> None:
     before, after = tmp_path / "before", tmp_path / "after"
     shutil.copytree(data / "crossing", before)
@@ -92,6 +95,7 @@ def test_a_recording_that_was_moved_is_found_again(data: Path, path: Path, tmp_p
         assert "detail" not in shown
 
 
+@pytest.mark.full
 def test_a_run_that_was_deleted_and_is_made_again_is_kept_again(kept: TestClient) -> None:
     _, default = runs_of(kept)
     kept.post("/api/library/delete", json={"runs": [default["id"]]})
@@ -100,6 +104,7 @@ def test_a_run_that_was_deleted_and_is_made_again_is_kept_again(kept: TestClient
     wait_until(lambda: [run["id"] for run in runs_of(kept)][:1] == [default["id"]])
 
 
+@pytest.mark.full
 def test_a_library_that_cannot_be_used_for_a_while_keeps_runs_again_afterwards(
     data: Path, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -120,6 +125,7 @@ def test_a_library_that_cannot_be_used_for_a_while_keeps_runs_again_afterwards(
         assert client.get("/api/library").json()["error"] is None
 
 
+@pytest.mark.full
 def test_a_kept_run_is_shown_as_it_was_and_nothing_is_computed(kept: TestClient) -> None:
     before = kept.get("/api/export/tracks.csv").text
     steps = [kept.get(f"/api/step/{step}").json() for step in (10, 60, 119)]
@@ -142,6 +148,7 @@ def test_a_kept_run_is_shown_as_it_was_and_nothing_is_computed(kept: TestClient)
     assert len(runs_of(kept)) == 2  # it is not kept again
 
 
+@pytest.mark.full
 def test_what_the_cameras_found_comes_back_by_computing_again(kept: TestClient) -> None:
     changed, _ = runs_of(kept)
     kept.post(f"/api/library/runs/{changed['id']}/open")
@@ -151,6 +158,7 @@ def test_what_the_cameras_found_comes_back_by_computing_again(kept: TestClient) 
     assert kept.get("/api/step/60").json()["cameras"][0]["measurements"] != []
 
 
+@pytest.mark.full
 def test_a_moved_slider_computes_on_from_a_kept_run(kept: TestClient) -> None:
     kept.post(f"/api/library/runs/{runs_of(kept)[1]['id']}/open")
     state = kept.patch("/api/parameters", json={"changes": {P_D: 0.7}}).json()
@@ -159,6 +167,7 @@ def test_a_moved_slider_computes_on_from_a_kept_run(kept: TestClient) -> None:
     wait_until(lambda: len(runs_of(kept)) == 3)
 
 
+@pytest.mark.full
 def test_a_run_of_older_code_says_so_and_is_another_than_a_computation(
     kept: TestClient, path: Path
 ) -> None:
@@ -175,6 +184,7 @@ def test_a_run_of_older_code_says_so_and_is_another_than_a_computation(
     assert (again["key"], again["kept"]) == (shown["stands_for"], None)
 
 
+@pytest.mark.full
 def test_a_run_of_another_recording_opens_it_first(kept: TestClient, data: Path) -> None:
     number = runs_of(kept)[0]["id"]
     kept.post("/api/sequence", json={"name": "numbers"})
@@ -185,6 +195,7 @@ def test_a_run_of_another_recording_opens_it_first(kept: TestClient, data: Path)
     assert kept.get("/api/step/60").json()["tracks"] != []
 
 
+@pytest.mark.full
 def test_a_kept_run_is_pinned_beside_the_shown_one(kept: TestClient) -> None:
     state = kept.post(f"/api/library/runs/{runs_of(kept)[1]['id']}/pin").json()
     assert state["pinned"]["differs"] == [P_D]
@@ -193,6 +204,7 @@ def test_a_kept_run_is_pinned_beside_the_shown_one(kept: TestClient) -> None:
     assert comparison["against"] == "pinned"
 
 
+@pytest.mark.full
 def test_names_stars_notes_and_deletion(kept: TestClient) -> None:
     number = runs_of(kept)[0]["id"]
     wish = {"name": "baseline", "star": True, "note": "as it comes", "tags": ["paper"]}
@@ -208,6 +220,7 @@ def test_names_stars_notes_and_deletion(kept: TestClient) -> None:
     assert "no run 999" in answer.json()["detail"]
 
 
+@pytest.mark.full
 def test_the_preview_has_what_is_drawn(kept: TestClient) -> None:
     number = runs_of(kept)[0]["id"]
     told = kept.get(f"/api/library/runs/{number}").json()
@@ -221,6 +234,7 @@ def test_the_preview_has_what_is_drawn(kept: TestClient) -> None:
         assert np.hypot(*ways.T).min() < 0.3
 
 
+@pytest.mark.full
 def test_what_is_drawn_says_what_there_is_and_is_escaped(kept: TestClient) -> None:
     number, other = (run["id"] for run in runs_of(kept))
     kept.patch(f"/api/library/runs/{number}", json={"note": '"><script>', "name": "<b>x"})
@@ -235,6 +249,7 @@ def test_what_is_drawn_says_what_there_is_and_is_escaped(kept: TestClient) -> No
     assert kept.get("/api/library/compared", params={"runs": [999]}).status_code == 404
 
 
+@pytest.mark.full
 def test_runs_stay_when_the_recording_is_gone(kept: TestClient, data: Path, path: Path) -> None:
     with Library(path) as library:
         library._connection.execute("UPDATE recordings SET place = place || '-gone'")

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from typing import Any
 
+import pytest
 from starlette.testclient import TestClient
 
 from app.state.workbench import Workbench
@@ -92,6 +93,7 @@ def test_what_is_not_understood_is_said_and_harms_nothing(client: TestClient) ->
         assert read_until(socket, is_type("step"))[-1]["step"] == 2
 
 
+@pytest.mark.full
 def test_a_changed_parameter_ends_in_the_step_of_its_own_run(client: TestClient) -> None:
     with connect(client) as socket:
         read_until(socket, is_type("timeline"))
@@ -131,6 +133,7 @@ def test_keys_pressed_in_3d_and_notices_are_relayed(client: TestClient) -> None:
         }
 
 
+@pytest.mark.full
 def test_a_failed_opening_is_told_to_a_page_that_comes_later(client: TestClient) -> None:
     client.post("/api/sequence", json={"name": "nonsense"})
     with connect(client) as socket:

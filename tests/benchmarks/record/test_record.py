@@ -84,6 +84,7 @@ def test_the_record_in_the_repository_has_every_figure_of_accuracy() -> None:
     assert record.FILE.stat().st_size < 500_000
 
 
+@pytest.mark.full
 def test_the_page_shows_every_figure(tmp_path: Path) -> None:
     file = tmp_path / "chart.html"
     chart.write([entry("one"), entry("two", machine={"processor": "other", "cores": 1})], file)

@@ -81,6 +81,7 @@ def test_a_template_that_cannot_be_read_is_told_and_hinders_nobody(
     assert 'template "person2"' in caplog.text
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("method", ["colour_phd", "pseudo_particle", "jpda", "association_matrix"])
 def test_every_method_with_pictures_passes_it_on(painted: Sequence, method: str) -> None:
     parameters = RunParameters(single_view=cast(str, method))

@@ -21,6 +21,7 @@ from tracker.single_view.working.shaking import check_shake
 from tracker.single_view.working.steadying import Steadying, agreed
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("sigma", [0.5, 2.0])
 def test_a_shake_is_measured_and_undone(sigma: float) -> None:
     pictures = shaken(np.random.default_rng(3), sigma)
@@ -34,6 +35,7 @@ def test_a_shake_is_measured_and_undone(sigma: float) -> None:
     assert left.shake < 0.15 * sigma
 
 
+@pytest.mark.full
 def test_a_shake_undone_leaves_people_as_foreground_and_no_edges() -> None:
     pictures = shaken(np.random.default_rng(3), 2.0)
     found = Steadying.learn(pictures, None, 0.2)

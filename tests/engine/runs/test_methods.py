@@ -138,6 +138,7 @@ def effects(choice: dict[str, Any]) -> bool:
     return choice["fusion_method"] == "multi_bernoulli" or choice["single_view"] == "none"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("choice", [c for c in CHOICES if effects(c)], ids=named)
 def test_what_is_not_shown_changes_no_result(choice: dict[str, Any], recording: Sequence) -> None:
     parameters = with_values(RunParameters(), choice)
@@ -224,6 +225,7 @@ def test_a_method_that_cannot_work_is_known_with_the_reason(recording: Sequence)
     assert "jpda" in unfit_methods(without(recording, "detections"), boxes)["single_view"]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("what", ["pictures", "detections", "templates", "detector"])
 @pytest.mark.parametrize("name", METHODS["single_view"])
 def test_a_method_fails_just_where_it_is_said_to(recording: Sequence, what: str, name: str) -> None:

@@ -100,6 +100,7 @@ def test_a_person_is_followed(
     assert told == ["new"]
 
 
+@pytest.mark.full
 @both
 def test_two_who_pass_each_other_keep_their_ids(
     passing: tuple[Sequence, Clip], parameters: RunParameters
@@ -168,6 +169,7 @@ def test_missing_pictures_change_nothing(
     np.testing.assert_array_equal(result.estimate_labels, results[-1].estimate_labels)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("level", [0, 255])
 @both
 def test_a_black_or_white_frame_shows_nobody_and_is_survived(
@@ -182,6 +184,7 @@ def test_a_black_or_white_frame_shows_nobody_and_is_survived(
     np.testing.assert_array_equal(results[-1].estimate_labels, results[19].estimate_labels)
 
 
+@pytest.mark.full
 @both
 def test_no_foreground_for_a_hundred_frames(
     walker: Sequence, reader: FrameReader, parameters: RunParameters
@@ -197,6 +200,7 @@ def test_no_foreground_for_a_hundred_frames(
     assert len(result.boxes) == 1
 
 
+@pytest.mark.full
 @both
 def test_a_frozen_camera_sees_nobody(walker: Sequence, parameters: RunParameters) -> None:
     view = walker.views[0]
@@ -206,6 +210,7 @@ def test_a_frozen_camera_sees_nobody(walker: Sequence, parameters: RunParameters
     assert not any(len(result.boxes) for result in results)
 
 
+@pytest.mark.full
 @both
 def test_a_camera_that_freezes_keeps_whom_it_shows(
     walker: Sequence, reader: FrameReader, parameters: RunParameters
@@ -216,6 +221,7 @@ def test_a_camera_that_freezes_keeps_whom_it_shows(
     assert len({tuple(result.estimate_labels) for result in results[10:]}) == 1
 
 
+@pytest.mark.full
 @both
 def test_boxes_of_a_pixel(
     tmp_path_factory: pytest.TempPathFactory, parameters: RunParameters
@@ -246,6 +252,7 @@ def test_a_camera_without_pictures_is_told_what_to_do(walker: Sequence) -> None:
         method_of(blind, opened)
 
 
+@pytest.mark.full
 def test_what_one_camera_does_leaves_the_others_alone(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> None:

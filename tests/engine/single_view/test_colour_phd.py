@@ -95,6 +95,7 @@ def test_the_published_scheme_follows_a_person_in_plain_sight(
         assert result.boxes is result.estimates
 
 
+@pytest.mark.full
 def test_two_people_side_by_side_keep_a_peak_each(two_people: Sequence) -> None:
     with FrameReader(two_people) as reader:
         results = run(method_of(two_people, reader), reader, STEPS)
@@ -163,6 +164,7 @@ def test_black_and_white_frames_show_nobody(
             assert len(result.boxes) == 0
 
 
+@pytest.mark.full
 def test_in_a_frozen_picture_who_was_taught_is_found_and_nobody_else(one_person: Sequence) -> None:
     view, step = one_person.views[0], one_person.templates[0].frame
     frozen = replace(one_person, views=(replace(view, images=(view.images[step],) * STEPS),))

@@ -145,6 +145,7 @@ def test_a_box_tells_where_its_target_stands(x: float, y: float, camera: int) ->
     assert np.linalg.norm(near - lens) < np.linalg.norm(place - lens) < np.linalg.norm(far - lens)
 
 
+@pytest.mark.full
 @given(st.integers(0, 10_000), st.floats(0.0, 1.0))
 def test_a_way_meets_the_room_where_some_point_of_it_does(seed: int, margin: float) -> None:
     rng = np.random.default_rng(seed)

@@ -183,6 +183,7 @@ pieces = st.lists(
 )  # fmt: skip
 
 
+@pytest.mark.full
 @given(st.lists(pieces, min_size=1, max_size=12), st.sampled_from(["pixels", "boxes"]),
        st.integers(1, 4))  # fmt: skip
 def test_whatever_shows_every_object_carries_tracks_and_no_track_is_in_two(

@@ -106,6 +106,7 @@ def events_of(results: list[ViewResult]) -> Counter[str]:
     return Counter(event.kind for result in results for event in result.events)
 
 
+@pytest.mark.full
 def test_a_person_is_followed_under_one_id(one_person: Sequence, reader: FrameReader) -> None:
     results = run(method_of(one_person, reader), film(reader))
     assert within_radius(one_person, results, "boxes")[2:].mean() > 0.95
@@ -123,6 +124,7 @@ def test_the_other_filters_follow_one_person_in_plain_sight(
     assert within_radius(one_person, results, "estimates")[12:].mean() > 0.9
 
 
+@pytest.mark.full
 def test_two_alike_are_both_followed_where_the_classical_filter_has_one_mean(
     two_alike: Sequence,
 ) -> None:
@@ -237,6 +239,7 @@ def test_a_missing_picture_only_spreads_the_particles(
     assert off(true_boxes(one_person, 11)[0], found.estimates) < 1.0
 
 
+@pytest.mark.full
 @every_variant
 @pytest.mark.parametrize("level", [0, 255])
 def test_black_and_white_frames_are_survived(
@@ -255,6 +258,7 @@ def test_black_and_white_frames_are_survived(
     assert within_radius(one_person, results[:40], "estimates")[28:].mean() > 0.9
 
 
+@pytest.mark.full
 @every_variant
 def test_a_frozen_camera_is_survived(one_person: Sequence, variant: str) -> None:
     view = one_person.views[0]
@@ -295,6 +299,7 @@ def test_a_camera_that_looks_away_finds_nobody(
     assert all(len(result.boxes) == 0 for result in results)
 
 
+@pytest.mark.full
 def test_a_camera_without_pictures_to_read_takes_nothing_from_the_others(
     one_person: Sequence, reader: FrameReader
 ) -> None:

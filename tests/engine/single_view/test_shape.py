@@ -39,6 +39,7 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Sequence:
     return read_sequence(folder)
 
 
+@pytest.mark.full
 def test_a_window_hangs_from_the_crown_and_has_the_targets_box_in_it(room: Sequence) -> None:
     camera, half = room.cameras[1], room.target_half_extents
     crowns = np.array([[*(room.room.minimum[:2] + room.room.maximum[:2]) / 2.0, 1.7]])
@@ -159,6 +160,7 @@ def test_who_walks_is_found_by_shape_alone(room: Sequence) -> None:
     assert near > 0.8 * (STEPS - 20)
 
 
+@pytest.mark.full
 def test_what_is_little_in_one_camera_is_passed_on_and_weighed(room: Sequence) -> None:
     nobody_marked = replace(room, templates=(), digest=f"{room.digest}-passed")
     chosen = with_values(RunParameters(), {"single_view": "shapes"})
@@ -203,6 +205,7 @@ def test_shape_is_believed_of_whose_template_shows_one(room: Sequence) -> None:
     assert 0.3 / 3.0 < found.fit < 0.45
 
 
+@pytest.mark.full
 def test_where_shapes_fit_the_templates_they_place_whom_colours_find(room: Sequence) -> None:
     def seen(shapes: str) -> list[ViewResult]:
         chosen = with_values(RunParameters(), {"single_view": "colour_phd"})

@@ -51,6 +51,7 @@ def carried_by(sequence: Sequence) -> dict[tuple[str, str], ndarray]:
     return {(t.name, t.camera): Boxes.from_left_top(t.box[None]).centred[0] for t in new}
 
 
+@pytest.mark.full
 def test_templates_are_carried_to_the_other_cameras(room: Sequence) -> None:
     carried = carried_by(room)
     assert set(carried) == {(f"person{i}", c) for i in (1, 2) for c in ("right", "back")}
@@ -83,6 +84,7 @@ def test_the_foreground_is_believed_of_who_walks_and_not_of_who_sits(room: Seque
             assert trust["person2"] == 0.0
 
 
+@pytest.mark.full
 def test_both_are_found_with_the_defaults(room: Sequence) -> None:
     run = pipeline.compute(room, RunParameters())
     for path in (WALKER, SEATED):

@@ -133,6 +133,7 @@ def test_an_upright_box_comes_back_around_the_same_person() -> None:
         np.testing.assert_allclose(long * view.scale / boxes[:, 3], 1.0, atol=0.1)
 
 
+@pytest.mark.full
 @given(angle=st.floats(-math.pi, math.pi).filter(lambda a: abs(abs(math.tan(a)) - 1.0) > 0.05))
 def test_a_drawn_box_gives_the_upright_one(angle: float) -> None:
     view = seen(rolled(CAMERAS[0], angle))
@@ -199,6 +200,7 @@ def test_methods_that_look_at_no_pictures_get_the_recording_as_it_is(tmp_path: P
         assert working.reader is reader
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("factor", [1.3, 2.0, 2.25, 2.9, 3.4, 4.5])
 def test_a_reduced_picture_averages_and_stays_in_its_place(factor: float) -> None:
     camera = replace(CAMERAS[1], image_size=(round(640 * factor), round(480 * factor)))

@@ -52,6 +52,7 @@ def routes(client: TestClient) -> list[tuple[str, str]]:
     ]
 
 
+@pytest.mark.full
 def test_without_a_token_every_route_answers_with_what_to_do(closed: TestClient) -> None:
     places = routes(closed)
     assert len(places) > 30
@@ -133,6 +134,7 @@ def test_what_starts_the_browser_shows_a_key_that_opens_once(
     assert closed.get("/api/state", headers=cookie).status_code == 401
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("site", ["cross-site", "same-site"])
 @pytest.mark.parametrize("with_token", [True, False])
 def test_a_link_on_another_page_asks_before_it_opens_something(

@@ -26,6 +26,7 @@ FOREIGN = [
 ]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "host",
     [

@@ -38,6 +38,7 @@ def test_the_likelier_the_denser() -> None:
     assert 0 < shown[0, 1, 3] < shown[0, 2, 3]
 
 
+@pytest.mark.full
 def test_a_step_names_its_map_which_may_be_kept(numbers: TestClient) -> None:
     key = numbers.get("/api/state").json()["sequence"]["key"]
     step = numbers.get("/api/step/5").json()
@@ -51,6 +52,7 @@ def test_a_step_names_its_map_which_may_be_kept(numbers: TestClient) -> None:
     assert numbers.get(path).content == answer.content
 
 
+@pytest.mark.full
 def test_what_there_is_no_map_of(numbers: TestClient, client: TestClient) -> None:
     key = numbers.get("/api/state").json()["sequence"]["key"]
     for path in ("nothing/0/5.png", f"{key}/9/5.png", f"{key}/0/999.png", f"{key}/0/5.png?run=x"):

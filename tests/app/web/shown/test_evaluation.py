@@ -74,6 +74,7 @@ def test_figures_are_the_engines(client: TestClient, crossing: Path) -> None:
     assert [row["camera"] for row in found["cameras"]] == ["left", "right", "back"]
 
 
+@pytest.mark.full
 def test_series_are_the_engines(client: TestClient, crossing: Path) -> None:
     run = engine(crossing)
     expected = evaluate_sequence(run.sequence, run.tracks)
@@ -119,6 +120,7 @@ def test_an_axis_ends_at_a_round_number_above_nearly_all() -> None:
     assert axis_end(np.zeros(0)) == axis_end(np.array([np.nan])) == 0.1
 
 
+@pytest.mark.full
 def test_a_run_is_set_against_the_one_before_it(client: TestClient, crossing: Path) -> None:
     assert client.get("/api/evaluation/comparison").json() is None
     assert client.get("/api/evaluation/series?of=previous").status_code == 409
@@ -137,6 +139,7 @@ def test_a_run_is_set_against_the_one_before_it(client: TestClient, crossing: Pa
     assert (series["run"], series["of"]) == (before.key, "previous")
 
 
+@pytest.mark.full
 def test_a_pinned_run_stays_the_reference(client: TestClient) -> None:
     assert get(client, "/api/state")["pinned"] is None
     pinned = client.post("/api/run/pin").json()["pinned"]
@@ -156,6 +159,7 @@ def test_a_pinned_run_stays_the_reference(client: TestClient) -> None:
     assert client.get("/api/evaluation/series?of=pinned").status_code == 409
 
 
+@pytest.mark.full
 def test_another_sequence_forgets_runs_and_pin(client: TestClient) -> None:
     client.post("/api/run/pin")
     client.post("/api/sequence", json={"name": "numbers"})
@@ -164,6 +168,7 @@ def test_another_sequence_forgets_runs_and_pin(client: TestClient) -> None:
     assert state["pinned"] is None
 
 
+@pytest.mark.full
 def test_what_is_not_there_is_said(data: Path, tmp_path: Path) -> None:
     app = create_app(Settings(data=data, with_viser=False))
     with TestClient(app, base_url=ADDRESS) as client:
@@ -185,6 +190,7 @@ def test_what_is_not_there_is_said(data: Path, tmp_path: Path) -> None:
         assert client.post("/api/run/pin").status_code == 200
 
 
+@pytest.mark.full
 def test_the_report(client: TestClient) -> None:
     answer = client.get("/api/export/report.html")
     assert answer.status_code == 200
@@ -204,6 +210,7 @@ def test_the_report(client: TestClient) -> None:
     assert query == {"seq": [state["sequence"]["opened_as"]], f"p.{P_D}": ["0.5"]}
 
 
+@pytest.mark.full
 def test_pages_are_told(client: TestClient) -> None:
     with connect(client) as socket:
         told: list[dict[str, Any]] = []
@@ -247,6 +254,7 @@ def shown(bench: Workbench) -> tuple[str, int] | None:
     return (scored.key, scored.steps) if scored is not None else None
 
 
+@pytest.mark.full
 def test_a_run_under_way_is_scored_as_far_as_it_is_and_set_against_as_much(
     bench: Workbench, sequence: Sequence
 ) -> None:
@@ -269,6 +277,7 @@ def test_a_run_under_way_is_scored_as_far_as_it_is_and_set_against_as_much(
     evaluator.close()
 
 
+@pytest.mark.full
 def test_a_run_under_way_is_scored_now_and_then(
     bench: Workbench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -301,6 +310,7 @@ def test_a_run_under_way_is_scored_now_and_then(
     assert np.diff(calls)[:-1].min() >= 0.3
 
 
+@pytest.mark.full
 def test_a_pin_is_scored_though_another_run_is_shown_already(bench: Workbench) -> None:
     run = compute(bench)
     assert bench.pin()
@@ -320,6 +330,7 @@ def test_a_pin_is_scored_though_another_run_is_shown_already(bench: Workbench) -
     evaluator.close()
 
 
+@pytest.mark.full
 def test_a_failure_is_told_once_and_the_next_run_is_scored(
     bench: Workbench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

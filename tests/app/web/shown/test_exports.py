@@ -31,6 +31,7 @@ def fetched(client: TestClient, **wish: object) -> bytes:
     return answer.content
 
 
+@pytest.mark.full
 def test_the_shown_run(client: TestClient) -> None:
     assert fetched(client, format="csv") == client.get("/api/export/tracks.csv").content
     assert len(json.loads(fetched(client, format="json"))["tracks"]) == 2

@@ -87,6 +87,7 @@ def test_a_step_is_told_as_the_step_tells_it(client: TestClient) -> None:
     assert curves["OSPA  m"] == f"{series['ospa'][60]:.3f}"
 
 
+@pytest.mark.full
 def test_events_can_be_gone_to(client: TestClient, tmp_path: Path) -> None:
     assert "No such event" in get(client, "events")  # both are there from end to end
     client.post("/api/sequence", json={"name": str(write_walkers(tmp_path / "walkers"))})
@@ -104,6 +105,7 @@ def test_events_can_be_gone_to(client: TestClient, tmp_path: Path) -> None:
     assert client.get("/api/tables/events?kind=party").status_code == 422
 
 
+@pytest.mark.full
 def test_changes_are_listed_with_their_reset(client: TestClient) -> None:
     assert "at their defaults" in get(client, "changes")
     client.patch("/api/parameters", json={"changes": {"fusion.detection_probability": 0.6}})
@@ -145,6 +147,7 @@ def test_figures_of_the_run_before_do_not_pass_for_the_shown_one(
     assert "<b>B</b> the run before, this one is being scored, " in get(client, "compare")
 
 
+@pytest.mark.full
 def test_the_comparison_is_the_evaluations(client: TestClient) -> None:
     alone = get(client, "compare")
     assert "no run to compare with" in alone
@@ -169,6 +172,7 @@ def test_the_comparison_is_the_evaluations(client: TestClient) -> None:
     assert "pinned run, default parameters" in html
 
 
+@pytest.mark.full
 def test_runs_are_listed_and_can_be_taken_up_again(client: TestClient) -> None:
     before = client.get("/api/state").json()
     client.patch("/api/parameters", json={"changes": {"fusion.detection_probability": 0.6}})

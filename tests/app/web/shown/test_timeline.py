@@ -149,6 +149,7 @@ def test_a_growing_run_is_counted_on() -> None:
     assert after == Timelines().of(whole, run, window)
 
 
+@pytest.mark.full
 def test_what_a_page_gets_does_not_grow_with_the_recording() -> None:
     sizes = []
     for frames in (2_000, 20_000):
@@ -160,6 +161,7 @@ def test_what_a_page_gets_does_not_grow_with_the_recording() -> None:
     assert sizes[1] < 1.2 * sizes[0]
 
 
+@pytest.mark.full
 def test_the_routes_take_a_part_and_a_width(client: TestClient) -> None:
     whole = client.get("/api/timeline").json()
     part = client.get("/api/timeline?first=20&last=59&buckets=10").json()

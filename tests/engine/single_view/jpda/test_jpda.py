@@ -222,6 +222,7 @@ def filmed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Clip, Sequence]:
     return clip, write(clip, tmp_path_factory.mktemp("clip"))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "changes",
     [{}, {"jpda.foreground_box": "piece"}, {"jpda.measurements": "colour"}, PUBLISHED,
@@ -357,6 +358,7 @@ def two_cameras(folder: Path, spoilt: str) -> Sequence:
     return replace(one, views=(one.views[0], second))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("spoilt", ["missing", "frozen", "black"])
 def test_a_spoilt_camera_takes_nothing_from_the_others(tmp_path: Path, spoilt: str) -> None:
     both = two_cameras(tmp_path, spoilt)
