@@ -24,6 +24,8 @@ class Piece:
     name: str
     real: bool
     """Whether it is one of the recordings beside the checkout, else a rendered room."""
+    pictures: bool
+    """Whether people are found in pictures, else given as boxes."""
     first: int
     frames: int
     """Of the piece: the background is learnt of them, and their templates are known."""
@@ -44,14 +46,14 @@ class Piece:
 
 PIECES: tuple[Piece, ...] = (
     # in the rooms each begins where all are inside and templates of every person follow
-    Piece("room24-2p", False, 200, 800, 40, 200),
-    Piece("room35-2p", False, 270, 800, 40, 200),
-    Piece("room44-3p", False, 360, 800, 40, 200),
-    Piece("av163-seq30-2p-1101", True, 60, 440, 40, 200),
-    Piece("av163-seq45-3p-1111-points", True, 300, 600, 50, 600),
-    Piece("cmc1", True, 60, 201, 50, 201),
-    Piece("cmc2", True, 60, 201, 40, 201),
-    Piece("wildtrack-points-300", True, 150, 100, 24, 100),
+    Piece("room24-2p", False, True, 200, 800, 40, 200),
+    Piece("room35-2p", False, True, 270, 800, 40, 200),
+    Piece("room44-3p", False, True, 360, 800, 40, 200),
+    Piece("av163-seq30-2p-1101", True, True, 60, 440, 40, 200),
+    Piece("av163-seq45-3p-1111-points", True, False, 300, 600, 50, 600),
+    Piece("cmc1", True, False, 60, 201, 50, 201),
+    Piece("cmc2", True, False, 60, 201, 40, 201),
+    Piece("wildtrack-points-300", True, False, 150, 100, 24, 100),
 )
 """Every recording at hand."""
 

@@ -40,6 +40,7 @@ BOXES_RECORDING = "cmc1"
 """A recording with such boxes, and without pictures."""
 
 QUICK_STEPS = 320
+QUICK_RECORDED_STEPS = 80
 """All three people are there, and have hidden each other."""
 
 FIGURES = ("mota", "idf1", "ospa", "position_error", "found_share")
@@ -111,7 +112,7 @@ def _scenes(context: Context, notes: list[str]) -> list[tuple[Sequence, int]]:
             notes.append(f"Left out: {missing}.")
             continue
         steps = recording.frames
-        scenes.append((recording, min(cameras.QUICK_STEPS, steps) if context.quick else steps))
+        scenes.append((recording, min(QUICK_RECORDED_STEPS, steps) if context.quick else steps))
     return scenes
 
 

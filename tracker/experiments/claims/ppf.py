@@ -38,7 +38,7 @@ from tracker.single_view.protocol import ViewResult
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SEEDS, QUICK_SEEDS = 20, 2
+SEEDS, QUICK_SEEDS = 20, 1
 QUICK_STEPS = 120
 
 SETTLING = 1.0

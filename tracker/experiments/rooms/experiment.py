@@ -33,7 +33,7 @@ ASKED = {True: (0.95, 0.70, 0.05, 0.3), False: (0.80, 0.45, 0.1, 0.5)}
 """With templates and without: found at least, in the median room and in nine tenths of the
 rooms; and false tracks a step at most, likewise."""
 
-QUICK_ROOMS, QUICK_STEPS = 2, 25
+QUICK_ROOMS, QUICK_STEPS = 1, 25
 _SHOWN_CAUSES = 4
 
 
