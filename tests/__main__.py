@@ -4,7 +4,7 @@ Needs nothing but Python 3.11 or newer: makes the environment ``.venv``, install
 the project and its test tools into it, and checks style, types, the import rules,
 every law and oracle, and the main job in a browser: within six minutes on two cores,
 the first time too. ``python3 -m tests --all`` checks the rest as well: all of the
-browser, processes, recordings, long forms, benchmarks and mutants; what has already
+browser, processes, recordings, benchmarks and mutants; what has already
 passed on these very files is not run again.
 
 ``python3 -m tests --fuzz 60`` damages recordings for an hour: whatever is done to their files,
@@ -49,7 +49,7 @@ many wait for what another process does; each takes up to a gigabyte. The full f
 each: a browser and its server keep one busy."""
 
 SHORT = "not full and not long"
-FULL = "full or long"
+FULL = "full"
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from tests.browser.looking import ask
 from tests.browser.serving import Server
 from tests.browser.walkers import write_walkers
 
-SECONDS = float(os.environ.get("MULTIVIEW_PHD_SOAK", "75"))
+SECONDS = float(os.environ.get("MULTIVIEW_PHD_SOAK", "45"))
 PAGES = 4
 SHARE = 0.05
 """By how much the last third may lie above the second."""
@@ -51,7 +51,7 @@ def mean(rows: list[dict[str, float]], name: str) -> float:
     return sum(row[name] for row in rows) / len(rows)
 
 
-@pytest.mark.long
+@pytest.mark.full
 @pytest.mark.browser
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_nothing_grows_while_four_pages_are_used(
