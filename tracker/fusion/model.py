@@ -59,6 +59,8 @@ class FusionModel:
         """Squared Mahalanobis distance within which a place that somebody names is a target's."""
         self.near = p.duplicate_distance * 2.0 * float(np.mean(sequence.target_half_extents[:2]))
         """Metres within which two components may be one person."""
+        self.height = 2.0 * float(sequence.target_half_extents[2])
+        """Metres from which one target is above another."""
         margin = p.followed_margin
         self.followed = (self.room.minimum - margin, self.room.maximum + margin)
         """The corners between which people are followed."""
@@ -190,13 +192,15 @@ class FusionModel:
         """Which of n tracks are duplicates, which repeat a surer or older one at the same place.
 
         Two nearer than ``near`` are one person, unless some camera gave each a box of
-        its own; at half of it they are one even so, for a detector may draw two boxes
-        around one person, and two people cannot stand in one place. Among sure ones
+        its own; who stand on the floor within half of it are one even so, for a detector may
+        draw two boxes around one person, one higher than the other, and two people cannot
+        stand in one place. Among sure ones
         the older label stays; an unsure one never displaces a sure one.
         """
         found: ndarray = linear_algebra.duplicates(
-            means, weights, labels, np.ascontiguousarray(sources), self.near, CONFIRMED
-        )
+            means, weights, labels, np.ascontiguousarray(sources), self.near, self.height,
+            CONFIRMED,
+        )  # fmt: skip
         return found
 
 

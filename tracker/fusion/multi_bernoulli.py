@@ -90,7 +90,7 @@ class MultiBernoulli:
         self._camera_rule = model.camera_rule(WORTH_TELLING)
         low, high = model.followed
         self._keeping_rule = KeepingRule(
-            p.pruning_threshold, low, high, p.max_components, model.near, CONFIRMED
+            p.pruning_threshold, low, high, p.max_components, model.near, model.height, CONFIRMED
         )
 
     def _with_frame(self, cameras: Int[ndarray, " S"] | None) -> tuple[StepModel, Calibrations]:

@@ -172,6 +172,7 @@ def duplicates(
     labels: ndarray,
     sources: ndarray,
     near: float,
+    height: float,
     confirmed: float,
 ) -> ndarray:
     """Which of n people only repeat a surer or older one at the same place.
@@ -182,7 +183,9 @@ def duplicates(
         labels: (n,); the smaller one is older.
         sources: (C, n), the box that each camera gave each, -1 for none.
         near: Two nearer than this are one, unless some camera gave each a box of its own; two
-            nearer than half of it even so.
+            who stand nearer than half of it on the floor even so, as far as they are not above
+            each other.
+        height: From how far above another somebody is above them.
         confirmed: Whoever has more weight is sure, and is never displaced by an unsure one.
     """
     size, cameras = len(means), len(sources)
@@ -195,16 +198,18 @@ def duplicates(
             yields = labels[i] > labels[j] if sure == other_sure else other_sure
             if not yields:
                 continue
-            distance = 0.0
-            for axis in range(3):
-                distance += (means[i, axis] - means[j, axis]) ** 2
-            if not distance < near * near:
+            x, y, z = means[i, :3] - means[j, :3]
+            on_floor = x * x + y * y
+            if abs(z) < height and on_floor < (near / 2.0) ** 2:
+                duplicate[i] = True
+                break
+            if not on_floor + z * z < near * near:
                 continue
             parted = False
             for c in range(cameras):
                 if sources[c, i] >= 0 and sources[c, j] >= 0 and sources[c, i] != sources[c, j]:
                     parted = True
-            if not parted or distance < (near / 2.0) * (near / 2.0):
+            if not parted:
                 duplicate[i] = True
                 break
     return duplicate

@@ -53,12 +53,16 @@ def test_two_within_a_share_of_a_persons_width_are_one_unless_each_has_a_box() -
     made = model(duplicate_distance=0.5)
     width = 2.0 * float(HALF_EXTENTS[:2].mean())
     nobodys, their_own = np.full((4, 2), -1), np.array([[-1, -1], [3, 4], [0, -1], [2, 2]])
-    for apart, sources, duplicate in (
-        (0.49 * width, nobodys, True),
-        (0.51 * width, nobodys, False),
-        (0.49 * width, their_own, False),  # the second camera gave each a box
-        (0.24 * width, their_own, True),  # but two people cannot stand in one place
+    height = 2.0 * float(HALF_EXTENTS[2])
+    for apart, above, sources, duplicate in (
+        (0.49 * width, 0.0, nobodys, True),
+        (0.51 * width, 0.0, nobodys, False),
+        (0.49 * width, 0.0, their_own, False),  # the second camera gave each a box
+        (0.24 * width, 0.0, their_own, True),  # but two people cannot stand in one place
+        (0.24 * width, 0.9 * height, their_own, True),  # with one box drawn higher, too
+        (0.24 * width, 1.1 * height, their_own, False),  # unless one is above the other
+        (0.26 * width, 0.2 * height, their_own, False),
     ):
-        means = np.array([[0.0, 0.0, 0.85], [apart, 0.0, 0.85]])
+        means = np.array([[0.0, 0.0, 0.85], [apart, 0.0, 0.85 + above]])
         found = made.duplicates(means, np.array([0.9, 0.9]), np.array([1, 2]), sources)
         assert found.tolist() == [False, duplicate]

@@ -124,17 +124,25 @@ def test_one_call_is_all_its_parts(
 
 
 def reference_duplicates(
-    means: ndarray, weights: ndarray, labels: ndarray, sources: ndarray, near: float
+    means: ndarray,
+    weights: ndarray,
+    labels: ndarray,
+    sources: ndarray,
+    near: float,
+    height: float,
 ) -> ndarray:
     """The same rule over the whole table of pairs."""
-    distances = ((means[:, None, :3] - means[None, :, :3]) ** 2).sum(axis=2)
+    apart = means[:, None, :3] - means[None, :, :3]
+    distances, on_floor = (apart**2).sum(axis=2), (apart[:, :, :2] ** 2).sum(axis=2)
     np.fill_diagonal(distances, np.inf)
+    np.fill_diagonal(on_floor, np.inf)
     both = (sources[:, :, None] >= 0) & (sources[:, None, :] >= 0)
     parted = (both & (sources[:, :, None] != sources[:, None, :])).any(axis=0)
     sure = weights > 0.5
     older = labels[:, None] > labels[None, :]
     yields = np.where(sure[:, None] == sure[None, :], older, sure[None, :])
-    one = (distances < near**2) & (~parted | (distances < (near / 2.0) ** 2))
+    in_one_place = (on_floor < (near / 2.0) ** 2) & (np.abs(apart[:, :, 2]) < height)
+    one = in_one_place | ((distances < near**2) & ~parted)
     return np.asarray((one & yields).any(axis=1))
 
 
@@ -146,8 +154,9 @@ def test_duplicates_are_those_of_the_table_of_pairs(count: int) -> None:
         means = rng.uniform(0.0, 1.0, (count, 6))
         weights, labels = rng.uniform(0.0, 1.0, count), rng.permutation(count)
         sources = rng.integers(-1, 4, (3, count))
-        duplicate = linear_algebra.duplicates(means, weights, labels, sources, 0.5, 0.5)
-        assert_array_equal(duplicate, reference_duplicates(means, weights, labels, sources, 0.5))
+        given = means, weights, labels, sources, 0.5, 0.7
+        duplicate = linear_algebra.duplicates(*given, 0.5)
+        assert_array_equal(duplicate, reference_duplicates(*given))
         found += int(duplicate.sum())
     assert found > 0 or count < 2
 

@@ -216,13 +216,13 @@ def test_the_kept_are_neither_faint_nor_strayed_nor_duplicates_nor_too_many() ->
         order = np.array(sorted(alive, key=lambda i: -existences[i])[:5], dtype=np.int64)
         duplicate = linear_algebra.duplicates(
             means[order], existences[order], labels[order],
-            np.ascontiguousarray(sources[:, order]), 0.8, CONFIRMED,
+            np.ascontiguousarray(sources[:, order]), 0.8, 1.5, CONFIRMED,
         )  # fmt: skip
         found = step.kept_tracks(
             existences,
             means,
             labels,
             sources,
-            step.KeepingRule(0.2, low, high, 5, 0.8, CONFIRMED),
+            step.KeepingRule(0.2, low, high, 5, 0.8, 1.5, CONFIRMED),
         )
         assert found.tolist() == order[~duplicate].tolist()

@@ -101,7 +101,8 @@ class KeepingRule(NamedTuple):
     most: int
     """No more than this are kept."""
     near: float
-    """As ``confirmed``, of :func:`tracker.kernels.linear_algebra.duplicates`."""
+    """As ``height`` and ``confirmed``, of :func:`tracker.kernels.linear_algebra.duplicates`."""
+    height: float
     confirmed: float
 
 
@@ -266,6 +267,7 @@ def kept_tracks(
         labels[order],
         sources[:, order],
         rule.near,
+        rule.height,
         rule.confirmed,
     )
     return np.asarray(order[~duplicate])
