@@ -9,6 +9,9 @@ import { all, h, one } from "../elements/dom.js";
 const DRAW = "Drag a box around a person. Esc leaves; the Teach tab takes numbers too.";
 const NAME = "Whose colours are these? Type a name: Enter keeps it, Esc leaves it as it is.";
 
+/** What the form of a template without a mouse is called. */
+const NUMBERS = "Template by numbers";
+
 /** @param {HTMLElement} mosaic  the pictures @param {Context} context */
 export function mountTeach(mosaic, { store, actions }) {
 	const panel = one("#panel-teach");
@@ -22,6 +25,7 @@ export function mountTeach(mosaic, { store, actions }) {
 	/** The name that the page asks for: only Enter keeps what was typed, since nobody chose the field. */
 	let asked = "";
 	/** What is being sent; saving comes after it. */
+	/** @type {Promise<any>} */
 	let sending = Promise.resolve();
 
 	actions.drawTemplate = () => {
@@ -142,6 +146,10 @@ export function mountTeach(mosaic, { store, actions }) {
 	};
 	panel.onsubmit = (event) => {
 		event.preventDefault();
+		const { ariaLabel } = /** @type {HTMLFormElement} */ (event.target);
+		const before = store.get().sequence?.templates ?? 0;
+		// The name of a template by numbers is asked for as that of a drawn one.
+		if (ariaLabel === NUMBERS) added = before + 1;
 		send(event.target, "form", () =>
 			Object.fromEntries(
 				[...new FormData(/** @type {HTMLFormElement} */ (event.target))].filter(
@@ -149,6 +157,13 @@ export function mountTeach(mosaic, { store, actions }) {
 				),
 			),
 		);
+		// What was taken is not sent once more by the next Enter, what was refused can be mended.
+		void sending.then((told) => {
+			/** @type {HTMLFormElement | null} */
+			const form = panel.querySelector(`form[aria-label="${ariaLabel}"]`);
+			if (told) form?.reset();
+			else added = Infinity;
+		});
 	};
 	// The name of a new template is asked for where it is listed.
 	new MutationObserver(() => {

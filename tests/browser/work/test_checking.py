@@ -269,6 +269,20 @@ def test_nothing_serious_in_any_state(check: Page, theme: str, screenshots: Path
     assert {name: bad for name, bad in states.items() if bad} == {}
 
 
+def test_a_link_to_a_step_of_check_leads_there(
+    browser: Browser, server: Server, as_it_was: None
+) -> None:
+    with opened(browser, server, flat=True) as page:
+        page.goto(f"{server.address}?step={BEFORE}#check")
+        page.reload()
+        expect(places(page).first).to_be_visible()
+        page.wait_for_timeout(500)  # the queue is whole
+        assert readout(page) == str(BEFORE)
+        expect(page.get_by_text("No place is chosen")).to_be_visible()
+        page.keyboard.press("y")
+        expect(places(page).first).to_have_attribute("aria-selected", "true")
+
+
 def test_a_new_person_with_a_small_window_has_the_place_and_its_buttons_in_sight(
     browser: Browser, server: Server, as_it_was: None
 ) -> None:
