@@ -41,6 +41,7 @@ def key_of(sequence: Sequence, parameters: ColourPhdParams) -> str:
         parameters.histogram_kernel,
         parameters.likelihood_sigma,
         parameters.acceptance_distance,
+        (LOW, HIGH, DIM, OPAQUE),
     )
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
