@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tests.engine.synthetic import CAMERAS
 from tracker.corrections import CorrectionError
-from tracker.corrections.pointing import foot_on_floor, triangulated
+from tracker.corrections.pointing import foot_on_floor, ground_under, stands, triangulated
 
 _SPOTS = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
 
@@ -21,6 +21,25 @@ def test_a_click_on_the_feet_is_where_they_stand(spot: tuple[float, float], came
     x, y = pixels[0].tolist()
     found = foot_on_floor(camera, (x, y), floor=0.0, half_height=0.9)  # type: ignore[arg-type]
     assert found == pytest.approx([*spot, 0.9], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("feet", "half_height", "ground"),
+    [
+        (None, 0.125, 0.2),  # of nobody nothing else is known
+        (0.525, 0.125, 0.525),  # a head that goes at 0.65 m
+        (0.3, 0.125, 0.2),
+        (0.45, 0.9, 0.2),  # a person stands, whatever the filter made of the height
+        (1.2, 0.9, 1.2),
+    ],
+)
+def test_a_click_goes_to_what_the_target_stands_on(
+    feet: float | None, half_height: float, ground: float
+) -> None:
+    found = ground_under(feet, floor=0.2, half_height=half_height)
+    assert found == ground
+    assert stands(found + half_height, ground=found, half_height=half_height)
+    assert not stands(found + 4.0 * half_height, ground=found, half_height=half_height)
 
 
 @given(_SPOTS, st.floats(0.2, 1.8))

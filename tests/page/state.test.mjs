@@ -442,10 +442,41 @@ test("of two parameters of one name the palette offers the essential one first",
       server: { shown: parameters.map(({ key }) => key), parameters: {} },
       link: "open",
       layouts: {},
+      bookmarks: [],
     },
     {},
     ({ key }) => asked.push(key),
   );
   for (const { run } of matching(offers, "survival")) run();
   assert.deepEqual(asked, ["fusion.survival_probability", "colour_phd.survival_probability"]);
+});
+
+test("the palette leads to bookmarks by their notes", () => {
+  const by = [];
+  const offers = offersOf(
+    {
+      sequences: [],
+      layouts: {},
+      link: "open",
+      step: 100,
+      bookmarks: [{ step: 605, note: "hands meet" }],
+    },
+    { stepBy: (steps) => by.push(steps) },
+    () => {},
+  );
+  for (const { run } of matching(offers, "hands")) run();
+  assert.deepEqual(by, [505]);
+});
+
+test("one large picture and the others stand close together in a wide pane", () => {
+  for (const count of [2, 3, 7]) {
+    const { cells } = mosaic(Array(count).fill(1.25), 0, { width: 1280, most: 430, gap: 4 });
+    const lefts = [...new Set(cells.map(({ x }) => x))].sort((a, b) => a - b);
+    for (const [k, left] of lefts.slice(1).entries()) {
+      const before = cells.find(({ x }) => x === lefts[k]);
+      assert.ok(left - before.x - before.width <= 6, `${count} cameras: a void of ${left}`);
+    }
+    const last = cells.find(({ x }) => x === lefts.at(-1));
+    assert.ok(Math.abs(lefts[0] - (1280 - last.x - last.width)) <= 3, "in the middle");
+  }
 });

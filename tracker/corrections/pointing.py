@@ -18,6 +18,34 @@ _MISS = 0.5
 """Metres by which the rays of two clicks on one person may miss each other."""
 
 
+_OFF_FLOOR = 0.3
+"""Metres, of a person's height: what is nearer to the floor than this stands on it."""
+
+
+def ground_under(feet: float | None, *, floor: float, half_height: float) -> float:
+    """The height of what a target stands on: the floor, or the air below somebody's head.
+
+    Args:
+        feet: Where the target's lower end was found, world metres; None if it was not.
+        floor: Height of the floor, world metres.
+        half_height: Of the target, metres.
+    """
+    if feet is None or abs(feet - floor) <= _near_floor(half_height):
+        return floor
+    return feet
+
+
+def stands(height: float, *, ground: float, half_height: float) -> bool:
+    """Whether a point at a height is one of a target that stands on a ground."""
+    margin = _near_floor(half_height)
+    return ground - margin <= height <= ground + 2.0 * half_height + margin
+
+
+def _near_floor(half_height: float) -> float:
+    """For a target lower than a person, such as a head, no more than half of it."""
+    return min(_OFF_FLOOR, half_height)
+
+
 def foot_on_floor(
     camera: Camera, pixel: tuple[float, float], *, floor: float, half_height: float
 ) -> Float[ndarray, " 3"]:

@@ -8,15 +8,12 @@ from app.models.correcting import CorrectionWish
 from app.state.snapshot import Snapshot
 from tracker.corrections import Correction, CorrectionError, Place
 from tracker.corrections.kinds import make
-from tracker.corrections.pointing import foot_on_floor, triangulated
+from tracker.corrections.pointing import foot_on_floor, ground_under, stands, triangulated
 from tracker.doubts.doubt import Lanes
 from tracker.sequences.sequence import Sequence
 
 _MOST_PLACES = 12
 """Along the course of who was nobody."""
-
-_OFF_FLOOR = 0.3
-"""Metres by which a point that was clicked may lie under or over somebody who stands."""
 
 
 def corrections_of(wish: CorrectionWish, snapshot: Snapshot, note: str) -> tuple[Correction, ...]:
@@ -41,8 +38,8 @@ def corrections_of(wish: CorrectionWish, snapshot: Snapshot, note: str) -> tuple
             raise CorrectionError(f"step: expected 0 … {sequence.frames - 1}, found {one}")
     if wish.kind == "here" and (wish.clicks or wish.place is not None):
         return (
-            make(kind="here", places=[_place(wish, sequence, step)], accuracy=wish.accuracy,
-                 note=note),
+            make(kind="here", places=[_place(wish, snapshot, sequence, step)],
+                 accuracy=wish.accuracy, note=note),
         )  # fmt: skip
     return _of_tracks(wish, snapshot, step, note)
 
@@ -121,7 +118,7 @@ def _nobody(lanes: Lanes, track: int, wish: CorrectionWish, note: str) -> Correc
     return make(kind="nobody", places=places, accuracy=wish.accuracy, note=note)
 
 
-def _place(wish: CorrectionWish, sequence: Sequence, step: int) -> Place:
+def _place(wish: CorrectionWish, snapshot: Snapshot, sequence: Sequence, step: int) -> Place:
     if wish.place is not None:
         return Place(step, *wish.place)
     cameras = {camera.name: camera for camera in sequence.cameras}
@@ -130,12 +127,26 @@ def _place(wish: CorrectionWish, sequence: Sequence, step: int) -> Place:
             raise CorrectionError(f"clicks: there is no camera {click.camera}")
     points = [(cameras[click.camera], (click.x, click.y)) for click in wish.clicks]
     half_height = float(sequence.target_half_extents[2])
-    floor = float(sequence.room.minimum[2])
+    feet = _feet_of(wish, snapshot, step, half_height)
+    ground = ground_under(feet, floor=float(sequence.room.minimum[2]), half_height=half_height)
     if len(points) == 1:
-        found = foot_on_floor(*points[0], floor=floor, half_height=half_height)
+        found = foot_on_floor(*points[0], floor=ground, half_height=half_height)
     else:
         found = triangulated(points)
         # any point of somebody who stands says where: the middle is half a person over the floor
-        if floor - _OFF_FLOOR <= found[2] <= floor + 2.0 * half_height + _OFF_FLOOR:
-            found[2] = floor + half_height
+        if stands(float(found[2]), ground=ground, half_height=half_height):
+            found[2] = ground + half_height
     return Place(step, *found.tolist())
+
+
+def _feet_of(
+    wish: CorrectionWish, snapshot: Snapshot, step: int, half_height: float
+) -> float | None:
+    """How high the shown run has the feet of the track that is meant, if it is there."""
+    if snapshot.run is None or not wish.tracks:
+        return None
+    lanes = Lanes(snapshot.run.tracks)
+    if wish.tracks[0] not in lanes.rows:
+        return None
+    found = lanes.place(wish.tracks[0], step)
+    return found.z - half_height if found.step == step else None

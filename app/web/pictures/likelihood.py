@@ -21,11 +21,13 @@ from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.likelihood_map import likelihood_map
 from tracker.single_view.colour.templates import read_templates
 
-LOW, HIGH = (35, 119, 224), (190, 244, 255)
-"""Blue, green, red of a small and of the largest likelihood."""
+LOW, HIGH = (200, 84, 26), (150, 255, 190)
+"""Blue, green, red of a small and of the largest likelihood: hues that neither skin, wood nor the
+marks of boxes have."""
 
-OPAQUE = 225
-"""Opacity of 255 where the colours are just a template's; what looks less like one is clearer."""
+DIM, OPAQUE = 110, 235
+"""Opacities of 255: of the shade over what looks like nobody, and where the colours are just a
+template's."""
 
 missing = address.missing("no_likelihood")
 """The answer where there is no map."""
@@ -39,6 +41,7 @@ def key_of(sequence: Sequence, parameters: ColourPhdParams) -> str:
         parameters.histogram_kernel,
         parameters.likelihood_sigma,
         parameters.acceptance_distance,
+        (LOW, HIGH, DIM, OPAQUE),
     )
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
@@ -105,14 +108,17 @@ class Likelihoods:
 def heat(values: Float[ndarray, "rows columns"], least: float) -> bytes:
     """Log-likelihoods as a transparent PNG: the likelier, the brighter and the denser.
 
+    All else lies in shade, or what is likely would be lost in a bright picture.
+
     Args:
         values: 0 at most.
         least: What is at least so likely is seen; below 0.
     """
     share = np.clip(1.0 - values / least, 0.0, 1.0)[:, :, None]
     picture = np.empty((*values.shape, 4), dtype=np.uint8)
-    picture[:, :, :3] = np.rint(np.array(LOW) * (1.0 - share) + np.array(HIGH) * share)
-    picture[:, :, 3] = np.rint(OPAQUE * np.sqrt(share[:, :, 0]))
+    seen = np.minimum(1.0, 8.0 * share)  # out of the shade there is no hard edge
+    picture[:, :, :3] = np.rint(seen * (np.array(LOW) * (1.0 - share) + np.array(HIGH) * share))
+    picture[:, :, 3] = np.rint(DIM + (OPAQUE - DIM) * np.sqrt(share[:, :, 0]))
     done, data = cv2.imencode(".png", picture)
     assert done, "a picture of four channels can be written as PNG"
     return bytes(data)

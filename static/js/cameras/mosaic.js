@@ -74,11 +74,13 @@ function oneLarge(aspects, large, inner, tall, gap) {
 	const height = Math.min(wanted, tall);
 	const cellHeight = (height - gap * (rows - 1)) / rows;
 	const bigWidth = aspects[large] * height;
-	const cellWidth = (inner - bigWidth - columns * gap) / columns;
+	// No wider than their pictures: what is left of the width lies around all of them.
+	const cellWidth = Math.min((inner - bigWidth - columns * gap) / columns, small * cellHeight);
+	const begin = gap + (inner - bigWidth - columns * (gap + cellWidth)) / 2;
 	const cells = aspects.map((aspect, index) => {
-		if (index === large) return fit(aspect, { x: gap, y: gap, width: bigWidth, height });
+		if (index === large) return fit(aspect, { x: begin, y: gap, width: bigWidth, height });
 		const place = index - Number(index > large);
-		const x = gap + bigWidth + gap + Math.floor(place / rows) * (cellWidth + gap);
+		const x = begin + bigWidth + gap + Math.floor(place / rows) * (cellWidth + gap);
 		return fit(aspect, {
 			x,
 			y: gap + (place % rows) * (cellHeight + gap),

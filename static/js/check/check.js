@@ -1,5 +1,6 @@
 /** The place Check: the workbench, with the queue where the sliders stand and the tab Place. */
 import { one } from "../elements/dom.js";
+import { OPENED_AT } from "../panes/places.js";
 import { createCrops } from "./crops.js";
 import { mountFeet } from "./feet.js";
 import { checkOf } from "./model.js";
@@ -37,8 +38,11 @@ export function mountCheck(root, context) {
 	});
 
 	const { state } = check;
+	// A link that says where it leads to is followed: nobody who came by one is led to the first place.
+	let linked = OPENED_AT === "check";
 	const first = () => {
 		const { chosen, placing, queue } = state.get();
+		if (linked && store.get().moved) return;
 		// While a run goes on another may still come before it; who places somebody is not led away.
 		if (store.get().place === "check" && !chosen && !placing && queue?.complete && queue.doubts[0])
 			check.choose(queue.doubts[0]);
@@ -53,6 +57,7 @@ export function mountCheck(root, context) {
 	};
 	let before = "";
 	store.watch(["place"], ({ place }) => {
+		linked &&= place === "check";
 		if (place === "check" && before !== "check") {
 			actions.showTab("place");
 			comes = true;

@@ -19,6 +19,9 @@ const ITEMS = /** @type {const} */ ([
 	["check-nobody", "i-trash", "Was nobody"],
 ]);
 
+/** A button is let go where it was pressed, CSS pixels. */
+const STILL = 4;
+
 /** Others that are listed. */
 const MOST = 12;
 
@@ -229,6 +232,36 @@ export function mountMenu(context, timeline, does) {
 			click,
 		});
 	});
+	const frame = /** @type {HTMLIFrameElement} */ (one(".stage iframe"));
+	/** In 3D the other button moves the view; pressed and let go in place it asks. */
+	function in3d() {
+		/** @type {[number, number] | null} */
+		let pressed = null;
+		const view = frame.contentWindow;
+		view?.addEventListener(
+			"pointerdown",
+			({ button, clientX, clientY }) => (pressed = button === 2 ? [clientX, clientY] : null),
+			true,
+		);
+		view?.addEventListener(
+			"pointerup",
+			(event) => {
+				if (event.button !== 2 || !pressed || !store.get().sequence) return;
+				const [x, y] = [event.clientX - pressed[0], event.clientY - pressed[1]];
+				if (Math.hypot(x, y) > STILL) return;
+				const { selection } = store.get();
+				if (selection === null)
+					return actions.note("info", "Nobody is selected", "Click on somebody, then press again.");
+				const edge = frame.getBoundingClientRect();
+				[left, top] = [edge.left + event.clientX + 2, edge.top + event.clientY + 2];
+				open({ track: selection, step: shown() });
+			},
+			true,
+		);
+	}
+	frame.addEventListener("load", in3d);
+	// It may have been there before this was read.
+	in3d();
 	return {
 		/** @param {{track: number, step: number}} what */
 		open(what) {

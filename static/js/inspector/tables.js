@@ -25,6 +25,10 @@ const TABLES = {
 	runs: { keys: ["server", "run"], path: () => "runs" },
 };
 
+/** By what a button or a field is found again in a table that is written anew. @param {Part} control */
+const called = ({ id, ariaLabel, form, textContent }) =>
+	id || ariaLabel || `${form?.ariaLabel ?? ""} ${textContent}`;
+
 /** @type {Pane} */
 export function mountTables(root, { store, actions }) {
 	const {
@@ -53,19 +57,16 @@ export function mountTables(root, { store, actions }) {
 			told = text;
 			// Where the focus was, it is again, on the one in its place; what is being typed stays, but
 			// for what the server has taken.
-			const held = document.activeElement;
+			const held = all(":focus", body)[0];
 			const at = all("button, input", body).findIndex((control) => control === held);
 			const typed = all("input", body).filter(({ value, defaultValue }) => value !== defaultValue);
 			body.innerHTML = text;
 			for (const { id, value, defaultValue } of typed)
 				for (const field of all(`#${id}`, body))
 					if (field.defaultValue === defaultValue) field.value = value;
+			const there = all("button, input", body);
 			if (at >= 0)
-				(
-					(held?.id && all(`#${held.id}`, body)[0]) ||
-					all("button, input", body)[at] ||
-					body
-				).focus();
+				(there.find((control) => called(control) === called(held)) || there[at] || body).focus();
 		});
 		store.watch([...keys, "tab", "sequence"], refresh);
 	}

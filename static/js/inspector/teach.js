@@ -5,9 +5,14 @@
  */
 import { lensOf } from "../draw/picture.js";
 import { all, h, one } from "../elements/dom.js";
+import { mountFrame } from "./frame.js";
 
-const DRAW = "Drag a box around a person. Esc leaves; the Teach tab takes numbers too.";
+const DRAW = "Drag a box around a person, or Enter for one that arrows move. Esc leaves.";
+const FRAME = "Arrows move the box, with Ctrl they size it, with Shift further; Enter keeps it.";
 const NAME = "Whose colours are these? Type a name: Enter keeps it, Esc leaves it as it is.";
+
+/** What the form of a template without a mouse is called. */
+const NUMBERS = "Template by numbers";
 
 /** @param {HTMLElement} mosaic  the pictures @param {Context} context */
 export function mountTeach(mosaic, { store, actions }) {
@@ -22,11 +27,21 @@ export function mountTeach(mosaic, { store, actions }) {
 	/** The name that the page asks for: only Enter keeps what was typed, since nobody chose the field. */
 	let asked = "";
 	/** What is being sent; saving comes after it. */
+	/** @type {Promise<any>} */
 	let sending = Promise.resolve();
 
+	const frame = mountFrame(mosaic, store, {
+		keep: (cell, sides) => {
+			hint.textContent = DRAW;
+			add(cell, sides);
+		},
+		tell: (words) => (hint.textContent = `${FRAME} ${words}`),
+	});
 	actions.drawTemplate = () => {
 		begun = null;
 		drawn.remove();
+		frame.end();
+		hint.textContent = DRAW;
 		hint.hidden = !hint.hidden;
 		mosaic.classList.toggle("drawing", !hint.hidden);
 		one("[data-command=draw-template]").ariaPressed = String(!hint.hidden);
@@ -58,12 +73,25 @@ export function mountTeach(mosaic, { store, actions }) {
 			Math.abs(y - begun.y),
 		];
 	}
+	/** @param {HTMLElement} cam @param {import("./frame.js").Sides} sides  pixels of its picture */
+	function add(cam, sides) {
+		const camera = store.get().cameras[[...mosaic.children].indexOf(cam)];
+		actions.showTab("teach");
+		added = (store.get().sequence?.templates ?? 0) + 1;
+		void actions.ask("POST", "teach/templates", {
+			camera: camera.name,
+			step: Number(cam.dataset.step),
+			...sides,
+		});
+	}
 	/** @type {Record<string, (event: any) => void>} */
 	const drag = {
 		pointerdown(event) {
 			const cam = event.target.closest(".cam");
 			if (!cam) return;
 			const { left, top } = cam.getBoundingClientRect();
+			frame.end();
+			hint.textContent = DRAW;
 			begun = { cam, x: event.clientX - left, y: event.clientY - top };
 			cam.setPointerCapture(event.pointerId);
 			cam.append(drawn);
@@ -85,17 +113,7 @@ export function mountTeach(mosaic, { store, actions }) {
 			const lens = lensOf(store.get().zooms[index], cam.clientWidth, cam.clientHeight);
 			const scale = (cam.clientWidth * lens.k) / camera.width;
 			const [left, top] = [(sides[0] + lens.left) / scale, (sides[1] + lens.top) / scale];
-			const [width, height] = [sides[2] / scale, sides[3] / scale];
-			actions.showTab("teach");
-			added = (store.get().sequence?.templates ?? 0) + 1;
-			void actions.ask("POST", "teach/templates", {
-				camera: camera.name,
-				step: Number(cam.dataset.step),
-				left,
-				top,
-				width,
-				height,
-			});
+			add(cam, { left, top, width: sides[2] / scale, height: sides[3] / scale });
 		},
 		click() {},
 		dblclick() {},
@@ -111,6 +129,23 @@ export function mountTeach(mosaic, { store, actions }) {
 			true,
 		);
 	}
+
+	// In the picture that has the focus, else in the large one or the first.
+	document.addEventListener(
+		"keydown",
+		(event) => {
+			const target = /** @type {HTMLElement} */ (event.target);
+			if (event.key !== "Enter" || hint.hidden || document.querySelector("dialog[open]")) return;
+			const own = /** @type {HTMLElement | null} */ (target.closest(".cam"));
+			if (!own && target.closest("button, a, input, select, summary, tr, [role=listbox]")) return;
+			const cell = own ?? all(".cam", mosaic)[store.get().large ?? 0];
+			if (!cell) return;
+			event.preventDefault();
+			event.stopPropagation();
+			frame.begin(cell);
+		},
+		true,
+	);
 
 	/** @param {any} from @param {string} kind @param {() => object} body */
 	function send(from, kind, body) {
@@ -142,6 +177,10 @@ export function mountTeach(mosaic, { store, actions }) {
 	};
 	panel.onsubmit = (event) => {
 		event.preventDefault();
+		const { ariaLabel } = /** @type {HTMLFormElement} */ (event.target);
+		const before = store.get().sequence?.templates ?? 0;
+		// The name of a template by numbers is asked for as that of a drawn one.
+		if (ariaLabel === NUMBERS) added = before + 1;
 		send(event.target, "form", () =>
 			Object.fromEntries(
 				[...new FormData(/** @type {HTMLFormElement} */ (event.target))].filter(
@@ -149,6 +188,13 @@ export function mountTeach(mosaic, { store, actions }) {
 				),
 			),
 		);
+		// What was taken is not sent once more by the next Enter, what was refused can be mended.
+		void sending.then((told) => {
+			/** @type {HTMLFormElement | null} */
+			const form = panel.querySelector(`form[aria-label="${ariaLabel}"]`);
+			if (told) form?.reset();
+			else added = Infinity;
+		});
 	};
 	// The name of a new template is asked for where it is listed.
 	new MutationObserver(() => {

@@ -5,6 +5,9 @@
 import { all, fill, h, one, write } from "../elements/dom.js";
 import { PLACES, isBench, placeOf } from "../state/places.js";
 
+/** The place that the page was opened at. */
+export const OPENED_AT = placeOf(location.hash);
+
 /** @type {Pane} */
 export function mountPlaces(root, context) {
 	const { store, actions } = context;

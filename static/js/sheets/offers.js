@@ -1,5 +1,5 @@
 /**
- * What the palette finds besides commands: places, recordings, tracks and parameters, by their
+ * What the palette finds besides commands: places, recordings, tracks, parameters and bookmarks, by their
  * words. Nothing here touches the page but its address.
  */
 import { PLACES } from "../state/places.js";
@@ -14,7 +14,7 @@ const MOST = 12;
  * @returns {Offer[]}
  */
 export function offersOf(state, actions, edit) {
-	const { sequences, timeline, schema, server, link, layouts } = state;
+	const { sequences, timeline, schema, server, link, layouts, bookmarks } = state;
 	const own = [
 		...PLACES.filter(({ exists }) => !exists || exists(state)).map(({ name, word, tip }) => ({
 			title: `${word}: ${tip[0].toLowerCase()}${tip.slice(1)}`,
@@ -48,6 +48,11 @@ export function offersOf(state, actions, edit) {
 			title: `Track ${id}${name ? `, ${name}` : ""}`,
 			keys: [],
 			run: () => actions.go(`${first} ${id}`),
+		})),
+		...bookmarks.map(({ step, note }) => ({
+			title: `Bookmark ${step}${note ? `, ${note}` : ""}`,
+			keys: [],
+			run: () => actions.stepBy(step - state.step),
 		})),
 	];
 }

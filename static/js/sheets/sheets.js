@@ -1,6 +1,6 @@
 /** The two dialogs made from the registry of commands: help with its keys, and the palette. */
 import { COMMANDS, keyLabel, perform, search } from "../state/commands.js";
-import { all, fill, h, parts, symbolOf } from "../elements/dom.js";
+import { all, fill, h, one, parts, symbolOf } from "../elements/dom.js";
 import { matching, offersOf, rangeOf, valueOf } from "./offers.js";
 
 /** What a row of the palette says. @param {Offer} offer */
@@ -64,9 +64,17 @@ export function mountSheets({ store, actions }) {
 		const commands = search(input.value).map((command) => ({
 			title: command.title,
 			keys: command.keys.slice(0, 1),
-			run: () => perform(command, actions),
+			run: () => (perform(command, actions), enter(command)),
 		}));
 		return [...commands, ...matching(offersOf(store.get(), actions, edit), input.value)];
+	}
+	/** Who asked for a table by its name goes on in it. @param {Command} command */
+	function enter({ action, value }) {
+		if (action !== "showTab") return;
+		const panel = one(`#panel-${value}`);
+		panel.tabIndex = -1;
+		// Once the panel is there.
+		requestAnimationFrame(() => panel.focus());
 	}
 	/** Keep the layout under what is typed, or forget one. @returns {Offer[]} */
 	function layoutOffers() {

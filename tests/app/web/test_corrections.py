@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,6 +19,7 @@ from tests.app.conftest import ADDRESS, Runs, run_is, wait_until
 from tracker.corrections.log import read_log
 from tracker.doubts import Alternative, Doubt, Queue
 from tracker.doubts.doubt import Lanes, unsaid
+from tracker.sequences.reader import read_sequence
 
 PLACE = "/api/corrections"
 
@@ -292,6 +294,32 @@ def test_one_point_of_a_person_in_two_pictures_says_where_the_middle_is(
     wish = {"kind": "here", "step": 30, "clicks": clicks}
     (told,) = desk.post(PLACE, json={"corrections": [wish]}).json()["corrections"]
     assert told["places"][0] == pytest.approx([30, 0.1, -0.2, middle], abs=2e-3)
+
+
+@pytest.mark.full
+def test_the_feet_of_a_track_that_goes_over_the_floor_stay_where_they_are(own: Path) -> None:
+    # as heads do; here the floor is sunk below people
+    file, sequence = own / "sequence.toml", read_sequence(own)
+    text, found = re.subn(r"(?m)^min = \[(.*), .*\]", r"min = [\1, -1.0]", file.read_text())
+    assert found == 1
+    file.write_text(text)
+    with started(own) as desk:
+        life = tracks(desk)[0]
+        step = (life["first"] + life["last"]) // 2
+        told = desk.get(f"/api/step/{step}?trails=true").json()
+        (track,) = [one for one in told["tracks"] if one["id"] == life["id"]]
+        camera = sequence.cameras[0]
+        ((x, y),), _ = camera.project(
+            np.array([track["position"]]) - [0.0, 0.0, sequence.target_half_extents[2]]
+        )
+        wish = {
+            "kind": "here",
+            "step": step,
+            "tracks": [life["id"]],
+            "clicks": [{"camera": camera.name, "x": float(x), "y": float(y)}],
+        }
+        (told,) = desk.post(PLACE, json={"corrections": [wish]}).json()["corrections"]
+    assert told["places"][0] == pytest.approx([step, *track["position"]], abs=0.02)
 
 
 @pytest.mark.full

@@ -269,6 +269,41 @@ def test_nothing_serious_in_any_state(check: Page, theme: str, screenshots: Path
     assert {name: bad for name, bad in states.items() if bad} == {}
 
 
+def test_the_other_button_in_3d_has_the_menu_of_who_is_selected(
+    browser: Browser, server: Server, as_it_was: None
+) -> None:
+    with opened(browser, server) as page:
+        ask(server, "POST", "seek", {"step": BEFORE})
+        canvas = viser(page).locator("canvas").first.bounding_box()
+        assert canvas is not None
+        x, y = canvas["x"] + 60, canvas["y"] + 60
+        page.keyboard.press("]")
+        page.mouse.move(x, y)
+        page.mouse.down(button="right")
+        page.mouse.move(x + 40, y)  # this moves the view
+        page.mouse.up(button="right")
+        menu = page.get_by_role("menu", name="Corrections of track")
+        page.wait_for_timeout(300)
+        expect(menu).to_have_count(0)
+        page.mouse.click(x, y, button="right")
+        expect(menu.get_by_role("menuitem").first).to_be_focused()
+        expect(menu.get_by_role("menuitem")).to_have_count(8)
+
+
+def test_a_link_to_a_step_of_check_leads_there(
+    browser: Browser, server: Server, as_it_was: None
+) -> None:
+    with opened(browser, server, flat=True) as page:
+        page.goto(f"{server.address}?step={BEFORE}#check")
+        page.reload()
+        expect(places(page).first).to_be_visible()
+        page.wait_for_timeout(500)  # the queue is whole
+        assert readout(page) == str(BEFORE)
+        expect(page.get_by_text("No place is chosen")).to_be_visible()
+        page.keyboard.press("y")
+        expect(places(page).first).to_have_attribute("aria-selected", "true")
+
+
 def test_a_new_person_with_a_small_window_has_the_place_and_its_buttons_in_sight(
     browser: Browser, server: Server, as_it_was: None
 ) -> None:

@@ -15,7 +15,7 @@ from playwright.sync_api import Page, expect
 from app.scene import framing
 from app.scene.scene import _margin_around
 from tests.browser.conftest import Server
-from tests.browser.looking import as_at_first, readout, until, viser
+from tests.browser.looking import as_at_first, ask, by_palette, readout, until, viser
 from tracker import pipeline
 from tracker.export import read_tracks_csv
 from tracker.sequences.reader import FILE, read_sequence
@@ -50,7 +50,7 @@ def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(
     expect(page.get_by_text("The run stopped at step")).to_be_visible(timeout=20_000)
     page.keyboard.press("c")
     expect(page.locator(".mosaic")).to_have_class(re.compile("drawing"))
-    expect(page.get_by_text("Drag a box around a person.")).to_be_visible(timeout=20_000)
+    expect(page.get_by_text("Drag a box around a person, or")).to_be_visible(timeout=20_000)
     picture = page.locator(".cam").first.bounding_box()
     assert picture is not None
     scale = picture["width"] / 192
@@ -99,7 +99,7 @@ def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(
     page.keyboard.press("Escape")  # out of the name
     page.evaluate("document.activeElement.blur()")
     page.keyboard.press("Escape")
-    expect(page.get_by_text("Drag a box around a person.")).to_be_hidden(timeout=20_000)
+    expect(page.get_by_text("Drag a box around a person, or")).to_be_hidden(timeout=20_000)
     page.keyboard.press("Control+z")
     server.wait(lambda state: state["teaching"]["unsaved"] > 0)
     page.keyboard.press("Control+Shift+z")
@@ -175,6 +175,105 @@ def test_the_field_of_a_new_name_is_no_trap(flat_page: Page, server: Server) -> 
         httpx2.delete(server.address + f"api/teach/templates/{before + index}")
     httpx2.post(server.address + "api/teach/save", json={})
     as_at_first(server)
+
+
+def test_a_template_is_drawn_moved_and_named_by_keys_alone(flat_page: Page, server: Server) -> None:
+    page = flat_page
+    as_at_first(server)
+    before = server.get("/api/state").json()["sequence"]["templates"]
+    page.keyboard.press("c")
+    page.locator(".cam").nth(1).focus()
+    page.keyboard.press("Enter")
+    box = page.get_by_role("button", name="Box in cam2")
+    expect(box).to_be_focused()
+    begun = box.bounding_box()
+    readout_before = readout(page)
+    for key in ("ArrowRight", "Shift+ArrowDown", "Control+Shift+ArrowRight", "Control+ArrowUp"):
+        page.keyboard.press(key)
+    moved = box.bounding_box()
+    assert begun is not None
+    assert moved is not None
+    scale = page.locator(".cam").nth(1).bounding_box()["width"] / 192  # type: ignore[index]
+    assert (moved["x"] - begun["x"]) / scale == pytest.approx(1.0, abs=0.2)
+    assert (moved["y"] - begun["y"]) / scale == pytest.approx(10.0, abs=0.2)
+    assert (moved["width"] - begun["width"]) / scale == pytest.approx(10.0, abs=0.2)
+    assert (moved["height"] - begun["height"]) / scale == pytest.approx(-1.0, abs=0.2)
+    assert readout(page) == readout_before  # the clock has other keys meanwhile
+    page.keyboard.press("Escape")  # leaves the box, and again the drawing
+    expect(box).to_have_count(0)
+    expect(page.locator(".mosaic")).to_have_class(re.compile("drawing"))
+    page.keyboard.press("Enter")
+    page.keyboard.press("Shift+ArrowLeft")
+    page.keyboard.press("Enter")
+    name = page.locator(f"#template-{before}")
+    expect(name).to_be_focused()
+    expect(name).to_be_in_viewport()
+    page.keyboard.type("Eve")
+    page.keyboard.press("Enter")
+    expect(name).to_have_value("Eve")
+    page.keyboard.press("Escape")
+    expect(page.locator(".mosaic")).not_to_have_class(re.compile("drawing"))
+    page.keyboard.press("Control+s")
+    server.wait(lambda state: state["teaching"]["unsaved"] == 0)
+    template = read_sequence(Path(server.folder)).templates[before]
+    assert (template.name, template.camera) == ("Eve", "cam2")
+    ask(server, "DELETE", f"teach/templates/{before}")
+    ask(server, "POST", "teach/save", {})
+    as_at_first(server)
+
+
+def test_a_template_by_numbers_is_added_once_and_named(flat_page: Page, server: Server) -> None:
+    page = flat_page
+    as_at_first(server)
+    before = server.get("/api/state").json()["sequence"]["templates"]
+    by_palette(page, "teach: colours, room")
+    # the panel has the focus: what is in it comes next
+    expect(page.locator("#panel-teach")).to_be_focused()
+    page.keyboard.press("Tab")
+    assert page.locator("#panel-teach :focus").count() == 1
+    page.locator("#new-step").focus()
+    page.keyboard.type("20")
+    for number in (40, 30, 24, 48):
+        page.keyboard.press("Tab")
+        page.keyboard.type(str(number))
+    page.keyboard.press("Tab")
+    expect(page.get_by_role("button", name="Add", exact=True)).to_be_focused()
+    page.keyboard.press("Enter")
+    name = page.locator(f"#template-{before}")
+    expect(name).to_be_focused()
+    page.keyboard.type("Dora")
+    page.keyboard.press("Enter")
+    expect(name).to_have_value("Dora")
+    expect(page.locator("#new-left")).to_have_value("")
+    # what is beside a new row keeps the focus
+    save = page.get_by_role("button", name="Add an entrance")
+    save.focus()
+    page.keyboard.press("Enter")
+    server.wait(lambda state: state["teaching"]["unsaved"] == 2)
+    expect(page.get_by_label("Entrance 1, x, metres")).to_be_visible()
+    page.wait_for_timeout(300)  # the table is written anew
+    expect(save).to_be_focused()
+    assert server.get("/api/state").json()["sequence"]["templates"] == before + 1
+    ask(server, "POST", "teach/discard", {})
+    server.wait(lambda state: state["teaching"]["unsaved"] == 0)
+
+
+def test_whatever_is_come_to_by_tab_is_seen_in_a_low_panel(flat_page: Page) -> None:
+    page = flat_page
+    page.set_viewport_size({"width": 1280, "height": 720})
+    page.get_by_role("tab", name="Teach").click()
+    page.locator("#new-step").wait_for()
+    page.get_by_role("tab", name="Teach").focus()
+    hidden = """() => {
+        const { activeElement: own } = document;
+        const { x, y, width, height } = own.getBoundingClientRect();
+        const there = document.elementFromPoint(x + width / 2, y + height / 2);
+        return own.matches("#panel-teach input, #panel-teach button") && !own.contains(there)
+            ? own.id || own.textContent : "";
+    }"""
+    for _ in range(30):
+        page.keyboard.press("Tab")
+        assert page.evaluate(hidden) == ""
 
 
 def test_a_face_is_dragged_in_3d_saved_and_reopened(page: Page, server: Server) -> None:

@@ -34,8 +34,19 @@ def decoded(content: bytes) -> ndarray:
 def test_the_likelier_the_denser() -> None:
     shown = decoded(heat(np.array([[-np.inf, -10.0, -2.0]]), -20.0))
     assert shown.shape == (1, 3, 4)
-    assert shown[0, 0, 3] == 0
-    assert 0 < shown[0, 1, 3] < shown[0, 2, 3]
+    assert 0 < shown[0, 0, 3] < shown[0, 1, 3] < shown[0, 2, 3]
+
+
+@pytest.mark.parametrize("below", [(250, 250, 250), (120, 150, 200), (20, 20, 20)])
+def test_what_is_likely_stands_out_of_any_picture(below: tuple[int, int, int]) -> None:
+    # white wall, skin, black hair: what looks like nobody is darker and has no hue of its own
+    shown = decoded(heat(np.array([[-np.inf, -1.0]]), -20.0)).astype(float)
+    opacity = shown[:, :, 3:] / 255.0
+    nobody, likely = (opacity * shown[:, :, :3] + (1.0 - opacity) * np.array(below))[0]
+    assert np.ptp(nobody) <= np.ptp(below)
+    assert nobody.max() < max(below)
+    assert likely.mean() - nobody.mean() > 40.0
+    assert np.abs(likely - np.array(below)).max() > 60.0
 
 
 @pytest.mark.full
