@@ -216,6 +216,10 @@ export function mountCameras(root, { store, actions, playback }) {
 		else if (!isOwn({ step, pictures }, index))
 			words.push(`no frame ${step}, this is ${pictures[index]?.of}`);
 		if (roomy && floor.words()) words.push(floor.words());
+		const { follow, selection } = store.get();
+		const own = follow && result?.tracks.find(({ id }) => id === selection);
+		if (roomy && own)
+			words.push(`${own.id} ± ${own.sigma.map((v) => (100 * v).toFixed(0)).join(", ")} cm`);
 		const view = result?.cameras[index];
 		if (stale) words.push("computing");
 		else if (result && !result.computed)

@@ -105,6 +105,25 @@ def test_alt_and_a_click_show_one_track_alone(flat_page: Page, server: Server) -
     ask(server, "POST", "select", {"id": None})
 
 
+def test_who_is_followed_has_its_deviations_beside_it(flat_page: Page, server: Server) -> None:
+    page = flat_page
+    as_at_first(server)
+    ask(server, "POST", "seek", {"step": 45})
+    until(page, lambda: readout(page) == "45", "the step")
+    track = server.get("/api/step/45").json()["tracks"][0]
+    ask(server, "POST", "select", {"id": track["id"]})
+    tag = page.locator(".cam-tag").first
+    expect(tag).not_to_contain_text("±")
+    page.keyboard.press("Shift+f")
+    # the shown result may be that of hindsight, and so are its deviations
+    expect(tag).to_contain_text(re.compile(rf"{track['id']} ± \d+, \d+, \d+ cm"))
+    told = [int(v) for v in re.findall(r"\d+", tag.inner_text().split("±")[1].split("cm")[0])]
+    track = server.get("/api/step/45").json()["tracks"][0]
+    assert told == pytest.approx([100 * sigma for sigma in track["sigma"]], abs=1.0)
+    page.keyboard.press("Shift+f")
+    expect(tag).not_to_contain_text("±")
+
+
 def test_a_and_b_change_places_and_a_link_brings_both(
     browser: Browser, flat_page: Page, server: Server
 ) -> None:
