@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import errno
+import shutil
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +20,7 @@ from app.web.server import Settings, create_app
 from app.web.studies import routes
 from tests.studies.small import Serial, made_up, recording, run
 from tracker.studies.kept.records import Status
-from tracker.studies.kept.store import find
+from tracker.studies.kept.store import Store, find
 
 ADDRESS = "http://127.0.0.1:8000"
 RANGES = {"fusion.detection_probability": {"low": 0.6, "high": 0.98}, "fusion.clutter_rate": {}}
@@ -213,13 +216,9 @@ def test_no_more_workers_than_the_machine_can_bear(client: TestClient) -> None:
     assert client.get("/api/studies").json() == before
 
 
-def test_who_goes_on_at_once_waits_for_what_is_just_ending(
-    client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    define(client)
-    store = find("mine", tmp_path / "studies")
-    begun: list[bool] = []
-    monkeypatch.setattr(StudyDesk, "run", lambda *_: begun.append(store.is_running()))
+@contextmanager
+def just_ending(store: Store) -> Iterator[threading.Event]:
+    """A study that somebody asked to stop, and that runs for a moment yet; set when it ends."""
     holds, ends = threading.Event(), threading.Event()
 
     def ending() -> None:
@@ -232,11 +231,45 @@ def test_who_goes_on_at_once_waits_for_what_is_just_ending(
     other.start()
     assert holds.wait(30.0)
     threading.Timer(0.3, ends.set).start()
-    answer = client.post("/api/studies/mine/start", json={"workers": 1})
-    assert answer.status_code == 200, answer.text
-    assert ends.is_set()
-    assert begun == [False]
+    yield ends
     other.join()
+
+
+def test_who_goes_on_at_once_waits_for_what_is_just_ending(
+    client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    define(client)
+    store = find("mine", tmp_path / "studies")
+    begun: list[bool] = []
+    monkeypatch.setattr(StudyDesk, "run", lambda *_: begun.append(store.is_running()))
+    with just_ending(store) as ends:
+        answer = client.post("/api/studies/mine/start", json={"workers": 1})
+        assert answer.status_code == 200, answer.text
+        assert ends.is_set()
+    assert begun == [False]
+
+
+def test_what_is_just_ending_is_deleted_with_the_last_that_it_writes(
+    client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    define(client)
+    store = find("mine", tmp_path / "studies")
+    tried: list[Path] = []
+
+    def late(folder: Path) -> None:
+        tried.append(folder)
+        if len(tried) == 1:
+            raise OSError(errno.ENOTEMPTY, "Directory not empty", str(folder))
+        remove(folder)
+
+    remove = shutil.rmtree
+    monkeypatch.setattr(shutil, "rmtree", late)
+    with just_ending(store) as ends:
+        answer = client.delete("/api/studies/mine")
+        assert answer.json()["studies"] == [], answer.text
+        assert ends.is_set()
+    assert len(tried) == 2
+    assert not store.folder.exists()
 
 
 @pytest.mark.full

@@ -6,6 +6,7 @@ work. Nothing of a study is kept here but when its files were last seen to chang
 
 from __future__ import annotations
 
+import errno
 import json
 import logging
 import shutil
@@ -138,12 +139,7 @@ class StudyDesk:
         if place == Place():
             place = self._last_place(store)
         self.check_place(place.workers, place.scheduler)
-        until = time.monotonic() + ENDING_SECONDS
-        while (running := store.is_running()) and time.monotonic() < until:
-            if store.status().state == "running" and not store.asked_to_stop():
-                break
-            time.sleep(0.05)  # its workers end before it does
-        if running:
+        if self._goes_on(store):
             raise StudyError(f'the study "{name}" runs already')
         line = [sys.executable, "-m", "app", "study", "resume", str(store.folder)]
         line += ["--workers", str(place.workers)] if place.workers else []
@@ -156,6 +152,15 @@ class StudyDesk:
             ) from None
         self.run(store, line)
         return store
+
+    def _goes_on(self, store: Store) -> bool:
+        """Whether a study runs; one that is just ending is waited for."""
+        until = time.monotonic() + ENDING_SECONDS
+        while (running := store.is_running()) and time.monotonic() < until:
+            if store.status().state == "running" and not store.asked_to_stop():
+                break
+            time.sleep(0.05)  # its workers end before it does
+        return running
 
     def _last_place(self, store: Store) -> Place:
         try:
@@ -204,15 +209,25 @@ class StudyDesk:
         return store
 
     def remove(self, name: str) -> None:
-        """Delete a study with everything in it.
+        """Delete a study with everything in it; one that is just ending is waited for.
 
         Raises:
             StudyError: If it runs.
+            OSError: If it cannot be deleted.
         """
         store = self.store(name)
-        if store.is_running():
+        if self._goes_on(store):
             raise StudyError(f'the study "{name}" runs; stop it first')
-        shutil.rmtree(store.folder)
+        until = time.monotonic() + ENDING_SECONDS
+        while store.folder.exists():
+            try:
+                shutil.rmtree(store.folder)
+            except OSError as error:
+                # a worker's last files come or go meanwhile
+                passes = error.errno in (errno.ENOENT, errno.ENOTEMPTY)
+                if not passes or time.monotonic() > until:
+                    raise
+                time.sleep(0.05)
         with self._lock:
             self._summaries.pop(name, None)
             self._seen.pop(name, None)
