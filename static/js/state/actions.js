@@ -135,8 +135,11 @@ export function createActions({ store, seek, send, receive }) {
 			store.set({ range: next, loop: next[0] !== null || next[1] !== null });
 		},
 		toEvent(direction) {
-			const event = nextEvent(eventsNow(store.get()), store.get().step, direction);
-			if (event) actions.go(`${event.step} ${event.id}`);
+			const { step, eventKind } = store.get();
+			const event = nextEvent(eventsNow(store.get()), step, direction);
+			if (event) return void actions.go(`${event.step} ${event.id}`);
+			const kind = eventKind || "event";
+			actions.note("info", `No ${kind} ${direction > 0 ? "after" : "before"} step ${step}`, "");
 		},
 
 		// tracks

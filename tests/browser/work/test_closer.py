@@ -105,6 +105,16 @@ def test_alt_and_a_click_show_one_track_alone(flat_page: Page, server: Server) -
     ask(server, "POST", "select", {"id": None})
 
 
+def test_where_no_event_follows_that_is_said(flat_page: Page, server: Server) -> None:
+    page = flat_page
+    as_at_first(server)
+    last = server.get("/api/state").json()["sequence"]["frames"] - 1
+    page.keyboard.press("End")
+    until(page, lambda: readout(page) == str(last), "the last step")
+    page.keyboard.press("n")
+    expect(page.get_by_text(f"No event after step {last}")).to_be_visible()
+
+
 def test_who_is_followed_has_its_deviations_beside_it(flat_page: Page, server: Server) -> None:
     page = flat_page
     as_at_first(server)
