@@ -113,11 +113,19 @@ def test_the_wheel_zooms_over_the_lanes_and_values_stand_by_the_pointer(
 ) -> None:
     page = flat_page
     as_at_first(server)
-    plot, lane = page.locator(".plot").bounding_box(), page.locator(".lane").first.bounding_box()
-    assert plot is not None
-    assert lane is not None
-    page.mouse.move(plot["x"] + plot["width"] / 2, lane["y"] + lane["height"] / 2)
-    expect(page.locator(".hint-card")).to_contain_text(re.compile(r"step \d+.*people", re.DOTALL))
+    card = page.locator(".hint-card")
+
+    def told() -> bool:
+        plot = page.locator(".plot").bounding_box()
+        lane = page.locator(".lane").first.bounding_box()
+        if plot is None or lane is None:
+            return False
+        # lanes of a run that has just ended may be laid out meanwhile
+        page.mouse.move(plot["x"] + plot["width"] / 2 - 9, lane["y"] + lane["height"] / 2)
+        page.mouse.move(plot["x"] + plot["width"] / 2, lane["y"] + lane["height"] / 2)
+        return bool(re.search(r"step \d+.*people", card.inner_text(), re.DOTALL))
+
+    until(page, told, "values by the pointer")
     page.mouse.wheel(0, -300)
     until(page, lambda: "zoom=" in page.url, "a part is shown")
     page.keyboard.press("x")
