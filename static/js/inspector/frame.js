@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * A box over a picture without a pointer: arrows move it, with Ctrl they size it, with Shift they go
  * further; Enter keeps it.

@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * Teaching: boxes dragged on a picture, and the fields of a panel that the server writes; each says
  * where it is sent.
