@@ -78,8 +78,15 @@ def box_overlaps(
         first: left, top, width, height; 0 is shared by boxes without any area.
         second: The same.
     """
-    low = np.maximum(first[:, None, :2], second[None, :, :2])
-    high = np.minimum((first[:, :2] + first[:, 2:])[:, None], (second[:, :2] + second[:, 2:])[None])
-    shared = np.maximum(high - low, 0.0).prod(axis=2)
-    areas = first[:, 2:].prod(axis=1)[:, None] + second[:, 2:].prod(axis=1)
+    return paired_overlaps(first[:, None], second[None])
+
+
+def paired_overlaps(
+    first: Float[ndarray, "*#N 4"], second: Float[ndarray, "*#N 4"]
+) -> Float[ndarray, "*N"]:
+    """Intersection over union of boxes with those in the same places, as :func:`box_overlaps`."""
+    low = np.maximum(first[..., :2], second[..., :2])
+    high = np.minimum(first[..., :2] + first[..., 2:], second[..., :2] + second[..., 2:])
+    shared = np.maximum(high - low, 0.0).prod(axis=-1)
+    areas = first[..., 2:].prod(axis=-1) + second[..., 2:].prod(axis=-1)
     return np.asarray(shared / np.maximum(areas - shared, np.finfo(float).tiny))

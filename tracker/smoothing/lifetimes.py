@@ -8,6 +8,7 @@ from numpy import ndarray
 
 from tracker.kernels.smoothing.presence import Habits, presence
 from tracker.parameters import SmoothingParams
+from tracker.smoothing.apart import shown_apart
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Shared, Smoother
 
@@ -43,7 +44,9 @@ def lifetimes(
     Where stage 1 tells how much likelier a person looks so, log Λ is added to that; its boxes are
     many, and most are false. One alone has a place somewhere on its ray whatever it shows, so
     that only its looks count. Two of something else meet somewhere in the room, a third hardly
-    meets them: each beyond the second outweighs as much doubt of their looks as a vote.
+    meets them: each beyond the second outweighs as much doubt of their looks as a vote. That holds
+    of boxes that show somebody apart from surer people (:func:`shown_apart`); others meet because
+    there is one, and only looks tell a second.
 
     Returns:
         (N,) probabilities; (n,) log odds of a person at some step against nobody.
@@ -57,27 +60,39 @@ def lifetimes(
         looks[own] = -np.log(camera.clutter_factors[links.boxes[own]])
     rows = len(paths.states)
     shown = np.bincount(links.rows, links.shares, rows)
-    votes = hit * shown
-    if looks.any():
-        doubt = np.bincount(links.rows, links.shares * looks, rows)
-        outweighed = np.minimum(doubt + hit * np.maximum(shown - _MEETING, 0.0), 0.0)
-        votes = hit * np.minimum(shown, 2.0 * np.maximum(shown - 1.0, 0.0))
-        votes += np.where(doubt < 0.0, outweighed, doubt)
-    votes[smoother.pinned(paths)[0]] += _SAID
     weight = independence(smoother.model.step_time, parameters.memory)
     survival = min(p.survival_probability, 1.0 - 1e-9)
     # within the time in which the evidence tells anew; a recording seen backwards is the same
     steps = 1.0 / weight
     come = float(np.log(min(p.birth_rate * steps * smoother.model.step_time, 1.0)))
     leave = float(np.log1p(-(survival**steps)))
-    found = presence(
-        paths.starts,
-        paths.firsts,
-        weight * (votes + misses(shared)),
-        Habits(float(np.log(survival)), (come + leave) / 4.0, -parameters.change),
-        smoother.frames - 1,
-    )
-    return found.probabilities, found.odds
+    habits = Habits(float(np.log(survival)), (come + leave) / 4.0, -parameters.change)
+    pinned, against = smoother.pinned(paths)[0], misses(shared)
+
+    def by(votes: Float[ndarray, " N"]) -> tuple[Float[ndarray, " N"], Float[ndarray, " n"]]:
+        votes[pinned] += _SAID
+        found = presence(
+            paths.starts, paths.firsts, weight * (votes + against), habits, smoother.frames - 1
+        )
+        return found.probabilities, found.odds
+
+    if not looks.any():
+        return by(hit * shown)
+    doubt = np.bincount(links.rows, links.shares * looks, rows)
+    there, odds = by(_votes(hit, shown, doubt))
+    apart = shown_apart(smoother, paths, shared, odds)
+    if apart.all():
+        return there, odds
+    return by(_votes(hit, np.bincount(links.rows, links.shares * apart, rows), doubt))
+
+
+def _votes(
+    hit: float, shown: Float[ndarray, " N"], doubt: Float[ndarray, " N"]
+) -> Float[ndarray, " N"]:
+    """Of so many cameras for each row, where their boxes' looks say ``doubt``, log odds."""
+    outweighed = np.minimum(doubt + hit * np.maximum(shown - _MEETING, 0.0), 0.0)
+    meeting = hit * np.minimum(shown, 2.0 * np.maximum(shown - 1.0, 0.0))
+    return np.asarray(meeting + np.where(doubt < 0.0, outweighed, doubt))
 
 
 def extended(smoother: Smoother, paths: Paths, steps: int) -> tuple[Paths, Float[ndarray, " N"]]:

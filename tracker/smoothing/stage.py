@@ -120,6 +120,7 @@ class Identities(Positions):
         fitted, shared, learnt = _settled(
             smoother, paths, existences, links, p, None, check, turns=p.iterations
         )
+        first, first_odds = fitted.paths, lifetimes.lifetimes(smoother, fitted.paths, shared, p)[1]
         seen = Seen.of(views) if p.appearance > 0.0 else Seen()
         names = np.where(existences == 1.0, paths.labels[paths.owners], -1)
         for again in range(p.rounds):
@@ -135,7 +136,9 @@ class Identities(Positions):
             paths, links, names = found.paths, found.links, found.names
             learnt = learnt.of_people(found.origins)
             existences = np.where(found.had, 1.0, lifetimes.UNSURE)
-        decided = _Decided(found.decisions, found.joined, found.limits)
+        gone = np.flatnonzero(~np.isin(first.labels, names))
+        removed = [_removed(first, path, first_odds[path]) for path in gone.tolist()]
+        decided = _Decided([*found.decisions, *removed], found.joined, found.limits)
         return paths, existences, links, learnt, decided
 
 
@@ -184,18 +187,7 @@ def _finished(
     there[away] = 0.0
     paths, owners = fitted.paths, fitted.paths.owners
     somebody = odds > 0.0
-    removed = [
-        Decision(
-            "removed",
-            int(paths.firsts[path]),
-            int(paths.labels[path]),
-            int(paths.labels[path]),
-            float(1.0 / (1.0 + np.exp(min(odds[path], 600.0)))),
-            float(1.0 / (1.0 + np.exp(-max(odds[path], -600.0)))),
-            "over its whole life it is likelier nobody",
-        )
-        for path in np.flatnonzero(~somebody)
-    ]
+    removed = [_removed(paths, path, odds[path]) for path in np.flatnonzero(~somebody).tolist()]
     links = shared.links
     seen = np.zeros((len(there), len(smoother.cameras)), dtype=bool)
     sure = links.shares > _SEEN
@@ -213,6 +205,18 @@ def _finished(
         learnt,
         decided.joined,
     )
+
+
+def _removed(paths: Paths, path: int, odds: float) -> Decision:
+    """That a track is nobody's: by its odds in its whole life, or as no piece of it is left."""
+    nobody = float(1.0 / (1.0 + np.exp(np.clip(odds, -600.0, 600.0))))
+    reason = (
+        "over its whole life it is likelier nobody"
+        if odds <= 0.0
+        else "no piece of it stands by boxes of its own"
+    )
+    label = int(paths.labels[path])
+    return Decision("removed", int(paths.firsts[path]), label, label, nobody, 1.0 - nobody, reason)
 
 
 def _outside(paths: Paths, limits: Mapping[int, tuple[int, int]]) -> Bool[ndarray, " N"]:

@@ -1,0 +1,103 @@
+"""Whose boxes bear witness to a person more, beside somebody who is surer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy import ndarray
+
+from tests.engine.smoothing.test_positions_laws import PLAIN, STEPS
+from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, sequence, walk
+from tracker import pipeline
+from tracker.parameters import with_values
+from tracker.runs.run import Run
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.protocol import ViewResult
+from tracker.smoothing import create
+from tracker.smoothing.apart import shown_apart
+from tracker.smoothing.lifetimes import lifetimes
+from tracker.smoothing.paths import Paths
+from tracker.smoothing.smoother import Shared, Smoother
+
+WIDTH = 2.0 * float(HALF_EXTENTS[0])
+BEGIN, END = 10, 30
+ALONE = walk((-1.0, 0.2, 1.0), (0.9, -0.3, 1.1), STEPS)
+DOUBTFUL = -3.5
+"""Two cameras cannot outweigh it, a third does."""
+
+
+def second(offset_at_first: float, offset_at_last: float) -> ndarray:
+    """Somebody who is there for a while, so many metres beside the one who is always there."""
+    offsets = np.linspace(offset_at_first, offset_at_last, END - BEGIN)
+    return ALONE[BEGIN:END] + np.stack([0.0 * offsets, offsets, 0.0 * offsets], axis=1)
+
+
+def filtered(other: ndarray) -> tuple[Sequence, Run, list[tuple[ViewResult, ...]]]:
+    """The sequence of both, what the filter says, and stage 1 with every box looking doubtful."""
+    whole = sequence([(0, ALONE), (BEGIN, other)], STEPS, CAMERAS)
+    run = pipeline.compute(whole, with_values(PLAIN, {"smoothing_method": "none"}))
+    views = [
+        tuple(replace(view, log_ratios=np.full(len(view.boxes), DOUBTFUL)) for view in step)
+        for step in run.views
+    ]
+    return whole, run, views
+
+
+def tracked(other: ndarray, *, swapped: bool = False) -> tuple[Smoother, Paths, Shared]:
+    """Both as they were, and whose box each is."""
+    whole, _, views = filtered(other)
+    smoother = Smoother(whole, PLAIN.fusion, views)
+    walked = [(0, ALONE), (BEGIN, other)][:: -1 if swapped else 1]
+    states = [np.concatenate([path, np.zeros_like(path)], axis=1) for _, path in walked]
+    spread = [np.tile(1e-3 * np.eye(6), (len(path), 1, 1)) for _, path in walked]
+    paths = Paths.of([1, 2], [first for first, _ in walked], states, spread, 6)
+    return smoother, paths, smoother.share(paths)
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_nobody_is_shown_apart_who_never_leaves_the_side_of_who_is_surer(swapped: bool) -> None:
+    smoother, paths, shared = tracked(second(0.6 * WIDTH, 0.9 * WIDTH), swapped=swapped)
+    surer = 1 if swapped else 0
+    odds = np.where(np.arange(2) == surer, 9.0, 4.0)
+    of_surer = paths.owners[shared.links.rows] == surer
+    assert np.array_equal(shown_apart(smoother, paths, shared, odds), of_surer)
+
+
+def test_who_came_from_elsewhere_is_shown_apart_wherever_the_boxes_are() -> None:
+    smoother, paths, shared = tracked(second(4.0 * WIDTH, 0.6 * WIDTH))
+    apart = shown_apart(smoother, paths, shared, np.array([9.0, 4.0]))
+    own = paths.owners[shared.links.rows] == 1
+    steps = paths.steps[shared.links.rows]
+    assert apart[~own].all()
+    assert apart[own & (steps < BEGIN + 5)].all()
+    late = own & (steps > END - 4)
+    assert apart[late].any()
+    assert not apart[late].all(), "one camera sees them one behind the other"
+
+
+def test_equals_take_nothing_from_each_other() -> None:
+    smoother, paths, shared = tracked(second(0.6 * WIDTH, 0.9 * WIDTH))
+    assert shown_apart(smoother, paths, shared, np.array([4.0, 4.0])).all()
+
+
+def test_doubtful_boxes_beside_somebody_are_nobodys_and_elsewhere_somebodys() -> None:
+    beside = tracked(second(0.6 * WIDTH, 0.9 * WIDTH))
+    elsewhere = tracked(second(4.0 * WIDTH, 5.0 * WIDTH))
+    odds = [lifetimes(*one, PLAIN.smoothing)[1] for one in (beside, elsewhere)]
+    assert odds[0][0] > 0.0 > odds[0][1]
+    assert (odds[1] > 0.0).all()
+
+
+def test_whoever_the_filter_had_and_hindsight_has_not_is_told_of() -> None:
+    whole, run, views = filtered(second(0.6 * WIDTH, 0.9 * WIDTH))
+    smoothed = create(whole, PLAIN).smooth(views, run.fused)
+    assert smoothed is not None
+    had = set(run.filtered.labels.tolist())
+    gone = had - set(smoothed.labels.tolist())
+    assert len(had) == 2
+    assert len(gone) == 1
+    told = [one for one in smoothed.decisions if one.kind == "removed"]
+    assert {one.label for one in told} == gone
+    assert all(0.5 < one.probability <= 1.0 and BEGIN <= one.step < END for one in told)
