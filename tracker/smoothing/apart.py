@@ -16,12 +16,19 @@ ONE_PERSON = 0.3
 """Two boxes of one camera that share more than this of what both cover may be one person's, as
 detectors take it that keep one box a person."""
 
+_THERE = 0.5
+"""Probability from which somebody is at a place."""
+
 _HARDLY_EVER = 0.1
 """Share of a life below which somebody was elsewhere by a stray box."""
 
 
 def shown_apart(
-    smoother: Smoother, paths: Paths, shared: Shared, odds: Float[ndarray, " n"]
+    smoother: Smoother,
+    paths: Paths,
+    shared: Shared,
+    there: Float[ndarray, " N"],
+    odds: Float[ndarray, " n"],
 ) -> Bool[ndarray, " L"]:
     """Which links are to boxes that show their person apart from every surer one.
 
@@ -34,10 +41,11 @@ def shown_apart(
         smoother: With the boxes.
         paths: Whose rows they may be.
         shared: Whose box each is.
-        odds: (n,) of the paths; who has greater ones is surer.
+        there: (N,) of the rows, the probability that somebody was there.
+        odds: (n,) of the paths; who has greater ones is surer, where they are there.
     """
     links = shared.links
-    rows, sure = links.rows, odds[paths.owners]
+    rows, sure = links.rows, np.where(there > _THERE, odds[paths.owners], -np.inf)
     beside = _beside_surer(paths, sure, 2.0 * smoother.model.target.half_width)
     away = np.bincount(paths.owners[rows], links.shares * ~beside[rows], len(paths.labels))
     whole = np.bincount(paths.owners[rows], links.shares, len(paths.labels))

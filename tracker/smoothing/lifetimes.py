@@ -80,7 +80,7 @@ def lifetimes(
         return by(hit * shown)
     doubt = np.bincount(links.rows, links.shares * looks, rows)
     there, odds = by(_votes(hit, shown, doubt))
-    apart = shown_apart(smoother, paths, shared, odds)
+    apart = shown_apart(smoother, paths, shared, there, odds)
     if apart.all():
         return there, odds
     return by(_votes(hit, np.bincount(links.rows, links.shares * apart, rows), doubt))

@@ -56,18 +56,23 @@ def tracked(other: ndarray, *, swapped: bool = False) -> tuple[Smoother, Paths, 
     return smoother, paths, smoother.share(paths)
 
 
+def everywhere(paths: Paths) -> ndarray:
+    """Everybody is there at each of their rows."""
+    return np.ones(len(paths.states))
+
+
 @pytest.mark.parametrize("swapped", [False, True])
 def test_nobody_is_shown_apart_who_never_leaves_the_side_of_who_is_surer(swapped: bool) -> None:
     smoother, paths, shared = tracked(second(0.6 * WIDTH, 0.9 * WIDTH), swapped=swapped)
     surer = 1 if swapped else 0
     odds = np.where(np.arange(2) == surer, 9.0, 4.0)
     of_surer = paths.owners[shared.links.rows] == surer
-    assert np.array_equal(shown_apart(smoother, paths, shared, odds), of_surer)
+    assert np.array_equal(shown_apart(smoother, paths, shared, everywhere(paths), odds), of_surer)
 
 
 def test_who_came_from_elsewhere_is_shown_apart_wherever_the_boxes_are() -> None:
     smoother, paths, shared = tracked(second(4.0 * WIDTH, 0.6 * WIDTH))
-    apart = shown_apart(smoother, paths, shared, np.array([9.0, 4.0]))
+    apart = shown_apart(smoother, paths, shared, everywhere(paths), np.array([9.0, 4.0]))
     own = paths.owners[shared.links.rows] == 1
     steps = paths.steps[shared.links.rows]
     assert apart[~own].all()
@@ -77,9 +82,18 @@ def test_who_came_from_elsewhere_is_shown_apart_wherever_the_boxes_are() -> None
     assert not apart[late].all(), "one camera sees them one behind the other"
 
 
+def test_who_is_gone_takes_nothing_from_who_stands_there_now() -> None:
+    smoother, paths, shared = tracked(second(0.6 * WIDTH, 0.9 * WIDTH))
+    there = np.where(paths.steps < (BEGIN + END) // 2, 1.0, 0.0)
+    there[paths.owners == 1] = 1.0
+    apart = shown_apart(smoother, paths, shared, there, np.array([9.0, 4.0]))
+    late = paths.steps[shared.links.rows] >= (BEGIN + END) // 2
+    assert apart[late & (paths.owners[shared.links.rows] == 1)].all()
+
+
 def test_equals_take_nothing_from_each_other() -> None:
     smoother, paths, shared = tracked(second(0.6 * WIDTH, 0.9 * WIDTH))
-    assert shown_apart(smoother, paths, shared, np.array([4.0, 4.0])).all()
+    assert shown_apart(smoother, paths, shared, everywhere(paths), np.array([4.0, 4.0])).all()
 
 
 def test_doubtful_boxes_beside_somebody_are_nobodys_and_elsewhere_somebodys() -> None:
