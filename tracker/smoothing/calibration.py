@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -32,6 +32,9 @@ OFFSET_RIDGE = _ALIKE * (_BOX_SIGMA / _OFFSET_SIGMA) ** 2
 NARROWEST, WIDEST = 0.15, 1.0
 """Between these factors of the stated noise the learnt one lies."""
 
+ODD = 0.4
+"""Half heights: who is so far off is not standing."""
+
 FEWEST = 50
 """Boxes of a camera below which its noise is taken as stated."""
 
@@ -42,10 +45,10 @@ class Calibration:
 
     A box of person i in camera c is taken as
 
-        z = h_c(x) + ½ height(h_c(x)) (b_c + s_i u) + v,   v ~ N(0, f_c² R)
+        z = h_c(x) + ½ height(h_c(x)) (b_c + s_i u + d_i w) + v,   v ~ N(0, f_c² R)
 
-    with u = (0, −1, 1) for horizontal centre, top and bottom: who is taller than the target
-    has a taller box, without being nearer.
+    with u = (0, −1, 1) and w = (0, 1, 1) for horizontal centre, top and bottom: who is taller than
+    the target has a taller box, without being nearer, and whose boxes lie low is not lower.
     """
 
     sizes: Float[ndarray, " n"]
@@ -54,15 +57,19 @@ class Calibration:
     """b, in half heights."""
     noises: Float[ndarray, " C"]
     """f."""
+    shifts: Float[ndarray, " n"]
+    """d: how far below the person's middle the boxes lie, in half heights."""
 
     @staticmethod
     def none(people: int, cameras: int, size: int) -> Calibration:
         """As stated: nothing learnt."""
-        return Calibration(np.zeros(people), np.zeros((cameras, size)), np.ones(cameras))
+        return Calibration(
+            np.zeros(people), np.zeros((cameras, size)), np.ones(cameras), np.zeros(people)
+        )
 
     def of_people(self, people: ndarray) -> Calibration:
         """Of some of the people, in that order."""
-        return Calibration(self.sizes[people], self.offsets, self.noises)
+        return replace(self, sizes=self.sizes[people], shifts=self.shifts[people])
 
     def measured(self, camera: int, measurements: Measurements) -> Measurements:
         """A camera's measurements with the noise that was learnt."""
@@ -74,7 +81,9 @@ class Calibration:
         A number that the picture's edge holds fast stays.
         """
         half_height = (expected.boxes[:, 3] - expected.boxes[:, 1]) / 2.0
-        shares = self.offsets[camera] + self.sizes[people, None] * upright(self.offsets.shape[1])
+        size = self.offsets.shape[1]
+        shares = self.offsets[camera] + self.sizes[people, None] * upright(size)
+        shares += self.shifts[people, None] * lower(size)
         return np.asarray(half_height[:, None] * shares * free(expected))
 
 
@@ -90,4 +99,13 @@ def upright(size: int) -> Float[ndarray, " m"]:
         2: np.zeros(2),
         3: np.array([0.0, -1.0, 1.0]),
         4: np.array([0.0, -1.0, 1.0, 0.0]),
+    }[size]
+
+
+def lower(size: int) -> Float[ndarray, " m"]:
+    """w: how a box that lies lower differs."""
+    return {
+        2: np.array([0.0, 1.0]),
+        3: np.array([0.0, 1.0, 1.0]),
+        4: np.array([0.0, 1.0, 1.0, 0.0]),
     }[size]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Sequence as Many
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
 
@@ -24,13 +24,16 @@ from tracker.single_view.protocol import ViewResult
 from tracker.smoothing.calibration import (
     FEWEST,
     NARROWEST,
+    ODD,
     OFFSET_RIDGE,
     SIZE_RIDGE,
     WIDEST,
     Calibration,
     free,
+    lower,
     upright,
 )
+from tracker.smoothing.marks import Marks, shifts
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.recording import CameraBoxes
 from tracker.smoothing.restlessness import restlessness
@@ -43,7 +46,6 @@ START_SIGMA = 10.0
 _MOST_THREADS = 4
 _LEAST = 0.01  # association probability of a pair worth keeping
 _SURE = 0.9  # association probability of a box that tells of its person's size
-_ODD = 0.4  # half heights: who is so far off is not standing
 _MEDIAN = 0.4549  # of a squared standard normal
 
 
@@ -107,6 +109,8 @@ class Smoother:
             learning: Whether people's restlessness is learnt; else they move as stated.
         """
         self._learning = learning
+        self._sequence = sequence
+        self._marks = Marks.of(sequence)
         self._threads = ThreadPoolExecutor(min(len(sequence.views), _MOST_THREADS))
         self.parameters = parameters
         self._here = [one for one in corrections if one.kind == "here"]
@@ -308,7 +312,7 @@ class Smoother:
         towards 0 by their priors; the noise is the median of r² + H P Hᵀ over its stated value.
         """
         size, owners = self.model.target.size, paths.owners
-        u = upright(size)
+        u, w = upright(size), lower(size)
         people = len(paths.labels)
         told, count = np.zeros(people), np.zeros(people)
         offsets, noises = np.zeros_like(learnt.offsets), learnt.noises.copy()
@@ -322,11 +326,12 @@ class Smoother:
             whole = expected.valid & free(expected).all(axis=1)
             left = (plain - learnt.shift(c, owners[own.rows], expected)) / half[:, None]
             # a box of another posture is no witness of a person's height
-            whole &= (np.abs(left) < _ODD).all(axis=1)
+            whole &= (np.abs(left) < ODD).all(axis=1)
             if not whole.any():
                 continue
             rows, plain, half = owners[own.rows[whole]], plain[whole], half[whole]
             shares = plain / half[:, None]
+            shares -= learnt.shifts[rows, None] * w
             rest = shares - learnt.sizes[rows, None] * u
             offsets[c] = rest.sum(axis=0) / (len(rest) + OFFSET_RIDGE)
             if size >= 3:
@@ -346,7 +351,13 @@ class Smoother:
                 noises[c] = np.clip(
                     np.sqrt(ratio * (1.0 + alike) / (1.0 - alike)), NARROWEST, WIDEST
                 )
-        return Calibration(told / (count + SIZE_RIDGE), offsets, noises)
+        return Calibration(told / (count + SIZE_RIDGE), offsets, noises, learnt.shifts)
+
+    def placed(self, paths: Paths, learnt: Calibration) -> Calibration:
+        """What marked boxes say of paths that were fitted with it: how low each one's boxes lie."""
+        half_extents = self._sequence.target_half_extents
+        found = shifts(self._marks, self.model.cameras, half_extents, paths)
+        return replace(learnt, shifts=learnt.shifts + found)
 
 
 def _alike(

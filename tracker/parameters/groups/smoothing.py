@@ -17,7 +17,8 @@ class SmoothingParams(Params):
     """How often boxes are shared out anew by the smoothed tracks, and the tracks fitted to them."""
 
     learning: Annotated[bool, ui("s, b, f")] = True
-    """Whether people's heights and restlessness and the cameras' offsets and noise are learnt."""
+    """Whether people's heights and restlessness, the cameras' offsets and noise, and how low boxes
+    lie against the templates are learnt."""
 
     memory: Annotated[float, Field(ge=0.05, le=10.0), ui("τ_z", unit="s", step=0.05, log=True)] = (
         0.25
