@@ -184,7 +184,8 @@ def _finished(
     fitted = smoother.fit(longer, shared.links, 1, learnt)
     if p.learning:
         learnt = smoother.placed(fitted.paths, learnt)
-        fitted = smoother.fit(fitted.paths, shared.links, 1, learnt)
+        if learnt.shifts.any():
+            fitted = smoother.fit(fitted.paths, shared.links, 1, learnt)
     shared = smoother.share(fitted.paths, existences, learnt)
     there, odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
     there[away] = 0.0
