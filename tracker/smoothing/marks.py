@@ -83,15 +83,15 @@ def shifts(
         rows = np.flatnonzero(steps == step)
         own, half_axes = _bounds(cameras[index], paths.states[rows, :3], half_extents)
         off = (own.centres - box[:2]) / own.half_sizes
-        taller = box[3] / own.half_sizes[:, 1] - 1.0
-        # who lies or is bent is no witness of where the middle of an upright target is
-        standing = (np.abs(off[:, 1]) < ODD) & (np.abs(taller) < ODD)
+        taller = np.abs(box[3] / own.half_sizes[:, 1] - 1.0)
+        # who lies, is bent or stretches out is no witness of where an upright target's middle is
+        odd = np.abs(off).max(axis=1)
+        standing = (odd < ODD) & (taller < ODD)
         # nor is a camera that sees people from above, or is turned on its side
         half_heights = half_axes[:, 1]
         standing &= (half_heights > half_axes[:, 0]) & (half_heights > own.half_sizes[:, 1] / 2.0)
-        apart = np.where(standing, np.abs(off).max(axis=1), np.inf)
-        nearest = int(apart.argmin()) if len(rows) else -1
-        if nearest >= 0 and apart[nearest] < 1.0:
+        nearest = int(odd.argmin()) if len(rows) else -1
+        if nearest >= 0 and standing[nearest]:
             lower = own.centres[nearest, 1] - box[1]
             total[owners[rows[nearest]]] += lower / half_heights[nearest]
             count[owners[rows[nearest]]] += 1.0

@@ -119,7 +119,9 @@ def test_a_camera_on_its_side_tells_nothing_of_heights(turn: float, tells: bool)
     roll = np.array(
         [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
     )
-    rolled = replace(upright, R=roll @ upright.R, t=roll @ upright.t)
+    rolled = replace(
+        upright, rotation=roll @ upright.rotation, translation=roll @ upright.translation
+    )
     box = Boxes.from_left_top(cylinder(rolled, place)[None]).centred
     marks = Marks(np.array([20]), np.array([0]), box)
     assert shifts(marks, [rolled], HALF_EXTENTS, path).any() == tells
