@@ -98,6 +98,38 @@ def test_somebody_is_where_somebody_says_so(fusion: str, smoothing: str) -> None
 
 
 @pytest.mark.full
+@pytest.mark.parametrize(("fusion", "smoothing"), list(itertools.product(FUSIONS, SMOOTHINGS)))
+@pytest.mark.parametrize("noise", [0.5, 3.0])
+def test_a_track_passes_a_place_to_within_its_accuracy(
+    fusion: str, smoothing: str, noise: float
+) -> None:
+    whole = sequence(crossing(STEPS), STEPS, pixel_noise=noise)
+    before = run_of(whole, (), fusion, smoothing)
+    x, y, z = place(before, 30, 0.4)[1:]
+    for aside, accuracy in itertools.product((0.05, 0.12, 0.28, 0.5, 0.8), (0.02, 0.1)):
+        said = make(kind="here", places=[[30, x, y + aside, z]], accuracy=accuracy)
+        after = run_of(whole, (said,), fusion, smoothing)
+        assert [one.met for one in after.outcomes] == [True], after.outcomes
+        now = place(after, 30, y + aside)
+        assert np.hypot(now[1] - x, now[2] - y - aside) <= accuracy
+
+
+def test_who_is_said_to_be_elsewhere_stays_himself_and_at_other_steps_where_he_was() -> None:
+    whole = two_walkers()
+    before = run_of(whole)
+    x, y, z = place(before, 30, 0.4)[1:]
+    after = run_of(whole, (make(kind="here", places=[[30, x, y + 0.28, z]]),))
+    assert np.array_equal(before.tracks.frames, after.tracks.frames)
+    assert np.array_equal(before.tracks.ids, after.tracks.ids)
+    moved = np.linalg.norm(after.tracks.positions - before.tracks.positions, axis=1)
+    sides = before.tracks.positions[:, 1] > 0.0
+    assert moved[~sides | (np.abs(before.tracks.frames - 30) > 5)].max() < 0.01
+    way = np.diff(after.tracks.positions[(after.tracks.ids == after.outcomes[0].tracks[0])], axis=0)
+    speed = np.linalg.norm(way, axis=1) / whole.step_time
+    assert speed.max() < 3.0, "as fast as somebody can go"
+
+
+@pytest.mark.full
 @pytest.mark.parametrize("fusion", FUSIONS)
 def test_a_place_is_a_measurement_of_its_accuracy(fusion: str) -> None:
     whole = two_walkers()

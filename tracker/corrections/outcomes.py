@@ -12,6 +12,9 @@ from numpy import ndarray
 from tracker.corrections.kinds import Correction, Place
 from tracker.corrections.seeking import Whereabouts, mostly_inside
 
+_GATE = 3.0
+"""Standard deviations of a stated place within which somebody is at it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
@@ -113,9 +116,11 @@ def _here(tracks: _Tracks, one: Correction) -> tuple[tuple[int, ...], str]:
     if row is None:
         return (), f"found nobody near {place.words}"
     apart = float(np.hypot(*(tracks.positions[row, :2] - [place.x, place.y])))
-    allowed = max(3.0 * (one.accuracy or 0.0), 0.3)
-    if apart > allowed:
-        return (int(tracks.ids[row]),), f"the nearest is {apart:.2f} m from it"
+    accuracy = one.accuracy or 0.0
+    if apart > _GATE * accuracy:
+        return (int(tracks.ids[row]),), (
+            f"the nearest is {apart:.2f} m from it, and it is said to be right to {accuracy:g} m"
+        )
     return (int(tracks.ids[row]),), ""
 
 

@@ -11,6 +11,7 @@ from numpy import ndarray
 
 from tracker.corrections import Correction
 from tracker.corrections.contradictions import along
+from tracker.corrections.stating import doubted
 from tracker.filters import gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.model import FusionModel
@@ -71,8 +72,9 @@ def obey(
 
     Who was born in this step where nobody is, is not. A place z of standard deviation σ is a
     measurement that is sure to be made and is no clutter: it goes to the component j of the
-    largest w_j N(z; m_j, P_j + σ²I) within the gate, which is there then; where there is none,
-    somebody begins there.
+    largest w_j N(z; m_j, P_j + σ²I) within the gate, or so near that two people could not both
+    stand there, which is there then, and as wide as the place asks for (see
+    :func:`tracker.corrections.stating.doubted`); where there is none, somebody begins there.
 
     Args:
         mixture: Components of this step.
@@ -92,7 +94,7 @@ def obey(
         mixture, record = mixture.take(kept), record.take(kept)
     for place, sigma in zip(told.places, told.sigmas.tolist(), strict=True):
         noise = sigma**2 * np.eye(3)
-        best = _meant(mixture, place, noise, model.gate_of_places)
+        best = _meant(mixture, place, noise, model)
         if best is None:
             nameless = np.zeros(1, dtype=np.int64)
             one = GaussianMixture(np.array([_SURE]), place[None], noise[None], nameless)
@@ -105,7 +107,9 @@ def obey(
     return mixture, record, next_label
 
 
-def _meant(mixture: GaussianMixture, place: ndarray, noise: ndarray, gate: float) -> int | None:
+def _meant(
+    mixture: GaussianMixture, place: ndarray, noise: ndarray, model: FusionModel
+) -> int | None:
     """The component that a place means; None for nobody yet."""
     if not mixture.size:
         return None
@@ -114,7 +118,8 @@ def _meant(mixture: GaussianMixture, place: ndarray, noise: ndarray, gate: float
     distances = np.einsum("ja,ja->j", offsets, np.linalg.solve(spread, offsets[..., None])[..., 0])
     _, log_determinants = np.linalg.slogdet(spread)
     score = np.log(np.maximum(mixture.weights, 1e-300)) - 0.5 * (distances + log_determinants)
-    score[distances > gate] = -np.inf
+    too_near = (np.hypot(*offsets[:, :2].T) <= model.near) & (np.abs(offsets[:, 2]) <= model.height)
+    score[(distances > model.gate_of_places) & ~too_near] = -np.inf
     best = int(np.argmax(score))
     return best if np.isfinite(score[best]) else None
 
@@ -123,7 +128,9 @@ def _updated(
     mixture: GaussianMixture, component: int, place: ndarray, noise: ndarray
 ) -> GaussianMixture:
     """One component updated by a place, and its label sure to be there: Joseph's form."""
-    mean, covariance = mixture.means[component], mixture.covariances[component]
+    mean, covariance = mixture.means[component], mixture.covariances[component].copy()
+    sigma = float(np.sqrt(noise[0, 0]))
+    covariance[:3, :3] += doubted(place - mean[:3], covariance[:3, :3], sigma)
     gain = np.linalg.solve(covariance[:3, :3] + noise, covariance[:3]).T
     rest = np.eye(len(mean))
     rest[:, :3] -= gain

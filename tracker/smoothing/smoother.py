@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Sequence as Many
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TypeVar
 
@@ -37,6 +37,7 @@ from tracker.smoothing.marks import Marks, shifts
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.recording import CameraBoxes
 from tracker.smoothing.restlessness import restlessness
+from tracker.smoothing.stated import Stated
 
 _T = TypeVar("_T")
 
@@ -63,6 +64,8 @@ class Fitted:
     """Of the position's covariance before the backward pass, square metres."""
     restlessness: Float[ndarray, " N"]
     """s: by which the motion's noise is multiplied on the way to each row."""
+    places: Stated = field(default_factory=lambda: Stated.of(np.zeros(0, dtype=np.int64), ()))
+    """What somebody said of where people are, as weighed against all else."""
 
     @property
     def jumps(self) -> Float[ndarray, " N"]:
@@ -157,34 +160,31 @@ class Smoother:
             information = evidence.BoxInformation(
                 *(np.sum(parts, axis=0) for parts in zip(*told, strict=True))
             )
-            for row, one in zip(*self.pinned(paths), strict=True):
-                precision = float(one.accuracy or 1.0) ** -2
-                information.matrices[row] += precision * np.eye(3)
-                information.vectors[row] += precision * one.places[0].point
             begins = paths.states[paths.starts[:-1]].copy()
             begins[:, 3:] = 0.0
-            smooth = partial(
-                passes.smooth_paths,
-                paths.starts,
-                begins,
-                information.matrices,
-                information.vectors,
-                rule,
-            )
-            found = smooth(restless)
+            places = Stated.of(*self.pinned(paths))
+            smooth = partial(_smoothed, paths, begins, information, rule)
+            found = smooth(places, restless)
+            weighed = places.weighed(found.means, found.covariances)
+            if weighed.contradicted:
+                places = weighed
+                found = smooth(places, restless)
             if self._learning:
                 restless = restlessness(
                     paths.starts, found, motion.noise, restless, self.model.step_time
                 )
-                found = smooth(restless)
+                found = smooth(places, restless)
             paths = paths.with_states(found.means, found.covariances)
+        places, states, covariances = places.obeyed(found.means, found.covariances)
+        # who is said to be off his way jumps no farther than his boxes do
         return Fitted(
-            paths,
+            paths.with_states(states, covariances),
             found.fits + information.constants,
-            found.ahead,
-            found.ahead_covariances,
+            found.ahead + (states - found.means),
+            found.ahead_covariances + (covariances - found.covariances),
             found.traces,
             restless,
+            places,
         )
 
     def _each_camera(self, work: Callable[[int], _T]) -> list[_T]:
@@ -314,10 +314,12 @@ class Smoother:
         size, owners = self.model.target.size, paths.owners
         u, w = upright(size), lower(size)
         people = len(paths.labels)
+        witness = np.ones(len(paths.states), dtype=bool)
+        witness[self.pinned(paths)[0]] = False  # somebody knows better than the boxes there
         told, count = np.zeros(people), np.zeros(people)
         offsets, noises = np.zeros_like(learnt.offsets), learnt.noises.copy()
         for c, camera in enumerate(self.cameras):
-            own = links.take((links.cameras == c) & (links.shares > _SURE))
+            own = links.take((links.cameras == c) & (links.shares > _SURE) & witness[links.rows])
             expected = self.model.target.expected(
                 self.model.cameras[c], paths.states[own.rows], paths.covariances[own.rows]
             )
@@ -358,6 +360,22 @@ class Smoother:
         half_extents = self._sequence.target_half_extents
         found = shifts(self._marks, self.model.cameras, half_extents, paths)
         return replace(learnt, shifts=learnt.shifts + found)
+
+
+def _smoothed(
+    paths: Paths,
+    begins: Float[ndarray, "n d"],
+    information: evidence.BoxInformation,
+    rule: passes.PathMotion,
+    places: Stated,
+    restless: Float[ndarray, " N"],
+) -> passes.SmoothedRows:
+    """The rows of paths by their boxes and by what somebody said of their places."""
+    matrices, vectors = places.information(information.matrices, information.vectors)
+    found: passes.SmoothedRows = passes.smooth_paths(
+        paths.starts, begins, matrices, vectors, rule, restless
+    )
+    return found
 
 
 def _alike(

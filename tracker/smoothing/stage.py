@@ -189,7 +189,8 @@ def _finished(
     shared = smoother.share(fitted.paths, existences, learnt)
     there, odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
     there[away] = 0.0
-    paths, owners = fitted.paths, fitted.paths.owners
+    paths = fitted.places.led_to(fitted.paths, smoother.model.step_time)
+    owners = paths.owners
     somebody = odds > 0.0
     removed = [_removed(paths, path, odds[path]) for path in np.flatnonzero(~somebody).tolist()]
     links = shared.links
