@@ -1,7 +1,13 @@
 // How Check and the library word things.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { distinct, joinable, unbroken, whereIs } from "../../static/js/check/words.js";
+import {
+  distinct,
+  exchangeable,
+  joinable,
+  unbroken,
+  whereIs,
+} from "../../static/js/check/words.js";
 import { livesAMinute } from "../../static/js/library/words.js";
 
 test("a number and its unit stay on one line, other words do not", () => {
@@ -55,4 +61,27 @@ test("somebody who is there at every step is joined with nobody before or after"
     joinable(1, null, tracks, 30).map(({ id, pause }) => [id, pause]),
     [[2, 0]],
   );
+});
+
+test("only who is there before and after can be exchanged, and else it says why", () => {
+  const tracks = [
+    { id: 1, first: 0, last: 20 },
+    { id: 2, first: 0, last: 60 },
+    { id: 3, first: 10, last: 40 },
+    { id: 4, first: 50, last: 60 },
+  ];
+  const at = (id, x) => ({ id, position: [x, 0, 1] });
+  const here = { tracks: [at(1, 0), at(2, 5), at(3, 1)] };
+  const offered = (id, step) => exchangeable(id, here, tracks, step).found.map((one) => one.id);
+  const why = (id, step) => exchangeable(id, here, tracks, step).why;
+  assert.deepEqual(offered(1, 15), [3, 2], "the nearest first");
+  assert.deepEqual(offered(1, 10), [2], "3 begins there: nothing of it lies before");
+  assert.deepEqual(offered(2, 40), [3], "3 ends there: its last step would be another's");
+  assert.deepEqual(offered(2, 41), []);
+  assert.match(why(2, 41), /Nobody else is there both before step 41/);
+  assert.deepEqual(offered(1, 30), [], "who is not there himself is exchanged with nobody");
+  assert.match(why(1, 30), /Track 1 is not there at step 30: it is from step 0 to 20/);
+  assert.match(why(4, 50), /Track 4 begins at step 50/);
+  assert.match(why(9, 5), /Track 9 is not there at step 5\.$/);
+  assert.equal(why(1, 15), "");
 });

@@ -5,7 +5,7 @@ import { resultOf } from "../state/events.js";
 import { commandOf, keyLabel, perform } from "../state/commands.js";
 import { clickOf, pixelOf } from "./feet.js";
 import { checkOf } from "./model.js";
-import { joinable, neighbours, whereIs } from "./words.js";
+import { exchangeable, joinable, whereIs } from "./words.js";
 
 /** What the menu has for a track, in its order: a command, its sign, and what it says. */
 const ITEMS = /** @type {const} */ ([
@@ -116,7 +116,7 @@ export function mountMenu(context, timeline, does) {
 	}
 
 	/**
-	 * With whom: to exchange those alive there, the nearest first; to join first those that come
+	 * With whom: to exchange those who are there, the nearest first; to join first those that come
 	 * before or after. A click on anybody else is an answer too.
 	 * @param {"exchange" | "join"} what @param {number} track
 	 */
@@ -124,14 +124,12 @@ export function mountMenu(context, timeline, does) {
 		const { timeline: lanes, shown } = store.get();
 		const joins = what === "join";
 		const step = Math.max(0, shown);
-		const found = (joins ? joinable : neighbours)(
-			track,
-			resultOf(store.get()),
-			lanes?.tracks ?? [],
-			step,
-		);
+		const among = /** @type {const} */ ([track, resultOf(store.get()), lanes?.tracks ?? [], step]);
+		const { found, why } = joins
+			? { found: joinable(...among), why: "It takes a second track." }
+			: exchangeable(...among);
 		if (!found.length)
-			return actions.note("info", "There is nobody else", "It takes a second track.");
+			return actions.note("info", `Nobody to ${joins ? "join" : "exchange"} ${track} with`, why);
 		if (!menu.matches(":popover-open")) middle();
 		const word = joins ? "Join" : "Exchange";
 		const take = (/** @type {number} */ id) => (close(), void does[what](track, id));
@@ -165,7 +163,11 @@ export function mountMenu(context, timeline, does) {
 					),
 				),
 		);
-		takes = (id) => id !== track && take(id);
+		takes = (id) => {
+			if (found.some((other) => other.id === id)) return take(id);
+			const { why: not } = exchangeable(id, null, lanes?.tracks ?? [], step);
+			if (id !== track) actions.note("info", `${id} cannot be exchanged with ${track}`, not);
+		};
 	}
 
 	/** @param {number} track */

@@ -141,7 +141,7 @@ export function standsFor(preview, id, result) {
 }
 
 /**
- * Others alive at a step or near it, the nearest first: whom a track may be joined or exchanged with.
+ * Others alive at a step or near it, the nearest first.
  * @param {number} id
  * @param {Server.Step | null} result
  * @param {Server.TrackLife[]} tracks
@@ -161,6 +161,34 @@ export function neighbours(id, result, tracks, step) {
 			return { id: track.id, metres, steps: away(track), first: track.first, last: track.last };
 		})
 		.sort((a, b) => a.steps - b.steps || (a.metres ?? 1e9) - (b.metres ?? 1e9) || a.id - b.id);
+}
+
+/**
+ * Whom a track may be exchanged with from a step on: who is there before the step and from it on, as
+ * it is itself, the nearest first; where that is nobody, why.
+ * @param {number} id
+ * @param {Server.Step | null} result
+ * @param {Server.TrackLife[]} tracks
+ * @param {number} step
+ */
+export function exchangeable(id, result, tracks, step) {
+	const both = (/** @type {{first: number, last: number}} */ { first, last }) =>
+		first < step && step <= last;
+	const own = tracks.find((track) => track.id === id);
+	if (!own || !both(own))
+		return {
+			found: [],
+			why:
+				!own || step < own.first || step > own.last
+					? `Track ${id} is not there at step ${step}` +
+						(own ? `: it is from step ${own.first} to ${own.last}.` : ".")
+					: `Track ${id} begins at step ${step}: there is nothing before it to exchange.`,
+		};
+	const found = neighbours(id, result, tracks, step).filter(both);
+	return {
+		found,
+		why: found.length ? "" : `Nobody else is there both before step ${step} and from it on.`,
+	};
 }
 
 /**
