@@ -16,7 +16,7 @@ from tracker.fusion.told import told_by_step
 from tracker.parameters import RunParameters, Stage
 from tracker.runs.fitting import default_parameters
 from tracker.runs.gaps import where_to_keep
-from tracker.runs.run import Cancelled, Progress, Run, stage_keys
+from tracker.runs.run import Cancelled, Progress, Run, key_without_names, stage_keys
 from tracker.runs.single_views import Cancel, SingleViews
 from tracker.runs.stage_cache import FusionColumn, StageCache, TrackColumn, ViewColumn
 from tracker.sequences.pictures.frames import FrameReader
@@ -92,7 +92,9 @@ def compute(
     sound = False
     try:
         _fuse(run, total, reader, telling, cancelled, thread_begins)
-        _smooth(run, total, telling, cancelled)
+        # what changed while it was read is nothing to go on from
+        known = None if run.costly and len(run.views) > taken else cache
+        _smooth(run, total, telling, cancelled, known)
         _settle(run, telling)
         sound = True
     except Cancelled:
@@ -215,7 +217,9 @@ def _last_stage(run: Run) -> Stage:
     return "tracks" if there else "smoothing"
 
 
-def _smooth(run: Run, total: int, telling: _Telling, cancelled: Cancel) -> None:
+def _smooth(
+    run: Run, total: int, telling: _Telling, cancelled: Cancel, cache: StageCache | None
+) -> None:
     """Put the smoothed people in the place of the filter's."""
     telling.forget_meanwhile()
     if run.parameters.smoothing_method == "none" or run.tracks is not run.filtered:
@@ -230,7 +234,10 @@ def _smooth(run: Run, total: int, telling: _Telling, cancelled: Cancel) -> None:
         method = smoothing.create(run.sequence, run.parameters)
         views, fused = run.views[:total], run.fused[:total]
         if run.corrections and _takes(method.smooth, "corrections"):
-            run.smoothed = method.smooth(views, fused, check, run.corrections)
+            more = {}
+            if cache and total == run.sequence.frames and _takes(method.smooth, "earlier"):
+                more["earlier"] = cache.on_the_way(key_without_names(run))
+            run.smoothed = method.smooth(views, fused, check, run.corrections, **more)
         else:
             run.smoothed = method.smooth(views, fused, check)
         if run.smoothed is None:

@@ -18,7 +18,9 @@ from tracker.corrections.log import dump, parse
 from tracker.fusion.multi_bernoulli import MultiBernoulli
 from tracker.parameters import RunParameters, with_values
 from tracker.pipeline import Run
+from tracker.runs.stage_cache import StageCache
 from tracker.sequences.sequence import Sequence
+from tracker.smoothing.identity import identities
 
 STEPS = 80
 FUSIONS = ("multi_bernoulli", "sequential_phd")
@@ -43,11 +45,12 @@ def run_of(
     fusion: str = "multi_bernoulli",
     smoothing: str = "identities",
     previous: Run | None = None,
+    cache: StageCache | None = None,
 ) -> Run:
     """Boxes as they are, tracked."""
     values = {"fusion_method": fusion, "smoothing_method": smoothing, "fusion.memory": 0.0}
     parameters = with_values(RunParameters(single_view="none"), values)
-    return pipeline.compute(whole, parameters, corrections=told, previous=previous)
+    return pipeline.compute(whole, parameters, corrections=told, previous=previous, cache=cache)
 
 
 def place(run: Run, step: int, y: float) -> list[float]:
@@ -216,6 +219,47 @@ def test_any_sequence_of_corrections_and_undos_ends_where_the_rest_alone_would(
             told = [*told, action]
         run = run_of(_GAP, tuple(told), previous=run)
     assert same_tracks(run, run_of(_GAP, tuple(told)))
+
+
+_CACHE = StageCache()
+"""Of all examples together, so that each finds what others with other corrections left."""
+
+
+@settings(deadline=None, max_examples=15, suppress_health_check=[HealthCheck.too_slow])
+@given(st.lists(st.sampled_from(_CHOICES), unique=True, max_size=6))
+def test_what_other_corrections_left_changes_nothing(told: list[Correction]) -> None:
+    once = run_of(_GAP, tuple(told))
+    again = run_of(_GAP, tuple(told), cache=_CACHE)
+    assert same_tracks(once, again)
+    assert once.outcomes == again.outcomes
+    if told:
+        assert once.smoothed is not None
+        assert again.smoothed is not None
+        assert once.smoothed.decisions == again.smoothed.decisions
+
+
+def test_what_was_settled_before_is_not_settled_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    solves: list[list[Correction]] = []
+    settled = identities._settled
+
+    def counted(*given: Any) -> Any:
+        solves.append(given[3])
+        return settled(*given)
+
+    monkeypatch.setattr(identities, "_settled", counted)
+    cache = StageCache()
+    same, parted = _CHOICES[0], _CHOICES[1]
+    as_it_is = make(kind="same", places=[place(_BEFORE, 5, -0.7), place(_BEFORE, 9, -0.7)])
+    run_of(_GAP, (same,), cache=cache)
+    first = len(solves)
+    assert [same] in solves
+    held = run_of(_GAP, (same, as_it_is), cache=cache)
+    assert len(solves) == first, "what holds by itself asks for nothing"
+    assert [one.met for one in held.outcomes] == [True, True]
+    run_of(_GAP, (same, as_it_is, parted), cache=cache)
+    assert solves[first:] == [[same, parted]], "only with the new one"
+    run_of(_GAP, (same,), cache=cache)
+    assert len(solves) == first + 1, "and nothing for taking it back"
 
 
 def test_a_method_that_takes_no_corrections_runs_as_before(monkeypatch: pytest.MonkeyPatch) -> None:

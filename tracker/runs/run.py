@@ -126,6 +126,12 @@ def resting_of(run: Run) -> list[str]:
     return resting(tracks.frames, tracks.ids, tracks.positions, run.corrections, run.outcomes)
 
 
+def key_without_names(run: Run) -> str:
+    """The key of stage 3 without what a person said of who is who: what it begins with."""
+    said = tuple(one for one in run.corrections if one.kind in IN_THE_FUSION)
+    return stage_keys(run.sequence, run.parameters, run.seed, said)["smoothing"]
+
+
 def stage_keys(
     sequence: Sequence,
     parameters: RunParameters,

@@ -61,6 +61,21 @@ class TrackColumn:
     """As the filter alone has them; the same ones where nothing is smoothed."""
 
 
+class Kept:
+    """What smoothings that share a beginning found on their way, among the columns of a cache."""
+
+    def __init__(self, cache: StageCache, key: str) -> None:
+        self._cache, self._key = cache, key
+
+    def get(self, what: str) -> Any:
+        """Something that was kept, None where it is not there."""
+        return self._cache._get("smoothing", f"{self._key} {what}")
+
+    def put(self, what: str, found: object) -> None:
+        """Keep something for later runs."""
+        self._cache._put("smoothing", f"{self._key} {what}", found)
+
+
 class StageCache:
     """Columns by the key of their stage. Thread-safe."""
 
@@ -128,6 +143,10 @@ class StageCache:
         tracks: TrackColumn | None = self._get("tracks", key)
         return tracks
 
+    def on_the_way(self, key: str) -> Kept:
+        """What was found on the way to stage 3, by the key of what it begins with."""
+        return Kept(self, key)
+
     def keep_views(self, key: str, column: ViewColumn, *, complete: bool) -> None:
         """Keep stage 1, unless more of it is there; a complete one on disk as well."""
         before: ViewColumn | None = self._get("single_view", key)
@@ -188,9 +207,9 @@ class StageCache:
             self._later += weight
 
 
-def weigh(column: ViewColumn | FusionColumn | Smoothed | TrackColumn) -> int:
-    """Bytes of memory, estimated from some of the steps."""
-    if isinstance(column, Smoothed | TrackColumn):
+def weigh(column: object) -> int:
+    """Bytes of memory; of what has steps estimated from some of them."""
+    if not isinstance(column, ViewColumn | FusionColumn):
         return _weight(column, set())
     every = max(1, len(column.steps) // _SAMPLED)
     sampled = [_weight(step, set()) for step in column.steps[::every]]

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker import trajectories
@@ -24,6 +24,7 @@ from tracker.smoothing.identity import identities, pieces
 from tracker.smoothing.identity.cutting import Tracked
 from tracker.smoothing.identity.people import Seen
 from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.protocol import Earlier, Nothing
 from tracker.smoothing.result import Decision, Joined, Smoothed
 from tracker.smoothing.smoother import Fitted, Shared, Smoother
 
@@ -38,6 +39,27 @@ class _Decided(NamedTuple):
     joined: Joined | None = None
     limits: Mapping[int, tuple[int, int]] = MappingProxyType({})
     """Of some labels the first and the last step at which corrections let them be."""
+    key: str = ""
+    """Of what corrections had to be made to hold; empty where that was not asked."""
+
+
+class _First(NamedTuple):
+    """The filter's own tracks, and the log odds of each in its whole life."""
+
+    paths: Paths
+    odds: Float[ndarray, " n"]
+
+
+class _Start(NamedTuple):
+    """Where the last settling of who is who begins: what nobody's word on that has touched."""
+
+    fitted: Fitted
+    shared: Shared
+    learnt: Calibration
+    contested: Float[ndarray, " N"]
+    had: Bool[ndarray, " N"]
+    names: Int[ndarray, " N"]
+    first: _First
 
 
 class Positions:
@@ -64,9 +86,10 @@ class Positions:
         fused: Many[FusionResult],
         check: Callable[[], None] = lambda: None,
         corrections: Many[Correction] = (),
+        earlier: Earlier | None = None,
     ) -> Smoothed:
         """The tracks of some steps from step 0 on, each by the boxes of all of them."""
-        p = self._parameters.smoothing
+        p, earlier = self._parameters.smoothing, earlier or Nothing()
         smoother = Smoother(
             self._sequence, self._parameters.fusion, views, corrections, learning=p.learning
         )
@@ -79,13 +102,19 @@ class Positions:
         links = reading.read_links(fused, paths, smoother.cameras)
         check()
         paths, existences, links, learnt, decided = self._named(
-            smoother, paths, existences, links, views, check, corrections
+            smoother, paths, existences, links, views, check, corrections, earlier
         )
+        known: Smoothed | None = earlier.get(f"smoothed-{decided.key}") if decided.key else None
+        if known is not None:
+            return known
         turns = p.iterations if learnt is None else 1  # what was settled lies near its boxes
         fitted, shared, learnt = _settled(
             smoother, paths, existences, links, p, learnt, check, turns=turns
         )
-        return _finished(smoother, fitted, shared, learnt, p, decided)
+        found = _finished(smoother, fitted, shared, learnt, p, decided)
+        if decided.key:
+            earlier.put(f"smoothed-{decided.key}", found)
+        return found
 
     def _named(
         self,
@@ -96,6 +125,7 @@ class Positions:
         views: Many[tuple[ViewResult, ...]],
         check: Callable[[], None],
         corrections: Many[Correction],
+        earlier: Earlier,
     ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, _Decided]:
         """The tracks of people, with which existence each row asks for boxes, and what was learnt
         on the way: here the filter's own."""
@@ -114,32 +144,56 @@ class Identities(Positions):
         views: Many[tuple[ViewResult, ...]],
         check: Callable[[], None],
         corrections: Many[Correction],
+        earlier: Earlier,
     ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, _Decided]:
+        p = self._parameters.smoothing
+        seen = Seen.of(views) if p.appearance > 0.0 else Seen()
+        start: _Start | None = earlier.get("start")
+        if start is None:
+            start = self._start(smoother, paths, existences, links, seen, check)
+            earlier.put("start", start)
+        tracked = Tracked(
+            smoother, start.fitted, start.shared, start.contested, start.had, start.names
+        )
+        found, key = identities.settle(tracked, p, seen, corrections, earlier)
+        check()
+        existences = np.where(found.had, 1.0, lifetimes.UNSURE)
+        first = start.first
+        gone = np.flatnonzero(~np.isin(first.paths.labels, found.names)).tolist()
+        removed = [_removed(first.paths, path, first.odds[path]) for path in gone]
+        decided = _Decided([*found.decisions, *removed], found.joined, found.limits, key)
+        return found.paths, existences, found.links, start.learnt.of_people(found.origins), decided
+
+    def _start(
+        self,
+        smoother: Smoother,
+        paths: Paths,
+        existences: Float[ndarray, " N"],
+        links: Links,
+        seen: Seen,
+        check: Callable[[], None],
+    ) -> _Start:
+        """All rounds but the last settling, which alone obeys what was said of who is who."""
         p = self._parameters.smoothing
         contested = pieces.contested(paths, links)
         fitted, shared, learnt = _settled(
             smoother, paths, existences, links, p, None, check, turns=p.iterations
         )
-        first, first_odds = fitted.paths, lifetimes.lifetimes(smoother, fitted.paths, shared, p)[1]
-        seen = Seen.of(views) if p.appearance > 0.0 else Seen()
+        first_odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)[1]
+        first = _First(fitted.paths, first_odds)
         names = np.where(existences == 1.0, paths.labels[paths.owners], -1)
-        for again in range(p.rounds):
-            if again:  # who is who tells whose boxes are whose, and those again who is who
-                fitted, shared, learnt = _settled(
-                    smoother, paths, existences, links, p, learnt, check, turns=1
-                )
-                contested = pieces.contested(fitted.paths, shared.links)
+        for _ in range(p.rounds - 1):
             tracked = Tracked(smoother, fitted, shared, contested, existences == 1.0, names)
-            said = corrections if again == p.rounds - 1 else ()
-            found = identities.settle(tracked, p, seen, said)
+            found, _key = identities.settle(tracked, p, seen)
             check()
-            paths, links, names = found.paths, found.links, found.names
+            existences, names = np.where(found.had, 1.0, lifetimes.UNSURE), found.names
             learnt = learnt.of_people(found.origins)
-            existences = np.where(found.had, 1.0, lifetimes.UNSURE)
-        gone = np.flatnonzero(~np.isin(first.labels, names))
-        removed = [_removed(first, path, first_odds[path]) for path in gone.tolist()]
-        decided = _Decided([*found.decisions, *removed], found.joined, found.limits)
-        return paths, existences, links, learnt, decided
+            # who is who tells whose boxes are whose, and those again who is who
+            fitted, shared, learnt = _settled(
+                smoother, found.paths, existences, found.links, p, learnt, check, turns=1
+            )
+            contested = pieces.contested(fitted.paths, shared.links)
+        return _Start(fitted, shared, learnt, contested, existences == 1.0, names, first)
 
 
 def _settled(

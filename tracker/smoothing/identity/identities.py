@@ -16,6 +16,7 @@ from numpy import ndarray
 
 from tracker.assignment import names_by_majority
 from tracker.corrections import Correction
+from tracker.corrections.kinds import OF_PEOPLE, digest
 from tracker.corrections.kinds import leeway as corrections_leeway
 from tracker.corrections.outcomes import outcomes
 from tracker.parameters import SmoothingParams
@@ -28,6 +29,7 @@ from tracker.smoothing.identity.people import of_chains as people_of_chains
 from tracker.smoothing.identity.program import Cut
 from tracker.smoothing.identity.ties import Seeker, Ties
 from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.protocol import Earlier, Nothing
 from tracker.smoothing.result import Decision, Joined
 from tracker.smoothing.smoother import Shared
 
@@ -65,7 +67,8 @@ def settle(
     parameters: SmoothingParams,
     seen: Seen,
     corrections: Many[Correction] = (),
-) -> Settled:
+    earlier: Earlier | None = None,
+) -> tuple[Settled, str]:
     """Cut and join.
 
     Of what a person said of who is who only what does not hold by itself is made to hold, one
@@ -76,17 +79,28 @@ def settle(
         parameters: When to cut, and what holds together.
         seen: What the boxes look like.
         corrections: What a person said of who is who.
+        earlier: What was found for these tracks while other corrections were obeyed: most of what
+            is obeyed on the way to all of them is what was on the way to all but the newest.
+
+    Returns:
+        The people, and a hash of what had to be made to hold for them.
     """
+    earlier = earlier or Nothing()
     leeway = corrections_leeway(tracked.smoother.model.step_time)
     waiting = [one for one in corrections if one.pairs or one.apart]
-    plain = cutting.cuts(tracked, parameters)
+    plain: cutting.Cuts | None = None
     turn = 0
     while True:
         obeyed = [one for one in corrections if one not in waiting]
-        found = _settled(tracked, parameters, seen, obeyed, leeway, plain)
+        key = f"settled-{digest(obeyed, OF_PEOPLE)}"
+        found: Settled | None = earlier.get(key)
+        if found is None:
+            plain = plain or cutting.cuts(tracked, parameters)
+            found = _settled(tracked, parameters, seen, obeyed, leeway, plain)
+            earlier.put(key, found)
         unmet = _unmet(found.paths, waiting, leeway, careful=turn < _CAREFUL)
         if not unmet:
-            return found
+            return found, key
         waiting, turn = [one for one in waiting if one not in unmet], turn + 1
 
 
