@@ -307,7 +307,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 				"span",
 				{},
 				unmet
-					? `${unmet} found no track. `
+					? `${unmet} ${unmet === 1 ? "does" : "do"} not hold. `
 					: newest.length
 						? "A run again keeps them: each is tied to a place and a step. "
 						: "What you put right stands here, and holds after every change of parameters. ",
