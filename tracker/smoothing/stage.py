@@ -44,10 +44,10 @@ class _Decided(NamedTuple):
 
 
 class _First(NamedTuple):
-    """The filter's own tracks, and the log odds of each in its whole life."""
+    """The filter's own tracks, and whose box each was by them."""
 
     paths: Paths
-    odds: Float[ndarray, " n"]
+    shared: Shared
 
 
 class _Start(NamedTuple):
@@ -160,7 +160,10 @@ class Identities(Positions):
         existences = np.where(found.had, 1.0, lifetimes.UNSURE)
         first = start.first
         gone = np.flatnonzero(~np.isin(first.paths.labels, found.names)).tolist()
-        removed = [_removed(first.paths, path, first.odds[path]) for path in gone]
+        removed = []
+        if gone:
+            _, odds = lifetimes.lifetimes(smoother, first.paths, first.shared, p)
+            removed = [_removed(first.paths, path, odds[path]) for path in gone]
         decided = _Decided([*found.decisions, *removed], found.joined, found.limits, key)
         return found.paths, existences, found.links, start.learnt.of_people(found.origins), decided
 
@@ -179,8 +182,7 @@ class Identities(Positions):
         fitted, shared, learnt = _settled(
             smoother, paths, existences, links, p, None, check, turns=p.iterations
         )
-        first_odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)[1]
-        first = _First(fitted.paths, first_odds)
+        first = _First(fitted.paths, shared)
         names = np.where(existences == 1.0, paths.labels[paths.owners], -1)
         for _ in range(p.rounds - 1):
             tracked = Tracked(smoother, fitted, shared, contested, existences == 1.0, names)

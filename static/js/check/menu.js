@@ -164,7 +164,7 @@ export function mountMenu(context, timeline, does) {
 				),
 		);
 		takes = (id) => {
-			if (found.some((other) => other.id === id)) return take(id);
+			if (id !== track && (joins || found.some((other) => other.id === id))) return take(id);
 			const { why: not } = exchangeable(id, null, lanes?.tracks ?? [], step);
 			if (id !== track) actions.note("info", `${id} cannot be exchanged with ${track}`, not);
 		};
