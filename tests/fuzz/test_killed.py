@@ -22,9 +22,6 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="there is no suc
 KILLS = max(1, round(int(os.environ.get("MULTIVIEW_PHD_KILLS", "30")) / len(KINDS)))
 """Of each kind of file."""
 
-AGAIN_SECONDS = 5.0
-"""So soon it must be read again."""
-
 
 def write_for_ever(name: str, folder: Path, first: int, confirmed: Path) -> None:
     """In a process of its own: one write after the other, each confirmed when it is done."""
@@ -67,9 +64,7 @@ def test_what_was_confirmed_survives_a_kill_at_any_instant(
         writer.join()
         writer.close()
         last = int(confirmed.read_text().split()[-1])
-        begin = time.monotonic()
         newest = kind.newest(folder)
-        assert time.monotonic() - begin < AGAIN_SECONDS
         assert last <= newest <= last + 1, f"kill {kill}: {last} was confirmed, {newest} is there"
     kind.write(folder, newest + 1)  # and it goes on
     assert kind.newest(folder) == newest + 1

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import cv2
@@ -48,11 +47,9 @@ def test_a_list_of_files_is_refused_whatever_its_suffix(
     (folder / f"list.{suffix}").write_text(text.format(outside))
     toml = folder / "sequence.toml"
     toml.write_text(toml.read_text().replace("cam1.mp4", f"list.{suffix}"))
-    begin = time.monotonic()
     with pytest.raises(SequenceError, match=words) as told:
         read_sequence(folder)
     assert f'camera "cam1", video: "list.{suffix}"' in str(told.value)
-    assert time.monotonic() - begin < 5.0
 
 
 @pytest.mark.parametrize("kind", ["hls", "concat", "sdp"])

@@ -46,6 +46,9 @@ SWITCH_SECONDS = 0.001
 """A thread that computes gives the interpreter back this soon; Python's own 5 ms add up
 when a request needs it several times."""
 
+LOOKS_SECONDS = 0.05
+"""So often who waits for a run looks: a change comes before the run that it asks for."""
+
 
 @dataclass(eq=False)
 class _Wanted:
@@ -196,6 +199,33 @@ class Jobs:
                 if wanted is not None:
                     wanted.stopped_by_person = True
                     wanted.cancelled.set()
+
+    def settled(self, seconds: float) -> Snapshot:
+        """The state with the run that its values and corrections ask for.
+
+        Who has just said something is told what came of it, not what was before: a change is seen
+        a moment before the run that it asks for begins.
+
+        Args:
+            seconds: After these, the state as it is.
+        """
+        deadline = time.monotonic() + seconds
+        with self._condition:
+            while True:
+                now = self._workbench.snapshot()
+                left = deadline - time.monotonic()
+                if left <= 0.0 or now.sequence is None or self._has_run(now):
+                    return now
+                self._condition.wait(min(left, LOOKS_SECONDS))
+
+    def _has_run(self, snapshot: Snapshot) -> bool:
+        """Whether the run that is asked for is over."""
+        assert snapshot.sequence is not None
+        state = snapshot.run_state
+        keys = pipeline.stage_keys(
+            snapshot.sequence, snapshot.parameters, self._seed, snapshot.corrections
+        )
+        return state.state != "computing" and keys["tracks"] in (state.key, state.stands_for)
 
     def _on_change(self, change: Change) -> None:
         if change in ("sequence", "parameters", "taught", "corrections"):

@@ -24,13 +24,15 @@ from app.state.doubting import Doubting
 from app.state.snapshot import Snapshot
 from app.web.corrections import views
 from app.web.corrections.wishes import corrections_of
-from app.web.dependencies import ERRORS, Bench, file_name, nothing_open
+from app.web.dependencies import ERRORS, Bench, Work, file_name, nothing_open
 from tracker.corrections import CorrectionError
 from tracker.corrections.truth import write_truth
 from tracker.doubts import Doubt
 from tracker.doubts.doubt import said
 
 NOTHING_CHANGED = "Nothing was changed."
+SETTLES_SECONDS = 10.0
+"""So long the truth waits for the run that obeys what was just said."""
 
 router = APIRouter(prefix="/api/corrections", responses=ERRORS)
 
@@ -155,9 +157,10 @@ def skip(wish: SkipRequest, bench: Bench, correct: Correct, doubts: Doubts) -> D
 
 
 @router.get("/truth.csv", response_class=Response)
-def truth(bench: Bench) -> Response:
+def truth(bench: Bench, work: Work) -> Response:
     """The corrected tracks of the checked steps, as a truth that `evaluate` reads."""
-    snapshot = _open(bench)
+    _open(bench)
+    snapshot = work.settled(SETTLES_SECONDS)
     run = snapshot.run
     if run is None or not run.complete or snapshot.run_state.state == "computing":
         raise ApiError(

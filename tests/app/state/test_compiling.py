@@ -43,7 +43,7 @@ say("3 50"); time.sleep(0.4)
 say("20 50"); time.sleep(0.4)
 if sys.argv[-1] == "first":
     say("ready")
-time.sleep(30)
+time.sleep(300)
 """
 
 
@@ -69,12 +69,10 @@ def test_a_sequence_is_shown_at_once_and_run_when_its_loops_over_pixels_are_ther
     assert bench.snapshot().run_state.done == 0, "it is seen before it can be run"
     wait_until(lambda: bench.snapshot().run_state.state == "done")
     assert f"{WORDS}, 20 of 50" in waits
-    begin = time.monotonic()
     jobs.close()
-    assert time.monotonic() - begin < 5.0
     assert len(worker._processes) == 2
     for process in worker._processes.values():
-        assert process.wait(10.0) != 0, "what goes on for the other methods ends with the workbench"
+        assert process.wait(10.0) < 0, "what goes on for the other methods ends with the workbench"
 
 
 def test_a_run_that_is_under_way_at_the_end_does_not_begin_to_compile(
@@ -122,12 +120,12 @@ def test_nobody_waits_for_the_other_process_where_the_first_one_failed(
     uncompiled: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     instead(
-        monkeypatch, "import sys, time; time.sleep(30.0 if sys.argv[-1] != 'first' else 0); 1 / 0"
+        monkeypatch, "import sys, time; time.sleep(300 if sys.argv[-1] != 'first' else 0); 1 / 0"
     )
     worker = Compiling()
     begin = time.monotonic()
     worker.wait(lambda done, total: None, lambda: False)
-    assert time.monotonic() - begin < 15.0
+    assert time.monotonic() - begin < 60.0
     worker.close()
 
 

@@ -59,8 +59,8 @@ def desk(data: Path) -> Iterator[Desk]:
 
 @pytest.fixture
 def slow(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
-    """Runs take a while, step by step; counts how many there were, and at once."""
-    counts = {"runs": 0, "now": 0, "most": 0}
+    """Runs take a while, step by step; counts how many there were, at once, and stopped midway."""
+    counts = {"runs": 0, "now": 0, "most": 0, "stopped": 0}
     real = pipeline.compute
     lock = threading.Lock()
 
@@ -77,6 +77,9 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
             counts["most"] = max(counts["most"], counts["now"])
         try:
             return real(*args, cancelled=slowly, **kwargs)
+        except Cancelled:
+            counts["stopped"] += 1
+            raise
         finally:
             with lock:
                 counts["now"] -= 1
@@ -165,16 +168,28 @@ def test_changes_from_many_threads_still_end_in_the_stores_parameters(
     assert_same_tracks(desk.now.run, engine(desk))
 
 
+def test_who_waits_for_a_run_gets_that_of_the_values_as_they_are(
+    desk: Desk, slow: dict[str, int]
+) -> None:
+    desk.open()
+    desk.bench.set_parameters({P_D: 0.7}, "test")
+    assert desk.jobs.settled(0.0).run_state.state == "computing", "there is no patience"
+    now = desk.jobs.settled(60.0)
+    assert now.run_state.state == "done"
+    assert now.run is not None
+    assert now.run.parameters == now.parameters
+    assert slow["runs"] == 2, "that of the defaults before it"
+
+
 @pytest.mark.full
-def test_a_superseded_run_stops_soon(desk: Desk, slow: dict[str, int]) -> None:
+def test_a_superseded_run_stops_midway(desk: Desk, slow: dict[str, int]) -> None:
     desk.open()
     desk.bench.set_parameters({P_D: 0.7}, "test")
     wait_until(lambda: slow["now"] == 1)
-    asked = time.monotonic()
     runs = slow["runs"]
     desk.bench.set_parameters({P_D: 0.8}, "test")
     wait_until(lambda: slow["runs"] == runs + 1)
-    assert time.monotonic() - asked < 0.5
+    assert slow["stopped"] == 1
     desk.wait("done")
 
 
@@ -302,14 +317,13 @@ def test_another_sequence_starts_from_its_own_defaults(desk: Desk, tmp_path: Pat
     assert now.run_state.total == 30
 
 
-def test_closing_during_a_run_is_quick(data: Path, slow: dict[str, int]) -> None:
+def test_closing_stops_a_run_midway(data: Path, slow: dict[str, int]) -> None:
     desk = Desk(data)
     desk.jobs.open("crossing").result(30.0)
     wait_until(lambda: slow["now"] == 1)
-    begin = time.monotonic()
     desk.jobs.close()
-    assert time.monotonic() - begin < 1.5
     wait_until(lambda: slow["now"] == 0)
+    assert slow["stopped"] == 1
 
 
 def test_the_sequences_of_the_data_folder_have_keys_of_their_own(crossing: Path) -> None:
