@@ -16,7 +16,7 @@ from app.state.kept.json_files import read_json, write_json
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
 from tracker.corrections import Correction, CorrectionError
-from tracker.corrections.contradictions import refuse_contradiction
+from tracker.corrections.contradictions import refuse_contradiction, said_again
 from tracker.corrections.log import Log, open_log, own_place, write_log, writing_place
 from tracker.sequences.sequence import Sequence as Recording
 
@@ -87,8 +87,11 @@ class Correcting:
             before = self._workbench.snapshot().corrections
             after = list(before)
             for one in new:
-                refuse_contradiction(after, one)
-                after.append(one)
+                old, again = said_again(after, one)
+                if old is not None:
+                    after.remove(old)
+                refuse_contradiction(after, again)
+                after.append(again)
             words = new[0].words if len(new) == 1 else f"{len(new)} corrections"
             self._do(Action(words, before, tuple(after)))
 

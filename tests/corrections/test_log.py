@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tracker.corrections import Correction, CorrectionError
-from tracker.corrections.contradictions import refuse_contradiction
+from tracker.corrections.contradictions import refuse_contradiction, said_again
 from tracker.corrections.kinds import KINDS, digest, make
 from tracker.corrections.log import dump, open_log, parse, place_of, read_log, write_log
 from tracker.corrections.merging import difference, merge
@@ -29,6 +29,8 @@ def corrections(draw: st.DrawFn) -> Correction:
     fewest, most = KINDS[kind].places
     count = draw(st.integers(fewest, 5 if most is None else most))
     steps = sorted(draw(st.sets(st.integers(0, 900), min_size=count, max_size=count)))
+    if kind == "here":  # where somebody is, and where he was taken to be at the same step
+        steps = steps[:1] * count
     values: dict[str, object] = {
         "places": [[step, draw(_NUMBERS), draw(_NUMBERS), draw(_NUMBERS)] for step in steps]
     }
@@ -81,12 +83,13 @@ places = [[3, 5.0, 2.0, 0.8]]
         ('kind = "here"', "kind = {}", 12, "expected one of same"),
         ('kind = "here"', "kind = [[]]", 12, "expected one of same"),
         ("[[3, 5.0", "[[3.5, 5.0", 14, "places"),
-        ("[[3, 5.0, 2.0, 0.8]]", "[]", 14, "here has 1, found 0"),
+        ("[[3, 5.0, 2.0, 0.8]]", "[]", 14, "here has 1 to 2, found 0"),
         ("[9, 1.2", "[2, 1.2", 6, "forward in time"),
         ("format = 1", "format = 2", 1, "a newer program wrote it"),
         ("format = 1", "colour = 1", 1, "found colour"),
         ('kind = "here"', 'kind = "here"\ncolour = 3', 13, "colour"),
         ("[[3, 5.0", "[[nan, 5.0", 14, "places"),
+        ("0.8]]", "0.8], [4, 5.0, 2.0, 0.8]]", 14, "here says of one step"),
         ("5.0, 2.0, 0.8]]", "inf, 2.0, 0.8]]", 14, "places"),
         ('kind = "here"', 'kind = "here', 12, "not TOML"),
     ],
@@ -120,6 +123,23 @@ def test_who_is_tied_together_is_not_parted() -> None:
         refuse_contradiction([one], make(kind="same", places=[a, far]))
     with pytest.raises(CorrectionError, match="somebody is at"):
         refuse_contradiction([make(kind="here", places=[a])], make(kind="nobody", places=[a]))
+
+
+def test_whoever_is_moved_again_is_where_it_was_said_last() -> None:
+    found, first, second = (30, 1.0, 2.0, 0.9), (30, 2.5, 2.0, 0.9), (30, 2.5, 3.5, 0.9)
+    one = make(kind="here", places=[first, found])
+    again = make(kind="here", places=[second, (30, 2.6, 2.0, 0.9)])
+    old, new = said_again([one], again)
+    assert old is one
+    assert new.places == again.places[:1] + one.places[1:]
+    begun = make(kind="here", places=[first])  # nobody was there before
+    assert said_again([begun], again)[1].places == again.places[:1]
+    for other in (
+        make(kind="here", places=[second, found]),  # where another was
+        make(kind="here", places=[(31, *second[1:]), (31, *first[1:])]),
+        make(kind="here", places=[second]),
+    ):
+        assert said_again([one], other) == (None, other)
 
 
 def test_a_line_that_contradicts_one_before_is_told(tmp_path: Path) -> None:

@@ -28,7 +28,8 @@ def test_a_click_on_the_feet_is_where_they_stand(spot: tuple[float, float], came
     [
         (None, 0.125, 0.2),  # of nobody nothing else is known
         (0.525, 0.125, 0.525),  # a head that goes at 0.65 m
-        (0.3, 0.125, 0.2),
+        (0.36, 0.125, 0.36),
+        (0.23, 0.125, 0.2),
         (0.45, 0.9, 0.2),  # a person stands, whatever the filter made of the height
         (1.2, 0.9, 1.2),
     ],

@@ -133,6 +133,25 @@ def test_who_is_said_to_be_elsewhere_stays_himself_and_at_other_steps_where_he_w
 
 
 @pytest.mark.full
+@pytest.mark.parametrize(("fusion", "smoothing"), list(itertools.product(FUSIONS, SMOOTHINGS)))
+def test_who_is_meant_goes_to_the_place_however_far_it_is(fusion: str, smoothing: str) -> None:
+    whole = two_walkers()
+    before = run_of(whole, (), fusion, smoothing)
+    x, y, z = place(before, 30, 0.4)[1:]
+    for aside in (0.28, 0.8, 1.0):
+        said = make(kind="here", places=[[30, x, y + aside, z], [30, x, y, z]])
+        after = run_of(whole, (said,), fusion, smoothing)
+        assert [one.met for one in after.outcomes] == [True], after.outcomes
+        assert np.array_equal(before.tracks.frames, after.tracks.frames), "nobody else begins"
+        assert np.array_equal(before.tracks.ids, after.tracks.ids), "and he stays himself"
+        now = place(after, 30, y + aside)
+        assert np.hypot(now[1] - x, now[2] - y - aside) <= 0.1
+        moved = np.linalg.norm(after.tracks.positions - before.tracks.positions, axis=1)
+        sides = before.tracks.positions[:, 1] > 0.0
+        assert moved[~sides | (np.abs(before.tracks.frames - 30) > 25)].max() < 0.02
+
+
+@pytest.mark.full
 @pytest.mark.parametrize("fusion", FUSIONS)
 def test_a_place_is_a_measurement_of_its_accuracy(fusion: str) -> None:
     whole = two_walkers()

@@ -36,6 +36,24 @@ def refuse_contradiction(before: Many[Correction], new: Correction) -> None:
         ) from None
 
 
+def said_again(before: Many[Correction], new: Correction) -> tuple[Correction | None, Correction]:
+    """Whoever is moved again at a step is where it was said last.
+
+    Returns:
+        The *is here* among those before that put whom the new one means where it finds him; and the
+        new one, which means him by where he was before any of both.
+    """
+    if new.kind != "here" or len(new.places) < 2:
+        return None, new
+    found = new.places[1]
+    for old in reversed(before):
+        if old.kind == "here" and old.places[0].step == found.step:
+            if _distance(old.places[0], found) <= max(NEAR, old.accuracy or 0.0):
+                places = (new.places[0], *old.places[1:])
+                return old, new.model_copy(update={"places": places})
+    return None, new
+
+
 class _Contradiction(Exception):
     def __init__(self, why: str, *others: Correction) -> None:
         super().__init__(why)

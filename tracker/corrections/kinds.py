@@ -78,7 +78,12 @@ KINDS: dict[Kind, KindOf] = {
         (4, 4),
         "of two people before (first, second place) each is after where third and fourth are",
     ),
-    "here": KindOf("is here", (1, 1), "somebody is at this place", 0.1),
+    "here": KindOf(
+        "is here",
+        (1, 2),
+        "somebody is at this place; whom a run has at the second, where one is said",
+        0.1,
+    ),
     "nobody": KindOf("was nobody", (1, None), "nobody is along these places", 0.5),
     "came": KindOf(
         "came in here", (1, 1), "who is at this place came in then, and was not there just before"
@@ -135,7 +140,9 @@ class Correction(BaseModel):
         known, count = KINDS[self.kind], len(self.places)
         fewest, most = known.places
         if count < fewest or (most is not None and count > most):
-            wanted = str(fewest) if most == fewest else f"{fewest} or more"
+            wanted = {fewest: f"{fewest}", None: f"{fewest} or more"}.get(
+                most, f"{fewest} to {most}"
+            )
             raise ValueError(f"places: {self.kind} has {wanted}, found {count}")
         if any(place.step < 0 for place in self.places):
             raise ValueError("places: a step is a whole number from 0 on")
@@ -148,6 +155,11 @@ class Correction(BaseModel):
             raise ValueError(
                 "places: exchanged has two before and then two after, found steps "
                 + ", ".join(map(str, steps))
+            )
+        if self.kind == "here" and len(set(steps)) > 1:
+            raise ValueError(
+                "places: here says of one step where who is at the second place is, found steps "
+                f"{steps[0]} and {steps[1]}"
             )
         if self.kind == "nobody" and steps != sorted(set(steps)):
             raise ValueError("places: nobody has one place a step, in the order of time")

@@ -42,8 +42,8 @@ def stands(height: float, *, ground: float, half_height: float) -> bool:
 
 
 def _near_floor(half_height: float) -> float:
-    """For a target lower than a person, such as a head, no more than half of it."""
-    return min(_OFF_FLOOR, half_height)
+    """For a target lower than a person, such as a head, no more than a sixth of it."""
+    return min(_OFF_FLOOR, half_height / 3.0)
 
 
 def foot_on_floor(

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.corrections.contradictions import along
+from tracker.corrections.contradictions import NEAR, along
 from tracker.corrections.kinds import REACH, Correction, Place
 
 
@@ -59,6 +59,17 @@ class Whereabouts:
         cost = apart + np.abs(later) * (0.5 * reach / max(leeway, 1))
         best = int(np.argmin(cost))
         return int(self._order[low + best]) if cost[best] <= reach else None
+
+    def stated(self, here: Correction) -> int | None:
+        """The row of who *is here* says is there: at the place, or where a run had whom it means.
+
+        As long as nobody is at the place itself, it is who is at the second place that goes there.
+        """
+        place, *meant = here.places
+        if not meant:
+            return self.nearest(place)
+        there = self.nearest(place, reach=NEAR)
+        return self.nearest(meant[0]) if there is None else there
 
     def inside(self, nobody: Correction) -> Bool[ndarray, " N"]:
         """The rows within reach of the way along the places of *nobody*, at its steps."""

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.corrections import Correction
-from tracker.corrections.contradictions import along
+from tracker.corrections.contradictions import NEAR, along
 from tracker.corrections.stating import doubted
 from tracker.filters import gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
@@ -29,6 +29,8 @@ class Told:
     """Where somebody is, world metres."""
     sigmas: Float[ndarray, " K"]
     """Standard deviations of the places, metres."""
+    meant: Float[ndarray, "K 3"]
+    """Where who is there was found, world metres; NaN where nobody is meant in particular."""
     empty: Float[ndarray, "E 2"]
     """Where nobody begins, on the ground, world metres."""
     around: Float[ndarray, " E"]
@@ -37,12 +39,13 @@ class Told:
 
 def told_by_step(corrections: Iterable[Correction]) -> dict[int, Told]:
     """What is said of each step, where anything is."""
-    here: dict[int, list[tuple[ndarray, float]]] = {}
+    here: dict[int, list[tuple[ndarray, float, ndarray]]] = {}
     empty: dict[int, list[tuple[tuple[float, float], float]]] = {}
     for one in corrections:
         if one.kind == "here":
-            place = one.places[0]
-            here.setdefault(place.step, []).append((place.point, one.accuracy or 0.0))
+            place, *meant = one.places
+            whom = meant[0].point if meant else np.full(3, np.nan)
+            here.setdefault(place.step, []).append((place.point, one.accuracy or 0.0, whom))
         elif one.kind == "nobody":
             first, last = one.steps
             for step in range(first, last + 1):
@@ -50,8 +53,9 @@ def told_by_step(corrections: Iterable[Correction]) -> dict[int, Told]:
                     empty.setdefault(step, []).append((where, one.accuracy or 0.0))
     return {
         step: Told(
-            np.array([place for place, _ in here.get(step, [])]).reshape(-1, 3),
-            np.array([sigma for _, sigma in here.get(step, [])]),
+            np.array([place for place, _, _ in here.get(step, [])]).reshape(-1, 3),
+            np.array([sigma for _, sigma, _ in here.get(step, [])]),
+            np.array([whom for _, _, whom in here.get(step, [])]).reshape(-1, 3),
             np.array([where for where, _ in empty.get(step, [])]).reshape(-1, 2),
             np.array([reach for _, reach in empty.get(step, [])]),
         )
@@ -92,9 +96,11 @@ def obey(
         forbidden = (apart <= told.around).any(axis=1) & (mixture.labels >= first_new_label)
         kept = np.flatnonzero(~forbidden)
         mixture, record = mixture.take(kept), record.take(kept)
-    for place, sigma in zip(told.places, told.sigmas.tolist(), strict=True):
+    for place, sigma, whom in zip(told.places, told.sigmas.tolist(), told.meant, strict=True):
         noise = sigma**2 * np.eye(3)
-        best = _meant(mixture, place, noise, model)
+        best = _meant(mixture, whom, NEAR**2 * np.eye(3), model) if whom[0] == whom[0] else None
+        if best is None:
+            best = _meant(mixture, place, noise, model)
         if best is None:
             nameless = np.zeros(1, dtype=np.int64)
             one = GaussianMixture(np.array([_SURE]), place[None], noise[None], nameless)
@@ -130,7 +136,8 @@ def _updated(
     """One component updated by a place, and its label sure to be there: Joseph's form."""
     mean, covariance = mixture.means[component], mixture.covariances[component].copy()
     sigma = float(np.sqrt(noise[0, 0]))
-    covariance[:3, :3] += doubted(place - mean[:3], covariance[:3, :3], sigma)
+    doubt = doubted(place - mean[:3], covariance[:3, :3], sigma)
+    covariance[:3, :3] += doubt
     gain = np.linalg.solve(covariance[:3, :3] + noise, covariance[:3]).T
     rest = np.eye(len(mean))
     rest[:, :3] -= gain
@@ -138,6 +145,8 @@ def _updated(
     weights = mixture.weights.copy()
     means[component] = mean + gain @ (place - mean[:3])
     covariances[component] = rest @ covariance @ rest.T + gain @ noise @ gain.T
+    # the boxes of the next step err as those of this one do: they are still this person's
+    covariances[component, :3, :3] += doubt
     own = mixture.labels == mixture.labels[component]
     weights[component] += max(_SURE - float(weights[own].sum()), 0.0)
     return GaussianMixture(weights, means, covariances, mixture.labels)

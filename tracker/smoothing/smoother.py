@@ -222,16 +222,16 @@ class Smoother:
         return found
 
     def pinned(self, paths: Paths) -> tuple[Int[ndarray, " K"], list[Correction]]:
-        """The rows of paths that somebody said is there, each of one correction at most: the
-        nearest within reach."""
+        """The rows of paths that somebody said is there, each of one correction: of two the
+        later."""
         if not self._here:
             return np.zeros(0, dtype=np.int64), []
         whereabouts = Whereabouts(paths.steps, paths.states[:, :3])
         rows: dict[int, Correction] = {}
         for one in self._here:
-            row = whereabouts.nearest(one.places[0])
+            row = whereabouts.stated(one)
             if row is not None:
-                rows.setdefault(row, one)
+                rows[row] = one
         return np.array(list(rows), dtype=np.int64), list(rows.values())
 
     def stated(self, paths: Paths) -> Calibration:

@@ -37,10 +37,7 @@ def corrections_of(wish: CorrectionWish, snapshot: Snapshot, note: str) -> tuple
         if one is not None and one >= sequence.frames:
             raise CorrectionError(f"step: expected 0 … {sequence.frames - 1}, found {one}")
     if wish.kind == "here" and (wish.clicks or wish.place is not None):
-        return (
-            make(kind="here", places=[_place(wish, snapshot, sequence, step)],
-                 accuracy=wish.accuracy, note=note),
-        )  # fmt: skip
+        return (_here(wish, snapshot, sequence, step, note),)
     return _of_tracks(wish, snapshot, step, note)
 
 
@@ -90,6 +87,23 @@ def _of_tracks(
     return (make(kind="here", places=[place], accuracy=wish.accuracy, note=note),)
 
 
+def _here(
+    wish: CorrectionWish, snapshot: Snapshot, sequence: Sequence, step: int, note: str
+) -> Correction:
+    """Where somebody is; who is meant by where the shown run has the track."""
+    places = [_place(wish, snapshot, sequence, step)]
+    low, high = sequence.room.minimum, sequence.room.maximum
+    if not all(low[k] <= places[0][1 + k] <= high[k] for k in (0, 1)):
+        raise CorrectionError(
+            f"place: {places[0].words} lies outside the room, x {low[0]:.1f} … {high[0]:.1f} and "
+            f"y {low[1]:.1f} … {high[1]:.1f} m, where nobody is tracked; make the room larger first"
+        )
+    meant = _shown_at(wish, snapshot, step)
+    if meant is not None:
+        places.append(meant)
+    return make(kind="here", places=places, accuracy=wish.accuracy, note=note)
+
+
 def _exchanged(lanes: Lanes, tracks: list[int], step: int, note: str) -> Correction:
     one, other = tracks
     before = [lanes.place(track, step - 1) for track in (one, other)]
@@ -127,7 +141,8 @@ def _place(wish: CorrectionWish, snapshot: Snapshot, sequence: Sequence, step: i
             raise CorrectionError(f"clicks: there is no camera {click.camera}")
     points = [(cameras[click.camera], (click.x, click.y)) for click in wish.clicks]
     half_height = float(sequence.target_half_extents[2])
-    feet = _feet_of(wish, snapshot, step, half_height)
+    meant = _shown_at(wish, snapshot, step)
+    feet = None if meant is None else meant.z - half_height
     ground = ground_under(feet, floor=float(sequence.room.minimum[2]), half_height=half_height)
     if len(points) == 1:
         found = foot_on_floor(*points[0], floor=ground, half_height=half_height)
@@ -139,14 +154,12 @@ def _place(wish: CorrectionWish, snapshot: Snapshot, sequence: Sequence, step: i
     return Place(step, *found.tolist())
 
 
-def _feet_of(
-    wish: CorrectionWish, snapshot: Snapshot, step: int, half_height: float
-) -> float | None:
-    """How high the shown run has the feet of the track that is meant, if it is there."""
+def _shown_at(wish: CorrectionWish, snapshot: Snapshot, step: int) -> Place | None:
+    """Where the shown run has the track that is meant, if it is there."""
     if snapshot.run is None or not wish.tracks:
         return None
     lanes = Lanes(snapshot.run.tracks)
     if wish.tracks[0] not in lanes.rows:
         return None
     found = lanes.place(wish.tracks[0], step)
-    return found.z - half_height if found.step == step else None
+    return found if found.step == step else None

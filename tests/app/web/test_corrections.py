@@ -135,6 +135,35 @@ def test_after_another_slider_a_correction_still_holds(desk: TestClient) -> None
 
 
 @pytest.mark.full
+def test_who_is_moved_far_and_then_farther_stays_one_person_moved_once(desk: TestClient) -> None:
+    lives = tracks(desk)
+    one = max(lives, key=lambda life: life["last"] - life["first"])
+    step = (one["first"] + one["last"]) // 2
+
+    def places() -> dict[int, np.ndarray]:
+        told = desk.get(f"/api/step/{step}").json()["tracks"]
+        return {track["id"]: np.array(track["position"]) for track in told}
+
+    start = places().pop(one["id"])
+    (other,) = (place for track, place in places().items() if track != one["id"])
+    away = (start - other)[:2] / np.linalg.norm((start - other)[:2])
+    for far in (0.6, 0.95):
+        place = [*(start[:2] + far * away).tolist(), float(start[2])]
+        wish = {"kind": "here", "step": step, "tracks": [one["id"]], "place": place}
+        assert desk.post(PLACE, json={"corrections": [wish]}).status_code == 200
+        (told,) = settled(desk)["corrections"]
+        assert (told["met"], told["tracks"]) == (True, [one["id"]])
+        assert told["places"][1][1:] == pytest.approx(start.tolist(), abs=1e-3)
+        assert np.linalg.norm(places()[one["id"]][:2] - place[:2]) < 0.1
+        assert len(tracks(desk)) == len(lives), "nobody else begins"
+    desk.post(f"{PLACE}/undo")
+    assert settled(desk)["corrections"][0]["places"][0][0] == step
+    desk.post(f"{PLACE}/undo")
+    settled(desk)
+    assert places()[one["id"]].tolist() == start.tolist()
+
+
+@pytest.mark.full
 def test_what_cannot_be_is_refused_with_a_sentence(desk: TestClient, own: Path) -> None:
     lives = tracks(desk)
     two = [life["id"] for life in lives[:2]]
@@ -142,6 +171,7 @@ def test_what_cannot_be_is_refused_with_a_sentence(desk: TestClient, own: Path) 
         ({"kind": "different", "step": 40, "tracks": [999]}, "no track 999"),
         ({"kind": "exchanged", "step": 40, "tracks": two[:1]}, "found 1"),
         ({"kind": "here", "step": 40, "clicks": [{"camera": "x", "x": 1, "y": 1}]}, "no camera x"),
+        ({"kind": "here", "step": 40, "place": [90.0, 0.0, 1.0]}, "outside the room"),
         ({"kind": "checked", "first": 9, "last": 3}, "expected a step from 9 on"),
         ({"kind": "different", "step": 10**6, "tracks": two[:1]}, "expected 0 …"),
     ):

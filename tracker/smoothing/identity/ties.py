@@ -126,10 +126,15 @@ class Seeker:
         self._steps, self._owners = paths.steps, paths.owners
         self._whereabouts = Whereabouts(self._steps, paths.states[:, :3], self._owners)
         self._rows = {
-            place: self._whereabouts.nearest(place, leeway=0 if one.kind == "here" else leeway)
+            place: self._whereabouts.nearest(place, leeway=leeway)
             for one in corrections
-            if one.kind not in ("nobody", "checked")
+            if one.kind not in ("here", "nobody", "checked")
             for place in one.places
+        }
+        self._rows |= {
+            one.places[0]: self._whereabouts.stated(one)
+            for one in corrections
+            if one.kind == "here"
         }
         self._inside = {
             one.id: self._whereabouts.inside(one) for one in corrections if one.kind == "nobody"
