@@ -40,9 +40,12 @@ export function mountCheck(root, context) {
 	const { state } = check;
 	// A link that says where it leads to is followed: nobody who came by one is led to the first place.
 	let linked = OPENED_AT === "check";
+	/** Whoever had a place before him finds the next one himself, as long as there are any. */
+	let led = false;
 	const first = () => {
 		const { chosen, placing, queue } = state.get();
-		if (linked && store.get().moved) return;
+		led = (led || Boolean(chosen)) && queue?.doubts.length !== 0;
+		if (led || (linked && store.get().moved)) return;
 		// While a run goes on another may still come before it; who places somebody is not led away.
 		if (store.get().place === "check" && !chosen && !placing && queue?.complete && queue.doubts[0])
 			check.choose(queue.doubts[0]);
@@ -61,10 +64,11 @@ export function mountCheck(root, context) {
 		if (place === "check" && before !== "check") {
 			actions.showTab("place");
 			comes = true;
+			led = false;
 			goOn();
 			first();
 		} else if (before === "check" && state.get().other) check.show(0);
 		before = place;
 	});
-	state.on(["queue"], () => (first(), goOn()));
+	state.on(["queue", "chosen"], () => (first(), goOn()));
 }

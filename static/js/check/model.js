@@ -1,7 +1,7 @@
 /** What is doubtful and what was put right, fetched and kept; every part of Check looks at this. */
 import { ApiError, fetcher, getJson, sendJson } from "../state/api.js";
 import { createStore } from "../state/store.js";
-import { middleOf } from "./words.js";
+import { isLike, middleOf } from "./words.js";
 
 /** One for a page. @type {WeakMap<Store<PageState>, Check>} */
 const made = new WeakMap();
@@ -34,6 +34,7 @@ function createCheck({ store, actions, playback }) {
 	/** Where the chosen place stood, so that the next one is there when it is done. */
 	let at = 0;
 	let answered = false;
+	let placed = false;
 	/** Places that were answered, and the run whose they are: its queue still has them. */
 	/** @type {Map<string, string | null>} */
 	const gone = new Map();
@@ -55,7 +56,8 @@ function createCheck({ store, actions, playback }) {
 		const { chosen } = state.get();
 		const doubts = told.doubts.filter(({ id }) => gone.get(id) !== told.run || !gone.has(id));
 		const queue = { ...told, doubts };
-		const same = doubts.find(({ id }) => id === chosen?.id);
+		const same =
+			doubts.find(({ id }) => id === chosen?.id) ?? doubts.find((one) => isLike(one, chosen));
 		state.set({ queue });
 		store.set({
 			signs: { ...store.get().signs, check: doubts.length ? String(doubts.length) : "" },
@@ -65,10 +67,10 @@ function createCheck({ store, actions, playback }) {
 			state.set({ chosen: same });
 		} else if (answered || (chosen && queue.complete && store.get().run?.state === "done")) {
 			// What is done makes room for the next; while a run goes on the shown one stays. Who has
-			// sought elsewhere meanwhile is not called back.
+			// sought elsewhere meanwhile is not called back, nor who is placing people.
 			const { place, step } = store.get();
-			const away = !answered && chosen && (step < chosen.first || step > chosen.last);
-			answered = false;
+			const away = !answered && chosen && (placed || step < chosen.first || step > chosen.last);
+			answered = placed = false;
 			const next = doubts[Math.min(at, doubts.length - 1)] ?? null;
 			if (place === "check" && !away) choose(next);
 			else state.set({ ...hide(), chosen: null });
@@ -172,7 +174,10 @@ function createCheck({ store, actions, playback }) {
 		state,
 		choose,
 		show: (other) => void show(other),
-		say: (corrections) => ask("POST", "", { corrections }),
+		say(corrections) {
+			placed = corrections.some(({ kind }) => kind === "here");
+			return ask("POST", "", { corrections });
+		},
 		async answer(alternative) {
 			const { chosen } = state.get();
 			if (!chosen) return false;

@@ -239,3 +239,16 @@ export function nextCrossing(doubts, step) {
 
 /** The step at which a place is looked at. @param {Doubt} doubt */
 export const middleOf = ({ first, last }) => Math.round((first + last) / 2);
+
+/**
+ * Whether two places are one moment of the same people, in a run and in the next one: by the shift
+ * of a place somebody is known by another id.
+ * @param {Doubt} one @param {Doubt | null} other
+ */
+export const isLike = (one, other) =>
+	other !== null &&
+	one.kind === other.kind &&
+	one.tracks.length === other.tracks.length &&
+	one.tracks.every((track) => other.tracks.includes(track)) &&
+	one.first <= other.last &&
+	other.first <= one.last;

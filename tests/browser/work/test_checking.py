@@ -218,6 +218,39 @@ def test_somebody_is_placed_by_a_click(check: Page, server: Server) -> None:
     assert (told["kind"], told["first"]) == ("here", 0)
 
 
+def test_who_is_dragged_far_by_the_feet_stays_who_he_is(check: Page, server: Server) -> None:
+    middle = (HIDDEN.start + HIDDEN.stop) // 2 + 12
+    ask(server, "POST", "seek", {"step": middle})
+    until(check, lambda: readout(check) == str(middle), "the step is shown")
+    check.keyboard.press("]")
+    ring = check.locator(".foothold").first
+    expect(ring).to_be_visible()
+    label = ring.get_attribute("aria-label")
+    assert label is not None
+    told = server.get(f"/api/step/{middle}").json()["tracks"]
+    there = ring.bounding_box()
+    assert there is not None
+    x, y = there["x"] + there["width"] / 2, there["y"] + there["height"] / 2
+    check.mouse.move(x, y)
+    check.mouse.down()
+    check.mouse.move(x + 20, y + 5, steps=3)
+    check.mouse.move(x + 45, y + 12, steps=3)
+    check.mouse.up()
+    until(check, lambda: len(corrections(server)["corrections"]) == 1, "it is said")
+    server.wait_for_run()
+    until(check, lambda: corrections(server)["corrections"][0]["met"], "the track is there")
+    one = corrections(server)["corrections"][0]
+    (place, meant) = one["places"]
+    far = sum((a - b) ** 2 for a, b in zip(place[1:3], meant[1:3], strict=True)) ** 0.5
+    assert far > 0.5, "where a place alone would be somebody else's"
+    now = server.get(f"/api/step/{middle}").json()["tracks"]
+    assert {track["id"] for track in now} == {track["id"] for track in told}
+    assert f"Feet of track {one['tracks'][0]} in" in label
+    check.wait_for_timeout(500)  # the queue of the new run
+    assert readout(check) == str(middle), "who places somebody is not led away"
+    assert ring.get_attribute("aria-label") == label
+
+
 def test_a_name_and_a_checked_range_leave_as_truth(check: Page, server: Server) -> None:
     check.locator(".lane").first.click()
     check.keyboard.press("F2")
