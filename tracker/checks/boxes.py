@@ -333,7 +333,7 @@ def _stray_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
                 share=share,
             )
     if shares and min(shares.values()) >= _OWN_SHARE:
-        yield good("every camera agrees with another", "boxes of every camera meet others")
+        yield good("every camera agrees with another", "each one's boxes meet others'")
 
 
 def _found_where_expected(view: View, index: int, agreed: Consensus) -> Bool[ndarray, " E"]:

@@ -20,7 +20,7 @@ export function mountOpening({ store, actions }) {
 	/** What was dropped and is on its way: all is looked into when the last of it is here. */
 	let under = 0;
 	let [shown, trouble, turns] = ["", "", 0];
-	/** What is being wished; writing comes after it. */
+	/** What is being wished, one after the other; looking and writing come after it. */
 	let wishing = Promise.resolve();
 	/** @type {Timer} */
 	let timer;
@@ -64,12 +64,26 @@ export function mountOpening({ store, actions }) {
 			actions.note("info", `${next.wish.name} was imported`, next.folder);
 		} else {
 			show(next.sheet);
-			if (next.busy || ["writing", "copying", "reading"].includes(next.phase))
-				timer = setTimeout(
-					() => info && attempt(async () => take(await getJson(`/api/import/${next.key}`))),
-					ASK_AGAIN,
-				);
+			if (next.busy || ["writing", "copying", "reading"].includes(next.phase)) again(next.key);
 		}
+	}
+
+	/** Look how far it is, a little later. @param {string} key */
+	function again(key) {
+		clearTimeout(timer);
+		timer = setTimeout(
+			() =>
+				void attempt(async () => {
+					if (info?.key !== key) return;
+					await wishing;
+					const asked = turns;
+					const now = await getJson(`/api/import/${key}`);
+					// What was wished meanwhile is not in this answer.
+					if (asked === turns) take(now);
+					else again(key);
+				}),
+			ASK_AGAIN,
+		);
 	}
 
 	/** @param {string} html */
@@ -100,10 +114,13 @@ export function mountOpening({ store, actions }) {
 		info = { ...info, wish: told };
 		const { key } = info;
 		const turn = (turns += 1);
-		wishing = attempt(async () => {
-			const answer = await sendJson("PUT", `/api/import/${key}/wish`, told);
-			if (turn === turns && info?.key === key) take(answer);
-		});
+		// Each tells all that is wished: one that came late would take the next one back.
+		const tell = () =>
+			attempt(async () => {
+				const answer = await sendJson("PUT", `/api/import/${key}/wish`, told);
+				if (turn === turns && info?.key === key) take(answer);
+			});
+		wishing = wishing.then(tell, tell);
 	}
 
 	/** What a control wishes, with its value where that belongs. @param {Part} control */
