@@ -92,7 +92,7 @@ class Server:
         headers = {"Authorization": f"Bearer {self.token}"}
         return httpx2.get(self.address.rstrip("/") + path, headers=headers, timeout=30.0)
 
-    def wait(self, condition: Callable[[dict], bool], seconds: float = 180.0) -> dict:
+    def wait(self, condition: Callable[[dict], bool], seconds: float = 300.0) -> dict:
         """The state, once it is as wished."""
         deadline = time.monotonic() + seconds
         state: dict = {}
@@ -107,7 +107,7 @@ class Server:
         told = {key: value for key, value in state.items() if key != "parameters"}
         raise AssertionError(f"the server did not get there within {seconds} s: {told}")
 
-    def wait_for_run(self, seconds: float = 180.0) -> dict:
+    def wait_for_run(self, seconds: float = 300.0) -> dict:
         """The state with a finished run of the parameters that hold now."""
         return self.wait(lambda state: state["run"]["state"] == "done", seconds)
 

@@ -19,7 +19,7 @@ def held(browser: Browser, server: Server) -> Iterator[Held]:
     as_at_first(server)
     server.wait_for_run()
     context = browser.new_context(viewport={"width": 1280, "height": 800})
-    context.set_default_timeout(20_000)
+    context.set_default_timeout(60_000)
     context.route("**/viser/**", lambda route: route.abort())
 
     def open_(address: str, file: str) -> tuple[Page, Callable[[], None]]:
