@@ -90,6 +90,10 @@ export function mountFrame(mosaic, store, { keep, tell }) {
 		if (!at) return;
 		const { cell, index, sides } = at;
 		const { zooms, cameras } = store.get();
+		const [left, top, width, height] = Object.values(sides).map(Math.round);
+		const words = `${cameras[index].name}: left ${left}, top ${top}, ${width} by ${height} px`;
+		frame.ariaLabel = `Box in ${words}. Arrows move it, with Ctrl they size it, Enter keeps it.`;
+		tell(words); // which may take a line above the pictures, and move them
 		const lens = lensOf(zooms[index], cell.clientWidth, cell.clientHeight);
 		const scale = (cell.clientWidth * lens.k) / cameras[index].width;
 		Object.assign(frame.style, {
@@ -98,10 +102,6 @@ export function mountFrame(mosaic, store, { keep, tell }) {
 			width: `${sides.width * scale}px`,
 			height: `${sides.height * scale}px`,
 		});
-		const [left, top, width, height] = Object.values(sides).map(Math.round);
-		const words = `${cameras[index].name}: left ${left}, top ${top}, ${width} by ${height} px`;
-		frame.ariaLabel = `Box in ${words}. Arrows move it, with Ctrl they size it, Enter keeps it.`;
-		tell(words);
 	}
 	store.on(["zooms", "large", "layout"], () => requestAnimationFrame(put));
 	new ResizeObserver(put).observe(mosaic);
