@@ -90,7 +90,7 @@ def _offers(snapshot: Snapshot, sequence: Sequence, teaching: Teaching) -> str:
     forget = _send("No more offers", "DELETE teach/offers")
     if not rows:
         return line("All offers are taken. ", ask, " ", forget)
-    heads = ("Box", "Person", "Colours", "Seen at", "Why", "#")
+    heads = ("Offered", "Person", "Colours", "Seen at", "Why", "#")
     every = _send("Add all", "POST teach/offers/taken", label="Add all offers")
     return table("Offered templates", heads, rows) + line(every, " ", ask, " ", forget)
 
