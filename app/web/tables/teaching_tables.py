@@ -81,7 +81,7 @@ def _offers(snapshot: Snapshot, sequence: Sequence, teaching: Teaching) -> str:
             _send(f"{one.template.camera} · {one.template.frame}", "POST seek",
                   {"step": one.template.frame},
                   label=f"Go to step {one.template.frame}, camera {one.template.camera}"),
-            quiet(one.reason),
+            Markup(f'<span class="why">{escaped(one.reason)}</span>'),
             _send("add", f"POST teach/offers/{index}/taken",
                   label=f"Add offer {index + 1}: {one.template.name}, {one.template.camera}"),
         )
@@ -92,7 +92,7 @@ def _offers(snapshot: Snapshot, sequence: Sequence, teaching: Teaching) -> str:
         return line("All offers are taken. ", ask, " ", forget)
     heads = ("Offered", "Person", "Colours", "Seen at", "Why", "#")
     every = _send("Add all", "POST teach/offers/taken", label="Add all offers")
-    return table("Offered templates", heads, rows) + line(every, " ", ask, " ", forget)
+    return line(ask, " ", every, " ", forget) + table("Offered templates", heads, rows)
 
 
 def _method(snapshot: Snapshot) -> str:

@@ -278,6 +278,11 @@ def test_a_template_that_the_tracks_offer_is_taken_by_keys_and_undone(
     count = offered.count()
     assert count >= 2
     assert server.get("/api/state").json()["sequence"]["templates"] == before
+    # the button of each is within the panel, however narrow
+    panel, button = page.locator("#panel-teach").bounding_box(), offered.first.bounding_box()
+    assert panel is not None
+    assert button is not None
+    assert button["x"] + button["width"] <= panel["x"] + panel["width"]
     offered.first.focus()
     page.keyboard.press("Enter")
     server.wait(lambda state: state["sequence"]["templates"] == before + 1)
