@@ -156,7 +156,8 @@ def _looks(found: Moments, pictures: Pictures) -> tuple[Moments, Float[ndarray, 
 def _root(picture: ndarray, box: Float[ndarray, " 4"]) -> Float[ndarray, " bins"]:
     space, kernel = _NUMBERS.colour_space, _NUMBERS.histogram_kernel
     place = Boxes.from_left_top(box[None]).centred
-    return np.sqrt(colour.histograms(colour.bin_map(picture, space), place, space, kernel)[0])
+    (histogram,) = colour.histograms(colour.bin_map(picture, space), place, space, kernel)
+    return np.asarray(np.sqrt(histogram))
 
 
 def _known(sequence: Sequence, pictures: Pictures) -> list[Float[ndarray, " bins"]]:
