@@ -265,6 +265,7 @@ def test_a_template_that_the_tracks_offer_is_taken_by_keys_and_undone(
     as_at_first(server)
     before = server.get("/api/state").json()["sequence"]["templates"]
     by_palette(page, "teach: colours, room")
+    server.wait(lambda state: state["run"]["state"] == "done")  # else it is asked to wait
     ask_for = page.get_by_role("button", name="Offer from the tracks")
     ask_for.focus()
     page.keyboard.press("Enter")
