@@ -19,6 +19,7 @@ from app.command.arguments.importing import Check, ExportCalibration, Formats, I
 from app.command.arguments.library import Bundle, FormatName, LibraryCommand, LibraryFile, Runs
 from app.command.arguments.rooms import Benchmark, Experiment, Parameters, Render, Sequences
 from app.command.arguments.studies import Batch, Study, Tune
+from app.command.arguments.templates import Templates
 from tracker import parameters as table
 from tracker.library import KEEP
 from tracker.parameters import FOLLOWS, METHODS, PRESETS, Parameter, ParameterError
@@ -302,6 +303,7 @@ Arguments = (
     | Batch
     | Tune
     | Corrections
+    | Templates
 )
 
 
@@ -334,6 +336,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         | Annotated[Batch, subcommand("batch")]
         | Annotated[Tune, subcommand("tune")]
         | Annotated[Corrections, subcommand("corrections")]
+        | Annotated[Templates, subcommand("templates")]
     )
     parsed: Arguments = tyro.cli(
         commands,

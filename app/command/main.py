@@ -23,6 +23,7 @@ from app.command.arguments.importing import Check, ExportCalibration, Formats, I
 from app.command.arguments.library import Bundle, LibraryCommand, OpenRun, Runs
 from app.command.arguments.rooms import Benchmark, Experiment, Parameters, Render, Sequences
 from app.command.arguments.studies import Batch, Study, Tune
+from app.command.arguments.templates import Templates
 from app.command.flags import (
     Arguments,
     Detect,
@@ -136,6 +137,10 @@ def _run(command: Arguments) -> int:
             from app.command.commands.correcting import corrections
 
             return corrections(command)
+        case Templates():
+            from app.command.commands.templates import templates
+
+            templates(command)
     return 0
 
 

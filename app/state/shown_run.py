@@ -77,6 +77,7 @@ class ShownRun(Store):
                 run=None,
                 run_state=RunState(total=sequence.frames),
                 scores=Scores(),
+                offers=None,
             )
             return before
 

@@ -13,6 +13,7 @@ from app.colours import Theme
 from app.state.scores import Scores
 from tracker import parameters as table
 from tracker.corrections import Correction
+from tracker.offers import Offer
 from tracker.parameters import MethodKey, RunParameters
 from tracker.pipeline import Run
 from tracker.runs.fitting import unfit_methods
@@ -23,7 +24,7 @@ from tracker.trajectories import Trajectories
 Change = Literal[
     "sequence", "opening", "parameters", "playhead", "selection", "layers", "view", "theme",
     "run", "progress", "evaluation", "pinned", "presets", "taught", "editing", "corrections",
-    "ghosts",
+    "ghosts", "offers",
 ]  # fmt: skip
 """What is another now: ``run`` is a run's beginning and its end, ``progress`` its new steps,
 ``taught`` another room or other templates of the same recording."""
@@ -165,6 +166,8 @@ class Snapshot:
     scores: Scores = field(default_factory=Scores)
     """Runs against the truth, where there is one."""
     ghosts: Ghosts | None = None
+    offers: tuple[Offer, ...] | None = None
+    """Templates cut from a run's tracks, once somebody asked for them."""
     layers: Mapping[str, bool] = field(
         # the truth is in the pictures at first: in 3D twice as many boxes hide the people
         default_factory=lambda: MappingProxyType({name: name != "truth" for name in LAYERS})

@@ -29,6 +29,7 @@ from app.state.snapshot import (
 )
 from tracker import parameters as table
 from tracker.corrections import Correction
+from tracker.offers import Offer
 from tracker.parameters import ParameterError, RunParameters
 from tracker.pipeline import Run
 from tracker.sequences.sequence import Sequence
@@ -256,6 +257,19 @@ class Workbench(ShownRun):
         with self._edit() as now:
             if ghosts is not None or now.ghosts is not None:
                 self._put("ghosts", ghosts=ghosts)
+
+    def show_offers(self, sequence: Sequence, offers: tuple[Offer, ...] | None) -> None:
+        """Have Teach list templates that may be taken, or no more.
+
+        Args:
+            sequence: Of the recording that they are of; any other is refused silently.
+            offers: What is listed; None for no list.
+        """
+        with self._edit() as now:
+            if now.sequence is None or sequence.views is not now.sequence.views:
+                return
+            if offers is not now.offers:
+                self._put("offers", offers=offers)
 
     def set_theme(self, theme: Theme) -> None:
         """Have the 3D view dark or light."""

@@ -65,6 +65,38 @@ def add_template(wish: NewTemplate, bench: Bench, teach: Teach) -> models.State:
     return results.state_of(bench.snapshot())
 
 
+@router.post("/offers")
+def offer_templates(bench: Bench, teach: Teach) -> models.State:
+    """List the templates that the tracks of the shown run offer; they change nothing yet."""
+    with _complaining():
+        teach.offer_templates()
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/offers/taken")
+def take_all_offers(bench: Bench, teach: Teach) -> models.State:
+    """Add all templates that are offered; the run follows at once."""
+    with _complaining():
+        teach.take_offers()
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/offers/{index}/taken")
+def take_offer(index: int, bench: Bench, teach: Teach) -> models.State:
+    """Add an offered template to the others; the run follows at once."""
+    with _complaining():
+        teach.take_offers(index)
+    return results.state_of(bench.snapshot())
+
+
+@router.delete("/offers")
+def forget_offers(bench: Bench, teach: Teach) -> models.State:
+    """List no offered templates any more."""
+    with _complaining():
+        teach.forget_offers()
+    return results.state_of(bench.snapshot())
+
+
 @router.patch("/templates/{index}")
 def rename_template(index: int, wish: TextChange, bench: Bench, teach: Teach) -> models.State:
     """Say whose colours a template models; templates of one name are of one person."""

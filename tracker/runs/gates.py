@@ -78,7 +78,16 @@ def notices(run: Run) -> list[str]:
     """
     told = []
     gates = count_gates(run)
-    unsure = [f'"{one.camera}"' for one in gates if one.trust < _HALF]
+    given = {v.camera.name for v in run.sequence.views if v.background is not None}
+    doubted = [one.camera for one in gates if one.trust < _HALF]
+    unsure = [f'"{name}"' for name in doubted if name not in given]
+    peopled = [f'"{name}"' for name in doubted if name in given]
+    if peopled:
+        told.append(
+            f"the background given for {', '.join(peopled)} shows what the templates show: nobody "
+            "may be in it, and the templates' boxes must be of people; they are looked for by "
+            "colour, and by shape where their templates show one"
+        )
     if unsure:
         told.append(
             f"the background of {', '.join(unsure)} was learnt from people who stay there, for "

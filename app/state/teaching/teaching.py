@@ -11,11 +11,12 @@ from app.state.teaching.entrances import entrances_of
 from app.state.teaching.taught import Taught
 from app.state.teaching.values import METRE_DIGITS, at, rounded, take, within
 from app.state.workbench import Workbench
+from tracker import offers
 from tracker.folders import home
 from tracker.sequences.reader import FILE, given_folder
 from tracker.sequences.sequence import Sequence, SequenceError
 from tracker.sequences.writing import saving
-from tracker.sequences.writing.teaching import Values, taught_values
+from tracker.sequences.writing.teaching import Values, taught_values, template_values
 
 NEW_SIGMA = (0.3, 0.3, 0.15)
 """Standard deviations of an entrance that somebody adds, metres."""
@@ -83,6 +84,55 @@ class Teaching(Taught):
     def remove_template(self, index: int) -> None:
         """Take a template away."""
         self.edit(lambda values: take(values["template"], "template", index))
+
+    def offer_templates(self) -> None:
+        """List the templates that the shown run's tracks offer, to be taken or left.
+
+        Raises:
+            SequenceError: If there is no such run, or its tracks offer none.
+        """
+        now = self._workbench.snapshot()
+        run, reader = now.run, now.reader
+        if run is None or reader is None or run.sequence.views is not self.sequence().views:
+            raise SequenceError("there is no run yet whose tracks could offer templates")
+        if not run.complete or now.run_state.state == "computing":
+            raise SequenceError("the run goes on; ask for templates when it has ended")
+        if not run.sequence.has_pictures:
+            raise SequenceError("no camera has pictures, so there are no colours to learn")
+        found = offers.offered(run, reader)
+        if not found:
+            raise SequenceError(
+                "the tracks offer no further template: nobody is seen whole, apart from others and "
+                "by two cameras at once who has not a template alike; draw one by hand (C)"
+            )
+        self._workbench.show_offers(run.sequence, found)
+
+    def take_offers(self, index: int | None = None) -> None:
+        """Add an offered template to the others, or all that are listed; undo takes them away.
+
+        Args:
+            index: Which of those listed; None for all.
+
+        Raises:
+            SequenceError: If it is offered no more.
+        """
+        listed = self.offered()
+        if index is not None and not 0 <= index < len(listed):
+            raise SequenceError("that template is offered no more")
+        taken = listed if index is None else [listed[index]]
+        new = [template_values(one.template) for one in taken]
+        self.edit(lambda values: values["template"].extend(new))
+
+    def offered(self) -> list[offers.Offer]:
+        """The templates that are offered and not taken yet."""
+        now = self._workbench.snapshot()
+        if now.sequence is None or now.offers is None:
+            return []
+        return offers.untaken(now.offers, now.sequence)
+
+    def forget_offers(self) -> None:
+        """List none any more."""
+        self._workbench.show_offers(self.sequence(), None)
 
     def set_face(self, side: Side, axis: int, metres: float) -> None:
         """Move one of the room's six faces.

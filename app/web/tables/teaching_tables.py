@@ -11,7 +11,7 @@ from fastapi.responses import HTMLResponse
 from app.state.snapshot import Snapshot
 from app.state.teaching import Part, Side, Teaching
 from app.web.dependencies import ERRORS, Bench, nothing_open
-from app.web.tables.markup import Cell, Markup, escaped, line, quiet, table
+from app.web.tables.markup import Cell, Markup, escaped, id_tag, line, quiet, table
 from tracker.parameters import METHODS, method_of
 from tracker.sequences.sequence import PRESETS, Sequence, Template
 from tracker.sequences.writing.teaching import AXES, changes, taught_values
@@ -31,6 +31,7 @@ def teach_tables(request: Request, bench: Bench) -> str:
         raise nothing_open()
     return (
         _templates(snapshot, sequence)
+        + _offers(snapshot, sequence, teaching)
         + _numbers(sequence)
         + _room(sequence)
         + _target(sequence)
@@ -62,6 +63,36 @@ def _templates(snapshot: Snapshot, sequence: Sequence) -> str:
     ]  # fmt: skip
     heads = ("Box", "Person", "Colours", "Seen at", "#")
     return table("Colour templates", heads, rows) + _method(snapshot)
+
+
+def _offers(snapshot: Snapshot, sequence: Sequence, teaching: Teaching) -> str:
+    """What the tracks offer, each with its box: one click and it is a template like the others."""
+    if not sequence.has_pictures:
+        return ""
+    ask = _send("Offer from the tracks", "POST teach/offers")
+    if snapshot.offers is None:
+        words = " Boxes of people whom several cameras agree about, to look at and to take."
+        return line(ask, words)
+    rows = [
+        (
+            _picture(snapshot, sequence, one.template, "swatch", "png"),
+            Markup(f"{escaped(one.template.name)} {id_tag(one.track).html}"),
+            _picture(snapshot, sequence, one.template, "histogram", "svg"),
+            _send(f"{one.template.camera} · {one.template.frame}", "POST seek",
+                  {"step": one.template.frame},
+                  label=f"Go to step {one.template.frame}, camera {one.template.camera}"),
+            Markup(f'<span class="why">{escaped(one.reason)}</span>'),
+            _send("add", f"POST teach/offers/{index}/taken",
+                  label=f"Add offer {index + 1}: {one.template.name}, {one.template.camera}"),
+        )
+        for index, one in enumerate(teaching.offered())
+    ]  # fmt: skip
+    forget = _send("No more offers", "DELETE teach/offers")
+    if not rows:
+        return line("All offers are taken. ", ask, " ", forget)
+    heads = ("Offered", "Person", "Colours", "Seen at", "Why", "#")
+    every = _send("Add all", "POST teach/offers/taken", label="Add all offers")
+    return line(ask, " ", every, " ", forget) + table("Offered templates", heads, rows)
 
 
 def _method(snapshot: Snapshot) -> str:

@@ -199,6 +199,66 @@ def test_entrances_are_suggested_by_the_tracks(client: TestClient) -> None:
     assert "teach/entrances/suggested" in client.get("/api/tables/teach").text
 
 
+def test_templates_that_the_tracks_offer_are_taken_and_taken_back(client: TestClient) -> None:
+    done(client)
+    assert "Offered templates" not in client.get("/api/tables/teach").text
+    answer = client.post("/api/teach/offers")
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["sequence"]["templates"] == 0  # nothing is added by itself
+    table = client.get("/api/tables/teach").text
+    assert "Offered templates" in table
+    offered = table.count("Add offer ")
+    assert offered >= 2
+    assert "2 cameras agree" in table
+    pictures = re.findall(r'src="(/api/teach/swatch/[^"]+)"', table)
+    assert len(pictures) == offered
+    assert client.get(pictures[0]).status_code == 200
+
+    before = state(client)["teaching"]["key"]
+    taken = client.post("/api/teach/offers/0/taken")
+    assert taken.status_code == 200, taken.text
+    now = done(client)
+    assert now["sequence"]["templates"] == now["teaching"]["unsaved"] == 1
+    assert client.get("/api/tables/teach").text.count("Add offer ") == offered - 1
+    client.post("/api/teach/restore", json={"key": before})  # what undo sends
+    assert done(client)["sequence"]["templates"] == 0
+    assert client.get("/api/tables/teach").text.count("Add offer ") == offered
+
+    client.post("/api/teach/offers/taken")
+    assert done(client)["sequence"]["templates"] == offered
+    assert "All offers are taken" in client.get("/api/tables/teach").text
+    client.post("/api/teach/save")
+    folder = Path(str(client.app.state.workbench.snapshot().sequence.folder))  # type: ignore[attr-defined]
+    assert len(read_sequence(folder).templates) == offered
+    for _ in range(offered):  # and each can be removed like any other
+        assert client.delete("/api/teach/templates/0").status_code == 200
+    assert state(client)["sequence"]["templates"] == 0
+    client.delete("/api/teach/offers")
+    assert "Offered templates" not in client.get("/api/tables/teach").text
+
+
+def test_an_offer_that_is_none_any_more_is_refused(client: TestClient) -> None:
+    done(client)
+    assert complaint(client.post("/api/teach/offers/0/taken")) == (
+        "That template is offered no more."
+    )
+    client.post("/api/teach/offers")
+    client.post("/api/sequence", json={"name": "walkers"})
+    wait_until(run_is(client, "done"))
+    assert "Offered templates" not in client.get("/api/tables/teach").text
+    client.post("/api/teach/offers/taken")  # of nothing, which changes nothing
+    assert state(client)["teaching"]["unsaved"] == 0
+
+
+def test_tracks_that_offer_nothing_say_why(client: TestClient) -> None:
+    client.patch("/api/parameters", json={"changes": {"fusion.extraction_threshold": 0.99}})
+    client.patch("/api/teach/room/max/0", json={"value": -1.2})  # nobody is in what is left
+    done(client)
+    assert complaint(client.post("/api/teach/offers")).startswith(
+        "The tracks offer no further template: nobody is seen whole, apart from others"
+    )
+
+
 @pytest.mark.full
 def test_saving_keeps_a_backup_and_reopens_to_the_same_run(
     client: TestClient, walkers: Path

@@ -266,6 +266,45 @@ def test_a_template_by_numbers_is_added_once_and_named(flat_page: Page, server: 
     server.wait(lambda state: state["teaching"]["unsaved"] == 0)
 
 
+def test_a_template_that_the_tracks_offer_is_taken_by_keys_and_undone(
+    flat_page: Page, server: Server
+) -> None:
+    page = flat_page
+    as_at_first(server)
+    before = server.get("/api/state").json()["sequence"]["templates"]
+    by_palette(page, "teach: colours, room")
+    server.wait(lambda state: state["run"]["state"] == "done")  # else it is asked to wait
+    ask_for = page.get_by_role("button", name="Offer from the tracks")
+    ask_for.focus()
+    page.keyboard.press("Enter")
+    listed = page.get_by_role("table", name="Offered templates")
+    expect(listed).to_be_visible(timeout=20_000)
+    expect(listed).to_contain_text("2 cameras agree")
+    boxes = listed.locator("img.swatch")
+    natural = "images => images.length && images.every((i) => i.complete && i.naturalWidth > 0)"
+    until(page, lambda: boxes.evaluate_all(natural), "the pictures of what is offered")
+    offered = page.get_by_role("button", name=re.compile("^Add offer "))
+    count = offered.count()
+    assert count >= 2
+    assert server.get("/api/state").json()["sequence"]["templates"] == before
+    # the button of each is within the panel, however narrow
+    panel, button = page.locator("#panel-teach").bounding_box(), offered.first.bounding_box()
+    assert panel is not None
+    assert button is not None
+    assert button["x"] + button["width"] <= panel["x"] + panel["width"]
+    offered.first.focus()
+    page.keyboard.press("Enter")
+    server.wait(lambda state: state["sequence"]["templates"] == before + 1)
+    expect(page.locator(f"#template-{before}")).to_be_visible(timeout=20_000)
+    expect(offered).to_have_count(count - 1)
+    page.keyboard.press("Escape")
+    page.locator("body").press("Control+z")
+    server.wait(lambda state: state["sequence"]["templates"] == before)
+    expect(offered).to_have_count(count)
+    page.get_by_role("button", name="No more offers").click()
+    expect(listed).to_have_count(0)
+
+
 def test_whatever_is_come_to_by_tab_is_seen_in_a_low_panel(flat_page: Page) -> None:
     page = flat_page
     page.set_viewport_size({"width": 1280, "height": 720})

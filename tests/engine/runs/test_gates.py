@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,15 @@ def test_a_background_made_by_who_stays_is_told(tmp_path: Path) -> None:
     run = run_of(film(tmp_path, stays=True))
     assert count_gates(run)[0].trust == 0.0
     assert any('background of "left"' in one and "templates" in one for one in notices(run))
+
+
+def test_a_background_that_somebody_gave_was_not_learnt(tmp_path: Path) -> None:
+    """Who names steps as empty at which people are is told so."""
+    sequence = film(tmp_path, stays=True)
+    views = tuple(replace(view, background=range(STEPS)) for view in sequence.views)
+    (told,) = notices(run_of(replace(sequence, views=views, digest="given")))
+    assert told.startswith('the background given for "left" shows what the templates show')
+    assert "learnt" not in told
 
 
 def test_of_the_foreground_alone_tops_are_counted(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from typing import Any
 from numpy import ndarray
 
 from tracker.sequences.fields import Fields
-from tracker.sequences.sequence import Sequence
+from tracker.sequences.sequence import Sequence, Template
 from tracker.sequences.writing.taught_fields import read_room, read_target, read_templates
 
 Values = dict[str, Any]
@@ -47,15 +47,17 @@ def taught_values(sequence: Sequence) -> Values:
             ],
         },
         "target": {"half_extents": _numbers(sequence.target_half_extents)},
-        "template": [
-            {
-                "name": template.name,
-                "camera": template.camera,
-                "frame": template.frame,
-                "box": _numbers(template.box),
-            }
-            for template in sequence.templates
-        ],
+        "template": [template_values(template) for template in sequence.templates],
+    }
+
+
+def template_values(template: Template) -> Values:
+    """A template as one of ``[[template]]``."""
+    return {
+        "name": template.name,
+        "camera": template.camera,
+        "frame": template.frame,
+        "box": _numbers(template.box),
     }
 
 

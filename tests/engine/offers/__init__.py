@@ -1,0 +1,1 @@
+"""Templates that a run's tracks offer."""
