@@ -54,6 +54,12 @@ class Uses:
     reads: tuple[Reads, ...] = ()
     """Groups of parameters, its own included."""
 
+    @property
+    def finds_people(self) -> bool:
+        """Whether it finds people in pictures by itself, and so may draw several boxes around one;
+        an outside detector and a network keep one of those that overlap."""
+        return self.pictures and not self.detector
+
     def reads_number(self, group: str, name: str) -> bool:
         """Whether a number is read."""
         return any(part.reads(group, name) for part in self.reads)

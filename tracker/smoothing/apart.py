@@ -34,8 +34,9 @@ def shown_apart(
 
     Around somebody a camera draws second boxes: of his limbs, one too high, one of him and what he
     carries. Those of several cameras meet beside him, or where the rays of two people's cross. So a
-    box that overlaps a surer person's is no witness, and none is of somebody who stands within a
-    body's width of surer people as long as he is seen: he never came from anywhere else.
+    box that overlaps a surer person's, or is as well his, is no witness, and none is of somebody
+    who stands within a body's width of surer people as long as he is seen: he never came from
+    anywhere else.
 
     Args:
         smoother: With the boxes.

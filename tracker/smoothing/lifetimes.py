@@ -44,9 +44,11 @@ def lifetimes(
     Where stage 1 tells how much likelier a person looks so, log Λ is added to that; its boxes are
     many, and most are false. One alone has a place somewhere on its ray whatever it shows, so
     that only its looks count. Two of something else meet somewhere in the room, a third hardly
-    meets them: each beyond the second outweighs as much doubt of their looks as a vote. That holds
-    of boxes that show somebody apart from surer people (:func:`shown_apart`); others meet because
-    there is one, and only looks tell a second.
+    meets them: each beyond the second outweighs as much doubt of their looks as a vote.
+
+    Where stage 1 may draw several boxes around a person, all that holds of boxes that show
+    somebody apart from surer people (:func:`shown_apart`); others meet because there is one, and
+    only looks tell a second.
 
     Returns:
         (N,) probabilities; (n,) log odds of a person at some step against nobody.
@@ -76,14 +78,17 @@ def lifetimes(
         )
         return found.probabilities, found.odds
 
-    if not looks.any():
-        return by(hit * shown)
+    def voted(shown: Float[ndarray, " N"]) -> Float[ndarray, " N"]:
+        return _votes(hit, shown, doubt) if looks.any() else hit * shown
+
     doubt = np.bincount(links.rows, links.shares * looks, rows)
-    there, odds = by(_votes(hit, shown, doubt))
+    there, odds = by(voted(shown))
+    if not smoother.several_boxes:
+        return there, odds
     apart = shown_apart(smoother, paths, shared, there, odds)
     if apart.all():
         return there, odds
-    return by(_votes(hit, np.bincount(links.rows, links.shares * apart, rows), doubt))
+    return by(voted(np.bincount(links.rows, links.shares * apart, rows)))
 
 
 def _votes(

@@ -101,6 +101,7 @@ class Smoother:
         corrections: Many[Correction] = (),
         *,
         learning: bool = True,
+        several_boxes: bool = False,
     ) -> None:
         """Prepare for the boxes of some steps from step 0 on.
 
@@ -110,8 +111,9 @@ class Smoother:
             views: Stage 1 of each step.
             corrections: Of them *is here* is a measurement of the place.
             learning: Whether people's restlessness is learnt; else they move as stated.
+            several_boxes: Whether stage 1 may draw several boxes of one camera around a person.
         """
-        self._learning = learning
+        self._learning, self.several_boxes = learning, several_boxes
         self._sequence = sequence
         self._marks = Marks.of(sequence)
         self._threads = ThreadPoolExecutor(min(len(sequence.views), _MOST_THREADS))

@@ -90,8 +90,14 @@ class Positions:
     ) -> Smoothed:
         """The tracks of some steps from step 0 on, each by the boxes of all of them."""
         p, earlier = self._parameters.smoothing, earlier or Nothing()
+        used = self._parameters.method("single_view").used(self._parameters)
         smoother = Smoother(
-            self._sequence, self._parameters.fusion, views, corrections, learning=p.learning
+            self._sequence,
+            self._parameters.fusion,
+            views,
+            corrections,
+            learning=p.learning,
+            several_boxes=used.finds_people,
         )
         dimension, cameras = smoother.model.motion.dimension, len(smoother.cameras)
         tracks = trajectories.extract(fused, cameras=cameras, extraction_threshold=CONFIRMED)

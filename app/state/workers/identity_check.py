@@ -72,13 +72,16 @@ class IdentityCheck:
             return self._now
 
     def cancel(self) -> None:
-        """Stop what is under way."""
-        self._cancelled.set()
+        """Stop what is under way; its processes, which may just begin, end when they hear of it."""
+        with self._lock:
+            self._cancelled.set()
+            if self._now.state == "looking":
+                self._now = replace(self._now, state="cancelled")
 
     def close(self) -> None:
         """Stop, and wait a moment for the processes to end."""
         self._unsubscribe()
-        self._cancelled.set()
+        self.cancel()
         if self._thread is not None:
             self._thread.join(timeout=CLOSING_SECONDS)
 
@@ -86,14 +89,14 @@ class IdentityCheck:
         if change in ("sequence", "run") and self._now.state == "looking":
             state = self._workbench.snapshot().run_state
             if state.key != self._now.run:
-                self._cancelled.set()
+                self.cancel()
 
     def _work(self, run: Run, cancelled: threading.Event) -> None:
         be_nice()
 
         def tell(**values: object) -> None:
             with self._lock:
-                if self._cancelled is cancelled:
+                if not cancelled.is_set():
                     self._now = replace(self._now, **values)  # type: ignore[arg-type]
 
         context = Context(
@@ -104,7 +107,7 @@ class IdentityCheck:
         try:
             found = estimate(run, context)
         except Cancelled:
-            tell(state="cancelled")
+            pass  # who stopped it has told of it
         except Exception as error:
             if not isinstance(error, ValueError | OSError):
                 logger.exception("the check of identities failed")

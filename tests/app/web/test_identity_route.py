@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 
 import pytest
@@ -62,3 +63,28 @@ def test_another_run_ends_a_check(client: TestClient, monkeypatch: pytest.Monkey
     client.patch("/api/parameters", json={"changes": {"fusion.detection_probability": 0.7}})
     wait_until(lambda: client.get("/api/identity").json()["state"] == "cancelled")
     assert stopped == [key]
+
+
+def test_who_stops_a_check_does_not_wait_for_its_processes(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begins, ends = threading.Event(), threading.Event()
+    left: list[str] = []
+
+    def slow_to_hear(run: Run, context: Context) -> Estimate:
+        begins.set()
+        assert ends.wait(30.0)
+        left.append(run.key)
+        context.told("too late", 1, 1)
+        return Estimate(1.0, 1.0, (), (), ())
+
+    monkeypatch.setattr(identity_check, "estimate", slow_to_hear)
+    key = client.post("/api/identity").json()["run"]
+    assert begins.wait(30.0)
+    assert client.delete("/api/identity").json()["state"] == "cancelled"
+    worker = next(one for one in threading.enumerate() if one.name == "identity")
+    ends.set()
+    worker.join(30.0)
+    assert left == [key]
+    told = client.get("/api/identity").json()
+    assert (told["state"], told["score"], told["done"]) == ("cancelled", None, 0)

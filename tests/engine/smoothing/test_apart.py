@@ -11,7 +11,7 @@ from numpy import ndarray
 from tests.engine.smoothing.test_positions_laws import PLAIN, STEPS
 from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, sequence, walk
 from tracker import pipeline
-from tracker.parameters import with_values
+from tracker.parameters import METHODS, RunParameters, method_of, with_values
 from tracker.runs.run import Run
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
@@ -45,10 +45,13 @@ def filtered(other: ndarray) -> tuple[Sequence, Run, list[tuple[ViewResult, ...]
     return whole, run, views
 
 
-def tracked(other: ndarray, *, swapped: bool = False) -> tuple[Smoother, Paths, Shared]:
+def tracked(
+    other: ndarray, *, swapped: bool = False, several: bool = True, looks: bool = True
+) -> tuple[Smoother, Paths, Shared]:
     """Both as they were, and whose box each is."""
-    whole, _, views = filtered(other)
-    smoother = Smoother(whole, PLAIN.fusion, views)
+    whole, run, views = filtered(other)
+    views = views if looks else run.views
+    smoother = Smoother(whole, PLAIN.fusion, views, several_boxes=several)
     walked = [(0, ALONE), (BEGIN, other)][:: -1 if swapped else 1]
     states = [np.concatenate([path, np.zeros_like(path)], axis=1) for _, path in walked]
     spread = [np.tile(1e-3 * np.eye(6), (len(path), 1, 1)) for _, path in walked]
@@ -104,9 +107,25 @@ def test_doubtful_boxes_beside_somebody_are_nobodys_and_elsewhere_somebodys() ->
     assert (odds[1] > 0.0).all()
 
 
+def test_what_a_detector_keeps_beside_another_box_shows_somebody_more() -> None:
+    other = second(0.6 * WIDTH, 0.9 * WIDTH)
+    drawn = tracked(other, looks=False)
+    kept = tracked(other, looks=False, several=False)
+    assert lifetimes(*drawn, PLAIN.smoothing)[1][1] < 0.0, "two boxes around one person"
+    assert lifetimes(*kept, PLAIN.smoothing)[1][1] > 0.0
+
+
+@pytest.mark.parametrize("name", list(METHODS["single_view"]))
+def test_who_looks_at_pictures_by_itself_may_draw_several_boxes(name: str) -> None:
+    on_boxes = {"none", "detection_phd", "onnx_detector"}
+    used = method_of("single_view", name).used(RunParameters())
+    assert used.finds_people == (name not in on_boxes)
+
+
 def test_whoever_the_filter_had_and_hindsight_has_not_is_told_of() -> None:
     whole, run, views = filtered(second(0.6 * WIDTH, 0.9 * WIDTH))
-    smoothed = create(whole, PLAIN).smooth(views, run.fused)
+    on_pictures = with_values(PLAIN, {"single_view": "shapes"})
+    smoothed = create(whole, on_pictures).smooth(views, run.fused)
     assert smoothed is not None
     had = set(run.filtered.labels.tolist())
     gone = had - set(smoothed.labels.tolist())

@@ -32,7 +32,7 @@ ON_BOXES = "detection_phd"
 ON_PICTURES = tuple(
     name
     for name in METHODS["single_view"]
-    if (used := method_of("single_view", name).used(RunParameters())).pictures and not used.detector
+    if method_of("single_view", name).used(RunParameters()).finds_people
 )
 """Those that need nothing else: a detection network is brought by somebody."""
 
