@@ -15,6 +15,7 @@ from tracker import pipeline
 from tracker.corrections import Correction
 from tracker.corrections.kinds import make
 from tracker.corrections.log import dump, parse
+from tracker.doubts.doubt import Lanes
 from tracker.fusion.multi_bernoulli import MultiBernoulli
 from tracker.parameters import RunParameters, with_values
 from tracker.pipeline import Run
@@ -181,6 +182,29 @@ def test_nobody_is_where_somebody_says_so(fusion: str, smoothing: str) -> None:
     assert not left.any()
     others = after.tracks.positions[:, 1] < 0.0
     assert others.sum() >= STEPS - 10, "who is elsewhere stays"
+
+
+def test_who_turns_often_is_left_out_along_his_whole_course() -> None:
+    steps, turn = 320, 20
+    there = walk((-0.5, 0.4, 1.0), (0.5, 0.4, 1.0), turn)
+    path = np.concatenate([there if k % 2 else there[::-1] for k in range(steps // turn)])
+    other = walk((1.1, -0.9, 1.0), (-1.0, -0.8, 1.0), steps)
+    whole = sequence([(0, path), (0, other)], steps)
+    before = run_of(whole)
+    lanes = Lanes(before.tracks)
+    track = max(
+        lanes.ids.tolist(), key=lambda one: before.tracks.positions[lanes.rows[one], 1].mean()
+    )
+    rows = lanes.rows[track]
+    places = lanes.course(rows, 0.25)
+    assert len(places) < len(rows) // 2
+    known, x, y = np.array(places)[:, :3].T
+    frames, ground = before.tracks.frames[rows], before.tracks.positions[rows, :2]
+    way = np.column_stack([np.interp(frames, known, x), np.interp(frames, known, y)])
+    assert np.hypot(*(ground - way).T).max() <= 0.25
+    after = run_of(whole, (make(kind="nobody", places=places),))
+    assert [one.met for one in after.outcomes] == [True]
+    assert len(set(after.tracks.ids.tolist())) == 1
 
 
 @pytest.mark.parametrize("smoothing", SMOOTHINGS)
