@@ -21,7 +21,7 @@ from tracker.parameters import RunParameters, with_values
 from tracker.pipeline import Run
 from tracker.runs.stage_cache import StageCache
 from tracker.sequences.sequence import Sequence
-from tracker.smoothing.identity import identities
+from tracker.smoothing.identity import cutting, identities
 
 STEPS = 80
 FUSIONS = ("multi_bernoulli", "sequential_phd")
@@ -289,18 +289,27 @@ def test_what_was_settled_before_is_not_settled_again(monkeypatch: pytest.Monkey
         solves.append(given[3])
         return settled(*given)
 
+    looked: list[object] = []
+    cuts = cutting.cuts
+
+    def looked_at(*given: Any) -> Any:
+        looked.append(given)
+        return cuts(*given)
+
     monkeypatch.setattr(identities, "_settled", counted)
+    monkeypatch.setattr(cutting, "cuts", looked_at)
     cache = StageCache()
     same, parted = _CHOICES[0], _CHOICES[1]
     as_it_is = make(kind="same", places=[place(_BEFORE, 5, -0.7), place(_BEFORE, 9, -0.7)])
     run_of(_GAP, (same,), cache=cache)
-    first = len(solves)
+    first, cut = len(solves), len(looked)
     assert [same] in solves
     held = run_of(_GAP, (same, as_it_is), cache=cache)
     assert len(solves) == first, "what holds by itself asks for nothing"
     assert [one.met for one in held.outcomes] == [True, True]
     run_of(_GAP, (same, as_it_is, parted), cache=cache)
     assert solves[first:] == [[same, parted]], "only with the new one"
+    assert len(looked) == cut, "where tracks are cut by themselves is the same as before"
     run_of(_GAP, (same,), cache=cache)
     assert len(solves) == first + 1, "and nothing for taking it back"
 

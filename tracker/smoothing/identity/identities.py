@@ -100,7 +100,8 @@ def settle(
         key = f"settled-{digest(obeyed, OF_PEOPLE)}"
         found: Settled | None = earlier.get(key)
         if found is None:
-            plain = plain or cutting.cuts(tracked, parameters)
+            plain = plain or earlier.get("cuts") or cutting.cuts(tracked, parameters)
+            earlier.put("cuts", plain)
             found = _settled(tracked, parameters, seen, obeyed, leeway, plain, staying)
             earlier.put(key, found)
         if staying.people is None:
