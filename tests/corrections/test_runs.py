@@ -15,12 +15,13 @@ from tracker import pipeline
 from tracker.corrections import Correction
 from tracker.corrections.kinds import make
 from tracker.corrections.log import dump, parse
+from tracker.doubts.doubt import Lanes
 from tracker.fusion.multi_bernoulli import MultiBernoulli
 from tracker.parameters import RunParameters, with_values
 from tracker.pipeline import Run
 from tracker.runs.stage_cache import StageCache
 from tracker.sequences.sequence import Sequence
-from tracker.smoothing.identity import identities
+from tracker.smoothing.identity import cutting, identities
 
 STEPS = 80
 FUSIONS = ("multi_bernoulli", "sequential_phd")
@@ -183,6 +184,29 @@ def test_nobody_is_where_somebody_says_so(fusion: str, smoothing: str) -> None:
     assert others.sum() >= STEPS - 10, "who is elsewhere stays"
 
 
+def test_who_turns_often_is_left_out_along_his_whole_course() -> None:
+    steps, turn = 320, 20
+    there = walk((-0.5, 0.4, 1.0), (0.5, 0.4, 1.0), turn)
+    path = np.concatenate([there if k % 2 else there[::-1] for k in range(steps // turn)])
+    other = walk((1.1, -0.9, 1.0), (-1.0, -0.8, 1.0), steps)
+    whole = sequence([(0, path), (0, other)], steps)
+    before = run_of(whole)
+    lanes = Lanes(before.tracks)
+    track = max(
+        lanes.ids.tolist(), key=lambda one: before.tracks.positions[lanes.rows[one], 1].mean()
+    )
+    rows = lanes.rows[track]
+    places = lanes.course(rows, 0.25)
+    assert len(places) < len(rows) // 2
+    known, x, y = np.array(places)[:, :3].T
+    frames, ground = before.tracks.frames[rows], before.tracks.positions[rows, :2]
+    way = np.column_stack([np.interp(frames, known, x), np.interp(frames, known, y)])
+    assert np.hypot(*(ground - way).T).max() <= 0.25
+    after = run_of(whole, (make(kind="nobody", places=places),))
+    assert [one.met for one in after.outcomes] == [True]
+    assert len(set(after.tracks.ids.tolist())) == 1
+
+
 @pytest.mark.parametrize("smoothing", SMOOTHINGS)
 def test_the_log_again_gives_the_same_tracks_bit_for_bit(smoothing: str) -> None:
     whole = with_a_gap()
@@ -265,18 +289,27 @@ def test_what_was_settled_before_is_not_settled_again(monkeypatch: pytest.Monkey
         solves.append(given[3])
         return settled(*given)
 
+    looked: list[object] = []
+    cuts = cutting.cuts
+
+    def looked_at(*given: Any) -> Any:
+        looked.append(given)
+        return cuts(*given)
+
     monkeypatch.setattr(identities, "_settled", counted)
+    monkeypatch.setattr(cutting, "cuts", looked_at)
     cache = StageCache()
     same, parted = _CHOICES[0], _CHOICES[1]
     as_it_is = make(kind="same", places=[place(_BEFORE, 5, -0.7), place(_BEFORE, 9, -0.7)])
     run_of(_GAP, (same,), cache=cache)
-    first = len(solves)
+    first, cut = len(solves), len(looked)
     assert [same] in solves
     held = run_of(_GAP, (same, as_it_is), cache=cache)
     assert len(solves) == first, "what holds by itself asks for nothing"
     assert [one.met for one in held.outcomes] == [True, True]
     run_of(_GAP, (same, as_it_is, parted), cache=cache)
     assert solves[first:] == [[same, parted]], "only with the new one"
+    assert len(looked) == cut, "where tracks are cut by themselves is the same as before"
     run_of(_GAP, (same,), cache=cache)
     assert len(solves) == first + 1, "and nothing for taking it back"
 

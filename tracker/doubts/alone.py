@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tracker.doubts.doubt import Alternative, Doubt, Lanes, unsaid
+from tracker.corrections.kinds import KINDS
+from tracker.doubts.doubt import WITHIN, Alternative, Doubt, Lanes, unsaid
 from tracker.doubts.linking import Move, Piece
 from tracker.runs.run import Run
 
@@ -51,8 +52,7 @@ def _nobody(run: Run, lanes: Lanes, track: int) -> Iterator[Doubt]:
     if wrong < 0.05:
         return
     first, last = lanes.span(track)
-    chosen = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), 12)).round().astype(int))
-    places = tuple(lanes.of_row(int(rows[k])) for k in chosen)
+    places = lanes.course(rows, WITHIN * (KINDS["nobody"].accuracy or 0.0))
     wrong = float(min(wrong, 0.95))
     how = f"{life:.1f} s long, seen at {100 * seen:.0f} % of its steps"
     if one_alone:

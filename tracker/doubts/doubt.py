@@ -20,6 +20,9 @@ DoubtKind = Literal[
     "exchange", "join", "cut", "crossing", "gap", "short", "begins", "ends", "missing", "fast"
 ]
 
+WITHIN = 0.5
+"""Of how far around its places nobody is: how near these keep to the course of who was nobody."""
+
 _UNSAID = datetime(2000, 1, 1, tzinfo=UTC)
 """The time of what nobody said yet."""
 
@@ -114,6 +117,32 @@ class Lanes:
         frames = self.tracks.frames[rows]
         at = int(np.searchsorted(frames, step, side="left" if after else "right")) - (not after)
         return self.of_row(int(rows[min(max(at, 0), len(rows) - 1)]))
+
+    def course(self, rows: Int[ndarray, " K"], within: float) -> tuple[Place, ...]:
+        """So few places of a track that the straight ways between them keep near it all along.
+
+        It is the polygon of Ramer, Douglas and Peucker in time: the place farthest from the way
+        from the first to the last, at its own step, is taken, and so on on both sides of it.
+
+        Args:
+            rows: Of the track, at least one, in the order of steps.
+            within: Metres on the ground.
+        """
+        steps, ground = self.tracks.frames[rows], self.tracks.positions[rows, :2]
+        chosen, parts = {0, len(rows) - 1}, [(0, len(rows) - 1)]
+        while parts:
+            first, last = parts.pop()
+            inner = np.arange(first + 1, last)
+            if not len(inner):
+                continue
+            ends = [first, last]
+            way = [np.interp(steps[inner], steps[ends], ground[ends, axis]) for axis in (0, 1)]
+            apart = np.hypot(*(ground[inner].T - way))
+            farthest = first + 1 + int(np.argmax(apart))
+            if apart.max() > within:
+                chosen.add(farthest)
+                parts += [(first, farthest), (farthest, last)]
+        return tuple(self.of_row(int(rows[k])) for k in sorted(chosen))
 
     def of_row(self, row: int) -> Place:
         """The place of a row."""

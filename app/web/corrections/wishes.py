@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from app.models.correcting import CorrectionWish
 from app.state.snapshot import Snapshot
 from tracker.corrections import Correction, CorrectionError, Place
-from tracker.corrections.kinds import make
+from tracker.corrections.kinds import KINDS, make
 from tracker.corrections.pointing import foot_on_floor, ground_under, stands, triangulated
-from tracker.doubts.doubt import Lanes
+from tracker.doubts.doubt import WITHIN, Lanes
 from tracker.sequences.sequence import Sequence
-
-_MOST_PLACES = 12
-"""Along the course of who was nobody."""
 
 
 def corrections_of(wish: CorrectionWish, snapshot: Snapshot, note: str) -> tuple[Correction, ...]:
@@ -126,9 +121,8 @@ def _nobody(lanes: Lanes, track: int, wish: CorrectionWish, note: str) -> Correc
     own = lanes.rows[track][(frames >= first) & (frames <= last)]
     if not len(own):
         raise CorrectionError(f"first, last: track {track} is not there between them")
-    spread = np.linspace(0, len(own) - 1, min(len(own), _MOST_PLACES))
-    chosen = np.unique(spread.round().astype(int))
-    places = [lanes.of_row(int(own[k])) for k in chosen]
+    around = KINDS["nobody"].accuracy if wish.accuracy is None else wish.accuracy
+    places = lanes.course(own, WITHIN * (around or 0.0))
     return make(kind="nobody", places=places, accuracy=wish.accuracy, note=note)
 
 

@@ -6,16 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Int
-from numpy import ndarray
 
 from tracker import pipeline
-from tracker.assignment import pairs_within
 from tracker.corrections import Correction, Place
 from tracker.corrections.kinds import leeway
 from tracker.doubts import Doubt, queue
 from tracker.doubts.doubt import Lanes, said
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
+from tracker.experiments.laboratory.attainable import people_of
 from tracker.parameters import RunParameters
 from tracker.pipeline import Run
 from tracker.runs.stage_cache import StageCache
@@ -41,7 +39,7 @@ class Truthful:
         self._truth, self._gate, self._tracks = truth, gate, tracks
         self._lanes = Lanes(tracks)
         self._moment = leeway(step_time) + 1
-        self._people: dict[int, Int[ndarray, " K"]] = {}
+        self._people = people_of(tracks, truth, gate)
 
     def who(self, place: Place) -> int | None:
         """Whose the track at a place is, mostly, in the second before and after; None for nobody's.
@@ -59,23 +57,17 @@ class Truthful:
         rows = self._lanes.rows[int(self._tracks.ids[own.start + best])]
         steps = self._tracks.frames[rows]
         around = rows[np.abs(steps - place.step) < self._moment]
-        people = np.array([self._of_row(row) for row in around.tolist()])
-        names, counts = np.unique(people, return_counts=True)
-        here = self._of_row(own.start + best)
+        names, counts = np.unique(self._people[around], return_counts=True)
+        here = int(self._people[own.start + best])
         most = names[counts == counts.max()]
         person = here if here in most else int(most[0])
         return person if person >= 0 else None
-
-    def _of_row(self, row: int) -> int:
-        """The person of a row of the tracks, -1 for none."""
-        step = int(self._tracks.frames[row])
-        return int(self._at(step)[row - self._tracks.at(step).start])
 
     def untracked(self, place: Place) -> bool:
         """Whether somebody is at a place whom no track has."""
         theirs = self._truth.at(place.step)
         apart = np.hypot(*(self._truth.positions[theirs, :2] - [place.x, place.y]).T)
-        missing = ~np.isin(self._truth.ids[theirs], self._at(place.step))
+        missing = ~np.isin(self._truth.ids[theirs], self._people[self._tracks.at(place.step)])
         return bool((missing & (apart <= self._gate)).any())
 
     def _at_an_end(self, place: Place, *, before: bool) -> bool:
@@ -83,18 +75,6 @@ class Truthful:
         step = place.step + (-self._moment if before else self._moment)
         person = self.who(place)
         return person is not None and person not in self._truth.ids[self._truth.at(step)]
-
-    def _at(self, step: int) -> Int[ndarray, " K"]:
-        """The person of each track at a step, -1 for none."""
-        if step not in self._people:
-            own, theirs = self._tracks.at(step), self._truth.at(step)
-            between = self._tracks.positions[own, None, :2] - self._truth.positions[theirs, :2]
-            apart = np.hypot(between[..., 0], between[..., 1])
-            rows, columns = pairs_within(apart, self._gate)
-            found = np.full(len(apart), -1, dtype=np.int64)
-            found[rows] = self._truth.ids[theirs][columns]
-            self._people[step] = found
-        return self._people[step]
 
     def holds(self, one: Correction) -> bool:
         """Whether something is true."""

@@ -27,6 +27,7 @@ from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.identity.people import Seen, told_of_people
 from tracker.smoothing.identity.people import of_chains as people_of_chains
 from tracker.smoothing.identity.program import Cut
+from tracker.smoothing.identity.staying import Staying
 from tracker.smoothing.identity.ties import Seeker, Ties
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.protocol import Earlier, Nothing
@@ -60,6 +61,8 @@ class Settled:
     joined: Joined
     limits: dict[int, tuple[int, int]]
     """Of some labels the first and the last step at which corrections let them be."""
+    people: Int[ndarray, " R"]
+    """The label of each row before the cuts, -1 where nobody has it."""
 
 
 def settle(
@@ -72,7 +75,8 @@ def settle(
     """Cut and join.
 
     Of what a person said of who is who only what does not hold by itself is made to hold, one
-    after another: who says that it is as it is changes nothing.
+    after another: who says that it is as it is changes nothing. What nobody speaks of stays, as
+    far as it can, as it is settled without them.
 
     Args:
         tracked: By the filter, or as settled before.
@@ -89,15 +93,19 @@ def settle(
     leeway = corrections_leeway(tracked.smoother.model.step_time)
     waiting = [one for one in corrections if one.pairs or one.apart]
     plain: cutting.Cuts | None = None
+    staying = Staying()
     turn = 0
     while True:
         obeyed = [one for one in corrections if one not in waiting]
         key = f"settled-{digest(obeyed, OF_PEOPLE)}"
         found: Settled | None = earlier.get(key)
         if found is None:
-            plain = plain or cutting.cuts(tracked, parameters)
-            found = _settled(tracked, parameters, seen, obeyed, leeway, plain)
+            plain = plain or earlier.get("cuts") or cutting.cuts(tracked, parameters)
+            earlier.put("cuts", plain)
+            found = _settled(tracked, parameters, seen, obeyed, leeway, plain, staying)
             earlier.put(key, found)
+        if staying.people is None:
+            staying = Staying(found.people)
         unmet = _unmet(found.paths, waiting, leeway, careful=turn < _CAREFUL)
         if not unmet:
             return found, key
@@ -134,6 +142,7 @@ def _settled(
     corrections: Many[Correction],
     leeway: int,
     plain: cutting.Cuts,
+    staying: Staying,
 ) -> Settled:
     """Cut and join with all of some corrections."""
     smoother, fitted, shared = tracked.smoother, tracked.fitted, tracked.shared
@@ -152,7 +161,15 @@ def _settled(
     now, later = ties.parted(cut, longest)
     cuts: list[Cut] = []
     following, used = joining.join(
-        worths, births, deaths, pairs.earlier, pairs.later, pairs.gains, now, people, cuts
+        worths,
+        births,
+        deaths,
+        pairs.earlier,
+        pairs.later,
+        staying.gains(pairs, cut, kept),
+        now,
+        people,
+        cuts,
     )
     first = joining.chains(following, used)
     for _ in range(_TURNS):  # who is joined to whom tells of the ends of the pieces in between
@@ -165,7 +182,15 @@ def _settled(
         )
         pairs = goes_on.by(told)
         following, used = joining.join(
-            worths, births, deaths, pairs.earlier, pairs.later, pairs.gains, now, people, cuts
+            worths,
+            births,
+            deaths,
+            pairs.earlier,
+            pairs.later,
+            staying.gains(pairs, cut, kept),
+            now,
+            people,
+            cuts,
         )
         again = joining.chains(following, used)
         if again == first:
@@ -174,7 +199,15 @@ def _settled(
     of_chains = later.of_chains(first, cut)
     if of_chains is None:  # who is tied to somebody far away may not be joined to another meanwhile
         following, used = joining.join(
-            worths, births, deaths, pairs.earlier, pairs.later, pairs.gains, ties, people, cuts
+            worths,
+            births,
+            deaths,
+            pairs.earlier,
+            pairs.later,
+            staying.gains(pairs, cut, kept),
+            ties,
+            people,
+            cuts,
         )
         first = joining.chains(following, used)
         of_chains = Ties(apart=ties.apart).of_chains(first, cut) or Ties()
@@ -213,7 +246,9 @@ def _settled(
     )  # fmt: skip
     limits = {labels[k]: span for k, span in ties.limits(chains, cut).items()}
     origins_of = np.array(origins, dtype=np.int64)
-    return Settled(paths, links, origins_of, of_piece, names_of, decisions, joined, limits)
+    whose = np.full(len(fitted.paths.states), -1, dtype=np.int64)
+    whose[kept] = of_pieces[cut.owners]
+    return Settled(paths, links, origins_of, of_piece, names_of, decisions, joined, limits, whose)
 
 
 def _most(names: ndarray, weights: ndarray) -> int:
