@@ -117,7 +117,11 @@ def run(context: Context) -> Result:
                 f"{100.0 * won:.0f} % of it after {len(curve) - 1} answers: "
                 f"{curve[0]:.3f} → {curve[-1]:.3f}"
                 + ("" if needed is None else f"; half after {needed}")
-                + f"; the best {len(best.best) - 1} single changes alone win {100.0 * most:.0f} %",
+                + (
+                    f"; the best {len(best.best) - 1} single changes alone win {100.0 * most:.0f} %"
+                    if len(best.best) > 1
+                    else "; of the ids none was wrong at the start"
+                ),
                 "better" if needed is not None else "worse",
             )
         )
