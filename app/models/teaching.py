@@ -65,6 +65,13 @@ class RestoreRequest(Model):
     """Values by key that were changed with them."""
 
 
+class DetectorRequest(Model):
+    """A detection network for the pictures."""
+
+    model: GivenPath | None = None
+    """The path of an ONNX file on this machine; none takes the one away that there is."""
+
+
 class CopyRequest(Model):
     """Where a copy goes."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path as FolderPath
@@ -13,6 +14,7 @@ from app import models
 from app.errors import ApiError, sentence
 from app.models.teaching import (
     CopyRequest,
+    DetectorRequest,
     EditingChange,
     NewEntrance,
     NewTemplate,
@@ -22,10 +24,10 @@ from app.models.teaching import (
     ValueChange,
 )
 from app.state.teaching import Part, Side, Teaching
-from app.web.dependencies import ERRORS, FOR_EVER, Bench, nothing_open
+from app.web.dependencies import ERRORS, FOR_EVER, Bench, Work, nothing_open
+from app.web.opening import begun, told_in_the_answer
 from app.web.pictures.swatches import Swatches
 from app.web.views import results
-from tracker.sequences.sequence import SequenceError
 
 NOTHING_LOST = "Nothing was changed, and nothing is lost."
 
@@ -46,7 +48,7 @@ def _complaining(code: str = "cannot_teach") -> Iterator[None]:
     """What does not fit, in the one shape of errors."""
     try:
         yield
-    except (SequenceError, OSError) as error:
+    except (ValueError, OSError) as error:
         words = sentence(error)
         words = words[:1].upper() + words[1:] + "."
         raise ApiError(422, code, words, hint=NOTHING_LOST) from None
@@ -175,6 +177,22 @@ def remove_entrance(index: int, bench: Bench, teach: Teach) -> models.State:
     """Take an entrance away."""
     with _complaining():
         teach.remove_entrance(index)
+    return results.state_of(bench.snapshot())
+
+
+@router.put("/detector")
+async def use_detector(wish: DetectorRequest, bench: Bench, jobs: Work) -> models.State:
+    """Find people by a detection network of this machine, or no more; the run follows."""
+    if bench.snapshot().sequence is None:
+        raise nothing_open()
+    model = None if wish.model is None else FolderPath(wish.model).expanduser()
+    if model is not None:
+        from tracker.single_view.onnx.network import Network, Settings  # at its first use
+
+        with _complaining():
+            await asyncio.to_thread(Network, model, Settings())
+    with told_in_the_answer("the detector", field="model", hint=NOTHING_LOST):
+        await begun(jobs.use_detector(model))
     return results.state_of(bench.snapshot())
 
 

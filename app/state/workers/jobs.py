@@ -125,6 +125,10 @@ class Jobs:
         """Open a sequence in the background, as :meth:`Opener.open` does."""
         return self._opener.open(name, values)
 
+    def use_detector(self, model: Path | None) -> Future[None]:
+        """Open what is open again with a network, as :meth:`Opener.use_detector` does."""
+        return self._opener.use_detector(model)
+
     def take_up(self, note: Note) -> Future[None]:
         """Open what a start had open that crashed, with its values; its run is left out.
 

@@ -18,7 +18,7 @@ from app.state.workbench import Workbench
 from app.state.workers.threads import be_nice
 from tracker import pipeline
 from tracker.corrections.log import open_log
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters import RunParameters, changed, with_values
 from tracker.pipeline import Cancelled
 from tracker.sequences import library
 from tracker.sequences.pictures.frames import FrameReader
@@ -113,6 +113,23 @@ class Opener:
         self._workbench.set_opening(Opening(name, "reading"))
         thread.start()
         return future
+
+    def use_detector(self, model: Path | None) -> Future[None]:
+        """Have another detection network, or none, and open what is open again with it.
+
+        All values stay but the single-view method, which is the one that then fits.
+
+        Args:
+            model: An ONNX file that can be used; None where there is to be none.
+
+        Returns:
+            As :meth:`open`.
+        """
+        now = self._workbench.snapshot()
+        self._detector = model
+        values = changed(now.parameters, now.defaults)
+        values.pop("single_view", None)
+        return self.open(now.opened_as, values)
 
     def _open(
         self,

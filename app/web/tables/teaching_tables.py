@@ -33,6 +33,7 @@ def teach_tables(request: Request, bench: Bench) -> str:
         _templates(snapshot, sequence)
         + _offers(snapshot, sequence, teaching)
         + _numbers(sequence)
+        + _detector(sequence)
         + _room(sequence)
         + _target(sequence)
         + _entrances(sequence)
@@ -142,6 +143,21 @@ def _numbers(sequence: Sequence) -> str:
         '<label>step<input name="step" id="new-step" type="number" min="0" '
         f'max="{sequence.frames - 1}" placeholder="shown"></label>{sizes}'
         '<button class="btn box">Add</button></form>'
+    )
+
+
+def _detector(sequence: Sequence) -> str:
+    """A network that finds people where nobody draws templates."""
+    if not sequence.has_pictures:
+        return ""
+    model = "" if sequence.detector is None else str(sequence.detector.path)
+    without = _send("Without it", "PUT teach/detector", {"model": None}).html if model else ""
+    return (
+        '<form class="row" data-send="PUT teach/detector" aria-label="Detector">'
+        '<label class="wide" title="A person detector exported to ONNX, on this machine">'
+        f'Detector<input name="model" id="detector-model" value="{escaped(model)}" '
+        'placeholder="path of a model.onnx" required></label>'
+        f'<button class="btn box">Use</button>{without}</form>'
     )
 
 
@@ -271,6 +287,6 @@ def _send(
     name = f' aria-label="{escaped(label)}"' if label else ""
     content = escaped(json.dumps(body or {}))
     return Markup(
-        f'<button class="btn {"main" if main else "box"}" data-send="{escaped(address)}" '
-        f'data-body="{content}"{name}>{escaped(words)}</button>'
+        f'<button type="button" class="btn {"main" if main else "box"}" '
+        f'data-send="{escaped(address)}" data-body="{content}"{name}>{escaped(words)}</button>'
     )

@@ -14,6 +14,9 @@ const DOUBLE_CLICK = 220;
 /** Of the window's height, at most, where there is one camera and nothing to be beside it. */
 const LONE = 0.4;
 
+/** What the pictures leave of their column to the tables below, where notes make it low, CSS pixels. */
+const LEFT_BELOW = 170;
+
 /** @type {Pane} */
 export function mountCameras(root, { store, actions, playback }) {
 	const { mosaic: body, blank, nearest } = parts(root);
@@ -94,7 +97,10 @@ export function mountCameras(root, { store, actions, playback }) {
 		root.classList.toggle("own", own);
 		if (own) body.style.height = "";
 		const usual = parseFloat(getComputedStyle(root).getPropertyValue("--h-cam")) * 1.1 + 8;
-		const natural = cameras().length === 1 ? Math.max(usual, LONE * innerHeight) : usual;
+		const wanted = cameras().length === 1 ? Math.max(usual, LONE * innerHeight) : usual;
+		const around = root.offsetHeight - body.offsetHeight;
+		const fits = (root.parentElement?.clientHeight ?? Infinity) - around - LEFT_BELOW;
+		const natural = Math.min(wanted, Math.max(usual / 2, fits));
 		const { cells: found, height } = mosaic(
 			cameras().map((c) => c.width / c.height),
 			large,
@@ -350,6 +356,7 @@ export function mountCameras(root, { store, actions, playback }) {
 		["selection", "hover", "pointed", "layers2d", "layers3d", "zooms", "loupe", "follow"],
 		playback.repaint,
 	);
-	new ResizeObserver(arrange).observe(root);
+	const observer = new ResizeObserver(arrange);
+	for (const element of [root, root.parentElement]) element && observer.observe(element);
 	addEventListener("panes", arrange);
 }

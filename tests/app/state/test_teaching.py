@@ -18,6 +18,7 @@ from app.web.server import Settings, create_app
 from app.web.views import results
 from tests.app.conftest import ADDRESS, connect, run_is, wait_until
 from tests.browser.walkers import write_walkers
+from tests.engine.single_view.networks import pooling
 from tracker import pipeline
 from tracker.sequences.reader import FILE, read_sequence
 
@@ -440,3 +441,31 @@ def test_the_size_of_people_is_taught_saved_and_taken_back(
         assert "positive numbers" in complaint(
             client.patch("/api/teach/target/0", json={"value": wrong})
         )
+
+
+def test_a_detector_is_chosen_by_its_path_and_taken_away(
+    client: TestClient, walkers: Path, tmp_path: Path
+) -> None:
+    before = state(client)
+    change = {"fusion.survival_probability": 0.9}
+    client.patch("/api/parameters", json={"changes": change})
+    model = pooling(tmp_path / "red.onnx")
+    client.put("/api/teach/detector", json={"model": str(model)})
+    wait_until(lambda: state(client)["methods"]["single_view"] == "onnx_detector")
+    shown = done(client)
+    assert shown["methods"]["single_view"] == "onnx_detector"
+    assert shown["parameters"]["fusion.survival_probability"] == 0.9
+    assert f'value="{model}"' in client.get("/api/tables/teach").text
+    (tmp_path / "text.onnx").write_text("no network")
+    for wrong, words in (("none.onnx", "cannot be read"), ("text.onnx", "cannot be used")):
+        answer = client.put("/api/teach/detector", json={"model": str(tmp_path / wrong)})
+        assert answer.status_code == 422
+        assert wrong in answer.json()["detail"]
+        assert words in answer.json()["detail"]
+    assert state(client)["methods"]["single_view"] == "onnx_detector", "nothing was changed"
+    client.put("/api/teach/detector", json={"model": None})
+    wait_until(lambda: state(client)["methods"]["single_view"] != "onnx_detector")
+    shown = done(client)
+    assert shown["methods"]["single_view"] == before["methods"]["single_view"]
+    assert shown["parameters"]["fusion.survival_probability"] == 0.9
+    assert "Without it" not in client.get("/api/tables/teach").text
