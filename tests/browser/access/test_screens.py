@@ -134,8 +134,8 @@ def test_pictures_leave_room_for_the_tables_where_notes_make_the_column_low(
     as_at_first(server)
     pictures = flat_page.locator(".cam").first
     before = pictures.bounding_box()
-    flat_page.set_viewport_size({"width": 1440, "height": 740})
-    flat_page.wait_for_function("() => document.querySelector('.side').clientHeight > 100")
+    flat_page.locator("main").evaluate("main => { main.style.marginTop = '200px' }")
+    flat_page.wait_for_function("() => document.querySelector('.side').clientHeight > 130")
     after = pictures.bounding_box()
     assert before is not None
     assert after is not None
