@@ -307,6 +307,7 @@ def test_a_template_that_the_tracks_offer_is_taken_by_keys_and_undone(
     expect(offered).to_have_count(count)
     page.get_by_role("button", name="No more offers").click()
     expect(listed).to_have_count(0)
+    as_at_first(server)
 
 
 def test_whatever_is_come_to_by_tab_is_seen_in_a_low_panel(flat_page: Page) -> None:
