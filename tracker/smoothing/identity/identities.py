@@ -160,18 +160,16 @@ def _settled(
     longest = max(round(parameters.longest / smoother.model.step_time), 1)
     now, later = ties.parted(cut, longest)
     cuts: list[Cut] = []
-    following, used = joining.join(
-        worths,
-        births,
-        deaths,
-        pairs.earlier,
-        pairs.later,
-        staying.gains(pairs, cut, kept),
-        now,
-        people,
-        cuts,
-    )
-    first = joining.chains(following, used)
+
+    def chained(pairs: pieces.Pairs, ties: Ties) -> list[list[int]]:
+        """The chains of pieces that are worth most together, as far as the ties let them."""
+        gains = staying.gains(pairs, cut, kept)
+        following, used = joining.join(
+            worths, births, deaths, pairs.earlier, pairs.later, gains, ties, people, cuts
+        )
+        return joining.chains(following, used)
+
+    first = chained(pairs, now)
     for _ in range(_TURNS):  # who is joined to whom tells of the ends of the pieces in between
         several = [chain for chain in first if len(chain) > 1]
         if not several:
@@ -181,35 +179,13 @@ def _settled(
             cut, smoother.fit(whole, pieces.moved_to(links, rows)), rows, smoother.model.motion
         )
         pairs = goes_on.by(told)
-        following, used = joining.join(
-            worths,
-            births,
-            deaths,
-            pairs.earlier,
-            pairs.later,
-            staying.gains(pairs, cut, kept),
-            now,
-            people,
-            cuts,
-        )
-        again = joining.chains(following, used)
+        again = chained(pairs, now)
         if again == first:
             break
         first = again
     of_chains = later.of_chains(first, cut)
     if of_chains is None:  # who is tied to somebody far away may not be joined to another meanwhile
-        following, used = joining.join(
-            worths,
-            births,
-            deaths,
-            pairs.earlier,
-            pairs.later,
-            staying.gains(pairs, cut, kept),
-            ties,
-            people,
-            cuts,
-        )
-        first = joining.chains(following, used)
+        first = chained(pairs, ties)
         of_chains = Ties(apart=ties.apart).of_chains(first, cut) or Ties()
     # what goes on by its motion tells more of its looks than each piece alone
     back = odds.comes_back(smoother, refitted.paths, links, first, parameters, seen.looks)
