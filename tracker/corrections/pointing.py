@@ -90,7 +90,9 @@ def triangulated(points: Many[tuple[Camera, tuple[float, float]]]) -> Float[ndar
             "clicks: the two pictures look from the same side; click in another one"
         )
     place: Float[ndarray, " 3"] = np.linalg.solve(total, np.einsum("cij,cj->i", across, centres))
-    miss = float(np.linalg.norm(np.einsum("cij,cj->ci", across, place - centres), axis=1).max())
+    # the place lies in the middle, half as far from each of two rays as they are apart
+    away = np.linalg.norm(np.einsum("cij,cj->ci", across, place - centres), axis=1)
+    miss = 2.0 * float(away.max())
     ahead = np.einsum("ci,ci->c", rays, place - centres)
     if miss > _MISS or (ahead <= 0.0).any():
         raise CorrectionError(
