@@ -281,3 +281,18 @@ def test_a_name_is_no_formula_and_comes_back(tmp_path: Path, name: str) -> None:
 @given(st.text(alphabet="=+-@',; a\t\r"))
 def test_what_is_guarded_is_what_it_was(text: str) -> None:
     assert unguarded(guarded(text)) == text
+
+
+def test_who_was_named_has_the_name_in_every_row(tmp_path: Path) -> None:
+    path = tmp_path / "tracks.csv"
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        export.write_tracks_csv(
+            stream, SEQUENCE, TRACKS, PARAMETERS_OF_RUN, 5, names={2: "Anna, the =first"}
+        )
+    lines = [one for one in path.read_text("utf-8").splitlines() if not one.startswith("#")]
+    rows = list(csv.DictReader(lines))
+    assert [unguarded(row["name"]) for row in rows] == [
+        "", "Anna, the =first", "Anna, the =first", "",
+    ]  # fmt: skip
+    assert len(export.read_tracks_csv(path)) == len(TRACKS)
+    assert export.NAME not in table_of(text_of(TRACKS))[0]

@@ -7,12 +7,14 @@ value of every parameter, in words that ``multiview-phd track --set`` takes back
 from __future__ import annotations
 
 import csv
+import io
 import itertools
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TextIO
 
 import numpy as np
@@ -32,6 +34,9 @@ COLUMNS = ("frame", "time", "id", "x", "y", "z", "existence", "sigma_x", "sigma_
 
 CORRECTION = "correction"
 """The column of a corrected run: the id of the correction that a row rests on, empty for none."""
+
+NAME = "name"
+"""The column of a run in which somebody was named: the name of a row's track, empty for none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,6 +75,7 @@ def write_tracks_csv(
     done: int | None = None,
     remarks: Iterable[str] = (),
     resting: Many[str] = (),
+    names: Mapping[int, str] = MappingProxyType({}),
 ) -> None:
     """Write the track file.
 
@@ -85,13 +91,20 @@ def write_tracks_csv(
         remarks: What else is said there of the result, for instance that pictures were missing.
         resting: Of a run with corrections the id of the one that each row rests on; it becomes
             the column :data:`CORRECTION`.
+        names: What people were called by hand, by track; they become the column :data:`NAME`.
     """
     for line in _comments(sequence, parameters, seed, done, remarks):
         stream.write(f"# {line}\n")
     cameras = sequence.cameras
     boxes = [f"{camera.name}_{side}" for camera in cameras for side in BOX]
-    head = [*COLUMNS, *([CORRECTION] if resting else []), *map(guarded, boxes)]
+    head = [
+        *COLUMNS,
+        *([NAME] if names else []),
+        *([CORRECTION] if resting else []),
+        *map(guarded, boxes),
+    ]
     csv.writer(stream, lineterminator="\n").writerow(head)
+    called = {track: _cell(name) for track, name in names.items()}
     columns = [
         [f"{frame}" for frame in tracks.frames],
         [f"{frame * sequence.step_time:.6f}" for frame in tracks.frames],
@@ -99,12 +112,20 @@ def write_tracks_csv(
         *_fixed(tracks.positions, 4),
         *_fixed(tracks.existences[:, None], 4),
         *_fixed(tracks.sigmas, 4),
+        *([[called.get(track, "") for track in tracks.ids.tolist()]] if names else []),
         *([list(resting)] if resting else []),
     ]
     for camera in cameras:
         pixels, visible = camera.project_boxes(tracks.positions, sequence.target_half_extents)
         columns += _fixed(np.where(visible[:, None], pixels, np.nan), 2)
     stream.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
+
+
+def _cell(text: str) -> str:
+    """Text that somebody wrote as a cell of its own, and no formula."""
+    cell = io.StringIO()
+    csv.writer(cell, lineterminator="").writerow([guarded(" ".join(text.split()))])
+    return cell.getvalue()
 
 
 def _fixed(values: Float[ndarray, "N C"], decimals: int) -> Iterator[list[str]]:

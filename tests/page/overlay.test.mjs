@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { drawOverlay } from "../../static/js/draw/overlay.js";
 
 /** The words that are written over a picture of a width, with so many tracks. */
-function written(width, count, { selection = null, hover = null } = {}) {
+function written(width, count, { selection = null, hover = null, names = {} } = {}) {
   const words = [];
   const brush = new Proxy(
     { measureText: () => ({ width: 8 }), fillText: (text) => words.push(text) },
@@ -28,12 +28,13 @@ function written(width, count, { selection = null, hover = null } = {}) {
     hover,
     pointed: null,
     alone: false,
+    names,
     people: [],
     fades: true,
     opacity: 1,
     ink: { get: () => "#fff", id: () => "#123456", on: () => "#fff", font: "sans-serif" },
   });
-  return words.map(Number).sort((a, b) => a - b);
+  return words.map((word) => Number(word) || word).sort((a, b) => a - b);
 }
 
 test("a few are numbered in a picture of any size", () => {
@@ -44,4 +45,8 @@ test("a few are numbered in a picture of any size", () => {
 test("of a crowd in a small picture those alone are numbered that somebody means", () => {
   assert.deepEqual(written(150, 30), []);
   assert.deepEqual(written(150, 30, { selection: 7, hover: 12 }), [7, 12]);
+});
+
+test("who was named has the name beside the number", () => {
+  assert.deepEqual(written(600, 1, { names: { 1: "Anna" } }), ["1 Anna"]);
 });

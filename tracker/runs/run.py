@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from tracker.corrections.kinds import IN_THE_FUSION, OF_PEOPLE, Correction, Kind, digest
-from tracker.corrections.outcomes import Outcome
+from tracker.corrections.outcomes import Outcome, names_by_track
 from tracker.corrections.resting import resting
 from tracker.fusion.protocol import FusionResult
 from tracker.parameters import RunParameters, Stage, stage_values
@@ -124,6 +124,11 @@ def resting_of(run: Run) -> list[str]:
         return []
     tracks = run.tracks
     return resting(tracks.frames, tracks.ids, tracks.positions, run.corrections, run.outcomes)
+
+
+def names_of(run: Run) -> dict[int, str]:
+    """What people were called by hand, by track of a finished run."""
+    return names_by_track(run.outcomes, run.corrections)
 
 
 def key_without_names(run: Run) -> str:

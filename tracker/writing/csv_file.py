@@ -20,5 +20,6 @@ def write(path: Path, written: Written, options: Options) -> None:
             done=written.done,
             remarks=written.remarks,
             resting=written.resting,
+            names=written.names,
         )
     options.at(written.steps, written.steps)

@@ -58,6 +58,8 @@ class TrackOfFile(_Model):
     """One track: columns of equal length, one row a step that it is there."""
 
     id: int
+    name: str | None = None
+    """What the person was called by hand."""
     frames: list[int]
     """Steps, from 0 on, ascending."""
     positions: list[tuple[float, float, float]]
@@ -138,6 +140,7 @@ def _track(written: Written, number: int) -> TrackOfFile:
     cameras = written.sequence.cameras
     return TrackOfFile(
         id=number,
+        name=written.names.get(number),
         frames=tracks.frames[rows].tolist(),
         positions=tracks.positions[rows].tolist(),
         existences=tracks.existences[rows].tolist(),

@@ -34,6 +34,9 @@ def write(path: Path, written: Written, options: Options) -> None:
         "existence": tracks.existences,
         **{f"sigma_{axis}": tracks.sigmas[:, k] for k, axis in enumerate("xyz")},
     }
+    if written.names:
+        called = [written.names.get(track, "") for track in tracks.ids.tolist()]
+        columns["name"] = np.array(called, dtype=object)
     if written.resting:
         columns["correction"] = np.array(written.resting, dtype=object)
     for index, camera in enumerate(sequence.cameras):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from collections.abc import Sequence as Many
 from dataclasses import dataclass, field
 
@@ -62,6 +62,8 @@ class Written:
     """What must be said of it wherever it goes: that pictures were missing."""
     resting: Many[str] = ()
     """Of a corrected run the id of the correction that each row rests on, empty for none."""
+    names: Mapping[int, str] = field(default_factory=dict)
+    """What people were called by hand, by track."""
     back: str = ""
     """The address of the page that shows it, where there is one."""
     boxes: list[tuple[Float[ndarray, "N 4"], Bool[ndarray, " N"]]] = field(init=False)

@@ -152,6 +152,7 @@ export function mountCameras(root, { store, actions, playback }) {
 				hover: hover?.id ?? null,
 				pointed: pointed?.camera === index ? pointed.box : null,
 				alone: isAlone(store.get()),
+				names: store.get().names,
 				people: next.result?.truth ?? [],
 				fades: store.get().server?.trail.fades ?? true,
 				opacity: next.stale ? 0.45 : 1,
@@ -353,7 +354,7 @@ export function mountCameras(root, { store, actions, playback }) {
 	store.watch(["server", "sequences"], header);
 	store.on(["large"], arrange);
 	store.on(
-		["selection", "hover", "pointed", "layers2d", "layers3d", "zooms", "loupe", "follow"],
+		["selection", "hover", "pointed", "layers2d", "layers3d", "zooms", "loupe", "follow", "names"],
 		playback.repaint,
 	);
 	const observer = new ResizeObserver(arrange);

@@ -8,6 +8,8 @@ import { stroke, trace } from "./canvas.js";
 
 /** As many as this in a small picture are a crowd. */
 const CROWD = 9;
+/** Letters of a name that are written. */
+const LONGEST = 16;
 const WHITE = "#f4f4f4";
 /** Of samples: no track and no line has it. */
 const SAMPLE = "#ffd84d";
@@ -189,7 +191,7 @@ function drawSamples(g, samples, scale) {
  * @param {Scene} scene
  * @param {boolean} roomy
  */
-function drawTracks(g, tracks, { scale, selection, hover, ink, width }, roomy) {
+function drawTracks(g, tracks, { scale, selection, hover, ink, width, names }, roomy) {
 	const huge = width > 800 ? 1.4 : 1;
 	for (const { id, box, seen, fed_by: fed } of tracks) {
 		const marked = id === selection || id === hover;
@@ -212,7 +214,7 @@ function drawTracks(g, tracks, { scale, selection, hover, ink, width }, roomy) {
 	const named = roomy || tracks.length < CROWD;
 	for (const { id, box } of [...tracks].reverse()) {
 		if (!named && id !== selection && id !== hover) continue;
-		const text = String(id);
+		const text = names[id] ? `${id} ${names[id].slice(0, LONGEST)}` : String(id);
 		const wide = Math.max(size + 1, Math.ceil(g.measureText(text).width) + 6);
 		const top = Math.round(box[1] * scale);
 		const y = top - size - 1 < 2 ? Math.max(2, top + 2) : top - size - 1;

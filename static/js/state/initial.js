@@ -83,6 +83,7 @@ export function initialState() {
 		moved: false,
 		place: "tune",
 		signs: {},
+		names: {},
 		wantsStudy: false,
 		dismissed: [],
 		undoable: [0, 0],

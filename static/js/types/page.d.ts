@@ -154,6 +154,8 @@ interface PageState {
 	place: string;
 	/** Whether a new study was asked for, of what is open. */
 	wantsStudy: boolean;
+	/** What people were called by hand, by track. */
+	names: Record<number, string>;
 	/** What stands beside the words of the places, by name. */
 	signs: Record<string, string>;
 	/** Whether somebody has chosen a step of this sequence. */
@@ -418,6 +420,8 @@ interface Scene {
 	pointed: number | null;
 	/** Only the selected track. */
 	alone: boolean;
+	/** What people were called by hand, by track. */
+	names: Record<number, string>;
 	people: Server.Step["truth"];
 	/** Whether trails are fainter the older they are. */
 	fades: boolean;
