@@ -7,6 +7,7 @@ import numpy as np
 from tracker.corrections import Place
 from tracker.corrections.kinds import make
 from tracker.corrections.outcomes import outcomes
+from tracker.corrections.relabelling import relabelled
 from tracker.corrections.seeking import Whereabouts
 
 
@@ -40,3 +41,17 @@ def test_a_correction_of_a_moment_before_somebody_begins_is_met() -> None:
     found = outcomes(steps, owners, positions, (said,), leeway=2)
     assert found[0].met
     assert found[0].tracks == (7, 7)
+
+
+def test_who_begins_at_the_last_step_of_nobody_is_somebody() -> None:
+    steps = np.arange(40, 100)
+    ids = np.ones(60, dtype=np.int64)
+    where = np.column_stack([np.linspace(0.0, 5.0, 60), np.zeros(60), np.ones(60)])
+    until = make(kind="nobody", places=[[0, 0.0, 0.0, 1.0], [40, 0.0, 0.0, 1.0]])
+    (told,) = outcomes(steps, ids, where, [until], leeway=25)
+    assert told.met, told.why
+    assert len(relabelled(steps, ids, where, [until], leeway=25)[1]) == 60
+    at_once = make(kind="nobody", places=[[40, 0.0, 0.0, 1.0]])
+    assert not outcomes(steps, ids, where, [at_once], leeway=25)[0].met
+    (short,) = outcomes(steps[:1], ids[:1], where[:1], [until], leeway=25)
+    assert not short.met

@@ -107,7 +107,8 @@ def mostly_inside(
 ) -> set[int]:
     """The owners who are nobody: whose rows at the steps of the correction are mostly along it.
 
-    Somebody who only passes by is not meant.
+    Somebody who only passes by is not meant, nor who is there for one step of many alone: where the
+    births that were forbidden are allowed again, somebody may begin at the very last of them.
     """
     first, last = one.steps
     during = (steps >= first) & (steps <= last)
@@ -116,4 +117,6 @@ def mostly_inside(
     count = int(owners.max()) + 1
     there = np.bincount(owners[during], minlength=count)
     along_it = np.bincount(owners[inside], minlength=count)
-    return set(np.flatnonzero((along_it > 0) & (2 * along_it > there)).tolist())
+    whole = np.bincount(owners, minlength=count)
+    touches = (along_it == 1) & (whole > 1) & (first < last)
+    return set(np.flatnonzero((along_it > 0) & (2 * along_it > there) & ~touches).tolist())
