@@ -49,4 +49,6 @@ test("of a crowd in a small picture those alone are numbered that somebody means
 
 test("who was named has the name beside the number", () => {
   assert.deepEqual(written(600, 1, { names: { 1: "Anna" } }), ["1 Anna"]);
+  // a small picture has no room for it
+  assert.deepEqual(written(150, 1, { names: { 1: "Anna" } }), [1]);
 });

@@ -214,7 +214,7 @@ function drawTracks(g, tracks, { scale, selection, hover, ink, width, names }, r
 	const named = roomy || tracks.length < CROWD;
 	for (const { id, box } of [...tracks].reverse()) {
 		if (!named && id !== selection && id !== hover) continue;
-		const text = names[id] ? `${id} ${names[id].slice(0, LONGEST)}` : String(id);
+		const text = roomy && names[id] ? `${id} ${names[id].slice(0, LONGEST)}` : String(id);
 		const wide = Math.max(size + 1, Math.ceil(g.measureText(text).width) + 6);
 		const top = Math.round(box[1] * scale);
 		const y = top - size - 1 < 2 ? Math.max(2, top + 2) : top - size - 1;
