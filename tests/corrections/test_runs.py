@@ -330,3 +330,23 @@ def test_a_method_that_takes_no_corrections_runs_as_before(monkeypatch: pytest.M
     run = run_of(with_a_gap(), (make(kind="here", places=[[45, 0.0, 1.2, 1.0]]),), smoothing="none")
     assert [one.met for one in run.outcomes] == [False]
     assert len(run.tracks)
+
+
+@pytest.mark.parametrize("smoothing", SMOOTHINGS)
+@pytest.mark.parametrize(("kind", "before", "after"), [("left", 50, 51), ("came", 49, 50)])
+def test_who_left_or_came_in_while_he_is_seen_on_is_two_people(
+    smoothing: str, kind: str, before: int, after: int
+) -> None:
+    whole = with_a_gap()
+    then = run_of(whole, smoothing=smoothing)
+    said = make(kind=kind, places=[place(then, 50, -0.7)])
+    run = run_of(whole, (said,), smoothing=smoothing, previous=then)
+    tracks = run.tracks
+    y = tracks.positions[:, 1]
+    there = [
+        tracks.ids[(tracks.frames == step) & (np.abs(y + 0.7) < 0.4)].tolist()
+        for step in (before, after)
+    ]
+    assert [len(one) for one in there] == [1, 1]
+    assert there[0] != there[1]
+    assert [one.met for one in run.outcomes] == [True]

@@ -8,7 +8,7 @@ that are surely one person's; all of them together are joined at the least cost.
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Int
@@ -186,7 +186,7 @@ def _settled(
     of_chains = later.of_chains(first, cut)
     if of_chains is None:  # who is tied to somebody far away may not be joined to another meanwhile
         first = chained(pairs, ties)
-        of_chains = Ties(apart=ties.apart).of_chains(first, cut) or Ties()
+        of_chains = replace(ties, together=()).of_chains(first, cut) or Ties()
     # what goes on by its motion tells more of its looks than each piece alone
     back = odds.comes_back(smoother, refitted.paths, links, first, parameters, seen.looks)
     following, _ = joining.join(

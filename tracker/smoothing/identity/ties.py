@@ -51,7 +51,9 @@ class Ties:
         """
         near = tuple((i, j) for i, j in self.together if cut.firsts[j] - cut.lasts[i] <= longest)
         far = tuple(pair for pair in self.together if pair not in near)
-        return replace(self, together=near), Ties(far, self.apart)
+        return replace(self, together=near), Ties(
+            far, self.apart, firsts=self.firsts, lasts=self.lasts
+        )
 
     def limits(self, chains: Many[Many[int]], cut: Paths) -> dict[int, tuple[int, int]]:
         """The first and the last step at which the people of some chains may be: who is not
@@ -89,9 +91,11 @@ class Ties:
             [(number[i], number[j]) for i, j in self.together],
             [(number[i], number[j]) for i, j in self.apart if i in number and j in number],
         )
+        ends = [Said(first=number[piece]) for piece in sorted(self.firsts) if piece in number]
+        ends += [Said(last=number[piece]) for piece in sorted(self.lasts) if piece in number]
         firsts = np.array([cut.firsts[chain[0]] for chain in chains], dtype=np.int64)
         lasts = np.array([cut.lasts[chain[-1]] for chain in chains], dtype=np.int64)
-        return possible(firsts, lasts, [told], strict=True)
+        return possible(firsts, lasts, [told, *ends], strict=True)
 
 
 class Said(NamedTuple):
