@@ -7,6 +7,8 @@ import json
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import cv2
 import numpy as np
@@ -20,7 +22,9 @@ from tracker.sequences.rendering.random_rooms.boxes import seen_by
 from tracker.sequences.rendering.random_rooms.film import prepare
 from tracker.sequences.rendering.random_rooms.furnishing import furnish_randomly
 from tracker.sequences.rendering.random_rooms.rig import drawn_by, mount
+from tracker.sequences.rendering.random_rooms.sensors import record
 from tracker.sequences.rendering.random_rooms.shell import build_shell
+from tracker.sequences.rendering.walls.background import Background
 
 SEED = 71
 STEPS = 70
@@ -175,6 +179,21 @@ def test_nobody_walks_through_furniture_or_far_too_near_another(seed: int) -> No
         (middle,), (valid,) = camera.project(np.array([[0.0, 0.0, 1.0]]))
         assert valid
         assert np.all(np.abs(middle - np.array(camera.image_size) / 2.0) < camera.image_size)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_light_that_wavers_stays_about_what_the_camera_is_exposed_for(seed: int) -> None:
+    short = replace(
+        choose(seed), steps=60, fps=60.0, light="clouds", exposure="hunting",
+        white_balance="wandering",
+    )  # fmt: skip
+    grey = SimpleNamespace(room=np.full((4, 6, 3), 0.105))
+    camera = SimpleNamespace(image_size=(6, 4))
+    (film,) = record(short, [cast(Camera, camera)], [cast(Background, grey)])
+    levels = np.log(film.gains)
+    assert np.abs(levels.mean(axis=(0, 1))).max() < 0.6
+    assert np.abs(levels).max() < 1.5
+    assert levels.std(axis=0).min() > 0.05  # and does waver
 
 
 def test_large_pictures_are_drawn_at_half_their_size() -> None:

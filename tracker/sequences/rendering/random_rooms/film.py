@@ -45,7 +45,7 @@ from tracker.sequences.rendering.writing import (
     whole_folder,
 )
 
-VERSION = 1
+VERSION = 2
 """Grows when the same seed would give another room."""
 LABELS_FILE = "labels.json"
 

@@ -88,13 +88,20 @@ def _room_light(choices: Choices, times: ndarray, rng: np.random.Generator) -> n
             if rng.random() < 0.5:
                 colour[times >= on + rng.uniform(0.1, 0.25) * duration] /= factor * tint
         case "clouds":
-            slow = gaussian_filter1d(
-                rng.standard_normal(steps + 1), 0.9 * choices.fps, mode="wrap"
-            )[:steps]
-            colour *= np.exp(0.22 * slow / (slow.std() + 1e-9))[:, None]
+            slow = _wavering(rng.standard_normal(steps + 1), 0.9 * choices.fps)
+            colour *= np.exp(0.22 * slow)[:, None]
         case _:
             pass
     return colour
+
+
+def _wavering(noise: Float[ndarray, " F1 *k"], steps: float) -> Float[ndarray, " F *k"]:
+    """What comes and goes within about so many steps, about 0, with standard deviation 1.
+
+    In a recording that is shorter than that the mean would be many of its deviations away from 0.
+    """
+    slow = gaussian_filter1d(noise, steps, axis=0, mode="wrap")[:-1]
+    return np.asarray((slow - slow.mean(axis=0)) / (slow.std(axis=0) + 1e-9))
 
 
 def _film(
@@ -113,14 +120,12 @@ def _film(
     gains = exposure * balance * room_light
     slow = rng.standard_normal((steps + 1, 3))
     if choices.white_balance == "wandering":
-        wander = gaussian_filter1d(slow, 1.2 * choices.fps, axis=0, mode="wrap")[:steps]
-        gains = gains * np.exp(0.07 * wander / (wander.std(axis=0) + 1e-9))
+        gains = gains * np.exp(0.07 * _wavering(slow, 1.2 * choices.fps))
     if choices.exposure == "hunting":
         # it follows the room's light late, and is drawn about by who stands before it
         level = np.log(room_light.mean(axis=1))
         late = gaussian_filter1d(np.pad(level, (steps, 0), mode="edge"), 0.5 * choices.fps)[steps:]
-        hunt = gaussian_filter1d(rng.standard_normal(steps + 1), 0.8 * choices.fps, mode="wrap")
-        hunt = hunt[:steps] / (hunt.std() + 1e-9)
+        hunt = _wavering(rng.standard_normal(steps + 1), 0.8 * choices.fps)
         gains = gains * np.exp(0.11 * hunt - 0.8 * late)[:, None]
     rows = np.ones((steps, height))
     if choices.light == "flickering":
