@@ -29,7 +29,7 @@ from app.web.views import results, steps
 from app.web.views.timeline import Timelines
 from tracker import export
 from tracker.runs import gaps
-from tracker.runs.run import names_of, resting_of
+from tracker.runs.run import given_names, resting_of
 from tracker.sequences import library
 
 router = APIRouter(prefix="/api", responses=ERRORS)
@@ -284,7 +284,7 @@ def export_tracks(bench: Bench) -> Response:
         done=done,
         remarks=told,
         resting=resting_of(run),
-        names=names_of(run),
+        names=given_names(run),
     )
     return Response(
         stream.getvalue(),

@@ -126,7 +126,7 @@ def resting_of(run: Run) -> list[str]:
     return resting(tracks.frames, tracks.ids, tracks.positions, run.corrections, run.outcomes)
 
 
-def names_of(run: Run) -> dict[int, str]:
+def given_names(run: Run) -> dict[int, str]:
     """What people were called by hand, by track of a finished run."""
     return names_by_track(run.outcomes, run.corrections)
 

@@ -38,7 +38,7 @@ def track(command: Track) -> int:
     from tracker.runs import gaps
     from tracker.runs.gates import notices
     from tracker.runs.outcome import why_no_tracks
-    from tracker.runs.run import names_of, resting_of
+    from tracker.runs.run import given_names, resting_of
     from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
 
@@ -86,7 +86,7 @@ def track(command: Track) -> int:
             command.seed,
             remarks=tuple(missing),
             resting=resting_of(run),
-            names=names_of(run),
+            names=given_names(run),
         )
         save(output, form, written, Options(progress=writing.at))
     targets = len(set(run.tracks.ids.tolist()))

@@ -20,7 +20,7 @@ from tracker.library.errors import LibraryError
 from tracker.library.keeping import remarks_of
 from tracker.runs import gaps
 from tracker.runs.fitting import default_parameters
-from tracker.runs.run import names_of, resting_of
+from tracker.runs.run import given_names, resting_of
 from tracker.sequences import library as sequences
 from tracker.writing.registry import FORMATS
 from tracker.writing.written import Options, Written
@@ -131,7 +131,7 @@ def begin(
             done,
             tuple(gaps.sentences(run)),
             resting_of(run)[rows],
-            names_of(run),
+            given_names(run),
             address_of(base, now.opened_as, run.parameters, now.defaults),
         )
         try:

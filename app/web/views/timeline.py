@@ -20,8 +20,8 @@ from app.state.pairs import alike
 from app.state.scores import Scored
 from app.web.views.decisions import Named, decided
 from app.web.views.names import Names
-from tracker.corrections.outcomes import names_by_track
 from tracker.pipeline import Run
+from tracker.runs.run import given_names
 from tracker.sequences.sequence import Sequence
 from tracker.trajectories import Trajectories
 
@@ -215,7 +215,7 @@ class Timelines:
             found = [(one.step, one.track, one.decision.kind) for one in hindsight]
             events = sorted([*events, *found], key=lambda e: e[:2])[:MOST_EVENTS]
             # what somebody said goes before what the colours say
-            said = names_by_track(run.outcomes, run.corrections)
+            said = given_names(run)
             names = {**self._names.told(sequence, run), **said}
             for life in lives:
                 life.name = names.get(life.id)

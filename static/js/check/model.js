@@ -46,7 +46,6 @@ function createCheck({ store, actions, playback }) {
 		asked = performance.now();
 		const told = await getJson("/api/corrections");
 		state.set({ told });
-		store.set({ names: told.names });
 		// In Tune the run has the machine for itself; the queue is asked for when it is done.
 		if (!run?.done || (run.state === "computing" && store.get().place !== "check")) return;
 		receiveQueue(await getJson("/api/corrections/queue"));
@@ -133,11 +132,11 @@ function createCheck({ store, actions, playback }) {
 	function take(told) {
 		if (!told) return false;
 		state.set({ ...hide(), told });
-		store.set({ names: told.names });
 		void refresh();
 		return true;
 	}
 
+	state.on(["told"], ({ told }) => store.set({ names: told?.names ?? {} }));
 	store.watch(["sequence"], () => {
 		state.set({
 			told: null,
@@ -148,7 +147,7 @@ function createCheck({ store, actions, playback }) {
 			ends: null,
 			placing: null,
 		});
-		store.set({ names: {}, signs: { ...store.get().signs, check: "" } });
+		store.set({ signs: { ...store.get().signs, check: "" } });
 		void refresh();
 	});
 	let heard = "";

@@ -51,9 +51,7 @@ class Ties:
         """
         near = tuple((i, j) for i, j in self.together if cut.firsts[j] - cut.lasts[i] <= longest)
         far = tuple(pair for pair in self.together if pair not in near)
-        return replace(self, together=near), Ties(
-            far, self.apart, firsts=self.firsts, lasts=self.lasts
-        )
+        return replace(self, together=near), replace(self, together=far)
 
     def limits(self, chains: Many[Many[int]], cut: Paths) -> dict[int, tuple[int, int]]:
         """The first and the last step at which the people of some chains may be: who is not
