@@ -70,6 +70,7 @@ class Opener:
         self._picture_bytes = picture_bytes
         self._refused = ""
         self._lock = threading.Lock()
+        self._showing = threading.Lock()  # who was not cancelled is shown before a newer one
         self._newest: threading.Event | None = None
         self._threads: list[threading.Thread] = []
         self._closed = False
@@ -163,17 +164,18 @@ class Opener:
                 if self._computes:  # else neither pictures nor boxes are needed
                     parameters = pipeline.default_parameters(sequence)
                 reader = FrameReader(sequence, cache_bytes=self._picture_bytes)
-            with self._lock:
-                if cancelled.is_set():
-                    reader.close()
-                    raise Cancelled
-                self._newest = None
             key = sequence.digest[:16]
             log = open_log(sequence.folder)
-            before = self._workbench.open(
-                sequence, key, reader, parameters, name, log.corrections,
-                with_values(parameters, values),
-            )  # fmt: skip
+            with self._showing:
+                with self._lock:
+                    if cancelled.is_set():
+                        reader.close()
+                        raise Cancelled
+                    self._newest = None
+                before = self._workbench.open(
+                    sequence, key, reader, parameters, name, log.corrections,
+                    with_values(parameters, values),
+                )  # fmt: skip
         except Exception as error:
             if cancelled.is_set():
                 future.set_exception(Cancelled("another sequence was asked for"))

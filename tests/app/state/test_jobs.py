@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import concurrent.futures
 import threading
 import time
 from collections.abc import Iterator
@@ -20,7 +21,7 @@ from tests.synthetic import write_sequence
 from tracker import pipeline
 from tracker.pipeline import Cancelled, Run
 from tracker.sequences.reader import read_sequence
-from tracker.sequences.sequence import SequenceError
+from tracker.sequences.sequence import Sequence, SequenceError
 
 P_D = "fusion.detection_probability"
 
@@ -290,6 +291,25 @@ def test_what_cannot_be_opened_leaves_what_was_open(desk: Desk, tmp_path: Path) 
     assert desk.now.opening is None
     assert "left.csv" in desk.notices[-1].message
     assert "line 2" in desk.notices[-1].message
+
+
+def test_who_is_about_to_be_shown_is_shown_before_a_newer_opening(
+    desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, other = (str(write_crossing(tmp_path / name, 30, name=name)) for name in "ab")
+    show, newer = desk.bench.open, []
+
+    def late(sequence: Sequence, *arguments: Any) -> Any:
+        if sequence.name == "a":
+            newer.append(desk.jobs.open(other))
+            concurrent.futures.wait(newer, 1.0)  # as long as the newer one would need
+        return show(sequence, *arguments)
+
+    monkeypatch.setattr(desk.bench, "open", late)
+    desk.jobs.open(one).result(30.0)
+    newer[0].result(30.0)
+    assert desk.now.sequence is not None
+    assert desk.now.sequence.name == "b"
 
 
 def test_of_two_openings_the_newer_wins(desk: Desk, tmp_path: Path) -> None:
