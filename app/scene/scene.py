@@ -27,6 +27,7 @@ from app.state import opening_step
 from app.state.snapshot import Change, Snapshot, View
 from app.state.workbench import Workbench
 from tracker.pipeline import Run
+from tracker.runs.run import given_names
 from tracker.sequences.sequence import Room
 from tracker.trajectories import Trajectories
 
@@ -178,8 +179,9 @@ class Scene:
         with self._server.atomic():
             layers, palette = snapshot.layers, PALETTES[snapshot.theme]
             self._people.show(
-                sequence, run, step, snapshot.selection, layers, palette, snapshot.trail
-            )
+                sequence, run, step, snapshot.selection, layers, palette, snapshot.trail,
+                given_names(run) if run is not None else {},
+            )  # fmt: skip
             tracks = run.tracks if run is not None else Trajectories.empty(len(sequence.views))
             self._reference.show_truth(sequence, tracks, step if layers["truth"] else None, palette)
             self._reference.show_pinned(

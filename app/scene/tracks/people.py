@@ -22,7 +22,11 @@ from tracker.trajectories import Trajectories
 TAGS = 16
 """Made at once; a step with more people adds some for good."""
 NAME_ABOVE = 0.12
-"""Metres of a name above its box."""
+"""Metres of a number above its box."""
+CALLED_ABOVE = 0.2
+"""Metres of a name above the number."""
+LONGEST_NAME = 16
+"""Letters of a name that are written, as in the pictures."""
 FOOT = 1.35
 """How much wider than a person the disc is that he stands on."""
 BODIES, DISCS = (0.6, 0.8), (0.34, 0.55)
@@ -70,6 +74,7 @@ class PeopleNodes:
             server, "/people/ellipsoids", *sphere, on_click=self._pick_component
         )
         self._tags = Tags(server, "/labels/people", TAGS, 1.0)
+        self._called = Tags(server, "/labels/names", 0, 0.85)
         self.points: Float[ndarray, "N 3"] = np.zeros((0, 3))
         """How far what is drawn reaches: boxes, bodies, feet, names and ellipsoids, metres."""
 
@@ -90,6 +95,7 @@ class PeopleNodes:
         layers: Mapping[str, bool],
         palette: Palette,
         trail: Trail,
+        names: Mapping[int, str],
     ) -> None:
         """Draw one step.
 
@@ -102,6 +108,7 @@ class PeopleNodes:
                 than the selected one are.
             palette: Of the theme.
             trail: How long trails are.
+            names: What tracks were called by hand, by id.
         """
         self._palette = palette
         tracks = run.tracks if run is not None else Trajectories.empty(len(sequence.views))
@@ -155,6 +162,14 @@ class PeopleNodes:
                 )
                 for track, position, shade in zip(ids, positions, shades, strict=True)
                 if named
+            ]
+        )
+        higher = above + np.array([0.0, 0.0, CALLED_ABOVE])
+        self._called.show(
+            [
+                Tag(tuple((position + higher).tolist()), names[track][:LONGEST_NAME])
+                for track, position in zip(ids.tolist(), positions, strict=True)
+                if named and track in names
             ]
         )
 

@@ -42,6 +42,7 @@ from tracker import parameters as parameter_table
 from tracker.evaluation import Evaluation
 from tracker.evaluation.difference import Verdict
 from tracker.evaluation.figures import Figure
+from tracker.runs.run import given_names
 from tracker.sequences.sequence import Sequence
 
 SIGNS: dict[Verdict, str] = {"better": "▲ ", "worse": "▼ ", "same": "= ", "different": "≠ ",
@@ -72,18 +73,19 @@ def step_tables(step: int, bench: Bench) -> str:
             "Nothing is computed at this step",
             "Where people are, what each camera saw of them and the curves' values stand here.",
         )
-    parts = _people(message), _pictures(message), _nobodys(message)
+    names = given_names(snapshot.run) if snapshot.run is not None else {}
+    parts = _people(message, names), _pictures(message), _nobodys(message)
     return "".join(parts) + _curves(snapshot, sequence, message)
 
 
-def _people(message: Step) -> str:
+def _people(message: Step, names: Mapping[int, str]) -> str:
     errors = {person.track: person.error for person in message.truth}
     return table(
         f"People in 3D at step {message.step}",
         ("In 3D", "#Weight", "#x, y, z  m", "#± m", "#Error  m"),
         [
             (
-                id_tag(track.id),
+                joined(id_tag(track.id), f" {names.get(track.id, '')}"),
                 number(track.existence, 3),
                 vector(track.position),
                 vector(track.sigma),

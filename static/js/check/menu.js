@@ -93,7 +93,11 @@ export function mountMenu(context, timeline, does) {
 			track === null
 				? `Corrections at step ${step}`
 				: `Corrections of track ${track} at step ${step}`,
-			[track === null ? "nobody" : idTag(track), h("span", { class: "sub" }, `step ${step}`)],
+			[
+				track === null ? "nobody" : idTag(track),
+				track !== null && told?.names[track],
+				h("span", { class: "sub" }, `step ${step}`),
+			],
 			"menu",
 			...(track === null
 				? []
@@ -121,7 +125,7 @@ export function mountMenu(context, timeline, does) {
 	 * @param {"exchange" | "join"} what @param {number} track
 	 */
 	function others(what, track) {
-		const { timeline: lanes, shown } = store.get();
+		const { timeline: lanes, shown, names } = store.get();
 		const joins = what === "join";
 		const step = Math.max(0, shown);
 		const among = /** @type {const} */ ([track, resultOf(store.get()), lanes?.tracks ?? [], step]);
@@ -157,7 +161,11 @@ export function mountMenu(context, timeline, does) {
 				.map((other) =>
 					item(
 						joins ? "i-join" : "i-exchange",
-						[idTag(other.id), h("span", { class: "sub" }, ` ${whereIs(other, step, own)}`)],
+						[
+							idTag(other.id),
+							names[other.id] && ` ${names[other.id]}`,
+							h("span", { class: "sub" }, ` ${whereIs(other, step, own)}`),
+						],
 						"",
 						() => take(other.id),
 					),

@@ -40,7 +40,11 @@ export function mountTracks(root, { store, actions, playback }) {
 
 	/** @type {Column<Server.TrackLife>[]} */
 	const columns = [
-		{ word: "Id", cell: ({ id }) => idTag(id), by: ({ id }) => id },
+		{
+			word: "Id",
+			cell: ({ id, name }) => [idTag(id), name && ` ${name}`],
+			by: ({ id }) => id,
+		},
 		{
 			word: "State",
 			cell: (t) => state(t) ?? "–",
