@@ -51,6 +51,8 @@ ANSWERS, QUICK_ANSWERS = 15, 2
 PROPOSALS = 10
 """Of which at least :data:`REAL` should be mistakes."""
 REAL = 6
+COMPLETE = 0.9995
+"""IDF1 of which nothing is missing, as it is written."""
 
 CLAIM = (
     "Fifteen answers to what the program asks win half of what is missing of IDF1, and six of its "
@@ -111,6 +113,10 @@ def run(context: Context) -> Result:
         won, most = (
             (last - curve[0]) / max(1.0 - curve[0], 1e-9) for last in (curve[-1], best.best[-1])
         )
+        if min(curve) > COMPLETE:  # what is not wrong can neither be won nor asked about
+            nothing = f"nothing: {curve[0]:.3f}, and {curve[-1]:.3f} after {len(curve) - 1} answers"
+            findings.append(Finding(f"{task.name}: what is missing of the IDF1", nothing, "better"))
+            continue
         findings.append(
             Finding(
                 f"{task.name}: half of the missing IDF1 with at most {ANSWERS} answers",
