@@ -8,6 +8,7 @@ import pytest
 from tests.corrections.test_runs import run_of, with_a_gap
 from tests.engine.synthetic import crossing, sequence, walk
 from tracker.corrections import Place
+from tracker.corrections.kinds import Kind
 from tracker.doubts import queue
 from tracker.doubts.clear import Clear
 from tracker.doubts.doubt import Alternative, Lanes, said, unsaid
@@ -165,6 +166,18 @@ def test_two_who_were_parted_anywhere_are_not_asked_for_again() -> None:
     far = unsaid("different", (lanes.of_row(int(lanes.rows[first][2])),
                                lanes.of_row(int(lanes.rows[second][-3]))))  # fmt: skip
     after = run_of(with_a_gap(), said(far))
+    assert [one.met for one in after.outcomes] == [True]
+    assert all(one.kind != "join" for one in queue(after).doubts)
+
+
+@pytest.mark.parametrize("kind", ["left", "came"])
+def test_who_left_or_came_in_is_not_asked_for_as_going_on(kind: Kind) -> None:
+    run = run_of(with_a_gap())
+    join = next(one for one in queue(run).doubts if one.kind == "join")
+    lanes = Lanes(run.tracks)
+    first, second = join.tracks
+    row = lanes.rows[first][-1] if kind == "left" else lanes.rows[second][0]
+    after = run_of(with_a_gap(), said(unsaid(kind, (lanes.of_row(int(row)),))))
     assert [one.met for one in after.outcomes] == [True]
     assert all(one.kind != "join" for one in queue(after).doubts)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from collections.abc import Sequence as Many
 from dataclasses import dataclass, replace
 
@@ -78,11 +78,11 @@ def queue(
     found = [*linked, *alone.of_tracks(run, lanes), *of_edges(run, lanes, asked)]
     ordered = sorted(found, key=lambda one: (-one.weight, one.first, one.id))
     steps = leeway(run.sequence.step_time)
-    parted = _parted(run)
+    parted = _parted_by(run)
     told: list[Doubt] = []
     answered = 0
     for one in once_each(ordered, round(_SAME_MOMENT / run.sequence.step_time)):
-        if settled(one, said, steps) or (one.kind == "join" and frozenset(one.tracks) in parted):
+        if settled(one, said, steps) or (one.kind == "join" and parted(*one.tracks[:2])):
             answered += 1
         elif len(told) < MOST:
             told.append(one)
@@ -93,14 +93,15 @@ def queue(
     return Queue(tuple(told), answered, how)
 
 
-def _parted(run: Run) -> set[frozenset[int]]:
-    """Tracks of which somebody said that they are two people's, wherever along them."""
+def _parted_by(run: Run) -> Callable[[int, int], bool]:
+    """Whether somebody said that a track does not go on as another: that they are two people's,
+    wherever along them, or that the one left or the other came in."""
     kinds = {one.id: one.kind for one in run.corrections}
-    return {
-        frozenset(one.tracks)
-        for one in run.outcomes
-        if one.met and kinds.get(one.id) == "different"
-    }
+    obeyed = [(kinds.get(one.id), one.tracks) for one in run.outcomes if one.met]
+    parted = {frozenset(tracks) for kind, tracks in obeyed if kind == "different"}
+    left = {track for kind, tracks in obeyed if kind == "left" for track in tracks}
+    came = {track for kind, tracks in obeyed if kind == "came" for track in tracks}
+    return lambda one, other: one in left or other in came or frozenset((one, other)) in parted
 
 
 def once_each(ordered: Iterable[Doubt], pause: int) -> Iterable[Doubt]:

@@ -82,7 +82,8 @@ export function commandFor(key, singleKeys = true, place = "") {
 }
 
 /**
- * Commands whose title has all words of a text, those that begin with it first.
+ * Commands whose title has all words of a text: those that begin with it first, then those that
+ * have it in one piece, then those of which each word begins one.
  * @param {string} text
  */
 export function search(text) {
@@ -90,7 +91,14 @@ export function search(text) {
 	const found = COMMANDS.filter(({ title, group }) =>
 		words.every((word) => `${title} ${group}`.toLowerCase().includes(word)),
 	);
-	const late = (/** @type {Command} */ { title }) =>
-		Number(!title.toLowerCase().startsWith(words[0] ?? ""));
+	const late = (/** @type {Command} */ { title }) => {
+		const own = ` ${title.toLowerCase()}`;
+		const ranks = [
+			own.startsWith(` ${words[0] ?? ""}`),
+			own.includes(` ${words.join(" ")}`),
+			words.every((word) => own.includes(` ${word}`)),
+		];
+		return (ranks.indexOf(true) + 4) % 4;
+	};
 	return found.sort((a, b) => late(a) - late(b));
 }
