@@ -85,6 +85,23 @@ def test_parquet(tmp_path: Path) -> None:
     assert facts["parameters"]["fusion.survival_probability"] == "0.97"
 
 
+def test_what_a_person_said_stands_in_json_and_parquet(tmp_path: Path) -> None:
+    one = int(TRACKS.ids[0])
+    resting = ["a1b2" if track == one else "" for track in TRACKS.ids.tolist()]
+    named = replace(WRITTEN, names={one: "Änne, 3"}, resting=resting)
+    save(tmp_path / "tracks.json", FORMATS["json"], named)
+    told = json.loads((tmp_path / "tracks.json").read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator(json_file.schema()).validate(told)
+    for track in told["tracks"]:
+        assert track.get("name") == ("Änne, 3" if track["id"] == one else None)
+    save(tmp_path / "tracks.parquet", FORMATS["parquet"], named)
+    table = pq.read_table(tmp_path / "tracks.parquet")
+    expected = ["Änne, 3" if track == one else "" for track in TRACKS.ids.tolist()]
+    assert table["name"].to_pylist() == expected
+    assert table["correction"].to_pylist() == resting
+    assert "name" not in pq.read_schema(saved(tmp_path, "parquet")).names
+
+
 def test_trc_into_a_file_of_any_name(tmp_path: Path) -> None:
     save(tmp_path / "Küche.trc", FORMATS["trc"], WRITTEN)
     first = (tmp_path / "Küche.trc").read_text(encoding="ascii").split("\n")[0]

@@ -44,7 +44,10 @@ def write(path: Path, written: Written, options: Options) -> None:
         columns[f"{camera.name}_seen"] = tracks.seen[:, index]
         for k, side in enumerate(BOX):
             columns[f"{camera.name}_{side}"] = np.where(visible, boxes[:, k], np.nan)
-    kinds = {name: pa.array(values[:0]).type for name, values in columns.items()}
+    kinds = {  # of no rows a text would be nothing at all
+        name: pa.string() if values.dtype == object else pa.array(values[:0]).type
+        for name, values in columns.items()
+    }
     shape = pa.schema(list(kinds.items()), metadata=metadata)
     with pq.ParquetWriter(path, shape, compression="zstd") as file:
         for first in range(0, len(tracks), _ROWS):
