@@ -89,6 +89,14 @@ class CameraTruth(Model):
     """False where the position is not certain."""
 
 
+class Candidate(Model):
+    """What a camera's method looked at and did not believe."""
+
+    box: Box
+    gate: str
+    """At which it fell, in words."""
+
+
 class CameraStep(Model):
     """One camera at one step."""
 
@@ -97,6 +105,8 @@ class CameraStep(Model):
     estimates: list[Estimate]
     samples: list[tuple[float, float, float]] | None = None
     """x, y and relative weight; only where asked for."""
+    dropped: list[Candidate] | None = None
+    """With the samples."""
     events: list[CameraEvent] = Field(default_factory=list)
     gates: list[Gate] = Field(default_factory=list)
     """Where the method expects its targets, in pixels."""

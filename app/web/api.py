@@ -222,7 +222,7 @@ async def picture(
 async def step(
     step: int,
     bench: Bench,
-    samples: Annotated[bool, Query(description="With each camera's samples.")] = False,
+    samples: Annotated[bool, Query(description="With samples and what was dropped.")] = False,
     trails: Annotated[bool, Query(description="With the tracks' ways in the pictures.")] = False,
     seconds: Annotated[float, Query(ge=0.5, le=600.0, description="How far back.")] = 4.0,
 ) -> models.Step:

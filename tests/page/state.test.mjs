@@ -10,6 +10,7 @@ import {
   ordered,
   resultOf,
   stateAt,
+  gateWords,
   viewWords,
 } from "../../static/js/state/events.js";
 import { lensOf } from "../../static/js/draw/picture.js";
@@ -330,6 +331,13 @@ test("pictures that are alike lie side by side, the last row in the middle", () 
   const spare = { width: 473, most: 270, gap: 4, sparing: true };
   const row = mosaic([1.22, 1.22, 1.22], null, spare);
   assert.ok(row.cells.every(({ y }) => y === row.cells[0].y) && row.height < 140);
+});
+
+test("of what a camera looked at it is told where it fell", () => {
+  assert.deepEqual(gateWords({ cardinality: 2 }), []);
+  assert.deepEqual(gateWords({ candidates: 1 }), ["1 candidate"]);
+  const told = { candidates: 9, "dropped for colour": 6, "dropped for shape": 2, other: 3 };
+  assert.deepEqual(gateWords(told), ["9 candidates, 6 dropped for colour, 2 for shape"]);
 });
 
 test("what a camera tells of its people is one line of words", () => {

@@ -9,7 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tracker.runs.run import Run
-from tracker.single_view.protocol import CANDIDATES, DOUBT, DROPPED, SHAKE, TRUST, ViewResult
+from tracker.single_view.dropped import CANDIDATES, DROPPED
+from tracker.single_view.protocol import DOUBT, SHAKE, TRUST, ViewResult
 
 _HALF = 0.5
 """A foreground that is trusted less than this is not what finds people."""

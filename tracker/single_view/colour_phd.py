@@ -24,6 +24,7 @@ from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import entrance_boxes
 from tracker.single_view.colour.peaks import PeakFinder, Peaks
+from tracker.single_view.dropped import Dropped
 from tracker.single_view.protocol import ViewResult
 
 if TYPE_CHECKING:
@@ -196,5 +197,6 @@ class ColourPhd:
             samples=samples.astype(np.float32),
             sample_weights=sample_weights.astype(np.float32),
             information={**information, "cardinality": mixture.cardinality},
+            dropped=Dropped.none() if peaks is None else peaks.dropped,
             foreground=None if peaks is None or peaks.mask is None else pack(peaks.mask),
         )

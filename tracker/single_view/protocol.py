@@ -13,13 +13,11 @@ import numpy as np
 from jaxtyping import Float, Float16, Int, UInt8
 from numpy import ndarray
 
-CANDIDATES, DROPPED = "candidates", "dropped for "
-"""Names in a result's information: how many places were looked at more closely, and, followed
-by the name of a gate, how many of them fell there."""
+from tracker.single_view.dropped import Dropped
 
 TRUST, DOUBT = "trust in the foreground", "doubt in the background"
-"""And how far the foreground was believed about people with templates, and how little the
-background, 0 … 1."""
+"""Names in a result's information: how far the foreground was believed about people with
+templates, and how little the background, 0 … 1."""
 
 SHAKE = "shake, pixels"
 """And the standard deviation of a shake of the camera that is undone."""
@@ -65,6 +63,8 @@ class ViewResult:
     """Their weights relative to the largest, float32."""
     information: dict[str, float]
     """Numbers worth showing of this step, by name."""
+    dropped: Dropped = field(default_factory=Dropped.none)
+    """What was looked at and not believed."""
     events: tuple[ViewEvent, ...] = ()
     """What happened at this step, where the method tells such things."""
     gates: Float[ndarray, "G 5"] = field(default_factory=lambda: np.zeros((0, 5)))

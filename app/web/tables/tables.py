@@ -85,7 +85,7 @@ def _people(message: Step, names: Mapping[int, str]) -> str:
         ("In 3D", "#Weight", "#x, y, z  m", "#± m", "#Error  m"),
         [
             (
-                joined(id_tag(track.id), f" {names.get(track.id, '')}"),
+                joined(id_tag(track.id), f" {called}" if (called := names.get(track.id)) else ""),
                 number(track.existence, 3),
                 vector(track.position),
                 vector(track.sigma),

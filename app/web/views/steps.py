@@ -15,6 +15,7 @@ from tracker.fusion.protocol import FusionResult
 from tracker.parameters import ColourPhdParams
 from tracker.pipeline import Run
 from tracker.sequences.sequence import Sequence
+from tracker.single_view.dropped import GATES
 from tracker.single_view.protocol import ViewResult
 
 WORTH_A_REASON = 0.9
@@ -134,6 +135,14 @@ def _add_views(message: models.Step, run: Run, step: int, with_samples: bool) ->
         if with_samples:
             points = np.column_stack([view.samples[:, :2], view.sample_weights])
             camera.samples = [(x, y, w) for x, y, w in points.round(3).tolist()]
+            camera.dropped = [
+                models.Candidate(box=box, gate=GATES[gate])
+                for box, gate in zip(
+                    _corner_boxes(view.dropped.boxes.astype(float)),
+                    view.dropped.gates.tolist(),
+                    strict=True,
+                )
+            ]
 
 
 def _add_tracks(message: models.Step, sequence: Sequence, run: Run, step: int) -> None:

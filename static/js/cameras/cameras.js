@@ -5,7 +5,7 @@ import { drawLoupe, drawPicture, lensOf } from "../draw/picture.js";
 import { visibleTracks } from "../draw/overlay.js";
 import { fillBoxCard, fillTrackCard } from "./cards.js";
 import { createFloor } from "./floor.js";
-import { decisionsOf, isAlone, viewWords } from "../state/events.js";
+import { decisionsOf, gateWords, isAlone, viewWords } from "../state/events.js";
 import { mosaic } from "./mosaic.js";
 import { pictureInk } from "../draw/colours.js";
 
@@ -223,7 +223,7 @@ export function mountCameras(root, { store, actions, playback }) {
 		else if (!isOwn({ step, pictures }, index))
 			words.push(`no frame ${step}, this is ${pictures[index]?.of}`);
 		if (roomy && floor.words()) words.push(floor.words());
-		const { follow, selection } = store.get();
+		const { follow, selection, layers2d } = store.get();
 		const own = follow && result?.tracks.find(({ id }) => id === selection);
 		if (roomy && own)
 			words.push(`${own.id} ± ${own.sigma.map((v) => (100 * v).toFixed(0)).join(", ")} cm`);
@@ -233,6 +233,7 @@ export function mountCameras(root, { store, actions, playback }) {
 			words.push(store.get().run?.state === "computing" ? "computing" : "not computed");
 		else if (view && roomy) {
 			if (view.events.length) words.push(`2D: ${viewWords(view.events)}`);
+			if (layers2d.samples) words.push(...gateWords(view.information));
 			/** @type {Record<string, number[]>} */
 			const away = {};
 			for (const { id, visible, reason } of view.tracks)

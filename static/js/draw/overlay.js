@@ -68,6 +68,7 @@ export function drawOverlay(g, view, scene) {
 	g.globalAlpha = opacity;
 	g.lineJoin = "miter";
 	if (layers.samples && view.samples) drawSamples(g, view.samples, scale);
+	if (layers.samples && view.dropped) drawDropped(g, view.dropped, scene, roomy);
 	if (layers.trails) drawTrails(g, tracks, scene);
 	if (layers.truth && roomy) {
 		for (const { box, valid } of view.truth) {
@@ -183,6 +184,37 @@ function drawSamples(g, samples, scale) {
 		}
 	}
 	g.globalAlpha = opacity;
+}
+
+/**
+ * What was looked at and not believed: its box, and where there is room at which gate it fell.
+ * @param {Brush} g
+ * @param {Server.Candidate[]} dropped
+ * @param {Scene} scene
+ * @param {boolean} roomy
+ */
+function drawDropped(g, dropped, { scale, ink }, roomy) {
+	for (const { box } of dropped) stroke(outline(g, box, scale), SAMPLE, 1, [2, 3], 0.35);
+	if (!roomy) return;
+	Object.assign(g, {
+		font: `500 10px ${ink.font}`,
+		textAlign: "left",
+		textBaseline: "top",
+		fillStyle: SAMPLE,
+		strokeStyle: "rgb(0 0 0 / .7)",
+		lineWidth: 3,
+	});
+	/** @type {[number, number, number][]} */
+	const placed = [];
+	for (const { box, gate } of dropped) {
+		const [x, y] = [box[0] * scale + 3, box[1] * scale + 3];
+		const wide = g.measureText(gate).width + 4;
+		if (placed.some(([px, py, pw]) => Math.abs(y - py) < 12 && x < px + pw && px < x + wide))
+			continue;
+		placed.push([x, y, wide]);
+		g.strokeText(gate, x, y);
+		g.fillText(gate, x, y);
+	}
 }
 
 /**

@@ -81,6 +81,23 @@ export const viewWords = (events) =>
 		.map(({ kind, labels }) => `${labels.join(", ").replace(/, (?!.*,)/, " and ")} ${kind}`)
 		.join(", ");
 
+const CANDIDATES = "candidates";
+const DROPPED = "dropped for ";
+
+/**
+ * What became of the places that a camera's method looked at more closely:
+ * "9 candidates, 6 dropped for colour, 2 for shape". Nothing where it has no gates.
+ * @param {Record<string, number>} information  of the method, by name
+ */
+export function gateWords(information) {
+	const all = information[CANDIDATES];
+	if (all === undefined) return [];
+	const fell = Object.entries(information)
+		.filter(([name, count]) => name.startsWith(DROPPED) && count > 0)
+		.map(([name, count], k) => `${count} ${k ? "" : "dropped "}for ${name.slice(DROPPED.length)}`);
+	return [[`${all} candidate${all === 1 ? "" : "s"}`, ...fell].join(", ")];
+}
+
 /**
  * Tracks in the order of the lanes.
  * @param {Server.TrackLife[]} tracks

@@ -70,6 +70,8 @@ declare namespace Server {
 		estimates: Estimate[];
 		/** x, y and relative weight; only where asked for. */
 		samples: [number, number, number][] | null;
+		/** With the samples. */
+		dropped: Candidate[] | null;
 		events: CameraEvent[];
 		/** Where the method expects its targets, in pixels. */
 		gates: [number, number, number, number, number][];
@@ -110,6 +112,13 @@ declare namespace Server {
 		box: [number, number, number, number];
 		/** False where the position is not certain. */
 		valid: boolean;
+	}
+
+	/** What a camera's method looked at and did not believe. */
+	interface Candidate {
+		box: [number, number, number, number];
+		/** At which it fell, in words. */
+		gate: string;
 	}
 
 	/** A value that is not the recording's default. */

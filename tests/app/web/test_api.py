@@ -143,10 +143,12 @@ def test_steps_equal_the_engines(client: TestClient, crossing: Path) -> None:
                     [left + width / 2, top + height / 2, width / 2, height / 2], box, atol=0.02
                 )
             assert camera["samples"] is None
+            assert camera["dropped"] is None
         assert len(message["truth"]) == 2
     assert some > 50
     asked = client.get("/api/step/5?samples=1").json()
     assert asked["cameras"][0]["samples"] == []
+    assert asked["cameras"][0]["dropped"] == []
 
 
 def test_a_step_that_is_not_there(client: TestClient) -> None:

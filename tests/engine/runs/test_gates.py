@@ -15,6 +15,8 @@ from tracker.parameters import RunParameters, with_values
 from tracker.runs.gates import count_gates, notices
 from tracker.runs.run import Run
 from tracker.sequences.sequence import Sequence
+from tracker.single_view.box_sizes import upright_boxes
+from tracker.single_view.dropped import DROPPED, GATES
 
 STEPS = 10
 
@@ -44,6 +46,22 @@ def test_a_gate_that_lets_nobody_through_is_named(tmp_path: Path) -> None:
     assert told.passed == 0.0
     assert told.dropped["colour"] >= 0.9 * told.candidates
     assert any('camera "left"' in one and "for colour" in one for one in notices(run))
+
+
+def test_what_fell_is_told_with_its_place_and_gate(tmp_path: Path) -> None:
+    run = run_of(film(tmp_path, stays=False), colour_phd__acceptance_distance=0.05)
+    camera = run.sequence.cameras[0]
+    for (view,) in run.views:
+        dropped = view.dropped
+        assert len(dropped.boxes) == len(dropped.gates) == view.information["candidates"]
+        told = {name: count for name, count in view.information.items() if name.startswith(DROPPED)}
+        named = [DROPPED + GATES[gate] for gate in dropped.gates.tolist()]
+        assert told == {name: named.count(name) for name in named}
+    # who is refused by the strict gate is the person himself
+    last = np.array([[0.6, 0.3, 1.05]])
+    (box,), _ = upright_boxes(camera, last, run.sequence.target_half_extents)
+    apart = np.abs(run.views[9][0].dropped.boxes[:, :2] - box[:2])
+    assert (apart < box[2:]).all(axis=1).any()
 
 
 def test_a_background_made_by_who_stays_is_told(tmp_path: Path) -> None:

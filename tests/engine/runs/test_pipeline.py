@@ -12,6 +12,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from tests.engine.painted import RED, painted_sequence
+from tests.engine.runs.test_columns import same
 from tests.engine.synthetic import CAMERAS, crossing, sequence
 from tracker import pipeline
 from tracker.parameters import RunParameters, with_values
@@ -53,7 +54,7 @@ def assert_same(a: Run, b: Run) -> None:
     for one, other in zip(a.views, b.views, strict=True):
         for first, second in zip(one, other, strict=True):
             for field in fields(ViewResult):
-                assert_array_equal(getattr(first, field.name), getattr(second, field.name))
+                assert same(getattr(first, field.name), getattr(second, field.name)), field.name
     for here, there in zip(a.fused, b.fused, strict=True):
         for name in ("weights", "means", "covariances", "labels"):
             assert_array_equal(getattr(here.posterior, name), getattr(there.posterior, name))
@@ -304,7 +305,7 @@ def test_the_keys_follow_the_stages() -> None:
     views = stage_keys(WHOLE, with_values(BOXES, {"detection_boxes.size_sigma": 0.3}), 0)
     seed = stage_keys(WHOLE, BOXES, 1)
     digest = stage_keys(replace(WHOLE, digest="other"), BOXES, 0)
-    for other, same in (
+    for other, stages in (
         (tracks, {"single_view", "fusion", "smoothing"}),
         (smoothing, {"single_view", "fusion"}),
         (fusion, {"single_view"}),
@@ -312,7 +313,7 @@ def test_the_keys_follow_the_stages() -> None:
         (seed, set()),
         (digest, set()),
     ):
-        assert {stage for stage in keys if keys[stage] == other[stage]} == same
+        assert {stage for stage in keys if keys[stage] == other[stage]} == stages
     # a parameter of a method that is not in use changes nothing
     unused = with_values(BOXES, {"colour_phd.survival_probability": 0.8})
     assert stage_keys(WHOLE, unused, 0) == keys

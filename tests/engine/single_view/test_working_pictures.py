@@ -24,6 +24,7 @@ from tracker.pictures.foreground import pack, unpack
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, Template, View
 from tracker.single_view.box_sizes import upright_boxes
+from tracker.single_view.dropped import Dropped
 from tracker.single_view.protocol import ViewResult
 from tracker.single_view.working.sequence import Working
 from tracker.single_view.working.view import WorkingView, working_view
@@ -182,10 +183,12 @@ def test_methods_get_the_reduced_recording_and_their_results_come_back(tmp_path:
         mask = np.ones(picture.shape[:2], dtype=np.uint8)
         boxes = np.array([[100.0, 120.0, 10.0, 30.0]])
         result = ViewResult.of_boxes(boxes, np.ones(1), np.ones((1, 4)))
-        back = working.back(0, replace(result, foreground=pack(mask)))
+        fell = Dropped.of(boxes, {"colour": np.array([True])})
+        back = working.back(0, replace(result, foreground=pack(mask), dropped=fell))
         view = working.views[0]
         assert view is not None
         np.testing.assert_allclose(view.points(back.boxes[:, :2]), boxes[:, :2])
+        np.testing.assert_allclose(back.dropped.boxes, back.boxes, rtol=1e-6)
         assert back.foreground is not None
         reduced = np.rint(view.factors * [1280, 800])
         assert unpack(back.foreground).shape == (reduced[1], reduced[0])

@@ -28,7 +28,8 @@ from tracker.single_view.colour.trust import (
     taught_well,
     template_trust,
 )
-from tracker.single_view.protocol import CANDIDATES, DROPPED, TRUST
+from tracker.single_view.dropped import Dropped
+from tracker.single_view.protocol import TRUST
 from tracker.single_view.shape.evidence import log_ratios, shape_sigmas
 from tracker.single_view.shape.finder import SAME_PERSON, ShapeFinder, Shapes
 
@@ -73,6 +74,7 @@ class Peaks:
     mask: UInt8[ndarray, "h w"] | None
     """The foreground, where it was asked for."""
     information: dict[str, float]
+    dropped: Dropped
     passed: Passed | None = None
     """What the fusion is to get instead of the boxes, where shapes are looked at, too."""
 
@@ -195,12 +197,12 @@ class PeakFinder:
             ),
             mask=scene.mask,
             information={
-                CANDIDATES: float(len(candidates)),
-                **{DROPPED + gate: float(count) for gate, count in dropped.items()},
+                **dropped.information(len(candidates) - len(dropped.gates)),
                 "least distance": float(distances.min()) if len(distances) else 1.0,
                 "foreground share": scene.foreground_share,
                 TRUST: float(self._appearance.trust.mean()),
             },
+            dropped=dropped,
             passed=passed,
         )
 
@@ -366,9 +368,9 @@ class PeakFinder:
 
     def _accept(
         self, scene: Scene, shapes: Shapes | None, candidates: Float[ndarray, "M 4"]
-    ) -> tuple[Float[ndarray, "K 4"], Float[ndarray, " K"], Int[ndarray, " K"], dict[str, int]]:
+    ) -> tuple[Float[ndarray, "K 4"], Float[ndarray, " K"], Int[ndarray, " K"], Dropped]:
         """The peaks that look enough like a person, their distances, and like whom; one at each
-        place. How many others fell at which gate."""
+        place. And where the others fell."""
         p = self._parameters
         scores, distances, inside = self._score(scene, shapes, candidates)
         best, nearest, person = scores.max(axis=1), distances.min(axis=1), scores.argmax(axis=1)
@@ -386,14 +388,14 @@ class PeakFinder:
                 kept.append(int(i))
         fell = ~good & coloured & covered
         by_shape = self._instead[person] > self._trusted(person)
-        dropped = {
-            "colour": int((~good & ~coloured).sum()),
-            "foreground": int((~good & coloured & ~covered).sum()),
-            "surroundings": int((fell & ~by_shape).sum()),
-            "shape": int((fell & by_shape).sum()),
-            "another at its place": int(good.sum()) - len(kept),
+        gates = {
+            "colour": ~good & ~coloured,
+            "foreground": ~good & coloured & ~covered,
+            "surroundings": fell & ~by_shape,
+            "shape": fell & by_shape,
+            "another at its place": good & ~np.isin(np.arange(len(good)), kept),
         }
-        return candidates[kept], nearest[kept], person[kept], dropped
+        return candidates[kept], nearest[kept], person[kept], Dropped.of(candidates, gates)
 
 
 def _at_least(

@@ -27,6 +27,7 @@ from tracker.pictures.blobs import Blobs, blobs
 from tracker.pictures.foreground import integral, shape_shares
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BELOW_FLOOR, BoxSizes
+from tracker.single_view.dropped import Dropped
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,8 +39,8 @@ class Crowns:
     """Share of foreground in each box."""
     pieces: Float[ndarray, "N 4"]
     """The box of the piece of foreground that each is the top of."""
-    dropped: dict[str, int]
-    """How many other tops fell at which gate."""
+    dropped: Dropped
+    """Where other tops fell."""
 
 
 class TargetSizes:
@@ -138,11 +139,12 @@ def crowns(
         same = (across < p.shoulder_across) & (apart[:, 1] < p.shoulder_down * boxes[kept, 3])
         if good[i] and not same.any():
             kept.append(i)
-    dropped = {
-        "foreground": int((~full).sum()),
-        "surroundings": int((full & ~good).sum()),
-        "another's shoulders": int(good.sum()) - len(kept),
+    gates = {
+        "foreground": ~full,
+        "surroundings": full & ~good,
+        "another's shoulders": good & ~np.isin(np.arange(len(good)), kept),
     }
+    dropped = Dropped.of(boxes, gates)
     return Crowns(boxes[kept], inside[kept], pieces.boxes[owners[kept]], dropped)
 
 

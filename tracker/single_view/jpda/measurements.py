@@ -32,8 +32,9 @@ from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.peaks import PeakFinder
 from tracker.single_view.detector_boxes import DetectorBoxes, trust
+from tracker.single_view.dropped import Dropped
 from tracker.single_view.jpda.crowns import TargetSizes, crowns
-from tracker.single_view.protocol import CANDIDATES, DOUBT, DROPPED
+from tracker.single_view.protocol import DOUBT
 
 if TYPE_CHECKING:
     from tracker.parameters import RunParameters
@@ -57,6 +58,7 @@ class Measured:
     sample_weights: Float[ndarray, " S"] = field(default_factory=lambda: np.zeros(0))
     mask: UInt8[ndarray, "h w"] | None = None
     information: dict[str, float] = field(default_factory=dict)
+    dropped: Dropped = field(default_factory=Dropped.none)
 
     @staticmethod
     def nothing() -> Measured:
@@ -160,6 +162,7 @@ class _Foreground:
             "foreground share": float(found.mask.mean()),
             DOUBT: self._model.doubt if isinstance(self._model, MovingForeground) else 0.0,
         }
+        dropped = Dropped.none()
         if self._sizes is None:
             boxes = blobs(found.mask, self._minimum_area).boxes
             pieces = boxes
@@ -167,8 +170,8 @@ class _Foreground:
         else:
             targets = crowns(found.mask, self._sizes, self._minimum_area, self._parameters)
             boxes, pieces, scores = targets.boxes, targets.pieces, targets.inside
-            information[CANDIDATES] = float(len(boxes) + sum(targets.dropped.values()))
-            information |= {DROPPED + gate: float(n) for gate, n in targets.dropped.items()}
+            dropped = targets.dropped
+            information |= dropped.information(len(boxes))
         return state, Measured(
             boxes,
             scores,
@@ -176,6 +179,7 @@ class _Foreground:
             pieces,
             mask=found.mask,
             information=information,
+            dropped=dropped,
         )
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
@@ -223,6 +227,7 @@ class _Colours:
             sample_weights=peaks.sample_weights,
             mask=peaks.mask,
             information=peaks.information,
+            dropped=peaks.dropped,
         )
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:

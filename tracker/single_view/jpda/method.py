@@ -177,6 +177,7 @@ class Jpda:
             samples=seen.samples.astype(np.float32),
             sample_weights=seen.sample_weights.astype(np.float32),
             information={**seen.information, "newcomers": float((~counting).sum())},
+            dropped=seen.dropped,
             events=_events(expected, cases, moved, managed),
             gates=self._gates(expected),
             foreground=None if seen.mask is None else pack(seen.mask),

@@ -36,8 +36,8 @@ class Shapes:
     log_odds: Float[ndarray, " N"]
     sizes: Float[ndarray, "N 2"]
     """Pixels a metre there, across and down."""
-    unlikely: int
-    """How many people were not likely enough."""
+    unlikely: Float[ndarray, "U 4"]
+    """Boxes of those that were not likely enough."""
     windows: Windows
     """Those that were looked at to the end."""
     odds: Float[ndarray, " W"]
@@ -127,7 +127,7 @@ class ShapeFinder:
         if self._channels is None or state is None:
             none = np.zeros((0, 4))
             nowhere = Windows(none, none)
-            return state, Shapes(none, np.zeros(0), none[:, :2], 0, nowhere, np.zeros(0))
+            return state, Shapes(none, np.zeros(0), none[:, :2], none, nowhere, np.zeros(0))
         state, sums = self._channels.step(state, picture)
         scores = self._trees.scores(sums, self._edges).astype(float)
         ended = np.flatnonzero(np.isfinite(scores))
@@ -139,10 +139,10 @@ class ShapeFinder:
             own = np.flatnonzero((owners == i) & (scores > scores[i] - _NEAR))
             weights = np.exp(scores[own] - scores[i])
             boxes[n] = weights @ windows.boxes[own] / weights.sum()
-        found = Shapes(
-            boxes, scores[likely], windows.sizes[likely], len(best) - len(likely), windows, scores
+        unlikely = windows.boxes[best[scores[best] < least]]
+        return state, Shapes(
+            boxes, scores[likely], windows.sizes[likely], unlikely, windows, scores
         )
-        return state, found
 
 
 def strongest(

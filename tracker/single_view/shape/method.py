@@ -18,10 +18,11 @@ from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.parameters.groups.shapes import ShapesParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
+from tracker.single_view.dropped import Dropped
 from tracker.single_view.jpda import Jpda
 from tracker.single_view.jpda.measurements import Measured
 from tracker.single_view.jpda.method import JpdaState
-from tracker.single_view.protocol import CANDIDATES, DROPPED, ViewResult
+from tracker.single_view.protocol import ViewResult
 from tracker.single_view.shape.channels import ChannelState
 from tracker.single_view.shape.evidence import log_ratios, shape_sigmas
 from tracker.single_view.shape.finder import ShapeFinder
@@ -121,10 +122,8 @@ class ShapeSource:
         p = self._parameters
         least = min(p.passed_odds, p.least_odds)
         state, found = self._finder.find(state, picture, least, p.overlap)
-        information = {
-            CANDIDATES: float(len(found.boxes) + found.unlikely),
-            DROPPED + "shape": float(found.unlikely),
-        }
+        fell = np.ones(len(found.unlikely), dtype=bool)
+        dropped = Dropped.of(found.unlikely, {"shape": fell})
         probabilities = expit(found.log_odds)
         likely = np.flatnonzero(found.log_odds >= p.least_odds)
         return state, Measured(
@@ -134,7 +133,8 @@ class ShapeSource:
             found.boxes[likely] * [1.0, 1.0, p.cover, p.cover],
             shown=found.boxes,
             shown_scores=probabilities,
-            information=information,
+            information=dropped.information(len(found.boxes)),
+            dropped=dropped,
         )
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:

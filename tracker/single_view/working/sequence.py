@@ -79,6 +79,9 @@ class Working:
             estimates=view.boxes_back(result.estimates),
             measurements=view.boxes_back(result.measurements),
             samples=view.boxes_back(result.samples).astype(np.float32),
+            dropped=replace(
+                result.dropped, boxes=view.boxes_back(result.dropped.boxes).astype(np.float32)
+            ),
             gates=view.gates_back(result.gates),
             foreground=None if foreground is None else pack(view.mask(unpack(foreground))),
         )
