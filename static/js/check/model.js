@@ -106,19 +106,6 @@ function createCheck({ store, actions, playback }) {
 		if (now.chosen?.id === chosen.id && now.other === other) state.set({ preview });
 	}
 
-	/** Notes of what was refused last: the next answer takes their place. @type {Set<number>} */
-	let refused = new Set();
-	/** @template T @param {() => Promise<T>} asks  null where it was refused */
-	async function instead(asks) {
-		const { notes } = store.get();
-		const before = new Set(notes.map(({ id }) => id));
-		const answer = await asks();
-		const told = store.get().notes;
-		store.set({ notes: told.filter(({ id }) => !refused.has(id)) });
-		refused = new Set(answer ? [] : told.map(({ id }) => id).filter((id) => !before.has(id)));
-		return answer;
-	}
-
 	/**
 	 * Ask something of the chosen place. A run that came meanwhile may not have it any more: then
 	 * the queue is read anew, and nobody did anything wrong.
@@ -126,10 +113,13 @@ function createCheck({ store, actions, playback }) {
 	 */
 	async function askOfPlace(path, body) {
 		try {
-			return await sendJson("POST", `/api/corrections${path}`, body);
+			const answer = await sendJson("POST", `/api/corrections${path}`, body);
+			actions.accepted("corrections");
+			return answer;
 		} catch (error) {
 			if (!(error instanceof ApiError)) throw error;
-			if (error.code !== "no_doubt") actions.note("error", error.message, error.hint ?? "");
+			if (error.code !== "no_doubt")
+				actions.note("error", error.message, error.hint ?? "", undefined, undefined, "corrections");
 			else actions.note("info", "This place has changed", "The run is another by now: look again.");
 			state.set({ ...hide(), ends: state.get().ends });
 			void refresh();
@@ -139,7 +129,7 @@ function createCheck({ store, actions, playback }) {
 
 	/** Ask, and take over what is told. @param {"POST" | "DELETE"} method @param {string} path @param {object} [body] */
 	const ask = async (method, path, body) =>
-		take(await instead(() => actions.ask(method, `corrections${path}`, body)));
+		take(await actions.ask(method, `corrections${path}`, body));
 
 	/** @param {Server.Corrections | null} told  null where it was refused */
 	function take(told) {
@@ -198,7 +188,7 @@ function createCheck({ store, actions, playback }) {
 			answered = true;
 			const { queue } = state.get();
 			const wish = { doubt: chosen.id, alternative };
-			const taken = take(await instead(() => askOfPlace("/answers", wish)));
+			const taken = take(await askOfPlace("/answers", wish));
 			answered &&= taken;
 			if (taken && queue) {
 				gone.set(chosen.id, queue.run);

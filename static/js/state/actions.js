@@ -57,12 +57,12 @@ export function createActions({ store, seek, send, receive }) {
 
 	const count = () => store.set({ undoable: [past.length, future.length] });
 
-	/** @param {unknown} error */
-	function tell(error) {
+	/** @param {unknown} error @param {string} about */
+	function tell(error, about) {
 		if (!(error instanceof ApiError)) throw error;
 		// This the socket tells, to all tabs.
 		if (error.code === "cannot_open") return;
-		actions.note("error", error.message, error.hint ?? "");
+		actions.note("error", error.message, error.hint ?? "", undefined, undefined, about);
 	}
 
 	/**
@@ -78,25 +78,32 @@ export function createActions({ store, seek, send, receive }) {
 
 	/** @type {Actions} */
 	const actions = {
-		note(level, title, text, remedy, once) {
+		note(level, title, text, remedy, once, about) {
 			if (once && store.get().dismissed.includes(once)) return;
 			const id = (noteId += 1);
 			// The same thing said twice is one note.
 			const others = store.get().notes.filter((other) => other.title !== title);
-			store.set({ notes: [...others.slice(-3), { id, level, title, text, remedy, once }] });
+			store.set({ notes: [...others.slice(-3), { id, level, title, text, remedy, once, about }] });
 			if (level === "info" && !once)
 				setTimeout(
 					() => store.set({ notes: store.get().notes.filter((other) => other.id !== id) }),
 					6000,
 				);
 		},
+		accepted(about) {
+			const { notes } = store.get();
+			if (notes.some((note) => note.about === about))
+				store.set({ notes: notes.filter((note) => note.about !== about) });
+		},
 		async ask(method, path, body) {
+			const [about] = path.split("/");
 			try {
 				const answer = await sendJson(method, `/api/${path}`, body);
+				actions.accepted(about);
 				if (answer && typeof answer === "object" && "version" in answer) receive(answer);
 				return answer;
 			} catch (error) {
-				tell(error);
+				tell(error, about);
 				return null;
 			}
 		},
@@ -179,7 +186,8 @@ export function createActions({ store, seek, send, receive }) {
 			if (store.get().layout.max) actions.maximise(store.get().layout.max ?? null);
 			else actions.select(null);
 		},
-		exportTracks: () => void download("/api/export/tracks.csv", "tracks.csv").catch(tell),
+		exportTracks: () =>
+			void download("/api/export/tracks.csv", "tracks.csv").catch((error) => tell(error, "export")),
 
 		// cameras and 3D
 		chooseCamera(index) {

@@ -60,6 +60,8 @@ type Note = {
 	remedy?: Remedy;
 	/** Once closed, it is not told again in this browser. */
 	once?: string;
+	/** What was refused: gone once the like is accepted. */
+	about?: string;
 };
 
 interface PageState {
@@ -199,8 +201,12 @@ interface Actions {
 		text: string,
 		remedy?: Remedy,
 		once?: string,
+		/** Of what was refused: the first part of its path. */
+		about?: string,
 	) => void;
 	/** Null after a failure, which is told. */
+	/** What was refused before is no longer said. */
+	accepted: (about: string) => void;
 	ask: (method: "POST" | "PATCH" | "DELETE", path: string, body?: object) => Promise<any>;
 	togglePlay: () => void;
 	shuttle: (direction: -1 | 0 | 1) => void;
