@@ -118,8 +118,7 @@ function createCheck({ store, actions, playback }) {
 			return answer;
 		} catch (error) {
 			if (!(error instanceof ApiError)) throw error;
-			if (error.code !== "no_doubt")
-				actions.note("error", error.message, error.hint ?? "", undefined, undefined, "corrections");
+			if (error.code !== "no_doubt") actions.refused(error, "corrections");
 			else actions.note("info", "This place has changed", "The run is another by now: look again.");
 			state.set({ ...hide(), ends: state.get().ends });
 			void refresh();

@@ -57,14 +57,6 @@ export function createActions({ store, seek, send, receive }) {
 
 	const count = () => store.set({ undoable: [past.length, future.length] });
 
-	/** @param {unknown} error @param {string} about */
-	function tell(error, about) {
-		if (!(error instanceof ApiError)) throw error;
-		// This the socket tells, to all tabs.
-		if (error.code === "cannot_open") return;
-		actions.note("error", error.message, error.hint ?? "", undefined, undefined, about);
-	}
-
 	/**
 	 * A change that is undone by itself, however soon it follows another.
 	 * @param {"POST"} method
@@ -90,6 +82,12 @@ export function createActions({ store, seek, send, receive }) {
 					6000,
 				);
 		},
+		refused(error, about) {
+			if (!(error instanceof ApiError)) throw error;
+			// This the socket tells, to all tabs.
+			if (error.code === "cannot_open") return;
+			actions.note("error", error.message, error.hint ?? "", undefined, undefined, about);
+		},
 		accepted(about) {
 			const { notes } = store.get();
 			if (notes.some((note) => note.about === about))
@@ -103,7 +101,7 @@ export function createActions({ store, seek, send, receive }) {
 				if (answer && typeof answer === "object" && "version" in answer) receive(answer);
 				return answer;
 			} catch (error) {
-				tell(error, about);
+				actions.refused(error, about);
 				return null;
 			}
 		},
@@ -187,7 +185,9 @@ export function createActions({ store, seek, send, receive }) {
 			else actions.select(null);
 		},
 		exportTracks: () =>
-			void download("/api/export/tracks.csv", "tracks.csv").catch((error) => tell(error, "export")),
+			void download("/api/export/tracks.csv", "tracks.csv").catch((error) =>
+				actions.refused(error, "export"),
+			),
 
 		// cameras and 3D
 		chooseCamera(index) {

@@ -205,6 +205,8 @@ interface Actions {
 		about?: string,
 	) => void;
 	/** Null after a failure, which is told. */
+	/** Says what the server told of it; throws what is no answer of the server. */
+	refused: (error: unknown, about: string) => void;
 	/** What was refused before is no longer said. */
 	accepted: (about: string) => void;
 	ask: (method: "POST" | "PATCH" | "DELETE", path: string, body?: object) => Promise<any>;
