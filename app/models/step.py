@@ -149,6 +149,8 @@ class Step(Model):
 
     run: str
     """Key of the run that it is of; empty where none is shown."""
+    revision: int
+    """Of the run's people: a later one has others at steps that were there before."""
     step: int
     computed: bool
     cameras: list[CameraStep]

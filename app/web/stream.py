@@ -51,7 +51,7 @@ class _Page:
         self.wake = asyncio.Event()
         self.wake.set()
         self.told_step: tuple[Any, ...] = ()
-        self.told_timeline: tuple[str, str, int, bool] = ("", "", 0, False)
+        self.told_timeline: tuple[str, str, int, int] = ("", "", 0, 0)
         self.told_evaluation: tuple[str, int] | None = None
         self.due: set[str] = set()
         """Kinds of message that are held back for a moment."""
@@ -203,14 +203,16 @@ class Stream:
         if sequence is None:
             return
         computed = snapshot.step_is_computed
-        key = (snapshot.sequence_key, run.key if run is not None else "", step, computed)
+        shown = (run.key, run.revision) if run is not None else ("", 0)
+        key = (snapshot.sequence_key, *shown, step, computed)
         if key == page.told_step:
             return
         text = self._steps.get(key)
         if text is None:
             message = steps.step_of(sequence, run, step)
             text = _with_type("step", message)
-            if message.computed == computed:  # else it was computed this very moment
+            told = (message.computed, message.revision)
+            if told == (computed, shown[1]):  # else it was computed this very moment
                 self._steps[key] = text
                 while len(self._steps) > KEPT_STEPS:
                     self._steps.popitem(last=False)
@@ -249,7 +251,9 @@ class Stream:
                 page.due.discard(kind)
                 if kind == "timeline":
                     page.told_timeline = shown
-                    told: dict[str, Any] = {"run": shown[1], "done": shown[2]}
+                    told: dict[str, Any] = {
+                        "run": shown[1], "done": shown[2], "revision": shown[3],
+                    }  # fmt: skip
                 else:
                     told = {"run": results.run_of(snapshot).model_dump(mode="json")}
                 await socket.send_text(json.dumps({"type": kind, **told}))
@@ -276,13 +280,12 @@ def _remind(page: _Page) -> None:
     page.wake.set()
 
 
-def _shown(snapshot: Snapshot) -> tuple[str, str, int, bool]:
-    """What a timeline shows: of another sequence, run or length, or smoothed, it is
-    another."""
+def _shown(snapshot: Snapshot) -> tuple[str, str, int, int]:
+    """What a timeline shows: of another sequence, run, length or revision, it is another."""
     run = snapshot.run
     if run is None:
-        return snapshot.sequence_key, "", 0, False
-    return snapshot.sequence_key, run.key, run.done, run.smoothed is not None
+        return snapshot.sequence_key, "", 0, 0
+    return snapshot.sequence_key, run.key, run.done, run.revision
 
 
 def _with_type(kind: str, message: models.Model) -> str:

@@ -102,6 +102,16 @@ class Run:
         return self.keys["tracks"]
 
     @property
+    def revision(self) -> int:
+        """How often the people of all steps took the place of others: a step is told by the run's
+        key and this number.
+
+        0 while they are the filter's; 1 once they are the smoothed ones, or corrected ones where
+        nothing is smoothed; 2 once those who are smoothed have what a person said, too.
+        """
+        return (self.tracks is not self.filtered) + (self.settled and bool(self.corrections))
+
+    @property
     def complete(self) -> bool:
         """Whether every step is there."""
         return self.done == self.sequence.frames

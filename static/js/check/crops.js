@@ -30,13 +30,17 @@ function memory(most, load, dispose) {
 	};
 }
 
+/** @param {string} run @param {number} revision */
+const shownAs = (run, revision) => `${run} ${revision}`;
+
 /** @param {Store<PageState>} store */
 export function createCrops(store) {
 	const results = memory(RESULTS, async (name) => {
-		const [run, step] = name.split("/");
+		const [shown, step] = name.split("/");
 		/** @type {Server.Step} */
 		const result = await getJson(`/api/step/${step}`);
-		if (result.run !== run) throw new Error(`the server shows run ${result.run} by now`);
+		if (shown !== shownAs(result.run, result.revision))
+			throw new Error(`the server shows run ${result.run} by now`);
 		return result;
 	});
 	const pictures = memory(
@@ -48,7 +52,10 @@ export function createCrops(store) {
 
 	return {
 		/** @param {number} step @returns {Promise<Server.Step | null>} */
-		resultAt: (step) => results(`${store.get().basis}/${step}`).catch(() => null),
+		resultAt(step) {
+			const { basis, revision } = store.get();
+			return results(`${shownAs(basis, revision)}/${step}`).catch(() => null);
+		},
 		/**
 		 * A camera's picture; null where there is none.
 		 * @param {number} camera @param {number} step @returns {Promise<ImageBitmap | null>}

@@ -58,11 +58,13 @@ export function mountFeet({ store, playback }, check) {
 
 	/** The feet of the selected track at the shown step, as the server projects them. */
 	async function refresh() {
-		const { place, selection, shown, playing, cameras, basis, result } = store.get();
+		const { place, selection, shown, playing, cameras, basis, revision, result } = store.get();
 		const { placing } = state.get();
 		const track = placing ? placing.track : selection;
 		const on = place === "check" && !playing && shown >= 0 && (placing || track !== null);
-		const key = on ? `${track} ${shown} ${basis} ${Boolean(placing)} ${result?.run}` : "";
+		const key = on
+			? `${track} ${shown} ${basis} ${revision} ${Boolean(placing)} ${result?.run}`
+			: "";
 		if (key === wanted) return put();
 		// A click counts from the moment it is asked for, and stays said whatever arrives later.
 		const same = placing && wanted.startsWith(`${track} ${shown} `);
@@ -247,7 +249,7 @@ export function mountFeet({ store, playback }, check) {
 		true,
 	);
 	store.watch(
-		["place", "selection", "shown", "playing", "basis", "result", "cameras"],
+		["place", "selection", "shown", "playing", "basis", "revision", "result", "cameras"],
 		() => void refresh(),
 	);
 	state.on(["placing"], () => void refresh());

@@ -255,7 +255,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 		const turn = (drawn += 1);
 		const { chosen, preview } = state.get();
 		if (!chosen || store.get().place !== "check") return;
-		const { frames, fps, cameras: views, basis } = store.get();
+		const { frames, fps, cameras: views, basis, revision } = store.get();
 		steps = filmSteps(chosen.first, chosen.last, { frames, fps });
 		if (chosen.sights.length) {
 			const best = camerasOf(chosen.sights, views.length);
@@ -270,7 +270,8 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 				: chosen.tracks
 		).slice(0, ROWS);
 		const results = await Promise.all(steps.map(crops.resultAt));
-		if (turn !== drawn || basis !== store.get().basis) return;
+		const now = store.get();
+		if (turn !== drawn || basis !== now.basis || revision !== now.revision) return;
 		const best = camerasFor(results, chosen.tracks, views.length);
 		const camera = by !== null && by < views.length ? by : (best[0] ?? 0);
 		numbers(best, camera);
@@ -364,7 +365,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 	state.watch(["chosen", "queue", "other", "ends", "placing"], heads);
 	state.on(["chosen"], () => (by = null));
 	state.on(["chosen", "preview"], () => void roll());
-	store.on(["basis", "place", "theme"], () => void roll());
+	store.on(["basis", "revision", "place", "theme"], () => void roll());
 	store.on(["shown"], mark);
 	store.on(["scores"], words);
 	/** A wider pane has larger pictures. @type {Timer} */

@@ -96,7 +96,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 	const items = new Map();
 	/** What an item is of; its pictures are of a run. @param {Doubt} doubt */
 	const keyOf = ({ id, first, last, tracks, doubt }) =>
-		`${id} ${first} ${last} ${tracks} ${doubt} ${store.get().basis}`;
+		`${id} ${first} ${last} ${tracks} ${doubt} ${store.get().basis} ${store.get().revision}`;
 
 	/** Of the first one before and of the last one after. @param {HTMLElement} item */
 	async function picture(item) {
@@ -340,5 +340,5 @@ export function mountQueue(root, { store, actions }, check, crops) {
 	);
 	state.watch(["told"], () => (corrected(), head()));
 	store.on(["run", "sequence"], head);
-	store.on(["basis", "theme"], list);
+	store.on(["basis", "revision", "theme"], list);
 }

@@ -60,8 +60,8 @@ export function createPlayback(store, sendSeek) {
 			const [, step, query] = name.split("/");
 			/** @type {Server.Step} */
 			const result = await getJson(`/api/step/${step}${query}`, { signal });
-			if (name !== resultName(result.run, result.step, query))
-				throw new Error(`asked for ${name}, the server shows run ${result.run} by now`);
+			const told = resultName(result, result.step, query);
+			if (name !== told) throw new Error(`asked for ${name}, the server shows ${told} by now`);
 			return result;
 		},
 		sizeOf: () => 1,
@@ -80,11 +80,18 @@ export function createPlayback(store, sendSeek) {
 	});
 
 	/**
-	 * @param {string} run
+	 * @param {{run: string, revision: number}} shown
 	 * @param {number} step
 	 * @param {string} query  for what is not in every answer
 	 */
-	const resultName = (run, step, query) => `${run || "none"}/${step}/${query}`;
+	const resultName = ({ run, revision }, step, query) =>
+		`${run || "none"} ${revision}/${step}/${query}`;
+
+	/** What is shown by now. */
+	const shownRun = () => {
+		const { basis, revision } = store.get();
+		return { run: basis, revision };
+	};
 
 	/** What the layers need of a result besides what is always in it. */
 	const queryNow = () => {
@@ -111,7 +118,7 @@ export function createPlayback(store, sendSeek) {
 	/** @param {PageState} state */
 	function refreshWindow(state) {
 		windowDirty = false;
-		const { sequence, basis, step, speed, playing, layers2d, nearest } = state;
+		const { sequence, step, speed, playing, layers2d, nearest } = state;
 		if (!sequence) {
 			pictures.want([]);
 			results.want([]);
@@ -133,7 +140,7 @@ export function createPlayback(store, sendSeek) {
 		const steps = still ? prefetchWindow(step, { ...how, most }) : [step];
 		pictures.want(
 			steps.flatMap((k) => {
-				const result = results.get(resultName(basis, k, queryNow()));
+				const result = results.get(resultName(shownRun(), k, queryNow()));
 				const maps = result ? mapNames(sequence.key, result, layers2d).flat() : [];
 				return [
 					...sequence.cameras.flatMap((camera, index) => {
@@ -147,7 +154,9 @@ export function createPlayback(store, sendSeek) {
 		);
 		const done = shownDone(state);
 		const useful = steps.filter((k) => k === step || k < done);
-		results.want(useful.slice(0, RESULTS_KEPT / 2).map((k) => resultName(basis, k, queryNow())));
+		results.want(
+			useful.slice(0, RESULTS_KEPT / 2).map((k) => resultName(shownRun(), k, queryNow())),
+		);
 	}
 
 	/**
@@ -167,8 +176,8 @@ export function createPlayback(store, sendSeek) {
 		});
 		if (!lost && found.some((picture) => picture === undefined)) return null;
 		const result =
-			results.get(resultName(state.basis, step, queryNow())) ??
-			(lost ? results.get(resultName(state.basis, step, "")) : undefined);
+			results.get(resultName(shownRun(), step, queryNow())) ??
+			(lost ? results.get(resultName(shownRun(), step, "")) : undefined);
 		const names = result ? mapNames(sequence.key, result, state.layers2d) : [];
 		const maps = names.map((list) => list.flatMap((name) => pictures.get(name) ?? []));
 		if (!lost && maps.flat().length < names.flat().length) return null;
@@ -227,7 +236,7 @@ export function createPlayback(store, sendSeek) {
 		if (state.playing) ask();
 	}
 
-	store.on(["server", "run", "basis", "timeline"], (state) => {
+	store.on(["server", "run", "basis", "revision", "timeline"], (state) => {
 		const done = shownDone(state);
 		for (const name of [...results.names()]) {
 			const result = results.get(name);
@@ -284,7 +293,7 @@ export function createPlayback(store, sendSeek) {
 		},
 		/** A result that came by itself. @param {Server.Step} result */
 		receive(result) {
-			results.put(resultName(result.run, result.step, ""), result);
+			results.put(resultName(result, result.step, ""), result);
 			if (result.step === store.get().step) dirty = true;
 			ask();
 		},

@@ -43,6 +43,7 @@ export function initialState() {
 		cameras: [],
 		sequences: [],
 		basis: "",
+		revision: 0,
 		timeline: null,
 		span: null,
 		step: 0,

@@ -5,6 +5,7 @@ import { commandOf, perform } from "./commands.js";
 /** Forgotten when another sequence is opened. */
 const FORGOTTEN = /** @type {const} */ ({
 	basis: "",
+	revision: 0,
 	timeline: null,
 	span: null,
 	scores: null,
@@ -109,10 +110,11 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 		);
 	}
 
-	/** The server shows this run. @param {string} run */
-	function showRun(run) {
-		if (run === store.get().basis) return;
-		store.set({ basis: run, timeline: null });
+	/** The server shows this run, and its people as they are by now. @param {{run: string, revision: number}} news */
+	function showRun({ run, revision }) {
+		const { basis, revision: before } = store.get();
+		if (run === basis && revision === before) return;
+		store.set(run === basis ? { revision } : { basis: run, revision, timeline: null });
 		void fetchTimeline();
 	}
 
@@ -168,11 +170,11 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 			if (store.get().sequence && !isOld(origin)) playback.follow(step);
 		},
 		step(message) {
-			showRun(message.run);
+			showRun(message);
 			playback.receive(message);
 		},
-		timeline({ run }) {
-			showRun(run);
+		timeline(news) {
+			showRun(news);
 			void fetchTimeline();
 		},
 		evaluation: () => void fetchScores(),

@@ -36,14 +36,14 @@ export function mountPlots({ store, actions }, timeline) {
 		return span ? `first=${Math.floor(span[0])}&last=${Math.ceil(span[1])}` : "first=0";
 	};
 	const refresh = fetcher(async () => {
-		const { selection, plots, basis, sequence, timeline: lanes } = store.get();
+		const { selection, plots, basis, revision, sequence, timeline: lanes } = store.get();
 		if (!plots.length || selection === null || !sequence || !basis) {
 			if (told) ((told = null), (asked = ""), timeline.draw(), values());
 			return;
 		}
 		const wanted = plots.map((name) => `&kind=${name}`).join("");
 		const key = `${selection}?${part()}${wanted}`;
-		const news = `${key} ${basis} ${lanes?.done} ${lanes?.decisions.length} ${store.get().scores?.series.steps}`;
+		const news = `${key} ${basis} ${lanes?.done} ${revision} ${store.get().scores?.series.steps}`;
 		if (news === asked) return;
 		told = await getJson(`/api/courses/${key}`);
 		asked = news;
@@ -148,7 +148,7 @@ export function mountPlots({ store, actions }, timeline) {
 	}
 
 	store.watch(["plots", "sequence"], list);
-	store.on(["selection", "basis", "timeline", "scores", "span"], refresh);
+	store.on(["selection", "basis", "revision", "timeline", "scores", "span"], refresh);
 	store.on(["selection", "shown"], values);
 	button.addEventListener("click", () => !kinds.length && void read());
 	actions.plot = async (name) => {

@@ -86,6 +86,8 @@ interface PageState {
 	 * Key of the run that the server shows: that in `run`, or while that has no step yet, one before.
 	 */
 	basis: string;
+	/** Of its people: they are others where this is another. */
+	revision: number;
 	/** Always of the run `basis`. */
 	timeline: Server.Timeline | null;
 	/** Steps that the timeline shows of a long recording; null: all of them. */

@@ -1088,6 +1088,8 @@ declare namespace Server {
 	interface Step {
 		/** Key of the run that it is of; empty where none is shown. */
 		run: string;
+		/** Of the run's people: a later one has others at steps that were there before. */
+		revision: number;
 		step: number;
 		computed: boolean;
 		cameras: CameraStep[];

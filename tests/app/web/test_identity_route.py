@@ -62,7 +62,7 @@ def test_another_run_ends_a_check(client: TestClient, monkeypatch: pytest.Monkey
     key = client.post("/api/identity").json()["run"]
     client.patch("/api/parameters", json={"changes": {"fusion.detection_probability": 0.7}})
     wait_until(lambda: client.get("/api/identity").json()["state"] == "cancelled")
-    assert stopped == [key]
+    wait_until(lambda: stopped == [key])
 
 
 def test_who_stops_a_check_does_not_wait_for_its_processes(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -11,6 +12,7 @@ from starlette.testclient import TestClient
 
 from app.state.workbench import Workbench
 from tests.app.conftest import connect, run_is, wait_until
+from tracker import smoothing
 
 P_D = "fusion.detection_probability"
 Message = dict[str, Any]
@@ -116,6 +118,33 @@ def test_a_changed_parameter_ends_in_the_step_of_its_own_run(client: TestClient)
         versions = [state["version"] for state in states]
         assert versions == sorted(versions)
     wait_until(run_is(client, "done"))
+
+
+def test_a_step_is_told_again_when_hindsight_has_replaced_its_people(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told, make = threading.Event(), smoothing.create
+
+    def after_it_was_told(*args: Any) -> Any:
+        assert told.wait(30.0)
+        return make(*args)
+
+    monkeypatch.setattr(smoothing, "create", after_it_was_told)
+    with connect(client) as socket:
+        read_until(socket, is_type("timeline"))
+        client.post("/api/seek", json={"step": 100})
+        client.patch("/api/parameters", json={"changes": {P_D: 0.7}})
+        wanted = client.get("/api/state").json()["run"]["key"]
+
+        def is_step(message: Message) -> bool:
+            return message["type"] == "step" and message["run"] == wanted and message["computed"]
+
+        before = read_until(socket, is_step)[-1]
+        told.set()
+        after = read_until(socket, lambda m: is_step(m) and m["revision"] > 0)[-1]
+    assert before["revision"] == 0
+    assert after["tracks"] != before["tracks"]
+    assert after["tracks"] == client.get("/api/step/100").json()["tracks"]
 
 
 def test_keys_pressed_in_3d_and_notices_are_relayed(client: TestClient) -> None:

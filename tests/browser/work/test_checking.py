@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -119,6 +120,25 @@ def test_an_exchange_is_put_right_by_keys_alone(
             assert all(str(track) in label for track in left)
         if screenshots:
             page.screenshot(path=screenshots / "check-put-right.png")
+
+
+def test_pictures_and_lanes_have_who_hindsight_found(check: Page, server: Server) -> None:
+    """At a step at which the filter that obeys has nobody yet."""
+    by_palette(check, "next place to check")
+    check.keyboard.press("Shift+M")
+    listed = check.get_by_role("listbox", name="Corrections").get_by_role("option")
+    ask(server, "POST", "seek", {"step": 48})
+    until(check, lambda: readout(check) == "48", "the page is there")
+    check.keyboard.press("Shift+X")
+    expect(listed).to_have_count(1)
+    server.wait_for_run()
+    told = server.get("/api/step/48").json()
+    people = sorted(track["id"] for track in told["tracks"])
+    assert people == [1, 2]
+    for camera in range(2):
+        label = check.locator(".cam").nth(camera)
+        for track in people:
+            expect(label).to_have_attribute("aria-label", re.compile(rf"\b{track}\b"))
 
 
 def test_it_holds_after_a_slider_a_reload_and_is_undone(check: Page, server: Server) -> None:
