@@ -164,6 +164,31 @@ def test_two_logs_as_one() -> None:
     assert difference(first, first).empty
 
 
+def test_what_two_logs_both_say_counts_once() -> None:
+    said = {"kind": "same", "places": [[3, 1.0, 2.0, 0.8], [9, 1.2, 2.0, 0.8]]}
+    earlier = make(**said, time=datetime(2026, 11, 22, tzinfo=UTC))
+    later = make(**said, time=datetime(2026, 11, 23, tzinfo=UTC), note="so they are")
+    assert earlier.id != later.id
+    assert merge((later,), (earlier,)) == merge((earlier,), (later,)) == (earlier,)
+
+
+def test_two_logs_that_give_one_person_two_names_are_not_merged() -> None:
+    def named(name: str, step: int, x: float) -> Correction:
+        return make(kind="name", places=[[step, x, 2.0, 0.8]], name=name)
+
+    anna, bob = named("Anna", 3, 1.0), named("Bob", 3, 1.1)
+    with pytest.raises(CorrectionError, match=r'"Anna, step 3" .* "Bob, step 3" .* one person'):
+        merge((anna,), (bob,))
+    # they are one person by what one of the logs says
+    later = named("Bob", 9, 1.2)
+    same = make(kind="same", places=[[3, 1.0, 2.0, 0.8], [9, 1.2, 2.0, 0.8]])
+    with pytest.raises(CorrectionError, match="one person"):
+        merge((anna, same), (later,))
+    assert set(merge((anna,), (later,))) == {anna, later}
+    # within a log the later name counts
+    assert set(merge((anna, bob), (anna, bob))) == {anna, bob}
+
+
 def test_a_folder_that_may_only_be_read_has_its_log_with_the_user(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -191,3 +191,13 @@ def test_who_goes_on_as_another_is_asked_aside_of_the_moment_itself() -> None:
     assert clear.after(track, 40).step == 50
     slow = Clear(lanes, 0.5, 0.25)
     assert (slow.before(track, 40).step, slow.after(track, 40).step) == (38, 42)
+
+
+def test_who_was_named_is_not_asked_whether_he_is_anybody() -> None:
+    """A short life is asked about, until something is said that is said of people alone."""
+    whole = sequence([(20, walk((-0.4, 0.0, 1.0), (0.2, 0.0, 1.0), 14))], 60)
+    (asked,) = (one for one in queue(run_of(whole)).doubts if one.kind == "short")
+    (named,) = unsaid("name", asked.places[:1], name="Anna")
+    after = queue(run_of(whole, said((named,))))
+    assert "short" not in [one.kind for one in after.doubts]
+    assert after.answered > 0

@@ -66,6 +66,10 @@ test("the palette finds commands by their words, those that begin with them firs
   assert.equal(search("tim large")[0].name, "maximise-time");
   assert.equal(search("came in here")[0].name, "check-came");
   assert.equal(search("camera 1")[0].title.toLowerCase().includes("camera 1"), true);
+  assert.equal(
+    search("correct").some(({ name }) => name === "check-split"),
+    true,
+  );
   assert.deepEqual(search("no such thing"), []);
   assert.equal(search("").length, COMMANDS.length);
 });

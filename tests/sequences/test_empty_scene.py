@@ -123,7 +123,10 @@ def test_the_picture_is_reduced_as_the_others_are(tmp_path: Path) -> None:
         ("background = [3, 1]", "whole numbers from 0 to 11, found 3 and 1"),
         ("background = [1.5, 3]", "whole numbers from 0 to 11, found 1.5 and 3"),
         ("background = [3]", "expected 2 numbers"),
-        ("background = 3", "expected text in quotes, found 3"),
+        (
+            "background = 3",
+            "last step without anybody such as [0, 24], found 3",
+        ),
     ],
 )
 def test_what_shows_no_empty_scene_is_told(tmp_path: Path, line: str, told: str) -> None:

@@ -36,6 +36,31 @@ def refuse_contradiction(before: Many[Correction], new: Correction) -> None:
         ) from None
 
 
+def refuse_two_names(first: Many[Correction], second: Many[Correction]) -> None:
+    """Say so where two logs call one person by two names; within a log the later name counts.
+
+    One person's are places within :data:`NEAR` at one step, and those that *same* and *exchanged*
+    of either log tie together. Whom they name elsewhere is seen by a run alone.
+
+    Raises:
+        CorrectionError: With both of them in the sentence.
+    """
+    people = _People()
+    for one in (*first, *second):
+        for earlier, later in one.pairs:
+            people.tie(people.of(earlier, one), people.of(later, one))
+    numbers = [[(people.of(one.places[0], one), one) for one in log if one.kind == "name"]
+               for log in (first, second)]  # fmt: skip
+    ones, others = ({people.root(number): one for number, one in log} for log in numbers)
+    for person, one in ones.items():
+        other = others.get(person)
+        if other is not None and other.name != one.name:
+            raise CorrectionError(
+                f'"{one.words}" in one log and "{other.words}" in the other name one person; '
+                "take one of them out first"
+            )
+
+
 def said_again(before: Many[Correction], new: Correction) -> tuple[Correction | None, Correction]:
     """Whoever is moved again at a step is where it was said last.
 

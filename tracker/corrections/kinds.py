@@ -271,11 +271,16 @@ def digest(corrections: Iterable[Correction], kinds: Iterable[Kind]) -> str:
     Note, time and id say nothing to a run.
     """
     chosen = set(kinds)
-    told = [
-        one.model_dump(mode="json", exclude={"id", "time", "note"}, exclude_none=True)
-        for one in corrections
-        if one.kind in chosen
-    ]
+    told = [_content(one) for one in corrections if one.kind in chosen]
     if not told:
         return ""
     return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def content_of(correction: Correction) -> str:
+    """What it says, whoever said it when: the same for two that say the same."""
+    return json.dumps(_content(correction), sort_keys=True)
+
+
+def _content(one: Correction) -> dict[str, Any]:
+    return one.model_dump(mode="json", exclude={"id", "time", "note"}, exclude_none=True)

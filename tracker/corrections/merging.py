@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
 
-from tracker.corrections.contradictions import refuse_contradiction
-from tracker.corrections.kinds import Correction, CorrectionError
+from tracker.corrections.contradictions import refuse_contradiction, refuse_two_names
+from tracker.corrections.kinds import Correction, CorrectionError, content_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,10 +35,11 @@ def difference(first: Many[Correction], second: Many[Correction]) -> Difference:
 
 
 def merge(first: Many[Correction], second: Many[Correction]) -> tuple[Correction, ...]:
-    """All of both, in the order of their times; what is in both counts once.
+    """All of both, in the order of their times; what both say counts once, as it was said first.
 
     Raises:
-        CorrectionError: If one says another thing under the same id, or contradicts one.
+        CorrectionError: If one says another thing under the same id, contradicts one, or gives
+            another name to somebody.
     """
     told = difference(first, second)
     if told.changed:
@@ -47,9 +48,15 @@ def merge(first: Many[Correction], second: Many[Correction]) -> tuple[Correction
             f'correction {one.id}: expected the same in both logs, found "{one.words}" and '
             f'"{other.words}"; give one of them another id'
         )
+    refuse_two_names(first, second)
+    again = {content_of(one) for one in told.only_first}
+    again &= {content_of(one) for one in told.only_second}
     everything = sorted((*first, *told.only_second), key=lambda one: (one.time.timestamp(), one.id))
     merged: list[Correction] = []
     for one in everything:
+        content = content_of(one)
+        if content in again and any(content_of(other) == content for other in merged):
+            continue
         refuse_contradiction(merged, one)
         merged.append(one)
     return tuple(merged)

@@ -78,11 +78,13 @@ def queue(
     found = [*linked, *alone.of_tracks(run, lanes), *of_edges(run, lanes, asked)]
     ordered = sorted(found, key=lambda one: (-one.weight, one.first, one.id))
     steps = leeway(run.sequence.step_time)
-    parted = _parted_by(run)
+    parted, somebody = _parted_by(run), _somebody(run)
     told: list[Doubt] = []
     answered = 0
     for one in once_each(ordered, round(_SAME_MOMENT / run.sequence.step_time)):
-        if settled(one, said, steps) or (one.kind == "join" and parted(*one.tracks[:2])):
+        known = one.kind == "join" and parted(*one.tracks[:2])
+        known = known or (one.kind == "short" and one.tracks[0] in somebody)
+        if known or settled(one, said, steps):
             answered += 1
         elif len(told) < MOST:
             told.append(one)
@@ -102,6 +104,17 @@ def _parted_by(run: Run) -> Callable[[int, int], bool]:
     left = {track for kind, tracks in obeyed if kind == "left" for track in tracks}
     came = {track for kind, tracks in obeyed if kind == "came" for track in tracks}
     return lambda one, other: one in left or other in came or frozenset((one, other)) in parted
+
+
+def _somebody(run: Run) -> set[int]:
+    """The tracks of whom something was said that is said of people alone."""
+    kinds = {one.id: one.kind for one in run.corrections}
+    return {
+        track
+        for one in run.outcomes
+        if one.met and kinds.get(one.id) in ("here", "name", "came", "left", "same")
+        for track in one.tracks
+    }
 
 
 def once_each(ordered: Iterable[Doubt], pause: int) -> Iterable[Doubt]:

@@ -16,6 +16,12 @@ _HALF = 0.5
 """A foreground that is trusted less than this is not what finds people."""
 
 
+_EMPTY = (
+    "better is a picture, or some steps, of the scene without anybody: background of the camera "
+    "in sequence.toml"
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Gates:
     """Of one camera, over the pictures that were looked at."""
@@ -93,14 +99,14 @@ def notices(run: Run) -> list[str]:
         told.append(
             f"the background of {', '.join(unsure)} was learnt from people who stay there, for "
             "their templates lie on it: they are looked for by colour, and by shape where "
-            "their templates show one"
+            f"their templates show one; {_EMPTY}"
         )
     restless = [f'"{one.camera}"' for one in gates if one.doubt > _HALF]
     if restless:
         told.append(
             f"the background of {', '.join(restless)} was learnt from people who stay there, for "
             "much that moves never leaves: what moved lately counts as foreground; whoever keeps "
-            "still is found with a template"
+            f"still is found with a template; {_EMPTY}"
         )
     for number, view in enumerate(run.sequence.views):
         shake = max((step[number].information.get(SHAKE, 0.0) for step in run.views), default=0.0)

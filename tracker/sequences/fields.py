@@ -96,6 +96,14 @@ class Fields:
         """Whether the field is there and holds a list."""
         return isinstance(self._values.get(name), list)
 
+    def is_text(self, name: str) -> bool:
+        """Whether the field is there and holds text."""
+        return isinstance(self._values.get(name), str)
+
+    def shown(self, name: str) -> str:
+        """What the field holds, as a message quotes it."""
+        return shown(self._values.get(name))
+
     def error(self, name: str, message: str) -> SequenceError:
         """An error about one field."""
         return SequenceError(f"{self.where}, {name}: {message}")

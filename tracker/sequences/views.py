@@ -165,7 +165,13 @@ def _background(view: View, fields: Fields, steps: int, reading: Reading) -> Pat
         raise fields.error(
             "background", "expected a camera with a video or images, found one without; remove it"
         )
-    if not fields.is_list("background"):
+    if not fields.is_list("background") and not fields.is_text("background"):
+        raise fields.error(
+            "background",
+            "expected the file of an empty picture in quotes, or the first and the last step "
+            f"without anybody such as [0, 24], found {fields.shown('background')}",
+        )
+    if fields.is_text("background"):
         path = locate(reading.folder, fields, "background")
         reading.files.append(path)
         picture = read_image(path)

@@ -104,8 +104,10 @@ def track(command: Track) -> int:
     if command.keep and not any(gap.unexpected for gap in gaps.gaps(run)):
         _keep(command, run, began, seconds)
     incomplete = "".join(f"; {one}" for one in missing)
+    methods = [name for key in table.METHODS if (name := str(written.settings[key])) != "none"]
     say(
-        f"{sequence.frames} steps, {targets} tracks, {sequence.frames / seconds:.0f} steps/s "
+        f"{sequence.frames} steps, {targets} track{'' if targets == 1 else 's'} by "
+        f"{', '.join(methods)}, {sequence.frames / seconds:.0f} steps/s "
         f"({sequence.frames / seconds / sequence.fps:.1f} × real time{kept}), written to {output}"
         f"{incomplete}"
     )

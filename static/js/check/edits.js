@@ -4,7 +4,7 @@ import { sendsFile } from "./export.js";
 import { mountMarks } from "./marks.js";
 import { mountMenu } from "./menu.js";
 import { checkOf } from "./model.js";
-import { filmSteps, isOfTwo, nextCrossing, otherOf, proposed } from "./words.js";
+import { distinct, filmSteps, isOfTwo, nextCrossing, otherOf, proposed } from "./words.js";
 
 /** @param {Context} context @param {TimelineSeam} timeline */
 export function mountCorrecting(context, timeline) {
@@ -12,6 +12,12 @@ export function mountCorrecting(context, timeline) {
 	const check = checkOf(context);
 	const { state } = check;
 	const menu = mountMenu(context, timeline, { exchange, join, name });
+
+	/** The alternative that was looked at last, and of which place. */
+	let looked = { id: "", other: 0 };
+	state.on(["other"], ({ chosen: doubt, other }) => {
+		if (doubt && other) looked = { id: doubt.id, other };
+	});
 
 	const shown = () => store.get().step;
 	const chosen = () => (store.get().place === "check" ? state.get().chosen : null);
@@ -136,7 +142,16 @@ export function mountCorrecting(context, timeline) {
 		},
 		other() {
 			const doubt = chosen();
-			if (doubt) check.show(state.get().other ? 0 : otherOf(doubt));
+			if (!doubt) return;
+			const last = looked.id === doubt.id ? looked.other : otherOf(doubt);
+			check.show(state.get().other ? 0 : last);
+		},
+		alternative() {
+			const doubt = chosen();
+			if (!doubt) return;
+			const { other } = state.get();
+			const all = distinct(doubt, other).map(([, k]) => k);
+			check.show(all[(all.indexOf(other) + 1) % all.length]);
 		},
 		confirm: () => answer(0),
 		apply() {

@@ -50,7 +50,10 @@ export function mountFeet({ store, playback }, check) {
 	// Beside the pictures, which are buttons themselves.
 	const layer = h("div", { class: "feet" });
 	mosaic.after(layer);
-	/** By camera; a place in the picture, and whether somebody said it. @type {(Spot & {said: boolean})[]} */
+	/** By camera: a place in a picture, whether somebody said it, and where the run has it.
+	 * @typedef {Spot & {said: boolean, from: [number, number] | null}} Foot
+	 */
+	/** @type {Foot[]} */
 	let feet = [];
 	/** @type {HTMLElement[]} */
 	let handles = [];
@@ -76,15 +79,8 @@ export function mountFeet({ store, playback }, check) {
 				const at = there?.[index];
 				if (!at && !placing) return [];
 				const [x, y] = at ?? [width / 2, height * 0.75];
-				return [
-					known.find((one) => one.said && one.index === index) ?? {
-						index,
-						camera: name,
-						x,
-						y,
-						said: false,
-					},
-				];
+				const placed = known.find((one) => one.said && one.index === index);
+				return [{ index, camera: name, x, y, said: false, ...placed, from: at ?? null }];
 			});
 		feet = on && placing ? spots(null, clicked) : [];
 		build();
@@ -135,13 +131,14 @@ export function mountFeet({ store, playback }, check) {
 				if (foot.said && !state.get().placing) void send();
 			});
 			handle.addEventListener("keydown", (event) => keyed(event, foot));
+			handle.append(h("span", { class: "footbox", hidden: true }));
 			layer.append(handle);
 			return handle;
 		});
 		put();
 	}
 
-	/** @param {Spot & {said: boolean}} foot @param {number} x @param {number} y */
+	/** @param {Foot} foot @param {number} x @param {number} y */
 	function move(foot, x, y) {
 		const { width, height } = store.get().cameras[foot.index];
 		Object.assign(foot, {
@@ -153,7 +150,7 @@ export function mountFeet({ store, playback }, check) {
 		tell();
 	}
 
-	/** @param {KeyboardEvent} event @param {Spot & {said: boolean}} foot */
+	/** @param {KeyboardEvent} event @param {Foot} foot */
 	function keyed(event, foot) {
 		const far = event.shiftKey ? LARGE : SMALL;
 		const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[
@@ -207,11 +204,30 @@ export function mountFeet({ store, playback }, check) {
 			handle.style.translate = `${Math.round(mosaic.offsetLeft + cell.offsetLeft + x)}px ${Math.round(mosaic.offsetTop + cell.offsetTop + y)}px`;
 			handle.classList.toggle("said", foot.said);
 			handle.classList.toggle("placing", Boolean(state.get().placing));
+			follow(/** @type {HTMLElement} */ (handle.firstChild), foot, scale);
 		});
 		if (!feet.length) {
 			for (const handle of handles) handle.remove();
 			handles = [];
 		}
+	}
+
+	/** The box goes with its feet while they are moved. @param {HTMLElement} ghost @param {Foot} foot @param {number} scale */
+	function follow(ghost, foot, scale) {
+		const { selection, result } = store.get();
+		const { placing } = state.get();
+		const id = placing ? placing.track : selection;
+		const box = result?.cameras[foot.index]?.tracks.find((track) => track.id === id)?.box;
+		ghost.hidden = !foot.said || !foot.from || !box || id === null;
+		if (!foot.from || !box || id === null) return;
+		const [left, top, width, height] = box;
+		Object.assign(ghost.style, {
+			left: `${(left - foot.from[0]) * scale}px`,
+			top: `${(top - foot.from[1]) * scale}px`,
+			width: `${width * scale}px`,
+			height: `${height * scale}px`,
+		});
+		ghost.style.setProperty("--c", `var(--id-${((id - 1) % 24) + 1})`);
 	}
 
 	// While somebody is placed a click in a picture says where; nothing else happens there.

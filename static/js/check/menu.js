@@ -213,6 +213,8 @@ export function mountMenu(context, timeline, does) {
 		event.preventDefault();
 		[left, top] = [event.clientX + 2, event.clientY + 2];
 		open(what);
+		// What stood beside the pointer would lie under the menu.
+		store.set({ hover: null, pointed: null });
 	}
 	const shown = () => Math.max(0, store.get().shown);
 	/** By the other button, or by a finger or a pen that is held. */

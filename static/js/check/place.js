@@ -1,6 +1,6 @@
 /** The inspector's tab Place: one doubtful moment in pictures, what it could be, what to do. */
 import { palette } from "../draw/colours.js";
-import { all, fill, h, icon, idTag } from "../elements/dom.js";
+import { all, choices, fill, h, icon, idTag } from "../elements/dom.js";
 import { scoresOf } from "../state/events.js";
 import { commandOf, keyLabel, perform } from "../state/commands.js";
 import { drawCrop } from "./crops.js";
@@ -26,23 +26,24 @@ const ACTS = /** @type {const} */ ([
 	["check-nobody", "i-trash", "Delete"],
 	["check-here", "i-here", "Place…"],
 ]);
+/** What does that an alternative says; others are just said. @type {[RegExp, string][]} */
+const DOES = [
+	[/^exchanged/, "check-exchange"],
+	[/goes on/, "check-join"],
+	[/^two/, "check-split"],
+	[/^nobody/, "check-nobody"],
+];
 /** Where there is little room their words go first. */
 const SHORT = ["check-here", "check-nobody", "check-skip"];
 /** What is done with those who are there, not with who is missing. */
 const OF_OTHERS = ["check-exchange", "check-split"];
-/** Which of them a kind of doubt proposes where it is wrong. @type {Record<string, string>} */
-const PROPOSES = {
-	exchange: "check-exchange",
-	crossing: "check-exchange",
-	join: "check-join",
-	cut: "check-split",
-	gap: "check-split",
-	fast: "check-split",
-	short: "check-nobody",
-	missing: "check-apply",
-	begins: "check-apply",
-	ends: "check-apply",
-};
+/** The kinds of doubt about somebody who is not there. */
+const OF_NOBODY = ["missing", "begins", "ends"];
+/** So many alternatives stand side by side; the others are in a list. */
+const BESIDE = 3;
+
+/** @param {string} words */
+const sentence = (words) => words.charAt(0).toUpperCase() + words.slice(1);
 
 /** What is to be done while somebody is placed. */
 /** @param {NonNullable<ReturnType<Check["state"]["get"]>["placing"]>} placing */
@@ -172,27 +173,55 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 						),
 					]),
 			h("span", { class: "grow" }),
+			...choice(chosen, other),
+		);
+		head
+			.querySelector(".seg [aria-pressed=true], .seg .on")
+			?.scrollIntoView({ block: "nearest", inline: "nearest" });
+		words();
+		buttons();
+	}
+
+	/** What the place may be: the likeliest side by side, the others in a list. @param {Doubt} doubt @param {number} other */
+	function choice(doubt, other) {
+		const all = distinct(doubt, other);
+		const far = all.slice(all.length > BESIDE + 1 ? BESIDE : all.length);
+		const beside = all.slice(0, all.length - far.length);
+		const more = h("select", {
+			class: far.some(([, k]) => k === other) ? "on" : "",
+			"aria-label": "Other alternatives",
+			onchange: () => check.show(Number(more.value)),
+		});
+		choices(
+			more,
+			[
+				["", `${far.length} more`],
+				...far.map(
+					([{ words, probability }, k]) =>
+						/** @type {[string, string]} */ ([String(k), `${words}: ${percent(probability)}`]),
+				),
+			],
+			far.some(([, k]) => k === other) ? String(other) : "",
+		);
+		more.options[0].hidden = true;
+		return [
 			h(
 				"div",
 				{ class: "seg", role: "group", "aria-label": "Shown" },
-				distinct(chosen, other).map(([{ words, probability }, k]) =>
+				beside.map(([{ words, probability }, k]) =>
 					h(
 						"button",
 						{
 							"aria-pressed": String(k === other),
-							title: `${words}: ${percent(probability)}${k < 2 ? " (V)" : ""}`,
+							title: `${words}: ${percent(probability)}`,
 							onclick: () => check.show(k),
 						},
 						words,
 					),
 				),
+				far.length > 0 && more,
 			),
-		);
-		head
-			.querySelector(".seg [aria-pressed=true]")
-			?.scrollIntoView({ block: "nearest", inline: "nearest" });
-		words();
-		buttons();
+		];
 	}
 
 	function words() {
@@ -209,7 +238,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 		why.title = chosen.why;
 		fill(
 			why,
-			`${unbroken(chosen.why[0].toUpperCase() + chosen.why.slice(1))}.`,
+			`${unbroken(sentence(chosen.why))}.`,
 			h(
 				"span",
 				{ class: "q" },
@@ -222,29 +251,23 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 	}
 
 	function buttons() {
-		const { chosen, other } = state.get();
+		const { chosen, other, ends } = state.get();
 		if (!chosen) return;
 		const best = other || proposed(chosen);
 		const alternative = chosen.alternatives[best]?.words ?? "";
-		const main = !best
-			? "check-confirm"
-			: /^exchanged/.test(alternative)
-				? "check-exchange"
-				: /goes on/.test(alternative)
-					? "check-join"
-					: /^two/.test(alternative)
-						? "check-split"
-						: /^nobody/.test(alternative)
-							? "check-nobody"
-							: (PROPOSES[chosen.kind] ?? "check-confirm");
+		const does = DOES.find(([word]) => word.test(alternative))?.[1] ?? "check-apply";
+		const main = ends ? "check-exchange" : best ? does : "check-confirm";
 		fill(
 			acts,
-			...ACTS.filter(([name]) => main !== "check-apply" || !OF_OTHERS.includes(name)).map(
+			...ACTS.filter(([name]) => !OF_NOBODY.includes(chosen.kind) || !OF_OTHERS.includes(name)).map(
 				([name, sign, word]) =>
 					button(name, sign, name === main && name === "check-join" ? "Join" : word, name === main),
 			),
 			h("span", { class: "grow" }),
-			main === "check-apply" && button(main, "i-here", alternative || "Apply", true),
+			main === "check-apply" &&
+				(OF_NOBODY.includes(chosen.kind)
+					? button(main, "i-here", sentence(alternative), true)
+					: button(main, "i-tick", "Apply", true)),
 			button("check-skip", "i-next", "Skip", false),
 			button("check-confirm", "i-tick", "Confirm", main === "check-confirm"),
 		);

@@ -39,7 +39,17 @@ export function mountSheets({ store, actions }) {
 	fill(
 		sheet,
 		[...new Set(listed.map(({ group }) => group))].map((group) =>
-			h("section", {}, h("h3", {}, group), listed.filter((c) => c.group === group).map(row)),
+			h(
+				"section",
+				{},
+				h(
+					"h3",
+					{},
+					group,
+					group === "Check" && h("span", { class: "small" }, " · in that place, before all others"),
+				),
+				listed.filter((c) => c.group === group).map(row),
+			),
 		),
 	);
 	single.addEventListener("change", () => store.set({ singleKeys: single.checked }));

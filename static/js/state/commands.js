@@ -81,6 +81,9 @@ export function commandFor(key, singleKeys = true, place = "") {
 	);
 }
 
+/** What a group is looked for by besides its name. @type {Partial<Record<Command["group"], string>>} */
+const ALSO = { Check: "correct correction corrections" };
+
 /**
  * Commands whose title has all words of a text: those that begin with it first, then those that
  * have it in one piece, then those of which each word begins one.
@@ -89,7 +92,7 @@ export function commandFor(key, singleKeys = true, place = "") {
 export function search(text) {
 	const words = text.toLowerCase().split(/\s+/).filter(Boolean);
 	const found = COMMANDS.filter(({ title, group }) =>
-		words.every((word) => `${title} ${group}`.toLowerCase().includes(word)),
+		words.every((word) => `${title} ${group} ${ALSO[group] ?? ""}`.toLowerCase().includes(word)),
 	);
 	const late = (/** @type {Command} */ { title }) => {
 		const own = ` ${title.toLowerCase()}`;

@@ -6,6 +6,7 @@ type Correcting =
 	| "previous"
 	| "crossing"
 	| "other"
+	| "alternative"
 	| "confirm"
 	| "apply"
 	| "skip"

@@ -421,4 +421,5 @@ def test_the_command_writes_boxes_that_a_sequence_reads(
     )
     model.write_bytes(b"no network")
     assert cli.main(command) == 1
-    assert "model.onnx cannot be used: it is not an ONNX model" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "model.onnx cannot be used: it is not an ONNX model; name a network" in told

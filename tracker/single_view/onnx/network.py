@@ -49,6 +49,10 @@ class Settings:
     """What a picture's bytes become."""
 
 
+_REMEDY = "export it to ONNX again with one picture at a time"
+"""Where a network is one, but not fit to be run here."""
+
+
 class Network:
     """A model ready to look at pictures; one at a time, whoever asks.
 
@@ -72,7 +76,12 @@ class Network:
             raise ValueError(
                 f"the detector {path} cannot be read ({error.strerror}); name an ONNX file"
             ) from error
-        except (ValueError, cv2.error) as error:
+        except ValueError as error:
+            told = self._told(
+                f"cannot be used: {error}", "name a network that was exported to ONNX"
+            )
+            raise ValueError(told) from error
+        except cv2.error as error:
             raise ValueError(self._told(f"cannot be used: {_words(error)}")) from error
         self._picture = self._picture_port(ports.inputs)
         self._sizes = [p for p in ports.inputs if p is not self._picture]
@@ -96,11 +105,8 @@ class Network:
     def _channels_last(self) -> bool:
         return self._picture.shape[1] != 3 and self._picture.shape[3] == 3
 
-    def _told(self, words: str) -> str:
-        return (
-            f"the detector {self._path.name} {words}; export it to ONNX again with one picture at "
-            "a time"
-        )
+    def _told(self, words: str, remedy: str = _REMEDY) -> str:
+        return f"the detector {self._path.name} {words}; {remedy}"
 
     def _picture_port(self, inputs: tuple[Port, ...]) -> Port:
         for port in inputs:
