@@ -83,6 +83,8 @@ def test_presets_of_ones_own_by_keyboard(flat_page: Page, server: Server) -> Non
     server.wait(lambda state: state["changed"] == [])
     preset.select_option("quick")
     server.wait(lambda state: state["parameters"][P_D] == 0.6)
+    # the page takes back what it knows of
+    expect(page.locator("#panel-changes")).to_contain_text("0.6")
     page.keyboard.press("Control+z")
     state = server.wait(lambda state: state["parameters"][P_D] != 0.6)
     assert state["parameters"][P_D] == PARAMETERS[P_D].default
