@@ -25,6 +25,8 @@ logger = logging.getLogger("app")
 MOST = 500
 """Actions that can be taken back."""
 
+_MEND = "Mend the file, or move it away, and open the recording again."
+
 Told = tuple[Correction, ...]
 
 
@@ -147,9 +149,7 @@ class Correcting:
         if self._recording is None:
             raise CorrectionError("no recording is open")
         if self._log.problem is not None:
-            raise CorrectionError(
-                f"{self._log.problem}; mend the file, or move it away, and open the recording again"
-            )
+            raise CorrectionError(f"{self._log.problem}; {_MEND[0].lower()}{_MEND[1:-1]}")
         path = writing_place(self._recording.folder)
         try:
             write_log(path, corrections)
@@ -175,6 +175,8 @@ class Correcting:
             self._log = open_log(recording.folder)
             self._done, self._undone, self.skipped = [], [], set()
             self._read_history()
+        if self._log.problem is not None:
+            self._workbench.notify("warn", f"Corrections are left out: {self._log.problem}", _MEND)
 
     def _history_file(self) -> Path | None:
         if self._folder is None or self._recording is None:

@@ -195,7 +195,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 	}
 
 	function head() {
-		const { queue, told: corrections } = state.get();
+		const { queue } = state.get();
 		const { run, sequence } = store.get();
 		const left = queue?.doubts.length ?? 0;
 		const answered = queue?.answered ?? 0;
@@ -212,12 +212,6 @@ export function mountQueue(root, { store, actions }, check, crops) {
 		order.hidden = left < 2;
 		blank.hidden = left > 0;
 		if (left) return;
-		if (corrections?.problem)
-			return fill(
-				blank,
-				h("h3", {}, "The corrections cannot be read"),
-				h("p", {}, corrections.problem),
-			);
 		if (!queue || (computing && !answered))
 			return fill(
 				blank,
@@ -302,15 +296,17 @@ export function mountQueue(root, { store, actions }, check, crops) {
 		const unmet = newest.filter(({ met }) => met === false).length;
 		fill(
 			told,
-			icon(unmet ? "i-warn" : "i-pin", "s"),
+			icon(unmet || now?.problem ? "i-warn" : "i-pin", "s"),
 			h(
 				"span",
 				{},
-				unmet
-					? `${unmet} ${unmet === 1 ? "does" : "do"} not hold. `
-					: newest.length
-						? "A run again keeps them: each is tied to a place and a step. "
-						: "What you put right stands here, and holds after every change of parameters. ",
+				now?.problem
+					? `Left out, and nothing new is taken: ${now.problem}. `
+					: unmet
+						? `${unmet} ${unmet === 1 ? "does" : "do"} not hold. `
+						: newest.length
+							? "A run again keeps them: each is tied to a place and a step. "
+							: "What you put right stands here, and holds after every change of parameters. ",
 			),
 			chosen &&
 				h(

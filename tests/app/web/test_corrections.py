@@ -15,7 +15,7 @@ from starlette.testclient import TestClient
 
 from app.state.doubting import Doubting
 from app.web.server import Settings, create_app
-from tests.app.conftest import ADDRESS, Runs, run_is, wait_until
+from tests.app.conftest import ADDRESS, Runs, connect, run_is, wait_until
 from tracker.corrections.log import read_log
 from tracker.doubts import Alternative, Doubt, Queue
 from tracker.doubts.doubt import Lanes, unsaid
@@ -187,6 +187,10 @@ def test_a_malformed_log_is_told_and_the_recording_stays_usable(own: Path) -> No
     with started(own) as client:
         found = client.get(PLACE).json()
         assert "line 4" in found["problem"]
+        with connect(client) as socket:
+            told = socket.receive_json()
+        assert told["type"] == "notice"
+        assert "line 4" in told["message"]
         assert tracks(client)
         answer = client.post(
             PLACE, json={"corrections": [{"kind": "checked", "first": 0, "last": 9}]}
