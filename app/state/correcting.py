@@ -25,7 +25,7 @@ logger = logging.getLogger("app")
 MOST = 500
 """Actions that can be taken back."""
 
-_MEND = "Mend the file, or move it away, and open the recording again."
+_MEND = "Mend the file, or move it away; it is read again then."
 
 Told = tuple[Correction, ...]
 
@@ -37,6 +37,15 @@ class Action:
     words: str
     before: Told
     after: Told
+
+
+def _mark_of(path: Path) -> tuple[int, int, int] | None:
+    """What changes when a file is written: which it is, when that was, and its length."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_ino, found.st_mtime_ns, found.st_size
 
 
 class Correcting:
@@ -53,6 +62,8 @@ class Correcting:
         self._lock = threading.RLock()
         self._recording: Recording | None = None
         self._log = Log(Path())
+        self._mark: tuple[int, int, int] | None = None
+        """Of the log as it was read or written last."""
         self._done: list[Action] = []
         self._undone: list[Action] = []
         self.skipped: set[str] = set()
@@ -62,6 +73,26 @@ class Correcting:
     def close(self) -> None:
         """Stop following."""
         self._unsubscribe()
+
+    def refresh(self) -> None:
+        """Read the log again where another program has written it: what it says then counts, and
+        what was done before cannot be taken back any more."""
+        with self._lock:
+            if self._recording is None or _mark_of(self._log.path) == self._mark:
+                return
+            before, self._log = self._log, open_log(self._recording.folder)
+            self._mark = _mark_of(self._log.path)
+            if (before.corrections, before.problem) == (self._log.corrections, self._log.problem):
+                return
+            self._done, self._undone = [], []
+            self._workbench.correct(self._recording, self._log.corrections)
+        if self._log.problem is None:
+            self._workbench.notify("info", f"{self._log.path.name} was changed and is read again")
+        self._complain()
+
+    def _complain(self) -> None:
+        if self._log.problem is not None:
+            self._workbench.notify("warn", f"Corrections are left out: {self._log.problem}", _MEND)
 
     @property
     def log(self) -> Log:
@@ -86,6 +117,7 @@ class Correcting:
                 nothing changes then.
         """
         with self._lock:
+            self.refresh()
             before = self._workbench.snapshot().corrections
             after = list(before)
             for one in new:
@@ -104,6 +136,7 @@ class Correcting:
             CorrectionError: If there is none with this id, or the log cannot be written.
         """
         with self._lock:
+            self.refresh()
             before = self._workbench.snapshot().corrections
             gone = next((one for one in before if one.id == identity), None)
             if gone is None:
@@ -118,6 +151,7 @@ class Correcting:
             CorrectionError: If there is nothing to take back, or the log cannot be written.
         """
         with self._lock:
+            self.refresh()
             if not self._done:
                 raise CorrectionError("there is nothing to take back")
             action = self._done[-1]
@@ -132,6 +166,7 @@ class Correcting:
             CorrectionError: If nothing was, or the log cannot be written.
         """
         with self._lock:
+            self.refresh()
             if not self._undone:
                 raise CorrectionError("nothing was taken back that could be said again")
             action = self._undone[-1]
@@ -149,7 +184,7 @@ class Correcting:
         if self._recording is None:
             raise CorrectionError("no recording is open")
         if self._log.problem is not None:
-            raise CorrectionError(f"{self._log.problem}; {_MEND[0].lower()}{_MEND[1:-1]}")
+            raise CorrectionError(f"{self._log.problem}; mend the file, or move it away")
         path = writing_place(self._recording.folder)
         try:
             write_log(path, corrections)
@@ -158,7 +193,7 @@ class Correcting:
                 raise CorrectionError(str(error)) from None
             path = own_place(self._recording.folder)
             write_log(path, corrections)
-        self._log = Log(path, corrections)
+        self._log, self._mark = Log(path, corrections), _mark_of(path)
         self._workbench.correct(self._recording, corrections)
 
     # over a start
@@ -175,8 +210,8 @@ class Correcting:
             self._log = open_log(recording.folder)
             self._done, self._undone, self.skipped = [], [], set()
             self._read_history()
-        if self._log.problem is not None:
-            self._workbench.notify("warn", f"Corrections are left out: {self._log.problem}", _MEND)
+            self._mark = _mark_of(self._log.path)
+        self._complain()
 
     def _history_file(self) -> Path | None:
         if self._folder is None or self._recording is None:

@@ -118,6 +118,9 @@ def test_who_is_tied_together_is_not_parted() -> None:
         with pytest.raises(CorrectionError, match="contradicts"):
             refuse_contradiction([parted, one], other if parted.places[1].step == 20 else one)
     refuse_contradiction([one], make(kind="different", places=[a, c]))
+    named = make(kind="name", places=[a], name="Anna")
+    with pytest.raises(CorrectionError, match='contradicts "same person'):
+        refuse_contradiction([one, named], make(kind="different", places=[a, b]))
     far = [9, 9.0, 2.0, 0.8]
     with pytest.raises(CorrectionError, match="two places"):
         refuse_contradiction([one], make(kind="same", places=[a, far]))

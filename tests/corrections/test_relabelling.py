@@ -11,6 +11,7 @@ from tracker.corrections import Correction
 from tracker.corrections.kinds import make
 from tracker.corrections.outcomes import outcomes
 from tracker.corrections.relabelling import relabelled
+from tracker.corrections.resting import resting
 
 STEPS, LEEWAY = 60, 5
 
@@ -77,6 +78,8 @@ def test_each_kind_is_met_alone() -> None:
         make(kind="nobody", places=[at(1, 0), at(1, 20)]),
         make(kind="came", places=[at(3, 25)]),
         make(kind="left", places=[at(3, 25)]),
+        make(kind="came", places=[at(3, 3)]),
+        make(kind="left", places=[at(3, STEPS - 3)]),
         make(kind="name", places=[at(3, 25)], name="Anna"),
         make(kind="checked", first=0, last=9),
     ):
@@ -115,6 +118,32 @@ def test_who_is_not_found_is_told_and_changes_nothing() -> None:
     found = outcomes(steps, ids, places, told, leeway=LEEWAY)[0]
     assert not found.met
     assert "found nobody near (90.00, 0.00) at step 3" in found.why
+
+
+def test_what_stands_against_one_that_is_not_met_is_told() -> None:
+    steps, ids, places = walkers(2)
+    told = [
+        make(kind="same", places=[at(1, 10), at(1, 40)]),
+        make(kind="different", places=[at(1, 20), at(1, 30)]),
+        make(kind="different", places=[at(2, 20), at(2, 30)]),
+    ]
+    against, alone = outcomes(steps, ids, places, told, leeway=LEEWAY)[1:]
+    assert against.why == 'they are one track, 1; "same person, steps 10 – 40" holds there'
+    assert alone.why == "they are one track, 2"
+
+
+def test_rows_rest_on_a_join_from_where_somebody_comes_back() -> None:
+    steps, ids, places = walkers(2)
+    there = (ids == 2) | (steps < 20) | (steps >= 30)
+    steps, ids, places = steps[there], ids[there], places[there]
+    told = [
+        make(kind="same", places=[at(1, 10), at(1, 40)]),
+        make(kind="same", places=[at(2, 10), at(2, 40)]),
+    ]
+    met = outcomes(steps, ids, places, told, leeway=LEEWAY)
+    rests = np.array(resting(steps, ids, places, told, met))
+    assert steps[rests == told[0].id].tolist() == list(range(30, STEPS))
+    assert steps[rests == told[1].id].tolist() == list(range(40, STEPS))
 
 
 def test_nobody_at_all() -> None:

@@ -59,5 +59,5 @@ def test_rows_that_rest_on_a_correction_name_it() -> None:
     own = [
         step for step, name in zip(tracks.frames.tolist(), found, strict=True) if name == same.id
     ]
-    assert own == list(range(70, 80))
+    assert own == list(range(60, 80)), "from where the other piece begins"
     assert [s for s, n in zip(tracks.frames.tolist(), found, strict=True) if n == here.id] == [45]

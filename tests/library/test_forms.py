@@ -49,6 +49,8 @@ def test_the_form_follows_from_the_suffix_or_is_named() -> None:
     assert format_of(Path("a.txt"), "trc").name == "trc"
     with pytest.raises(ValueError, match=r"expected one of csv, .* got 'mp5'"):
         format_of(Path("a"), "mp5")
+    with pytest.raises(ValueError, match=r"ends in \.glb for glTF, got 'a\.gltf'"):
+        format_of(Path("a.gltf"))
 
 
 def test_csv(tmp_path: Path) -> None:

@@ -129,7 +129,9 @@ def _check(corrections: list[Correction]) -> None:
                     (
                         other
                         for other in reversed(corrections)
-                        if other is not one and any(_touches(other, p) for p in (earlier, later))
+                        if other is not one
+                        and other.pairs
+                        and any(_touches(other, p) for p in (earlier, later))
                     ),
                     one,
                 )

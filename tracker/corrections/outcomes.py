@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -77,7 +77,24 @@ def outcomes(
             found.append(Outcome(one.id, False, str(nobody)))
         else:
             found.append(Outcome(one.id, not why, why, who))
-    return tuple(found)
+    return tuple(_against(outcome, corrections, found) for outcome in found)
+
+
+def _against(unmet: Outcome, corrections: Many[Correction], found: Many[Outcome]) -> Outcome:
+    """With the sentence that stands against one that is not met: the last that holds of the same
+    people and steps."""
+    told = {one.id: one for one in corrections}
+    own = told[unmet.id]
+    if unmet.met or own.kind == "here":
+        return unmet
+    for outcome in reversed(found):
+        other = told[outcome.id]
+        if not outcome.met or other.kind not in ("same", "different", "exchanged"):
+            continue
+        (first, last), (begin, end) = own.steps, other.steps
+        if first <= end and begin <= last and set(outcome.tracks) & set(unmet.tracks):
+            return replace(unmet, why=f'{unmet.why}; "{other.words}" holds there')
+    return unmet
 
 
 def _looked(tracks: _Tracks, one: Correction) -> tuple[tuple[int, ...], str]:
@@ -103,9 +120,12 @@ def _looked(tracks: _Tracks, one: Correction) -> tuple[tuple[int, ...], str]:
         row = tracks.row(one.places[0])
         before = one.kind == "came"
         step = one.places[0].step + (-1 if before else 1) * (tracks.leeway + 1)
+        # Who is there at the recording's very end, or from its beginning on, has not left or come.
+        step = min(max(step, 0), int(tracks.frames.max()))
         own = tracks.frames[tracks.ids == who[0]]
-        between = np.sort(own[(own - step) * (own - tracks.frames[row]) <= 0])
-        if step in own and len(between) > tracks.leeway:
+        between = own[(own - step) * (own - tracks.frames[row]) <= 0]
+        long = min(abs(one.places[0].step - step), tracks.leeway)
+        if long and step in own and len(between) > long:
             return who, f"track {who[0]} is there {'before' if before else 'after'} it"
     return who, ""
 

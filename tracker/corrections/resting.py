@@ -21,7 +21,8 @@ def resting(
 ) -> list[str]:
     """The id of the correction that each row rests on, empty for none.
 
-    Whose a track is from a place on rests on what said so there, up to the next correction; that
+    Whose a track is from a place on rests on what said so there, up to the next correction; where
+    its people were not there for a while before the place, from where they come back. That
     somebody is at a place at all rests on *is here*. What is not met carries nothing.
 
     Args:
@@ -44,10 +45,19 @@ def resting(
                 found[row] = one.id
         later = {"same": 1, "different": 1, "exchanged": 2}.get(one.kind)
         if later is not None:
-            for place, track in zip(one.places[later:], outcome.tracks[later:], strict=True):
-                begins.append((track, place.step, one.id))
+            pairs = zip(one.places, one.places[later:], outcome.tracks[later:], strict=False)
+            for earlier, place, track in pairs:
+                between = (ids == track) & (frames > earlier.step) & (frames <= place.step)
+                begins.append((track, _back(frames[between], place.step), one.id))
     begins.sort(key=lambda begin: begin[1])
     for track, step, name in begins:
         for row in np.flatnonzero((ids == track) & (frames >= step)).tolist():
             found[row] = name
     return found
+
+
+def _back(own: Int[ndarray, " K"], step: int) -> int:
+    """The first step after the last gap among some steps; that of the place where there is none."""
+    own = np.unique(own)
+    gaps = np.flatnonzero(np.diff(own) > 1)
+    return int(own[gaps[-1] + 1]) if len(gaps) else step

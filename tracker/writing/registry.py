@@ -104,7 +104,7 @@ def format_of(path: Path, name: str | None = None) -> Format:
     nothing.
 
     Raises:
-        ValueError: If there is no such form.
+        ValueError: If there is no such form, or the suffix is the name of one that has another.
     """
     if name is not None:
         if name not in FORMATS:
@@ -113,7 +113,12 @@ def format_of(path: Path, name: str | None = None) -> Format:
     for form in FORMATS.values():
         if form.suffix and path.suffix.lower() == form.suffix:
             return form
-    return FORMATS["csv"]
+    meant = FORMATS.get(path.suffix.lower().removeprefix("."))
+    if meant is not None and meant.suffix:
+        raise ValueError(
+            f"expected a name that ends in {meant.suffix} for {meant.word}, got {path.name!r}"
+        )
+    return meant or FORMATS["csv"]
 
 
 def save(

@@ -72,6 +72,8 @@ def _open(bench: Bench) -> Snapshot:
 @router.get("")
 def corrections(bench: Bench, correct: Correct) -> Corrections:
     """All of them in their order, with what became of each in the shown run."""
+    _open(bench)
+    correct.refresh()
     return views.corrections_of(_open(bench), correct)
 
 

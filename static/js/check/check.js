@@ -34,7 +34,7 @@ export function mountCheck(root, context) {
 	document.addEventListener("keyup", ({ key }) => {
 		if (key !== "v" || !held) return;
 		held = false;
-		void check.show(0);
+		void actions.correct("other");
 	});
 
 	const { state } = check;

@@ -19,12 +19,16 @@ export function mountCorrecting(context, timeline) {
 		if (doubt && other) looked = { id: doubt.id, other };
 	});
 
+	/** The place that was looked at last; answered, it is no longer in the queue. @type {Doubt | null} */
+	let seen = null;
+	state.on(["chosen"], ({ chosen: doubt }) => (seen = doubt ?? seen));
+	store.on(["sequence"], () => (seen = null));
+
 	const shown = () => store.get().step;
 	const chosen = () => (store.get().place === "check" ? state.get().chosen : null);
 
-	/** The chosen place, where the playhead is at it. */
-	function here() {
-		const doubt = chosen();
+	/** A place, the chosen one if none is given, where the playhead is at it. */
+	function here(doubt = chosen()) {
 		if (!doubt) return null;
 		const film = filmSteps(doubt.first, doubt.last, store.get());
 		return shown() >= film[0] && shown() <= film[film.length - 1] ? doubt : null;
@@ -205,7 +209,7 @@ export function mountCorrecting(context, timeline) {
 		},
 		checked() {
 			const { range, loop, frames } = store.get();
-			const doubt = chosen();
+			const doubt = chosen() ?? here(seen);
 			const [first, last] = loop
 				? [range[0] ?? 0, range[1] ?? frames - 1]
 				: doubt

@@ -58,6 +58,16 @@ export function mountFeet({ store, playback }, check) {
 	/** @type {HTMLElement[]} */
 	let handles = [];
 	let wanted = "";
+	/** Whether somebody is to be placed from this moment on. */
+	let begun = false;
+
+	/** Who goes to another step places there; what was clicked was of the one before. */
+	function goAlong() {
+		const { placing } = state.get();
+		const { shown } = store.get();
+		if (placing && shown >= 0 && placing.step !== shown)
+			state.set({ placing: { ...placing, step: shown, clicks: [] } });
+	}
 
 	/** The feet of the selected track at the shown step, as the server projects them. */
 	async function refresh() {
@@ -107,6 +117,7 @@ export function mountFeet({ store, playback }, check) {
 	function build() {
 		const { placing } = state.get();
 		const { selection } = store.get();
+		const was = handles.findIndex((handle) => handle === document.activeElement);
 		for (const handle of handles) handle.remove();
 		handles = feet.map((foot) => {
 			const id = placing ? placing.track : selection;
@@ -128,7 +139,10 @@ export function mountFeet({ store, playback }, check) {
 			});
 			handle.addEventListener("pointerup", (event) => {
 				event.stopPropagation();
-				if (foot.said && !state.get().placing) void send();
+				if (event.button !== 0) return;
+				// On a ring that lies where somebody stands a click says so.
+				if (state.get().placing) says(foot, foot.x, foot.y);
+				else if (foot.said) void send();
 			});
 			handle.addEventListener("keydown", (event) => keyed(event, foot));
 			handle.append(h("span", { class: "footbox", hidden: true }));
@@ -136,6 +150,9 @@ export function mountFeet({ store, playback }, check) {
 			return handle;
 		});
 		put();
+		// Who places somebody goes on by keys at once.
+		if (was >= 0 || begun) handles[Math.max(was, 0)]?.focus({ preventScroll: true });
+		begun = false;
 	}
 
 	/** @param {Foot} foot @param {number} x @param {number} y */
@@ -150,6 +167,13 @@ export function mountFeet({ store, playback }, check) {
 		tell();
 	}
 
+	/** Two pictures are enough; a third click begins with the newest two. @param {Foot} foot @param {number} x @param {number} y */
+	function says(foot, x, y) {
+		const others = feet.filter((one) => one.said && one !== foot);
+		if (others.length > 1) others[0].said = false;
+		move(foot, x, y);
+	}
+
 	/** @param {KeyboardEvent} event @param {Foot} foot */
 	function keyed(event, foot) {
 		const far = event.shiftKey ? LARGE : SMALL;
@@ -158,7 +182,8 @@ export function mountFeet({ store, playback }, check) {
 		];
 		if (way) move(foot, foot.x + far * way[0], foot.y + far * way[1]);
 		else if (event.key === "Enter") {
-			foot.said = true;
+			// Where the ring lies of somebody who is not known nobody has said yet.
+			foot.said ||= foot.from !== null;
 			void send();
 		} else if (event.key === "Escape") cancel();
 		else return;
@@ -243,10 +268,7 @@ export function mountFeet({ store, playback }, check) {
 				event.stopPropagation();
 				const foot = feet.find(({ index }) => index === at.index);
 				if (name !== "click" || !foot) return;
-				// Two pictures are enough; a third click begins with the newest two.
-				const others = feet.filter((one) => one.said && one !== foot);
-				if (others.length > 1) others[0].said = false;
-				move(foot, at.x, at.y);
+				says(foot, at.x, at.y);
 			},
 			true,
 		);
@@ -264,11 +286,17 @@ export function mountFeet({ store, playback }, check) {
 		},
 		true,
 	);
+	store.on(["shown"], goAlong);
 	store.watch(
 		["place", "selection", "shown", "playing", "basis", "revision", "result", "cameras"],
 		() => void refresh(),
 	);
-	state.on(["placing"], () => void refresh());
+	let before = state.get().placing;
+	state.on(["placing"], ({ placing }) => {
+		begun = Boolean(placing && !before);
+		before = placing;
+		void refresh();
+	});
 	store.on(["zooms", "large", "layout"], put);
 	playback.onPaint(() => handles.length && put());
 	new ResizeObserver(put).observe(mosaic);

@@ -47,11 +47,11 @@ const sentence = (words) => words.charAt(0).toUpperCase() + words.slice(1);
 
 /** What is to be done while somebody is placed. */
 /** @param {NonNullable<ReturnType<Check["state"]["get"]>["placing"]>} placing */
-function placingWords({ track, clicks }) {
+function placingWords({ track, step, clicks }) {
 	if (clicks.length === 1) return "One picture: feet on the floor. Enter says it, Esc leaves it.";
 	if (clicks.length) return "Two pictures. Enter says it, Esc leaves it.";
 	const who = track === null ? "somebody stands" : `${track} stands`;
-	return `Click where ${who}, in one picture or in two. Esc leaves it.`;
+	return `Click where ${who} at step ${step}, in one picture or in two. Esc leaves it.`;
 }
 
 /**

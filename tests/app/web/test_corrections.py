@@ -200,6 +200,29 @@ def test_a_malformed_log_is_told_and_the_recording_stays_usable(own: Path) -> No
     assert "hier" in (own / "corrections.toml").read_text()
 
 
+def test_a_log_that_another_program_writes_is_read_again(own: Path) -> None:
+    log = own / "corrections.toml"
+    checked = {"kind": "checked", "first": 0, "last": 9}
+    with started(own) as client:
+        client.post(PLACE, json={"corrections": [checked]})
+        theirs = log.read_text().replace("last = 9", "last = 7")
+        log.write_text(theirs)
+        # without a look at it before: nothing of it is lost
+        found = client.post(PLACE, json={"corrections": [{**checked, "first": 20, "last": 30}]})
+        assert [one["last"] for one in found.json()["corrections"]] == [7, 30]
+        assert [one.last for one in read_log(log)] == [7, 30]
+        log.write_text("[[correction]]")
+        assert "corrections.toml" in client.get(PLACE).json()["problem"]
+        answer = client.post(PLACE, json={"corrections": [checked]})
+        assert answer.status_code == 422
+        assert log.read_text() == "[[correction]]"
+        log.write_text(theirs)
+        found = client.get(PLACE).json()
+        assert found["problem"] is None
+        assert [one["last"] for one in found["corrections"]] == [7]
+        assert found["undo"] is None
+
+
 @pytest.mark.full
 def test_the_queue_is_answered_previewed_and_skipped(
     desk: TestClient, monkeypatch: pytest.MonkeyPatch

@@ -238,6 +238,26 @@ def test_somebody_is_placed_by_a_click(check: Page, server: Server) -> None:
     assert (told["kind"], told["first"]) == ("here", 0)
 
 
+def test_somebody_is_placed_by_keys_at_the_step_that_is_shown(check: Page, server: Server) -> None:
+    ask(server, "POST", "seek", {"step": 68})
+    until(check, lambda: readout(check) == "68", "the page is there")
+    check.keyboard.press("Escape")
+    check.keyboard.press("Shift+H")
+    ring = check.get_by_role("button", name="Feet of somebody in cam1")
+    expect(ring).to_be_focused()
+    check.keyboard.press("Enter")  # nobody has said where yet
+    assert corrections(server)["corrections"] == []
+    check.keyboard.press(".")
+    expect(check.get_by_text("stands at step 69")).to_be_visible()
+    check.get_by_role("button", name="Feet of somebody in cam2").click()  # as it lies
+    expect(check.get_by_text("One picture")).to_be_visible()
+    check.keyboard.press("Enter")
+    listed = check.get_by_role("listbox", name="Corrections").get_by_role("option")
+    expect(listed).to_have_count(1)
+    (said,) = corrections(server)["corrections"]
+    assert (said["kind"], said["first"]) == ("here", 69)
+
+
 def test_who_is_dragged_far_by_the_feet_stays_who_he_is(check: Page, server: Server) -> None:
     middle = (HIDDEN.start + HIDDEN.stop) // 2 + 12
     ask(server, "POST", "seek", {"step": middle})
