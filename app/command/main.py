@@ -209,9 +209,9 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     if not library.is_room(place):
         library.open_sequence(place)  # what cannot be read is told here, before a page is open
     if command.detector is not None:
-        from tracker.single_view.onnx.network import Network, Settings
+        from tracker.single_view.onnx.network import Network
 
-        Network(command.detector, Settings())  # likewise
+        Network.tried(command.detector)  # likewise
     listener = _listen(
         command if life is None or life.port is None else replace(command, port=life.port)
     )

@@ -187,10 +187,10 @@ async def use_detector(wish: DetectorRequest, bench: Bench, jobs: Work) -> model
         raise nothing_open()
     model = None if wish.model is None else FolderPath(wish.model).expanduser()
     if model is not None:
-        from tracker.single_view.onnx.network import Network, Settings  # at its first use
+        from tracker.single_view.onnx.network import Network  # at its first use
 
         with _complaining():
-            await asyncio.to_thread(Network, model, Settings())
+            await asyncio.to_thread(Network.tried, model)
     with told_in_the_answer("the detector", field="model", hint=NOTHING_LOST):
         await begun(jobs.use_detector(model))
     return results.state_of(bench.snapshot())

@@ -335,7 +335,7 @@ test("pictures that are alike lie side by side, the last row in the middle", () 
 
 test("of what a camera looked at it is told where it fell", () => {
   assert.deepEqual(gateWords({ cardinality: 2 }), []);
-  assert.deepEqual(gateWords({ candidates: 1 }), ["1 candidate"]);
+  assert.deepEqual(gateWords({ candidates: 1 }), ["1 candidate, none dropped"]);
   const told = { candidates: 9, "dropped for colour": 6, "dropped for shape": 2, other: 3 };
   assert.deepEqual(gateWords(told), ["9 candidates, 6 dropped for colour, 2 for shape"]);
 });

@@ -57,6 +57,11 @@ def why_no_tracks(run: Run) -> str | None:
         return f"no tracks: not one of the {kind} could be read; see that the files are there"
     head = f"no tracks: {n.frames} {kind}, {n.found} boxes found"
     if not n.found:
+        if run.parameters.method("single_view").used(run.parameters).detector:
+            return (
+                f"{head}; lower the detector's least score, or see which class it has for people "
+                "and what values it wants its pictures in"
+            )
         return f"{head}; lower what a box must have to count, or teach what people look like"
     head += f", {n.passed} of them passed on to the fusion"
     if n.passed < 0.02 * n.found:
@@ -76,7 +81,7 @@ def why_no_tracks(run: Run) -> str | None:
     if len(run.filtered):
         return (
             f"{head}: the smoothing took all that the filter reported for nobody; choose "
-            "--smoothing none to see it"
+            "the smoothing none to see it"
         )
     return (
         f"{head}, the surest with existence {n.surest:.2f}, below the extraction threshold or "

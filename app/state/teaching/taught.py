@@ -153,7 +153,19 @@ class Taught:
         if saved is not None and values == taught_values(saved):
             sequence = saved
         self._remember(sequence)
-        self._workbench.teach(sequence, _defaults(sequence), changes)
+        defaults = _defaults(sequence)
+        self._workbench.teach(sequence, defaults, {**self._fitting(defaults), **changes})
+
+    def _fitting(self, defaults: RunParameters | None) -> Values:
+        """Whoever looks for people in pictures by the default method goes on by the one that looks
+        at what was just taught; boxes of a detector are somebody's choice."""
+        now = self._workbench.snapshot()
+        own, before = now.parameters.single_view, now.defaults.single_view
+        if defaults is None or own != before or defaults.single_view == own:
+            return {}
+        used = now.parameters.method("single_view").used(now.parameters)
+        looks = used.pictures and not used.detections and not used.detector
+        return {"single_view": defaults.single_view} if looks else {}
 
     def _remember(self, sequence: Sequence) -> None:
         self._states[sequence.digest] = taught_values(sequence)

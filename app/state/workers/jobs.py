@@ -31,6 +31,7 @@ from tracker.parameters import RunParameters, changed, with_values
 from tracker.pipeline import Cancelled, Progress, Run
 from tracker.runs import gaps
 from tracker.runs.gates import notices
+from tracker.runs.outcome import why_no_tracks
 from tracker.runs.stage_cache import StageCache
 from tracker.sequences.pictures.frames import CACHE_BYTES, FrameReader
 from tracker.sequences.sequence import Sequence
@@ -313,7 +314,8 @@ class Jobs:
                 logger.exception("a run failed")
             workbench.run_ends(wanted.key, "failed", sentence(error))
         else:
-            told = [*gaps.sentences(run), *notices(run)]
+            reason = why_no_tracks(run)
+            told = [*([reason] if reason else []), *gaps.sentences(run), *notices(run)]
             workbench.run_ends(wanted.key, "done", warnings=told)
 
     def _leave_out(self, wanted: _Wanted, crashed: Note) -> None:

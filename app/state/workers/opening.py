@@ -66,6 +66,8 @@ class Opener:
         self._retire = retire
         self._data = data
         self._detector = detector
+        self._own_detectors: dict[str, Path | None] = {}
+        """Chosen on the page, each for a recording, by the name that it is opened by."""
         self._computes = computes
         self._picture_bytes = picture_bytes
         self._refused = ""
@@ -127,7 +129,7 @@ class Opener:
             As :meth:`open`.
         """
         now = self._workbench.snapshot()
-        self._detector = model
+        self._own_detectors[now.opened_as] = model
         values = changed(now.parameters, now.defaults)
         values.pop("single_view", None)
         return self.open(now.opened_as, values)
@@ -159,7 +161,8 @@ class Opener:
                     progress=partial(progress, "rendering"),
                     cancelled=cancelled.is_set,
                 )
-                sequence = library.with_detector(sequence, self._detector)
+                detector = self._own_detectors.get(name, self._detector)
+                sequence = library.with_detector(sequence, detector)
                 parameters = RunParameters()
                 if self._computes:  # else neither pictures nor boxes are needed
                     parameters = pipeline.default_parameters(sequence)

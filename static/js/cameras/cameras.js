@@ -2,7 +2,7 @@
 import { fill, h, icon, parts, write } from "../elements/dom.js";
 import { prepare } from "../draw/canvas.js";
 import { drawLoupe, drawPicture, lensOf } from "../draw/picture.js";
-import { visibleTracks } from "../draw/overlay.js";
+import { isRoomy, visibleTracks } from "../draw/overlay.js";
 import { fillBoxCard, fillTrackCard } from "./cards.js";
 import { createFloor } from "./floor.js";
 import { decisionsOf, gateWords, isAlone, viewWords } from "../state/events.js";
@@ -161,7 +161,7 @@ export function mountCameras(root, { store, actions, playback }) {
 			const lens = lensOf(followed(index, view) ?? zooms[index], width, height);
 			drawPicture(g, what, scene, lens);
 			if (loupe && over?.index === index) drawLoupe(g, what, scene, lens, over);
-			write(words, wordsOf(next, index, width > 260));
+			write(words, wordsOf(next, index, isRoomy(width, height)));
 			absent.hidden = !next.pictures[index]?.missing;
 			write(absent, absent.hidden ? "" : `${cameras()[index].name}: no frame ${next.step}`);
 			if (!store.get().playing) element.ariaLabel = sentenceOf(next, index);

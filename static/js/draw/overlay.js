@@ -60,10 +60,16 @@ export function visibleTracks({ tracks }, only = null) {
 	return shown.sort((a, b) => a.box[1] + a.box[3] - b.box[1] - b.box[3]);
 }
 
+/**
+ * Whether a picture is large enough for what is said beside its boxes, in whatever shape.
+ * @param {number} width @param {number} height
+ */
+export const isRoomy = (width, height) => width * height > 260 * 146 && width > 120;
+
 /** @param {Brush} g @param {Server.CameraStep} view @param {Scene} scene */
 export function drawOverlay(g, view, scene) {
-	const { layers, width, scale, opacity, alone, selection } = scene;
-	const roomy = width > 260;
+	const { layers, width, height, scale, opacity, alone, selection } = scene;
+	const roomy = isRoomy(width, height);
 	const tracks = visibleTracks(view, alone ? selection : null);
 	g.globalAlpha = opacity;
 	g.lineJoin = "miter";

@@ -86,7 +86,7 @@ const DROPPED = "dropped for ";
 
 /**
  * What became of the places that a camera's method looked at more closely:
- * "9 candidates, 6 dropped for colour, 2 for shape". Nothing where it has no gates.
+ * "9 candidates, 6 dropped for colour, 2 for shape", or "none dropped". Nothing where it has no gates.
  * @param {Record<string, number>} information  of the method, by name
  */
 export function gateWords(information) {
@@ -95,7 +95,8 @@ export function gateWords(information) {
 	const fell = Object.entries(information)
 		.filter(([name, count]) => name.startsWith(DROPPED) && count > 0)
 		.map(([name, count], k) => `${count} ${k ? "" : "dropped "}for ${name.slice(DROPPED.length)}`);
-	return [[`${all} candidate${all === 1 ? "" : "s"}`, ...fell].join(", ")];
+	const rest = all && !fell.length ? ["none dropped"] : fell;
+	return [[`${all} candidate${all === 1 ? "" : "s"}`, ...rest].join(", ")];
 }
 
 /**

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
@@ -18,7 +19,7 @@ from app.web.server import Settings, create_app
 from app.web.views import results
 from tests.app.conftest import ADDRESS, connect, run_is, wait_until
 from tests.browser.walkers import write_walkers
-from tests.engine.single_view.networks import pooling
+from tests.engine.single_view.networks import answering, pooling
 from tracker import pipeline
 from tracker.sequences.reader import FILE, read_sequence
 
@@ -423,6 +424,24 @@ def test_defaults_follow_what_the_sequence_has_become(client: TestClient) -> Non
     assert "Use colour_phd" in client.get("/api/tables/teach").text
 
 
+def test_the_first_template_is_looked_at_where_nobody_chose_a_method(
+    client: TestClient, walkers: Path
+) -> None:
+    text = (walkers / "sequence.toml").read_text()
+    (walkers / "sequence.toml").write_text(re.sub(r"detections = .*\n", "", text))
+    client.post("/api/sequence", json={"name": str(walkers)})
+    wait_until(lambda: state(client)["methods"]["single_view"] == "shapes")
+    key = state(client)["teaching"]["key"]
+    taught = client.post("/api/teach/templates", json=BOX).json()
+    assert taught["methods"]["single_view"] == "colour_phd"
+    back = client.post("/api/teach/restore", json={"key": key}).json()
+    assert back["methods"]["single_view"] == "shapes", "and so it is without it"
+    chosen = {"changes": {"single_view": "jpda"}}
+    client.patch("/api/parameters", json=chosen)
+    taught = client.post("/api/teach/templates", json=BOX).json()
+    assert taught["methods"]["single_view"] == "jpda", "nobody's choice is taken away"
+
+
 def test_the_size_of_people_is_taught_saved_and_taken_back(
     client: TestClient, walkers: Path
 ) -> None:
@@ -457,12 +476,24 @@ def test_a_detector_is_chosen_by_its_path_and_taken_away(
     assert shown["parameters"]["fusion.survival_probability"] == 0.9
     assert f'value="{model}"' in client.get("/api/tables/teach").text
     (tmp_path / "text.onnx").write_text("no network")
-    for wrong, words in (("none.onnx", "cannot be read"), ("text.onnx", "cannot be used")):
+    answering(tmp_path / "kinds.onnx", {"kinds": np.zeros((1, 3), np.float32)})
+    for wrong, words in (
+        ("none.onnx", "cannot be read"),
+        ("text.onnx", "cannot be used"),
+        ("kinds.onnx", "of no known layout"),
+    ):
         answer = client.put("/api/teach/detector", json={"model": str(tmp_path / wrong)})
         assert answer.status_code == 422
         assert wrong in answer.json()["detail"]
         assert words in answer.json()["detail"]
     assert state(client)["methods"]["single_view"] == "onnx_detector", "nothing was changed"
+    # it is this recording's alone
+    other = write_walkers(tmp_path / "other")
+    client.post("/api/sequence", json={"name": str(other)})
+    assert state(client)["methods"]["single_view"] == before["methods"]["single_view"]
+    client.post("/api/sequence", json={"name": str(walkers)})
+    client.patch("/api/parameters", json={"changes": change})
+    assert state(client)["methods"]["single_view"] == "onnx_detector"
     client.put("/api/teach/detector", json={"model": None})
     wait_until(lambda: state(client)["methods"]["single_view"] != "onnx_detector")
     shown = done(client)

@@ -88,6 +88,18 @@ class Network:
         self._names = [port.name for port in ports.outputs]
         self._lock = threading.Lock()
 
+    @classmethod
+    def tried(cls, path: Path) -> Network:
+        """A model that has looked at an empty picture: one whose answers can be read.
+
+        Raises:
+            ValueError: As of the constructor and :meth:`look`.
+        """
+        network = cls(path, Settings())
+        width, height = network.size
+        network.look(np.full((height, width, 3), _GREY, np.uint8))
+        return network
+
     def with_settings(self, settings: Settings) -> Network:
         """The same model, fed and read otherwise; it is in memory once."""
         other = copy.copy(self)
