@@ -39,8 +39,8 @@ const SHORT = ["check-here", "check-nobody", "check-skip"];
 const OF_OTHERS = ["check-exchange", "check-split"];
 /** The kinds of doubt about somebody who is not there. */
 const OF_NOBODY = ["missing", "begins", "ends"];
-/** So many alternatives stand side by side; the others are in a list. */
-const BESIDE = 3;
+/** So many alternatives stand side by side, and in a pane narrower than that; others are in a list. */
+const BESIDE = { wide: 3, narrow: 2, below: 500 };
 
 /** @param {string} words */
 const sentence = (words) => words.charAt(0).toUpperCase() + words.slice(1);
@@ -185,7 +185,8 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 	/** What the place may be: the likeliest side by side, the others in a list. @param {Doubt} doubt @param {number} other */
 	function choice(doubt, other) {
 		const all = distinct(doubt, other);
-		const far = all.slice(all.length > BESIDE + 1 ? BESIDE : all.length);
+		const most = root.clientWidth < BESIDE.below ? BESIDE.narrow : BESIDE.wide;
+		const far = all.slice(all.length > most + 1 ? most : all.length);
 		const beside = all.slice(0, all.length - far.length);
 		const more = h("select", {
 			class: far.some(([, k]) => k === other) ? "on" : "",
@@ -395,6 +396,6 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 	let waiting;
 	new ResizeObserver(() => {
 		clearTimeout(waiting);
-		waiting = setTimeout(() => void roll(), 120);
+		waiting = setTimeout(() => (heads(), void roll()), 120);
 	}).observe(film);
 }
