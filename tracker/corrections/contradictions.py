@@ -45,10 +45,7 @@ def refuse_two_names(first: Many[Correction], second: Many[Correction]) -> None:
     Raises:
         CorrectionError: With both of them in the sentence.
     """
-    people = _People()
-    for one in (*first, *second):
-        for earlier, later in one.pairs:
-            people.tie(people.of(earlier, one), people.of(later, one))
+    people = _People.tied((*first, *second))
     numbers = [[(people.of(one.places[0], one), one) for one in log if one.kind == "name"]
                for log in (first, second)]  # fmt: skip
     ones, others = ({people.root(number): one for number, one in log} for log in numbers)
@@ -92,6 +89,15 @@ class _People:
         self.places: list[tuple[Place, Correction]] = []
         self._parents: list[int] = []
 
+    @classmethod
+    def tied(cls, corrections: Many[Correction]) -> _People:
+        """As corrections tie them together."""
+        people = cls()
+        for one in corrections:
+            for earlier, later in one.pairs:
+                people.tie(people.of(earlier, one), people.of(later, one))
+        return people
+
     def of(self, place: Place, correction: Correction) -> int:
         """The number of a place; that of one near it at its step where there is one."""
         for number, (other, _) in enumerate(self.places):
@@ -117,10 +123,7 @@ def _distance(one: Place, other: Place) -> float:
 
 
 def _check(corrections: list[Correction]) -> None:
-    people = _People()
-    for one in corrections:
-        for earlier, later in one.pairs:
-            people.tie(people.of(earlier, one), people.of(later, one))
+    people = _People.tied(corrections)
     for one in corrections:
         for earlier, later in one.apart:
             a, b = people.of(earlier, one), people.of(later, one)

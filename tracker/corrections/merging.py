@@ -53,10 +53,12 @@ def merge(first: Many[Correction], second: Many[Correction]) -> tuple[Correction
     again &= {content_of(one) for one in told.only_second}
     everything = sorted((*first, *told.only_second), key=lambda one: (one.time.timestamp(), one.id))
     merged: list[Correction] = []
+    there: set[str] = set()
     for one in everything:
         content = content_of(one)
-        if content in again and any(content_of(other) == content for other in merged):
+        if content in again and content in there:
             continue
+        there.add(content)
         refuse_contradiction(merged, one)
         merged.append(one)
     return tuple(merged)

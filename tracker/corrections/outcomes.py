@@ -16,6 +16,10 @@ _GATE = 3.0
 """Standard deviations of a stated place within which somebody is at it."""
 
 
+_WHO = ("same", "different", "exchanged")
+"""The kinds that say who is who, and may stand against another sentence."""
+
+
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """What became of one correction in one run."""
@@ -77,21 +81,19 @@ def outcomes(
             found.append(Outcome(one.id, False, str(nobody)))
         else:
             found.append(Outcome(one.id, not why, why, who))
-    return tuple(_against(outcome, corrections, found) for outcome in found)
+    both = list(zip(corrections, found, strict=True))
+    holds = [pair for pair in both if pair[1].met and pair[0].kind in _WHO]
+    return tuple(outcome if outcome.met else _against(one, outcome, holds) for one, outcome in both)
 
 
-def _against(unmet: Outcome, corrections: Many[Correction], found: Many[Outcome]) -> Outcome:
+def _against(own: Correction, unmet: Outcome, holds: Many[tuple[Correction, Outcome]]) -> Outcome:
     """With the sentence that stands against one that is not met: the last that holds of the same
     people and steps."""
-    told = {one.id: one for one in corrections}
-    own = told[unmet.id]
-    if unmet.met or own.kind == "here":
+    if own.kind == "here":
         return unmet
-    for outcome in reversed(found):
-        other = told[outcome.id]
-        if not outcome.met or other.kind not in ("same", "different", "exchanged"):
-            continue
-        (first, last), (begin, end) = own.steps, other.steps
+    first, last = own.steps
+    for other, outcome in reversed(holds):
+        begin, end = other.steps
         if first <= end and begin <= last and set(outcome.tracks) & set(unmet.tracks):
             return replace(unmet, why=f'{unmet.why}; "{other.words}" holds there')
     return unmet

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tracker.corrections import Correction, Place
-from tracker.corrections.kinds import leeway
+from tracker.corrections.kinds import Kind, leeway
 from tracker.doubts import alone, moves
 from tracker.doubts.clear import Clear
 from tracker.doubts.doubt import Alternative, Doubt, Lanes, unsaid
@@ -98,8 +98,7 @@ def queue(
 def _parted_by(run: Run) -> Callable[[int, int], bool]:
     """Whether somebody said that a track does not go on as another: that they are two people's,
     wherever along them, or that the one left or the other came in."""
-    kinds = {one.id: one.kind for one in run.corrections}
-    obeyed = [(kinds.get(one.id), one.tracks) for one in run.outcomes if one.met]
+    obeyed = _obeyed(run)
     parted = {frozenset(tracks) for kind, tracks in obeyed if kind == "different"}
     left = {track for kind, tracks in obeyed if kind == "left" for track in tracks}
     came = {track for kind, tracks in obeyed if kind == "came" for track in tracks}
@@ -108,13 +107,14 @@ def _parted_by(run: Run) -> Callable[[int, int], bool]:
 
 def _somebody(run: Run) -> set[int]:
     """The tracks of whom something was said that is said of people alone."""
+    said = ("here", "name", "came", "left", "same")
+    return {track for kind, tracks in _obeyed(run) if kind in said for track in tracks}
+
+
+def _obeyed(run: Run) -> list[tuple[Kind | None, tuple[int, ...]]]:
+    """Kind and tracks of each correction that is met."""
     kinds = {one.id: one.kind for one in run.corrections}
-    return {
-        track
-        for one in run.outcomes
-        if one.met and kinds.get(one.id) in ("here", "name", "came", "left", "same")
-        for track in one.tracks
-    }
+    return [(kinds.get(one.id), one.tracks) for one in run.outcomes if one.met]
 
 
 def once_each(ordered: Iterable[Doubt], pause: int) -> Iterable[Doubt]:

@@ -49,9 +49,9 @@ def count_stages(run: Run) -> StageCounts:
 
 def why_no_tracks(run: Run) -> str | None:
     """One sentence on where a run without tracks lost everybody; None where it has tracks."""
-    n = count_stages(run)
-    if n.tracks:
+    if len(run.tracks):
         return None
+    n = count_stages(run)
     kind = "pictures" if run.costly else "frames of boxes"
     if not n.frames:
         return f"no tracks: not one of the {kind} could be read; see that the files are there"

@@ -165,12 +165,6 @@ def _background(view: View, fields: Fields, steps: int, reading: Reading) -> Pat
         raise fields.error(
             "background", "expected a camera with a video or images, found one without; remove it"
         )
-    if not fields.is_list("background") and not fields.is_text("background"):
-        raise fields.error(
-            "background",
-            "expected the file of an empty picture in quotes, or the first and the last step "
-            f"without anybody such as [0, 24], found {fields.shown('background')}",
-        )
     if fields.is_text("background"):
         path = locate(reading.folder, fields, "background")
         reading.files.append(path)
@@ -179,6 +173,12 @@ def _background(view: View, fields: Fields, steps: int, reading: Reading) -> Pat
             raise fields.error("background", f'"{path.name}" {not_a_picture(path)}')
         check_size(view, fields, (picture.shape[1], picture.shape[0]), "background")
         return path
+    if not fields.is_list("background"):
+        raise fields.error(
+            "background",
+            "expected the file of an empty picture in quotes, or the first and the last step "
+            f"without anybody such as [0, 24], found {fields.shown('background')}",
+        )
     first, last = fields.vector("background", 2, "the first and the last step without anybody")
     if first != int(first) or last != int(last) or not 0 <= first <= last < steps:
         raise fields.error(

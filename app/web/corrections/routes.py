@@ -74,7 +74,7 @@ def corrections(bench: Bench, correct: Correct) -> Corrections:
     """All of them in their order, with what became of each in the shown run."""
     _open(bench)
     correct.refresh()
-    return views.corrections_of(_open(bench), correct)
+    return views.corrections_of(bench.snapshot(), correct)
 
 
 @router.post("")

@@ -2,6 +2,7 @@
 import { drawEmptyPicture } from "../draw/overlay.js";
 import { prepare } from "../draw/canvas.js";
 import { getJson, request } from "../state/api.js";
+import { shownVersion, versionOf } from "../state/events.js";
 import { pictureName } from "../play/pictures.js";
 
 /** Kept at most: results of steps, and decoded pictures. */
@@ -30,17 +31,13 @@ function memory(most, load, dispose) {
 	};
 }
 
-/** @param {string} run @param {number} revision */
-const shownAs = (run, revision) => `${run} ${revision}`;
-
 /** @param {Store<PageState>} store */
 export function createCrops(store) {
 	const results = memory(RESULTS, async (name) => {
 		const [shown, step] = name.split("/");
 		/** @type {Server.Step} */
 		const result = await getJson(`/api/step/${step}`);
-		if (shown !== shownAs(result.run, result.revision))
-			throw new Error(`the server shows run ${result.run} by now`);
+		if (shown !== versionOf(result)) throw new Error(`the server shows run ${result.run} by now`);
 		return result;
 	});
 	const pictures = memory(
@@ -52,10 +49,7 @@ export function createCrops(store) {
 
 	return {
 		/** @param {number} step @returns {Promise<Server.Step | null>} */
-		resultAt(step) {
-			const { basis, revision } = store.get();
-			return results(`${shownAs(basis, revision)}/${step}`).catch(() => null);
-		},
+		resultAt: (step) => results(`${shownVersion(store.get())}/${step}`).catch(() => null),
 		/**
 		 * A camera's picture; null where there is none.
 		 * @param {number} camera @param {number} step @returns {Promise<ImageBitmap | null>}

@@ -4,8 +4,9 @@
  * click.
  */
 import { lensOf } from "../draw/picture.js";
-import { h, one } from "../elements/dom.js";
+import { colourIndex, h, one } from "../elements/dom.js";
 import { getJson } from "../state/api.js";
+import { shownVersion } from "../state/events.js";
 
 /** Of a press of an arrow, pixels of the picture. */
 const [SMALL, LARGE] = [1, 10];
@@ -71,13 +72,12 @@ export function mountFeet({ store, playback }, check) {
 
 	/** The feet of the selected track at the shown step, as the server projects them. */
 	async function refresh() {
-		const { place, selection, shown, playing, cameras, basis, revision, result } = store.get();
+		const { place, selection, shown, playing, cameras, result } = store.get();
 		const { placing } = state.get();
 		const track = placing ? placing.track : selection;
 		const on = place === "check" && !playing && shown >= 0 && (placing || track !== null);
-		const key = on
-			? `${track} ${shown} ${basis} ${revision} ${Boolean(placing)} ${result?.run}`
-			: "";
+		const version = shownVersion(store.get());
+		const key = on ? `${track} ${shown} ${version} ${Boolean(placing)} ${result?.run}` : "";
 		if (key === wanted) return put();
 		// A click counts from the moment it is asked for, and stays said whatever arrives later.
 		const same = placing && wanted.startsWith(`${track} ${shown} `);
@@ -252,7 +252,7 @@ export function mountFeet({ store, playback }, check) {
 			width: `${width * scale}px`,
 			height: `${height * scale}px`,
 		});
-		ghost.style.setProperty("--c", `var(--id-${((id - 1) % 24) + 1})`);
+		ghost.style.setProperty("--c", `var(--id-${colourIndex(id)})`);
 	}
 
 	// While somebody is placed a click in a picture says where; nothing else happens there.

@@ -1,7 +1,7 @@
 /** The inspector's tab Place: one doubtful moment in pictures, what it could be, what to do. */
 import { palette } from "../draw/colours.js";
-import { all, choices, fill, h, icon, idTag } from "../elements/dom.js";
-import { scoresOf } from "../state/events.js";
+import { all, choices, colourIndex, fill, h, icon, idTag } from "../elements/dom.js";
+import { scoresOf, shownVersion } from "../state/events.js";
 import { commandOf, keyLabel, perform } from "../state/commands.js";
 import { drawCrop } from "./crops.js";
 import { camerasOf, fillSights } from "./sights.js";
@@ -173,7 +173,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 						),
 					]),
 			h("span", { class: "grow" }),
-			...choice(chosen, other),
+			choice(chosen, other),
 		);
 		head
 			.querySelector(".seg [aria-pressed=true], .seg .on")
@@ -188,8 +188,11 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 		const most = root.clientWidth < BESIDE.below ? BESIDE.narrow : BESIDE.wide;
 		const far = all.slice(all.length > most + 1 ? most : all.length);
 		const beside = all.slice(0, all.length - far.length);
+		const listed = far.some(([, k]) => k === other);
+		/** @param {Doubt["alternatives"][number]} one */
+		const likely = ({ words, probability }) => `${words}: ${percent(probability)}`;
 		const more = h("select", {
-			class: far.some(([, k]) => k === other) ? "on" : "",
+			class: listed ? "on" : "",
 			"aria-label": "Other alternatives",
 			onchange: () => check.show(Number(more.value)),
 		});
@@ -197,32 +200,27 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 			more,
 			[
 				["", `${far.length} more`],
-				...far.map(
-					([{ words, probability }, k]) =>
-						/** @type {[string, string]} */ ([String(k), `${words}: ${percent(probability)}`]),
-				),
+				...far.map(([one, k]) => /** @type {[string, string]} */ ([String(k), likely(one)])),
 			],
-			far.some(([, k]) => k === other) ? String(other) : "",
+			listed ? String(other) : "",
 		);
 		more.options[0].hidden = true;
-		return [
-			h(
-				"div",
-				{ class: "seg", role: "group", "aria-label": "Shown" },
-				beside.map(([{ words, probability }, k]) =>
-					h(
-						"button",
-						{
-							"aria-pressed": String(k === other),
-							title: `${words}: ${percent(probability)}`,
-							onclick: () => check.show(k),
-						},
-						words,
-					),
+		return h(
+			"div",
+			{ class: "seg", role: "group", "aria-label": "Shown" },
+			beside.map(([one, k]) =>
+				h(
+					"button",
+					{
+						"aria-pressed": String(k === other),
+						title: likely(one),
+						onclick: () => check.show(k),
+					},
+					one.words,
 				),
-				far.length > 0 && more,
 			),
-		];
+			far.length > 0 && more,
+		);
 	}
 
 	function words() {
@@ -279,7 +277,8 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 		const turn = (drawn += 1);
 		const { chosen, preview } = state.get();
 		if (!chosen || store.get().place !== "check") return;
-		const { frames, fps, cameras: views, basis, revision } = store.get();
+		const { frames, fps, cameras: views } = store.get();
+		const version = shownVersion(store.get());
 		steps = filmSteps(chosen.first, chosen.last, { frames, fps });
 		if (chosen.sights.length) {
 			const best = camerasOf(chosen.sights, views.length);
@@ -294,8 +293,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 				: chosen.tracks
 		).slice(0, ROWS);
 		const results = await Promise.all(steps.map(crops.resultAt));
-		const now = store.get();
-		if (turn !== drawn || basis !== now.basis || revision !== now.revision) return;
+		if (turn !== drawn || version !== shownVersion(store.get())) return;
 		const best = camerasFor(results, chosen.tracks, views.length);
 		const camera = by !== null && by < views.length ? by : (best[0] ?? 0);
 		numbers(best, camera);
@@ -318,7 +316,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 						class: `fr${inside(step) ? " in" : ""}`,
 						"--row": row + 2,
 						"--column": k + 2,
-						"--c": `var(--id-${((id - 1) % 24) + 1})`,
+						"--c": `var(--id-${colourIndex(id)})`,
 						"data-at": step,
 						"aria-label": `${id} at step ${step} by ${name}${there ? "" : track ? ", out of view" : ", not there"}`,
 						onclick: () => playback.seek(step),

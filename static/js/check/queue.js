@@ -1,6 +1,7 @@
 /** The queue of doubtful places where the sliders stand, and under it what was put right. */
 import { fill, h, icon, idTag, write } from "../elements/dom.js";
 import { commandOf, keyLabel } from "../state/commands.js";
+import { shownVersion } from "../state/events.js";
 import { drawCrop } from "./crops.js";
 import { ICONS, camerasFor, clockOf, middleOf, percent, stepsOf, unbroken } from "./words.js";
 import { palette } from "../draw/colours.js";
@@ -96,7 +97,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 	const items = new Map();
 	/** What an item is of; its pictures are of a run. @param {Doubt} doubt */
 	const keyOf = ({ id, first, last, tracks, doubt }) =>
-		`${id} ${first} ${last} ${tracks} ${doubt} ${store.get().basis} ${store.get().revision}`;
+		`${id} ${first} ${last} ${tracks} ${doubt} ${shownVersion(store.get())}`;
 
 	/** Of the first one before and of the last one after. @param {HTMLElement} item */
 	async function picture(item) {

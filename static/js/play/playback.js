@@ -6,6 +6,7 @@
  * animation frame. Until then the last whole step stays.
  */
 import { getJson } from "../state/api.js";
+import { shownVersion, versionOf } from "../state/events.js";
 import { createCache } from "./cache.js";
 import { advance, clampStep, playedRange, prefetchWindow, restAfter3d, restOf3d } from "./clock.js";
 import { createPictures, mapNames, pictureName, standIn, PICTURE_BUDGET } from "./pictures.js";
@@ -60,7 +61,7 @@ export function createPlayback(store, sendSeek) {
 			const [, step, query] = name.split("/");
 			/** @type {Server.Step} */
 			const result = await getJson(`/api/step/${step}${query}`, { signal });
-			const told = resultName(result, result.step, query);
+			const told = resultName(versionOf(result), result.step, query);
 			if (name !== told) throw new Error(`asked for ${name}, the server shows ${told} by now`);
 			return result;
 		},
@@ -80,18 +81,11 @@ export function createPlayback(store, sendSeek) {
 	});
 
 	/**
-	 * @param {{run: string, revision: number}} shown
+	 * @param {string} version  of the run
 	 * @param {number} step
 	 * @param {string} query  for what is not in every answer
 	 */
-	const resultName = ({ run, revision }, step, query) =>
-		`${run || "none"} ${revision}/${step}/${query}`;
-
-	/** What is shown by now. */
-	const shownRun = () => {
-		const { basis, revision } = store.get();
-		return { run: basis, revision };
-	};
+	const resultName = (version, step, query) => `${version}/${step}/${query}`;
 
 	/** What the layers need of a result besides what is always in it. */
 	const queryNow = () => {
@@ -140,7 +134,7 @@ export function createPlayback(store, sendSeek) {
 		const steps = still ? prefetchWindow(step, { ...how, most }) : [step];
 		pictures.want(
 			steps.flatMap((k) => {
-				const result = results.get(resultName(shownRun(), k, queryNow()));
+				const result = results.get(resultName(shownVersion(state), k, queryNow()));
 				const maps = result ? mapNames(sequence.key, result, layers2d).flat() : [];
 				return [
 					...sequence.cameras.flatMap((camera, index) => {
@@ -155,7 +149,7 @@ export function createPlayback(store, sendSeek) {
 		const done = shownDone(state);
 		const useful = steps.filter((k) => k === step || k < done);
 		results.want(
-			useful.slice(0, RESULTS_KEPT / 2).map((k) => resultName(shownRun(), k, queryNow())),
+			useful.slice(0, RESULTS_KEPT / 2).map((k) => resultName(shownVersion(state), k, queryNow())),
 		);
 	}
 
@@ -176,8 +170,8 @@ export function createPlayback(store, sendSeek) {
 		});
 		if (!lost && found.some((picture) => picture === undefined)) return null;
 		const result =
-			results.get(resultName(shownRun(), step, queryNow())) ??
-			(lost ? results.get(resultName(shownRun(), step, "")) : undefined);
+			results.get(resultName(shownVersion(state), step, queryNow())) ??
+			(lost ? results.get(resultName(shownVersion(state), step, "")) : undefined);
 		const names = result ? mapNames(sequence.key, result, state.layers2d) : [];
 		const maps = names.map((list) => list.flatMap((name) => pictures.get(name) ?? []));
 		if (!lost && maps.flat().length < names.flat().length) return null;
@@ -293,7 +287,7 @@ export function createPlayback(store, sendSeek) {
 		},
 		/** A result that came by itself. @param {Server.Step} result */
 		receive(result) {
-			results.put(resultName(result, result.step, ""), result);
+			results.put(resultName(versionOf(result), result.step, ""), result);
 			if (result.step === store.get().step) dirty = true;
 			ask();
 		},

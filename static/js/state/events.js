@@ -1,5 +1,11 @@
 /** Tracks and what happens to them, as the lanes, the tables and the keys need them. */
 
+/** What tells results of one run apart: before hindsight and after it they are of other people. @param {{run: string, revision: number}} shown */
+export const versionOf = ({ run, revision }) => `${run || "none"} ${revision}`;
+
+/** Of the run that the server shows. @param {Readonly<PageState>} state */
+export const shownVersion = ({ basis, revision }) => versionOf({ run: basis, revision });
+
 /** The scores, where they are of the run that is shown. @param {Readonly<PageState>} state */
 export const scoresOf = ({ scores, basis }) => (scores?.series.run === basis ? scores : null);
 

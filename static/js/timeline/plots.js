@@ -5,6 +5,7 @@ import { stroke, trace } from "../draw/canvas.js";
 import { all, fill, h, icon, one, write } from "../elements/dom.js";
 import { bucketOf, xOf } from "../play/clock.js";
 import { fetcher, getJson } from "../state/api.js";
+import { shownVersion } from "../state/events.js";
 
 /** @param {Context} context @param {TimelineSeam} timeline */
 export function mountPlots({ store, actions }, timeline) {
@@ -36,14 +37,14 @@ export function mountPlots({ store, actions }, timeline) {
 		return span ? `first=${Math.floor(span[0])}&last=${Math.ceil(span[1])}` : "first=0";
 	};
 	const refresh = fetcher(async () => {
-		const { selection, plots, basis, revision, sequence, timeline: lanes } = store.get();
+		const { selection, plots, basis, sequence, timeline: lanes } = store.get();
 		if (!plots.length || selection === null || !sequence || !basis) {
 			if (told) ((told = null), (asked = ""), timeline.draw(), values());
 			return;
 		}
 		const wanted = plots.map((name) => `&kind=${name}`).join("");
 		const key = `${selection}?${part()}${wanted}`;
-		const news = `${key} ${basis} ${lanes?.done} ${revision} ${store.get().scores?.series.steps}`;
+		const news = `${key} ${shownVersion(store.get())} ${lanes?.done} ${store.get().scores?.series.steps}`;
 		if (news === asked) return;
 		told = await getJson(`/api/courses/${key}`);
 		asked = news;
