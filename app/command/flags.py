@@ -17,7 +17,7 @@ from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subc
 from app.command.arguments.corrections import Corrections, LogFile
 from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
 from app.command.arguments.library import Bundle, FormatName, LibraryCommand, LibraryFile, Runs
-from app.command.arguments.rooms import Benchmark, Experiment, Parameters, Render, Sequences
+from app.command.arguments.rooms import Benchmark, Parameters, Render, Sequences
 from app.command.arguments.studies import Batch, Study, Tune
 from app.command.arguments.templates import Templates
 from tracker import parameters as table
@@ -25,6 +25,9 @@ from tracker.library import KEEP
 from tracker.parameters import FOLLOWS, METHODS, PRESETS, Parameter, ParameterError
 
 DEFAULT_SEQUENCE = "room44-3p"
+
+ONLY_IN_A_CHECKOUT = {"experiment": "python -m tests.papers"}
+"""Commands of earlier versions that only developers need, and what replaces each."""
 
 
 def has_screen() -> bool:
@@ -287,7 +290,6 @@ Arguments = (
     | Track
     | Detect
     | Evaluate
-    | Experiment
     | Benchmark
     | Import
     | Check
@@ -308,10 +310,16 @@ Arguments = (
 
 
 def parse(arguments: list[str] | None = None) -> Arguments:
-    """The command and its arguments. Wrong usage ends the program with status 2."""
+    """The command and its arguments. Wrong usage ends the program with status 2.
+
+    Raises:
+        ParameterError: If the command is one that only a checkout has.
+    """
     track: Any = _track_with_flags()
     # its settings come with the engine, which only who evaluates has to wait for
     asked = sys.argv[1:] if arguments is None else arguments
+    if asked[:1] and asked[0] in ONLY_IN_A_CHECKOUT:
+        raise ParameterError(asked[0], f"run `{ONLY_IN_A_CHECKOUT[asked[0]]}` in a checkout")
     evaluate: Any = _evaluate_with_flags() if asked[:1] == ["evaluate"] else Evaluate
     if asked[:1] == ["study"] and asked[1:2] and asked[1].endswith(".toml"):
         arguments = ["study", "run", *asked[1:]]  # `study STUDY.toml` runs it
@@ -320,7 +328,6 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         | Annotated[track, subcommand("track")]
         | Annotated[Detect, subcommand("detect")]
         | Annotated[evaluate, subcommand("evaluate")]
-        | Annotated[Experiment, subcommand("experiment")]
         | Annotated[Benchmark, subcommand("benchmark")]
         | Annotated[Import, subcommand("import")]
         | Annotated[Check, subcommand("check")]

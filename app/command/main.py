@@ -1,4 +1,4 @@
-"""The command line: serve, track, evaluate, experiment, benchmark, import, check, …
+"""The command line: serve, track, evaluate, benchmark, import, check, …
 
 Status 0 for success, 1 for a failure told in one line on standard error, 2 for
 wrong usage, 130 after Ctrl-C. The engine is imported by the command that needs it.
@@ -21,7 +21,7 @@ from app.command import supervision
 from app.command.arguments.corrections import Corrections
 from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
 from app.command.arguments.library import Bundle, LibraryCommand, OpenRun, Runs
-from app.command.arguments.rooms import Benchmark, Experiment, Parameters, Render, Sequences
+from app.command.arguments.rooms import Benchmark, Parameters, Render, Sequences
 from app.command.arguments.studies import Batch, Study, Tune
 from app.command.arguments.templates import Templates
 from app.command.flags import (
@@ -85,10 +85,6 @@ def _run(command: Arguments) -> int:
             from app.command.commands.evaluate import evaluate
 
             evaluate(command)
-        case Experiment():
-            from app.command.commands.experiment import experiment
-
-            experiment(command)
         case Benchmark():
             from app.command.commands.listing import benchmark
 

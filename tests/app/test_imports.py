@@ -8,12 +8,10 @@ import sys
 import pytest
 
 LATER = {
-    "matplotlib": "figures of the experiments",
     "plotly": "the report",
     "scipy.stats": "half a second for one quantile",
     "scipy.special": "a tenth of a second for a gate and a normal quantile",
     "tracker.formats.registry": "the readers of all formats: an import's",
-    "tracker.experiments.registry": "all experiments, and what they draw",
     "viser": "the 3D view, which starts beside the page",
     "PIL": "viser's",
     "trimesh": "viser's",
@@ -24,7 +22,7 @@ LATER = {
     "sklearn": "studies: what matters",
     "tomlkit": "what is saved",
     "websockets.asyncio.client": "the way to viser",
-    "concurrent.futures.process": "experiments, and the check of identities",
+    "concurrent.futures.process": "the check of identities",
 }
 """What neither the web nor the engine imports before it is used, and what it is for."""
 

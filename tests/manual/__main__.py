@@ -15,7 +15,7 @@ from pathlib import Path
 from tests.conftest import DATA
 from tests.manual.places import ROOT, made_pages
 from tests.manual.records import machines, results, sweeps
-from tracker.experiments import EXPERIMENTS
+from tests.papers.registry import EXPERIMENTS
 
 
 def main() -> int:
@@ -26,7 +26,7 @@ def main() -> int:
     )
     parser.add_argument(
         "--keep", nargs="+", type=Path, metavar="FILE", default=[],
-        help="take what `multiview-phd experiment` wrote into the records",
+        help="take what `python -m tests.papers` wrote into the records",
     )  # fmt: skip
     parser.add_argument("--sweeps", nargs="*", metavar="GROUP|KEY", default=None)
     parser.add_argument("--machines", action="store_true")

@@ -48,7 +48,7 @@ def test_a_shortened_run_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     for quick, seeds, form in ((True, None, "--quick"), (False, 3, "--seeds 3"), (False, None, "")):
         path.write_text(json.dumps({**document, "quick": quick, "seeds": seeds}), encoding="utf-8")
         results.keep(path)
-        assert (f"`multiview-phd experiment cmc {form}`" in results.page()) == bool(form)
+        assert (f"`python -m tests.papers cmc {form}`" in results.page()) == bool(form)
 
 
 def test_the_sweeps_are_of_parameters_that_there_are() -> None:

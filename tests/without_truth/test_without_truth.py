@@ -12,7 +12,6 @@ from scipy.stats import spearmanr
 from tests.engine.synthetic import crossing, sequence
 from tests.random_rooms import random_room
 from tracker import pipeline
-from tracker.experiments.laboratory.experiment import Context
 from tracker.parameters import RunParameters
 from tracker.pipeline import Cancelled
 from tracker.single_view.protocol import ViewResult
@@ -53,7 +52,7 @@ def tracks(ids: list[list[int]]) -> Trajectories:
 def test_two_people_who_never_meet_are_sure() -> None:
     run = pipeline.compute(sequence(crossing(STEPS), STEPS, clutter_rate=0.2), BOXES)
     told: list[tuple[int, int]] = []
-    found = estimate(run, Context(told=lambda words, done, total: told.append((done, total))))
+    found = estimate(run, on_progress=lambda done, total: told.append((done, total)))
     assert found.score > 0.97
     assert len(found.without) == len(found.overlaps) == len(run.sequence.views)
     assert found.score == pytest.approx(found.backwards * np.mean(found.without))
@@ -66,7 +65,7 @@ def test_two_people_who_never_meet_are_sure() -> None:
 def test_it_ends_when_it_is_told_to() -> None:
     run = pipeline.compute(sequence(crossing(STEPS), STEPS), BOXES)
     with pytest.raises(Cancelled):
-        estimate(run, Context(cancelled=lambda: True))
+        estimate(run, cancelled=lambda: True)
 
 
 def test_one_camera_alone_is_held_against_the_way_back() -> None:

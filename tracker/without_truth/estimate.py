@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from tracker.experiments.laboratory.experiment import Context
-from tracker.experiments.laboratory.pool import Desk, spread
+from tracker.runs.processes import WorkerControl, map_in_processes
 from tracker.runs.run import Run
 from tracker.trajectories import Trajectories
 from tracker.without_truth.agreement import (
@@ -48,29 +48,37 @@ class Estimate:
         return interval(self.score)
 
 
-def estimate(run: Run, context: Context | None = None) -> Estimate:
+def estimate(
+    run: Run,
+    *,
+    processes: int = 1,
+    on_progress: Callable[[int, int], None] = lambda done, total: None,
+    cancelled: Callable[[], bool] = lambda: False,
+) -> Estimate:
     """Look at a run's recording in the other ways, and see how far they agree.
 
     Args:
         run: Its boxes of stage 1 are used as they are, its steps as far as they go.
-        context: How many processes at a time; whom to tell; whom to ask.
+        processes: Largest number of processes.
+        on_progress: Called with the steps done in all ways, and how many there are.
+        cancelled: Asked now and then whether to stop.
 
     Raises:
-        tracker.pipeline.Cancelled: If the context said so.
+        tracker.pipeline.Cancelled: If ``cancelled`` returned true.
         ValueError: If the run has no step yet.
     """
     if not run.done:
         raise ValueError(f"{run.sequence.name}: the run has no step yet; compute it first")
-    context = context or Context()
     sequence, steps = run.sequence, run.done
     given = Given(sequence, run.parameters, run.seed, tuple(run.views[:steps]))
     ways = looks(len(sequence.views))
-    found = spread(
+    found = map_in_processes(
         _work,
         [(given, way) for way in ways],
-        context,
-        words="looking in other ways",
         steps=steps * len(ways),
+        processes=processes,
+        on_progress=on_progress,
+        cancelled=cancelled,
     )
     half = sequence.target_half_extents
     comparisons = [compared(run.tracks, other, steps, half) for other in found]
@@ -93,6 +101,6 @@ def estimate(run: Run, context: Context | None = None) -> Estimate:
     )
 
 
-def _work(item: tuple[Given, Look], desk: Desk) -> Trajectories:
+def _work(item: tuple[Given, Look], control: WorkerControl) -> Trajectories:
     given, way = item
-    return looked(given, way, desk.advance, desk.cancelled)
+    return looked(given, way, control.advance, control.cancelled)

@@ -1,5 +1,5 @@
-"""Arguments of the commands that need no recording: what there is, rooms that are drawn, claims
-and measurements."""
+"""Arguments of the commands that need no recording: what there is, rooms that are drawn, and
+measurements."""
 
 from __future__ import annotations
 
@@ -7,38 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg
-
-
-@dataclass
-class Experiment:
-    """Run a claim of the papers again; without a name, list them."""
-
-    name: Annotated[
-        Positional[str | None],
-        arg(metavar="NAME", help="Which one.", help_behavior_hint="(optional)"),
-    ] = None
-    all: FlagCreatePairsOff[bool] = False
-    """Run every one."""
-    quick: FlagCreatePairsOff[bool] = False
-    """Shortened to what shows the direction of each claim."""
-    seeds: Annotated[int | None, arg(help_behavior_hint="(default: each experiment's own)")] = None
-    """How many seeds each case is run with, where chance plays a part."""
-    count: int = 20
-    """Of `rooms`: how many random rooms."""
-    first: int = 0
-    """Of `rooms`: seed of the first; the others follow."""
-    method: Annotated[
-        UseAppendAction[tuple[str, ...]],
-        arg(metavar="NAME", help_behavior_hint="(repeatable; default: all)"),
-    ] = ()
-    """Of `rooms`: only this single-view method."""
-    keep_rooms: FlagCreatePairsOff[bool] = False
-    """Of `rooms`: leave the rendered rooms in the output folder, about 15 MB each."""
-    output: Annotated[Path, arg(metavar="DIR")] = Path("experiment-results")
-    """Folder for the figures (PNG) and numbers (JSON)."""
-    data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None
-    """Folder that holds the real recordings, for the experiments that need one."""
+from tyro.conf import FlagCreatePairsOff, Positional, arg
 
 
 @dataclass

@@ -95,9 +95,8 @@ def estimate_without_truth(command: Evaluate) -> None:
         raise CommandError(f"{flags}: expected a track file as well; name it after the sequence")
 
     from tracker import pipeline
-    from tracker.experiments.laboratory.experiment import Context
-    from tracker.experiments.laboratory.pool import cores
     from tracker.runs import gaps
+    from tracker.runs.processes import available_cores
     from tracker.runs.stage_cache import StageCache
     from tracker.without_truth import estimate
     from tracker.without_truth.estimate import WARNING
@@ -118,8 +117,7 @@ def estimate_without_truth(command: Evaluate) -> None:
     for sentence in gaps.sentences(run):
         say(sentence)
     with Bar("looking in other ways", "step") as looking:
-        told = lambda words, done, total: looking.at(done, total)  # noqa: E731
-        found = estimate(run, Context(processes=cores(), told=told))
+        found = estimate(run, processes=available_cores(), on_progress=looking.at)
     names = [camera.name for camera in sequence.cameras]
     if command.json:
         low, high = found.interval

@@ -11,9 +11,8 @@ from app.errors import sentence
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
 from app.state.workers.threads import CLOSING_SECONDS, be_nice
-from tracker.experiments.laboratory.experiment import Context
-from tracker.experiments.laboratory.pool import cores
 from tracker.pipeline import Cancelled, Run
+from tracker.runs.processes import available_cores
 from tracker.without_truth import Estimate, estimate
 
 logger = logging.getLogger("app")
@@ -99,13 +98,13 @@ class IdentityCheck:
                 if not cancelled.is_set():
                     self._now = replace(self._now, **values)  # type: ignore[arg-type]
 
-        context = Context(
-            processes=cores(),
-            told=lambda words, done, total: tell(done=done, total=total),
-            cancelled=cancelled.is_set,
-        )
         try:
-            found = estimate(run, context)
+            found = estimate(
+                run,
+                processes=available_cores(),
+                on_progress=lambda done, total: tell(done=done, total=total),
+                cancelled=cancelled.is_set,
+            )
         except Cancelled:
             pass  # who stopped it has told of it
         except Exception as error:

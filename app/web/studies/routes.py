@@ -14,7 +14,7 @@ from app.web.dependencies import ERRORS, Bench, nothing_open
 from app.web.studies import models, views
 from app.web.studies.dependencies import Desk, Named, no_study
 from tracker import parameters as table
-from tracker.experiments.laboratory.pool import cores
+from tracker.runs.processes import available_cores
 from tracker.studies.defined.defining import definition_of
 from tracker.studies.defined.definition import Definition
 from tracker.studies.defined.objectives import OBJECTIVES, WITH_TRUTH, WITHOUT_TRUTH, chosen
@@ -79,7 +79,7 @@ def draft(
         choices=[
             views.objective_of(one) for one in OBJECTIVES.values() if has_truth or one.of != "truth"
         ],
-        workers=cores(),
+        workers=available_cores(),
         words=_left_out(snapshot),
     )
 
@@ -149,13 +149,14 @@ def estimate(wish: models.CostWish, desk: Desk, bench: Bench) -> models.StudyCos
             words += f", about {_minutes(seconds)} of one worker's time"
         seconds = None
     elif seconds is not None:
-        workers = wish.workers or cores()
-        seconds /= min(workers, cores())
+        cores = available_cores()
+        workers = wish.workers or cores
+        seconds /= min(workers, cores)
         if definition.minutes is not None:
             seconds = min(seconds, 60.0 * definition.minutes)
         words += f", about {_minutes(seconds)} with {workers} worker{'s' if workers > 1 else ''}"
-        if workers > cores():
-            words += f" on {cores()} cores"
+        if workers > cores:
+            words += f" on {cores} cores"
     size = runs * RUN_BYTES + definition.trials * TRIAL_BYTES
     return models.StudyCost(runs=runs, seconds=seconds, bytes=size, words=words, error=None)
 

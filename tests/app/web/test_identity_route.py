@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
@@ -12,7 +14,6 @@ from app.state.workbench import Workbench
 from app.state.workers import identity_check
 from tests.app.conftest import wait_until
 from tracker import pipeline
-from tracker.experiments.laboratory.experiment import Context
 from tracker.pipeline import Run
 from tracker.sequences.library import open_sequence
 from tracker.without_truth import Estimate
@@ -53,8 +54,8 @@ def test_a_run_that_is_not_finished_is_not_checked(crossing: Path) -> None:
 def test_another_run_ends_a_check(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     stopped: list[str] = []
 
-    def endless(run: Run, context: Context) -> Estimate:
-        wait_until(context.cancelled, 30.0)
+    def endless(run: Run, *, cancelled: Callable[[], bool], **_: Any) -> Estimate:
+        wait_until(cancelled, 30.0)
         stopped.append(run.key)
         raise identity_check.Cancelled
 
@@ -71,11 +72,11 @@ def test_who_stops_a_check_does_not_wait_for_its_processes(
     begins, ends = threading.Event(), threading.Event()
     left: list[str] = []
 
-    def slow_to_hear(run: Run, context: Context) -> Estimate:
+    def slow_to_hear(run: Run, *, on_progress: Callable[[int, int], None], **_: Any) -> Estimate:
         begins.set()
         assert ends.wait(30.0)
         left.append(run.key)
-        context.told("too late", 1, 1)
+        on_progress(1, 1)
         return Estimate(1.0, 1.0, (), (), ())
 
     monkeypatch.setattr(identity_check, "estimate", slow_to_hear)

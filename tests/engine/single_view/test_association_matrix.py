@@ -13,8 +13,8 @@ from numpy import ndarray
 
 from tests.engine.painted import GREEN, RED, painted_sequence, true_boxes
 from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, walk
+from tests.papers.clips.clip import Actor, Clip, constant_size, through, wall, write
 from tracker import pipeline, single_view
-from tracker.experiments.clips.clip import Actor, Clip, constant_size, through, wall, write
 from tracker.parameters import PRESETS, RunParameters, with_values
 from tracker.pictures.foreground import unpack
 from tracker.sequences.pictures.frames import FrameReader

@@ -11,7 +11,7 @@ from typing import Any
 
 from tests.manual.places import RECORDS, ROOT, between
 from tests.manual.records import machines, recordings
-from tracker.experiments import EXPERIMENTS
+from tests.papers.registry import EXPERIMENTS
 
 FOLDER = RECORDS / "experiments"
 KEPT = ("experiment", "version", "form", "claim", "findings", "table", "notes")
@@ -20,7 +20,7 @@ KEPT = ("experiment", "version", "form", "claim", "findings", "table", "notes")
 OWN_MACHINE = ("steps/s", "frames/s")
 """Columns that tell of the machine more than of the method: they are not printed."""
 
-SMALLER = "A smaller form, run as `multiview-phd experiment {experiment} {form}`."
+SMALLER = "A smaller form, run as `python -m tests.papers {experiment} {form}`."
 
 INTRODUCTION = """# Results
 
@@ -32,7 +32,7 @@ a folder `DIR`:
 python3 -m tests.manual --record --data DIR
 ```
 
-One experiment alone, figure included, is run by `multiview-phd experiment NAME --data DIR`; what
+One experiment alone, figure included, is run by `python -m tests.papers NAME --data DIR`; what
 took too long to be run whole says in which smaller form it was. The
 rooms are rendered and come with the program; AV16.3 and the Curtin recordings are real
 ([sources](methods.md#sources)). *Found* is the share of true positions with an estimate within
@@ -42,7 +42,7 @@ defined in [`tracker.evaluation`](api/evaluation.md).
 
 
 def record(names: list[str], data: Path) -> None:
-    """Run experiments as the program's users do, and keep what the page prints.
+    """Run experiments, and keep what the page prints.
 
     Args:
         names: Which ones.
@@ -54,7 +54,7 @@ def record(names: list[str], data: Path) -> None:
     FOLDER.mkdir(parents=True, exist_ok=True)
     for name in names:
         with tempfile.TemporaryDirectory() as folder:
-            line = [sys.executable, "-m", "app", "experiment", name]
+            line = [sys.executable, "-m", "tests.papers", name]
             line += ["--output", folder, "--data", str(data)]
             subprocess.run(line, check=True, cwd=ROOT)
             keep(Path(folder, f"{name}.json"))

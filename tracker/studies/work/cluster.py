@@ -20,8 +20,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from tracker.experiments.laboratory.pool import cores
 from tracker.kernels import compilation
+from tracker.runs.processes import available_cores
 from tracker.studies.errors import StudyError
 from tracker.studies.work import recordings, working
 from tracker.studies.work.jobs import Job, Outcome
@@ -199,7 +199,7 @@ class DaskCrew:
         self._closed = False
         if scheduler is None:
             self._cluster = self._start(
-                how_many(workers) if processes else workers or cores(), processes, tell
+                how_many(workers) if processes else workers or available_cores(), processes, tell
             )
         else:
             check_address(scheduler)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from tracker.experiments.laboratory.pool import cores
+from tracker.runs.processes import available_cores
 from tracker.studies.errors import StudyError
 from tracker.studies.work import working
 
@@ -19,13 +19,14 @@ def how_many(wanted: int | None) -> int:
     Raises:
         StudyError: If they are more than it can bear.
     """
-    most = MOST_A_CORE * cores()
+    cores = available_cores()
+    most = MOST_A_CORE * cores
     if wanted is not None and not 1 <= wanted <= most:
         raise StudyError(
-            f"workers: expected 1 to {most} processes on this machine of {cores()} cores, got "
+            f"workers: expected 1 to {most} processes on this machine of {cores} cores, got "
             f"{wanted}; a cluster's scheduler takes more (--scheduler)"
         )
-    return wanted or cores()
+    return wanted or cores
 
 
 def dask_setup(worker: Any) -> None:

@@ -10,8 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tracker import pipeline, single_view
-from tracker.experiments.clips.clip import (
+from tests.papers.clips.clip import (
     Actor,
     Clip,
     constant_size,
@@ -20,6 +19,7 @@ from tracker.experiments.clips.clip import (
     wall,
     write,
 )
+from tracker import pipeline, single_view
 from tracker.parameters import PRESETS, RunParameters, stage_values, with_values
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Detections, Room, Sequence, View

@@ -1,0 +1,145 @@
+"""Every experiment in its short form, as the command runs it: files, and the claims' direction."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.conftest import DATA
+from tests.papers.claims import association, jpda, ppf
+from tests.papers.claims.cmc import GATES
+from tests.papers.claims.cmc import methods as cmc_methods
+from tests.papers.claims.methods import ON_PICTURES
+from tests.papers.clips.light import ROBUST
+from tests.papers.registry import EXPERIMENTS
+
+pytestmark = pytest.mark.full
+
+HAS_DATA = DATA.is_dir()
+NEEDS_DATA = {"cameras", "cmc", "corrections"}
+
+
+def verdicts(found: dict[str, Any]) -> list[str]:
+    return [finding["verdict"] for finding in found["findings"]]
+
+
+def fig1(found: dict[str, Any]) -> None:
+    for person in found["numbers"]["people"].values():
+        assert person["found_share"] > 0.7
+        assert person["armchair_error"] < 0.3
+
+
+def fig2(found: dict[str, Any]) -> None:
+    assert found["numbers"]["mean_overlap"] > 0.5
+
+
+def fig3(found: dict[str, Any]) -> None:
+    groups = found["numbers"]["groups"]
+    assert groups["without occlusion"]["scheme"] < 0.6 * groups["without occlusion"]["single"]
+    assert groups["with occlusion"]["scheme"] < groups["with occlusion"]["single"]
+
+
+def cameras(found: dict[str, Any]) -> None:
+    by_count = found["numbers"]["by_count"]
+    assert by_count["3"]["ospa"] < by_count["2"]["ospa"] < by_count["1"]["ospa"]
+    assert by_count["3"]["position_error"] < 0.44 * by_count["1"]["position_error"]
+
+
+def sequences(found: dict[str, Any]) -> None:
+    assert found["numbers"]["sequences"]["room44-3p"]["mota"] > 0.7
+
+
+def cmc(found: dict[str, Any]) -> None:
+    recordings = found["numbers"]["recordings"]
+    assert all(recording["steps"] == 100 for recording in recordings.values())
+    assert len(found["table"]["rows"]) == len(GATES) * len(cmc_methods())
+
+
+def corrections(found: dict[str, Any]) -> None:
+    assert found["numbers"]
+
+
+def two_in_data_association(found: dict[str, Any]) -> None:
+    assert [row[0] for row in found["table"]["rows"]] == list(jpda.methods())
+    clips = found["numbers"]["clips"]
+    assert clips[jpda.CLASSICAL]["largest"] > 2.0 * clips[jpda.PUBLISHED]["largest"]
+    assert clips[jpda.DEFAULTS]["mean"] < 2.0
+    assert clips[jpda.DEFAULTS]["largest"] < jpda.LARGEST_ERROR
+    middle = found["numbers"]["error_of_the_middle"]
+    assert jpda.LARGEST_ERROR < middle <= clips[jpda.PUBLISHED]["largest"]
+
+
+def pseudo_particles(found: dict[str, Any]) -> None:
+    assert len(found["table"]["rows"]) == 9 + 3 * HAS_DATA
+    scenes = found["numbers"]["scenes"]
+    for name in ("2BALL", "3FACE"):
+        assert scenes[name][ppf.CLASSICAL]["every"] < 0.2 < 0.6 < scenes[name][ppf.PSEUDO]["every"]
+        assert scenes[name][ppf.ROBUST]["every"] > 0.9
+    assert verdicts(found)[:2] == ["better"] * 2
+
+
+def merging_and_splitting(found: dict[str, Any]) -> None:
+    assert verdicts(found) == ["better"] * 4
+    passing = found["numbers"]["clips"]["passing"]
+    assert passing[association.DEFAULTS]["merged"] < passing[association.PUBLISHED]["merged"] < 6.0
+    assert passing[association.ONE_OBJECT]["merged"] > 12.0
+    assert found["numbers"]["light"][ROBUST]["f"] > 0.9
+
+
+def methods(found: dict[str, Any]) -> None:
+    measured = found["numbers"]["sequences"]["room44-3p"]
+    assert list(measured) == list(ON_PICTURES)
+    assert measured["colour_phd"]["found_share"] > 0.8
+    assert measured["association_matrix"]["found_share"] > 0.55
+    assert len(found["numbers"]["sequences"]) == 1 + 2 * HAS_DATA
+
+
+def rooms(found: dict[str, Any]) -> None:
+    assert all(case["rooms"] for case in found["numbers"]["cases"].values())
+
+
+LOOKS: dict[str, Callable[[dict[str, Any]], None]] = {
+    "fig1": fig1,
+    "fig2": fig2,
+    "fig3": fig3,
+    "cameras": cameras,
+    "sequences": sequences,
+    "cmc": cmc,
+    "corrections": corrections,
+    "jpda": two_in_data_association,
+    "ppf": pseudo_particles,
+    "association": merging_and_splitting,
+    "methods": methods,
+    "rooms": rooms,
+}
+"""What must be seen in the numbers of each."""
+
+
+def test_all_in_short_show_the_direction_of_each_claim(tmp_path: Path) -> None:
+    """In one process, since several of them look at the same runs."""
+    data = ["--data", str(DATA)] if HAS_DATA else []
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.papers", "--all", "--quick", "--output", str(tmp_path),
+         *data],
+        cwd=Path(__file__).parents[2],
+        env={**os.environ, "PYTHONWARNINGS": "error"},
+        capture_output=True,
+        text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = {
+        path.stem: json.loads(path.read_text(encoding="utf-8")) for path in tmp_path.glob("*.json")
+    }
+    assert set(found) == set(EXPERIMENTS) - (set() if data else NEEDS_DATA)
+    for name, told in found.items():
+        assert (tmp_path / f"{name}.png").stat().st_size > 10_000, name
+        table = told["table"]
+        assert {len(row) for row in table["rows"]} == {len(table["head"])}, name
+        LOOKS[name](told)
