@@ -182,7 +182,7 @@ def test_runs(arguments: list[str]) -> dict[str, Check]:
 
 def fuzzing(minutes: float, *how: str) -> tuple[str, ...]:
     """Damaged recordings for some minutes, other ones each time."""
-    return (PYTHON, "-m", "tests.fuzz", f"{minutes:g}", "--workers", str(CORES), *how)
+    return (PYTHON, "-m", "tests.bad_input", f"{minutes:g}", "--workers", str(CORES), *how)
 
 
 def digest() -> str:

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests.fuzz import strategies
-from tests.fuzz.cases import make_bases, try_case
-from tests.fuzz.damage import KINDS, WEIGHTS, Damage
+from tests.bad_input import strategies
+from tests.bad_input.cases import make_bases, try_case
+from tests.bad_input.damage import KINDS, WEIGHTS, Damage
 from tests.synthetic import write_sequence
 from tracker.sequences.csv_columns import read_columns
 from tracker.sequences.reader import FILE, read_sequence, read_summary

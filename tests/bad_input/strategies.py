@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from tests.fuzz.damage import CONTENTS, KINDS, NUMBERS, WORDS, Damage
+from tests.bad_input.damage import CONTENTS, KINDS, NUMBERS, WORDS, Damage
 
 BASES = ("boxes", "videos", "images", "bare")
 

@@ -15,7 +15,7 @@ import pytest
 from tests.app.folders import write_crossing
 from tests.browser.serving import Server
 
-SECONDS = int(os.environ.get("MULTIVIEW_PHD_CASES", "25"))
+SECONDS = int(os.environ.get("MULTIVIEW_PHD_CASES", "12"))
 CHECKS = (
     "not_a_server_error",
     "status_code_conformance",

@@ -1,7 +1,7 @@
-"""Damage recordings for some minutes: ``python3 -m tests.fuzz MINUTES [--seed N] [--workers N]``.
+"""Damage recordings for some minutes: ``python3 -m tests.bad_input MINUTES [--seed N]``.
 
-Every worker is a process of its own, so that a crash is a finding like others. What falls is told
-with the lines that the corpus takes (``tests/fuzz/corpus.json``), shortened to what is needed.
+Every worker is a process of its own, so that a crash is reported as any other failure: with the
+lines that the corpus takes (``tests/bad_input/corpus.json``), reduced to the damage that it needs.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ MEMORY_MB = 1024.0
 
 def main() -> int:
     """Run workers until the time is over; 1 where something fell."""
-    parser = argparse.ArgumentParser(prog="python3 -m tests.fuzz", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python3 -m tests.bad_input", description=__doc__)
     parser.add_argument("minutes", type=float)
     parser.add_argument("--seed", type=int, default=None)
     parser.add_argument("--workers", type=int, default=min(4, os.cpu_count() or 1))
@@ -53,7 +53,7 @@ def main() -> int:
         print("fuzz: every index is checked", flush=True)
     seed = secrets.randbelow(2**40) if arguments.seed is None else arguments.seed
     print(f"fuzz: seed {seed}", flush=True)
-    good = [sys.executable, "-m", "tests.fuzz", "0", "--work", "0"]
+    good = [sys.executable, "-m", "tests.bad_input", "0", "--work", "0"]
     if subprocess.run(good, stdout=subprocess.DEVNULL).returncode:  # compiles what is missing
         print("fuzz: a good recording does not run", flush=True)
         return 1
@@ -77,7 +77,7 @@ def watch(seed: int, deadline: float, counts: Counter[str]) -> None:
     while time.monotonic() < deadline - 1.0:
         with tempfile.TemporaryFile("w+") as errors:
             left = (deadline - time.monotonic()) / 60.0
-            line = [sys.executable, "-m", "tests.fuzz", str(left), "--work", str(seed)]
+            line = [sys.executable, "-m", "tests.bad_input", str(left), "--work", str(seed)]
             worker = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=errors, text=True)
             seed, current = hear(worker, seed, counts)
             status = worker.wait()
@@ -151,8 +151,8 @@ def tell_all(words: str) -> None:
 
 def work(seed: int, deadline: float) -> int:
     """One worker: a case a seed, told as a line of JSON before and after."""
-    from tests.fuzz.cases import LONGEST_SECONDS, Fell, make_bases, try_case
-    from tests.fuzz.damage import Damage, drawn
+    from tests.bad_input.cases import LONGEST_SECONDS, Fell, make_bases, try_case
+    from tests.bad_input.damage import Damage, drawn
 
     faulthandler.enable()
 

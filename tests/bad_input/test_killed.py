@@ -15,7 +15,7 @@ from random import Random
 
 import pytest
 
-from tests.fuzz.kinds import KINDS, Kind
+from tests.bad_input.writes import KINDS, Kind
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="there is no such signal")
 
@@ -35,7 +35,7 @@ def write_for_ever(name: str, folder: Path, first: int, confirmed: Path) -> None
 @pytest.fixture(scope="module")
 def processes() -> ForkServerContext:
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["tests.fuzz.kinds"])
+    context.set_forkserver_preload(["tests.bad_input.writes"])
     return context
 
 

@@ -1,0 +1,1 @@
+"""Connections that only cost, calls in any order, a soak, no home, a clock that goes back."""

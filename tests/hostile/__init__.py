@@ -1,1 +1,0 @@
-"""What somebody hostile sends: garbage over the API and both sockets, and more than is meant."""
