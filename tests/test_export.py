@@ -20,7 +20,7 @@ from tests.engine import synthetic
 from tracker import __version__, export
 from tracker.parameters import METHODS, PARAMETERS, RunParameters, value, with_values
 from tracker.sequences.csv_columns import guarded, unguarded
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.sequence import Sequence
 from tracker.trajectories import Trajectories
 
 SEQUENCE = synthetic.sequence([], 40)
@@ -221,37 +221,6 @@ def test_a_pipe_is_written_to(tmp_path: Path) -> None:
     export.save_tracks_csv(pipe, SEQUENCE, TRACKS, PARAMETERS_OF_RUN, 5)
     thread.join()
     assert received == [text_of(TRACKS)]
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("0.5123", "0.5l23", 'column "x": expected a number, found "0.5l23"'),
-        ("0,0.000000,2,", "0,0.000000,1,", 'column "id": track 1 is at step 0 already in line'),
-        ("0,0.000000,2,", "0.5,0.000000,2,", 'column "frame": expected a whole number of at least'),
-        ("0.000000,2,", "0.000000,", "columns as in the header, found"),
-        ("existence", "weight", "but existence is missing"),
-        (f"{CAMERA}_top", f"{CAMERA}_up", f"but {CAMERA}_top is missing"),
-    ],
-)
-def test_what_is_wrong_in_a_track_file_is_said(
-    tmp_path: Path, old: str, new: str, message: str
-) -> None:
-    text = text_of(TRACKS)
-    assert old in text
-    comments = sum(line.startswith("#") for line in text.splitlines())
-    line = comments + (1 if "missing" in message else 3)
-    path = tmp_path / "tracks.csv"
-    path.write_text(text.replace(old, new, 1), encoding="utf-8")
-    with pytest.raises(SequenceError) as caught:
-        export.read_tracks_csv(path)
-    assert str(caught.value).startswith(f"tracks.csv, line {line}")
-    assert message in str(caught.value)
-
-
-def test_a_file_that_is_not_there_is_said(tmp_path: Path) -> None:
-    with pytest.raises(SequenceError, match=r"tracks\.csv: cannot be read \(No such file"):
-        export.read_tracks_csv(tmp_path / "tracks.csv")
 
 
 FORMULAS = ["=1+1", "+1", "-1", "@SUM(A1)", "'=1", "=HYPERLINK('http://x')", "a;=1", "x"]

@@ -1,7 +1,7 @@
-"""Text of others as a terminal or a message may show it: what cannot be printed is written out.
+"""Text of others: where it is none, and as a terminal or a message may show it.
 
-A name may hold escape sequences that move a terminal's cursor, or signs that turn the direction
-of writing: then what is read is not what is there.
+What cannot be printed is written out: a name may hold escape sequences that move a terminal's
+cursor, or signs that turn the direction of writing, and then what is read is not what is there.
 """
 
 from __future__ import annotations
@@ -12,6 +12,13 @@ def visible(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else _escaped(c) for c in text)
+
+
+def not_utf_8(error: UnicodeDecodeError) -> str:
+    """What a message says of a file that is no text, after the file's name and a comma."""
+    line = error.object.count(b"\n", 0, error.start) + 1
+    found = f"found byte 0x{error.object[error.start]:02x}"
+    return f"line {line}: expected text in UTF-8, {found}; save the file as UTF-8"
 
 
 def _escaped(character: str) -> str:

@@ -152,7 +152,7 @@ def tell_all(words: str) -> None:
 def work(seed: int, deadline: float) -> int:
     """One worker: a case a seed, told as a line of JSON before and after."""
     from tests.bad_input.cases import LONGEST_SECONDS, Fell, make_bases, try_case
-    from tests.bad_input.damage import Damage, drawn
+    from tests.bad_input.drawing import Damage, drawn
 
     faulthandler.enable()
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from app.command.terminal import CommandError
 from tests.app.folders import write_crossing
-from tests.bad_input.damage import Damage, damage
+from tests.bad_input.drawing import Damage, damage
 from tests.synthetic import write_sequence
 from tracker import export, parameters, pipeline
 from tracker.checks import check

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from tests.bad_input.damage import CONTENTS, KINDS, NUMBERS, WORDS, Damage
+from tests.bad_input.drawing import CONTENTS, KINDS, NUMBERS, WORDS, Damage
 
 BASES = ("boxes", "videos", "images", "bare")
 
@@ -15,7 +15,7 @@ def damages() -> SearchStrategy[list[Damage]]:
     part = st.floats(0.0, 1.0, exclude_max=True)
     what = st.integers(0, max(len(NUMBERS), len(WORDS), len(CONTENTS), 64) * 8)
     return st.lists(
-        st.builds(Damage, kind=st.sampled_from(KINDS), file=part, place=part, what=what),
+        st.builds(Damage, kind=st.sampled_from(list(KINDS)), file=part, place=part, what=what),
         min_size=1,
         max_size=4,
     )

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from tests.bad_input import strategies
 from tests.bad_input.cases import make_bases, try_case
-from tests.bad_input.damage import KINDS, WEIGHTS, Damage
+from tests.bad_input.drawing import Damage
 from tests.synthetic import write_sequence
 from tracker.sequences.csv_columns import read_columns
 from tracker.sequences.reader import FILE, read_sequence, read_summary
@@ -97,7 +97,3 @@ def refused(read: Callable[[], object]) -> str | None:
     assert told.isprintable()
     assert len(told) < 1500
     return told
-
-
-def test_every_kind_has_its_weight() -> None:
-    assert len(KINDS) == len(WEIGHTS)

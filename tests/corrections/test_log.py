@@ -12,7 +12,17 @@ from hypothesis import strategies as st
 from tracker.corrections import Correction, CorrectionError
 from tracker.corrections.contradictions import refuse_contradiction, said_again
 from tracker.corrections.kinds import KINDS, digest, make
-from tracker.corrections.log import dump, open_log, parse, place_of, read_log, write_log
+from tracker.corrections.log import (
+    FILE,
+    dump,
+    open_log,
+    own_place,
+    parse,
+    place_of,
+    read_log,
+    write_log,
+    writing_place,
+)
 from tracker.corrections.merging import difference, merge
 
 _NUMBERS = st.floats(-50.0, 50.0).map(lambda v: round(v, 4))
@@ -76,39 +86,6 @@ places = [[3, 5.0, 2.0, 0.8]]
 """
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "line", "words"),
-    [
-        ('kind = "here"', 'kind = "hier"', 12, "expected one of same"),
-        ('kind = "here"', "kind = {}", 12, "expected one of same"),
-        ('kind = "here"', "kind = [[]]", 12, "expected one of same"),
-        ("[[3, 5.0", "[[3.5, 5.0", 14, "places"),
-        ("[[3, 5.0, 2.0, 0.8]]", "[]", 14, "here has 1 to 2, found 0"),
-        ("[9, 1.2", "[2, 1.2", 6, "forward in time"),
-        ("format = 1", "format = 2", 1, "a newer program wrote it"),
-        ("format = 1", "colour = 1", 1, "found colour"),
-        ('kind = "here"', 'kind = "here"\ncolour = 3', 13, "colour"),
-        ("[[3, 5.0", "[[nan, 5.0", 14, "places"),
-        ("0.8]]", "0.8], [4, 5.0, 2.0, 0.8]]", 14, "here says of one step"),
-        ("5.0, 2.0, 0.8]]", "inf, 2.0, 0.8]]", 14, "places"),
-        ('kind = "here"', 'kind = "here', 12, "not TOML"),
-    ],
-)
-def test_a_malformed_log_names_its_line(
-    tmp_path: Path, old: str, new: str, line: int, words: str
-) -> None:
-    assert old in LOG
-    path = tmp_path / "corrections.toml"
-    path.write_text(LOG.replace(old, new), encoding="utf-8")
-    with pytest.raises(CorrectionError, match=f"line {line}") as error:
-        read_log(path)
-    assert words in str(error.value)
-    assert str(path) in str(error.value)
-    opened = open_log(tmp_path)
-    assert opened.corrections == ()
-    assert opened.problem == str(error.value)
-
-
 def test_who_is_tied_together_is_not_parted() -> None:
     a, b, c = [3, 1.0, 2.0, 0.8], [9, 1.2, 2.0, 0.8], [20, 3.0, 2.0, 0.8]
     one, other = make(kind="same", places=[a, b]), make(kind="same", places=[b, c])
@@ -143,14 +120,6 @@ def test_whoever_is_moved_again_is_where_it_was_said_last() -> None:
         make(kind="here", places=[second]),
     ):
         assert said_again([one], other) == (None, other)
-
-
-def test_a_line_that_contradicts_one_before_is_told(tmp_path: Path) -> None:
-    more = (
-        '\n[[correction]]\nkind = "different"\nplaces = [[3, 1.0, 2.0, 0.8], [9, 1.2, 2.0, 0.8]]\n'
-    )
-    with pytest.raises(CorrectionError, match=r"line 16: .*contradicts"):
-        parse(LOG + more, "corrections.toml")
 
 
 def test_two_logs_as_one() -> None:
@@ -204,3 +173,24 @@ def test_a_folder_that_may_only_be_read_has_its_log_with_the_user(
     assert place.is_relative_to(tmp_path / "settings")
     write_log(place, parse(LOG, "one"))
     assert open_log(folder).corrections == parse(LOG, "one")
+
+
+@pytest.mark.parametrize("target", ["/etc/passwd", "/dev/zero", "corrections.toml"])
+def test_a_link_out_of_the_folder_is_neither_read_nor_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, target: str
+) -> None:
+    monkeypatch.setenv("MULTIVIEW_PHD_SETTINGS", str(tmp_path / "settings"))
+    folder = tmp_path / "room"
+    folder.mkdir()
+    (folder / FILE).symlink_to(target)
+    assert open_log(folder).path == own_place(folder)
+    assert writing_place(folder) == own_place(folder)
+    assert open_log(folder).problem is None
+
+
+def test_a_malformed_log_is_reported_and_empty(tmp_path: Path) -> None:
+    (tmp_path / FILE).write_text(LOG.replace("format = 1", "format = 2"), encoding="utf-8")
+    with pytest.raises(CorrectionError, match="line 1") as error:
+        read_log(tmp_path / FILE)
+    opened = open_log(tmp_path)
+    assert (opened.corrections, opened.problem) == ((), str(error.value))

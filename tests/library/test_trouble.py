@@ -1,4 +1,4 @@
-"""A library that is newer, another's, locked, read-only, on a full disk or damaged: a sentence."""
+"""A library that is locked, read-only, on a full disk or damaged: a sentence."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tests.library.runs import RECORDING, filled, run
-from tracker.library import repair, schema
+from tracker.library import repair
 from tracker.library.errors import LibraryError, told
 from tracker.library.store import Library, open_library
 
@@ -22,38 +22,6 @@ def path(tmp_path: Path) -> Path:
     path = tmp_path / "library.sqlite3"
     filled(path, 4).close()
     return path
-
-
-def spoil(path: Path, statement: str) -> None:
-    with sqlite3.connect(path) as connection:
-        connection.execute(statement)
-    connection.close()
-
-
-def test_of_a_newer_version(path: Path) -> None:
-    spoil(path, f"PRAGMA user_version = {schema.VERSION + 1}")
-    before = path.read_bytes()
-    with pytest.raises(LibraryError, match="newer version of multiview-phd"):
-        Library(path)
-    assert path.read_bytes() == before
-
-
-def test_another_program_s_database(tmp_path: Path) -> None:
-    path = tmp_path / "bookmarks.sqlite"
-    spoil(path, "CREATE TABLE bookmarks (a)")
-    before = path.read_bytes()
-    with pytest.raises(LibraryError, match="found another database"):
-        Library(path)
-    assert path.read_bytes() == before
-
-
-def test_no_database_at_all(tmp_path: Path) -> None:
-    path = tmp_path / "notes.txt"
-    path.write_text("not a database, but long enough to be taken for one " * 20)
-    with pytest.raises(LibraryError, match=r"damaged .*not a database"):
-        Library(path)
-    with pytest.raises(LibraryError, match=r"cannot be (opened|reached)"):
-        Library(tmp_path / "notes.txt" / "library.sqlite3")
 
 
 def test_held_by_another_program(path: Path) -> None:

@@ -22,6 +22,7 @@ from tracker.corrections.contradictions import refuse_contradiction
 from tracker.corrections.kinds import KINDS, Correction, CorrectionError, sentence_of
 from tracker.folders import cache_folder, settings_folder
 from tracker.placing import replacing
+from tracker.visible import not_utf_8
 
 FILE = "corrections.toml"
 FORMAT = 1
@@ -97,12 +98,18 @@ def read_log(path: Path) -> tuple[Correction, ...]:
         if not path.exists():
             return ()
         if not path.is_file():
-            raise CorrectionError(f"{path}: expected a file, found a folder, pipe or device")
-        if path.stat().st_size > _MOST_BYTES:
-            raise CorrectionError(f"{path}: expected a log of at most {_MOST_BYTES >> 20} MB")
+            raise CorrectionError(
+                f"{path}: expected a file, found a folder, pipe or device; move it away"
+            )
+        size = path.stat().st_size
+        if size > _MOST_BYTES:
+            raise CorrectionError(
+                f"{path}: expected a log of at most {_MOST_BYTES >> 20} MB, found "
+                f"{size / 2**20:,.0f} MB; move it away"
+            )
         text = path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise CorrectionError(f"{path}: expected UTF-8, found {error.reason}") from None
+        raise CorrectionError(f"{path}, {not_utf_8(error)}") from None
     except OSError as error:
         raise CorrectionError(f"{path}: cannot be read ({error.strerror})") from None
     return parse(text, str(path))
@@ -130,10 +137,11 @@ def parse(text: str, where: str) -> tuple[Correction, ...]:
     try:
         values = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise CorrectionError(f"{where}: not TOML: {error}") from None
+        raise CorrectionError(f"{where}: expected TOML, found something else ({error})") from None
     except (RecursionError, ValueError):
         raise CorrectionError(
-            f"{where}: not TOML: expected a few levels and numbers of at most 18 digits, found more"
+            f"{where}: expected a few levels and numbers of at most 18 digits, found more; "
+            "shorten it"
         ) from None
     strange = sorted(set(values) - {"format", "correction"})
     if strange:

@@ -17,6 +17,7 @@ from typing import Any
 
 from tracker.formats.pieces import FormatError
 from tracker.formats.yaml_text import parse_yaml
+from tracker.visible import not_utf_8
 
 HEAD_BYTES = 65536
 """Read to recognise a file; a format shows itself within its first lines."""
@@ -172,11 +173,7 @@ class SourceFile:
                 raise self.error("expected text, found binary data; it may be cut short or spoilt")
             return data.decode("utf-8-sig")
         except UnicodeDecodeError as error:
-            line = data.count(b"\n", 0, error.start) + 1
-            raise self.error(
-                f"line {line}: expected text in UTF-8, found byte 0x{data[error.start]:02x}; "
-                "save the file as UTF-8"
-            ) from None
+            raise self.error(not_utf_8(error)) from None
 
     def lines(self) -> list[str]:
         """The lines of a text file."""
@@ -198,8 +195,8 @@ class SourceFile:
             ) from None
         except RecursionError:
             raise self._too_deep() from None
-        except ValueError as error:  # a number of thousands of digits
-            raise self.error(f"is not a JSON file of data ({error})") from None
+        except ValueError:
+            raise self._too_long() from None
 
     @cached_property
     def json_lines(self) -> list[Any] | None:
@@ -270,8 +267,8 @@ class SourceFile:
             raise self.error(f"is not valid TOML ({error})") from None
         except RecursionError:
             raise self._too_deep() from None
-        except ValueError as error:  # a number of thousands of digits
-            raise self.error(f"is not a TOML file of data ({error})") from None
+        except ValueError:
+            raise self._too_long() from None
 
     @cached_property
     def yaml(self) -> Any:
@@ -286,6 +283,11 @@ class SourceFile:
             raise self._too_deep() from None
         except ValueError as error:
             raise self.error(str(error)) from None
+
+    def _too_long(self) -> FormatError:
+        return self.error(
+            "has a number of thousands of digits; it may be spoilt: get the file again"
+        )
 
     def _too_deep(self) -> FormatError:
         return self.error(f"has more than {MOST_DEPTH} levels of nesting; it is no data of ours")

@@ -43,6 +43,7 @@ _UNREADABLE = (
 )  # fmt: skip
 """What the standard library raises of an archive that is none, or of a spoilt or locked one."""
 
+_EXPECTED = "expected a bundle as `multiview-phd bundle` writes it"
 _QUALITY = {"preset": "veryfast", "crf": "32"}
 _ANEW = ("video", "images", "first_frame", "background", "detections",
          "detections_first_frame", "detected_steps", "appearance", *CLOCK)  # fmt: skip
@@ -198,8 +199,12 @@ def unpack_bundle(path: Path, folder: Path) -> Result:
         LibraryError: If it is no bundle, is damaged, of a newer version, or climbs out.
     """
     try:
+        if path.exists() and not path.is_file():  # whoever reads a pipe waits
+            raise LibraryError(f"{path}: {_EXPECTED}, found a folder, pipe or device")
         with zipfile.ZipFile(path) as archive:
             _check_names(path, archive)
+            if MANIFEST not in archive.namelist():
+                raise LibraryError(f"{path}: {_EXPECTED}, found an archive without {MANIFEST}")
             archive.extractall(folder)
         manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
         if manifest["format"] != FORMAT:
@@ -226,9 +231,8 @@ def unpack_bundle(path: Path, folder: Path) -> Result:
         raise
     except _UNREADABLE as error:
         shutil.rmtree(folder, ignore_errors=True)
-        raise LibraryError(
-            f"{path}: expected a bundle as `multiview-phd bundle` writes it ({error})"
-        ) from None
+        why = error.strerror if isinstance(error, OSError) else error
+        raise LibraryError(f"{path}: {_EXPECTED}, found none ({why})") from None
 
 
 def _check_names(path: Path, archive: zipfile.ZipFile) -> None:

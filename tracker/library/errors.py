@@ -56,7 +56,7 @@ def _sentence(path: Path, error: sqlite3.Error) -> str:
             "written to, or name another by --library"
         )
     if code == sqlite3.SQLITE_IOERR:
-        return f"{path}: the disk failed under the library ({words})"
+        return f"{path}: the disk failed under the library ({words}); name another by --library"
     if code == sqlite3.SQLITE_CONSTRAINT:
         return f"{path}: the library refuses what it was given ({words})"
     return (

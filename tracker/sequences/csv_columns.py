@@ -15,6 +15,7 @@ from numpy import ndarray
 
 from tracker.sequences.fields import LARGEST, did_you_mean, listed, shown
 from tracker.sequences.sequence import SequenceError
+from tracker.visible import not_utf_8
 
 _FORMULA = re.compile(r"(^|[,;\t]\s*)(?='*[=+\-@\t\r])")
 _GUARDED = re.compile(r"(^|[,;\t]\s*)'(?='*[=+\-@\t\r])")
@@ -180,11 +181,7 @@ def _lines(path: Path, where: str) -> tuple[list[str], list[int]]:
     except OSError as error:
         raise SequenceError(f"{where}: cannot be read ({error.strerror})") from None
     except UnicodeDecodeError as error:
-        place = error.object.count(b"\n", 0, error.start) + 1
-        raise SequenceError(
-            f"{where}, line {place}: expected text in UTF-8, found byte "
-            f"0x{error.object[error.start]:02x}; save the file as UTF-8"
-        ) from None
+        raise SequenceError(f"{where}, {not_utf_8(error)}") from None
     lines: list[str] = []
     numbers: list[int] = []
     for number, line in enumerate(text.split("\n"), 1):

@@ -21,6 +21,7 @@ from tracker.sequences.sequence import FileState, Sequence, SequenceError
 from tracker.sequences.tables import Reading, read_ground_truth
 from tracker.sequences.views import CAMERA, read_sources, read_views
 from tracker.sequences.writing.taught_fields import read_room, read_target, read_templates
+from tracker.visible import not_utf_8
 
 FILE = "sequence.toml"
 FORMAT = 1
@@ -154,11 +155,7 @@ def _find(folder: Path) -> tuple[Path, str]:
             f"{folder}: cannot be read ({error.strerror}); check its permissions"
         ) from None
     except UnicodeDecodeError as error:
-        line = error.object.count(b"\n", 0, error.start) + 1
-        raise SequenceError(
-            f"{folder.name}/{FILE}, line {line}: expected text in UTF-8, found byte "
-            f"0x{error.object[error.start]:02x}; save the file as UTF-8"
-        ) from None
+        raise SequenceError(f"{folder.name}/{FILE}, {not_utf_8(error)}") from None
 
 
 def _import(source: Path) -> str:

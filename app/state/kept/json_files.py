@@ -10,6 +10,7 @@ import hashlib
 import json
 import logging
 import os
+import stat
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -43,7 +44,10 @@ def read_json(path: Path) -> Any:
         OSError: If it cannot be read.
         ValueError: If it is spoilt, in words.
     """
-    if path.stat().st_size > MOST_BYTES:
+    there = path.stat()
+    if not stat.S_ISREG(there.st_mode):  # whoever reads a pipe waits
+        raise ValueError("expected a file, found a folder, pipe or device")
+    if there.st_size > MOST_BYTES:
         raise ValueError(f"expected at most {MOST_BYTES >> 20} MB, found a larger file")
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
@@ -52,7 +56,9 @@ def read_json(path: Path) -> Any:
         value = found["value"]
         same = "sha256" not in found or found["sha256"] == _sum(value)
     except (UnicodeDecodeError, RecursionError):
-        raise ValueError("it is no JSON any more") from None
+        raise ValueError("expected JSON, found something else") from None
+    except json.JSONDecodeError as error:
+        raise ValueError(f"expected JSON, found something else ({error})") from None
     if not same:
         raise ValueError(
             "it was changed since it was written; where that was you, take the line sha256 out"

@@ -280,20 +280,6 @@ def test_score_and_overlap(tmp_path: Path) -> None:
 # ── files that are no such networks ──────────────────────────────────────────
 
 
-def test_bad_files_are_a_sentence(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"cannot be read .*name an ONNX file"):
-        Network(tmp_path / "nowhere.onnx", Settings())
-    for name, data in (("text", b"this is no network"), ("empty", b""), ("zeros", bytes(500))):
-        path = tmp_path / f"{name}.onnx"
-        path.write_bytes(data)
-        with pytest.raises(ValueError, match=rf"^the detector {name}\.onnx cannot be used: "):
-            Network(path, Settings())
-    good = answering(tmp_path / "good.onnx", {"output0": yolo_8()}).read_bytes()
-    (tmp_path / "cut.onnx").write_bytes(good[: len(good) // 2])
-    with pytest.raises(ValueError, match=r"cut\.onnx cannot be used"):
-        Network(tmp_path / "cut.onnx", Settings())
-
-
 def test_a_network_without_a_known_answer_is_told_when_it_is_run(tmp_path: Path) -> None:
     path = answering(tmp_path / "classes.onnx", {"probabilities": np.zeros((1, 1000))})
     with pytest.raises(ValueError, match=r"classes\.onnx cannot be used: its outputs probab"):

@@ -32,7 +32,8 @@ def locate(folder: Path, fields: Fields, name: str) -> Path:
         hint = did_you_mean(path.name, siblings)
         raise fields.error(name, f'there is no file "{given}" in the sequence folder{hint}')
     if not path.is_file():
-        raise fields.error(name, f'expected a file, found the folder "{given}"')
+        what = "folder" if path.is_dir() else "pipe or device"
+        raise fields.error(name, f'expected a file, found the {what} "{given}"')
     return path
 
 
@@ -73,7 +74,10 @@ def _inside(folder: Path, given: str, fields: Fields, name: str) -> Path:
     try:
         leaves = outright or not path.resolve().is_relative_to(folder.resolve())
     except (OSError, RuntimeError, ValueError):  # a circle of links, or a name that cannot be
-        raise fields.error(name, f'"{given}" is not a path that can be followed') from None
+        raise fields.error(
+            name,
+            f'expected a path to a file, found "{given}", which leads nowhere; put the file there',
+        ) from None
     if leaves:
         how = "" if outright else " (by a symbolic link)"
         raise fields.error(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import errno
+import stat
 import threading
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +19,9 @@ from tracker.single_view.onnx.file import INT64, UINT8, Port, ports_of
 from tracker.single_view.onnx.layouts import FOUND_OUT, proposals
 
 Values = Literal["unit", "imagenet", "signed", "bytes"]
+
+MOST_BYTES = 2**31
+"""Of a Protocol Buffers message, which an ONNX file is."""
 
 _GREY = 114
 """Of the borders that fill a picture up to the network's shape, as YOLO's training has it."""
@@ -69,7 +74,7 @@ class Network:
         """
         self._path, self._settings = path, settings
         try:
-            data = path.read_bytes()
+            data = _content(path)
             ports = ports_of(data)
             self._net = cv2.dnn.readNetFromONNX(np.frombuffer(data, np.uint8))
         except OSError as error:
@@ -204,6 +209,16 @@ class Network:
                 return {n: np.array(o) for n, o in zip(self._names, outputs, strict=True)}
         except cv2.error as error:
             raise ValueError(self._told(f"cannot be run: {_words(error)}")) from error
+
+
+def _content(path: Path) -> bytes:
+    """The bytes of a model: of an ordinary file, and of no more than ONNX allows."""
+    there = path.stat()
+    if not stat.S_ISREG(there.st_mode):  # a pipe is waited for, a device has no end
+        raise OSError(errno.EINVAL, "it is a folder, pipe or device")
+    if there.st_size > MOST_BYTES:
+        raise OSError(errno.EFBIG, f"it has {there.st_size >> 20:,} MB, expected at most 2,048")
+    return path.read_bytes()
 
 
 def _words(error: Exception) -> str:

@@ -15,12 +15,14 @@ from tracker.sequences.fields import did_you_mean, shown
 from tracker.studies.defined.definition import GRID_STEPS, MOST_TRIALS, Definition, Search, Varied
 from tracker.studies.defined.objectives import OBJECTIVES
 from tracker.studies.errors import StudyError
+from tracker.visible import not_utf_8
 
 _NAME = re.compile(r"[^\W_][\w .+-]{0,59}")
 _TOP = frozenset(
     {"name", "recordings", "trials", "minutes", "seeds", "search", "objectives", "prune", "preset",
      "propose", "seed", "values", "start", "parameters"}
 )  # fmt: skip
+_MOST_BYTES = 4 << 20
 _RANGE = frozenset({"low", "high", "log", "steps", "choices"})
 
 
@@ -30,15 +32,34 @@ def read_definition(path: Path) -> Definition:
     Raises:
         StudyError: If it cannot be read or something in it is not as it must be, with the field.
     """
+    text = _text_of(path)
     try:
-        found = tomllib.loads(path.read_text(encoding="utf-8"))
+        found = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise StudyError(f"{path}: expected TOML, found something else ({error})") from None
+    except (ValueError, RecursionError):
+        raise StudyError(
+            f"{path}: expected a few levels and numbers of at most 18 digits, found more; "
+            "shorten it"
+        ) from None
+    return definition_of(found, where=str(path), folder=path.absolute().parent)
+
+
+def _text_of(path: Path) -> str:
+    try:
+        size = path.stat().st_size
+        if size > _MOST_BYTES:
+            raise StudyError(
+                f"{path}: expected at most {_MOST_BYTES >> 20} MB, found {size / 2**20:,.0f} MB; "
+                "name a study's file"
+            )
+        return path.read_text(encoding="utf-8")
     except OSError as error:
         raise StudyError(
             f"{path}: cannot be read ({error.strerror}); name a study's file"
         ) from None
-    except (ValueError, RecursionError) as error:  # no number has thousands of digits
-        raise StudyError(f"{path}: expected TOML, found something else ({error})") from None
-    return definition_of(found, where=str(path), folder=path.absolute().parent)
+    except UnicodeDecodeError as error:
+        raise StudyError(f"{path}, {not_utf_8(error)}") from None
 
 
 def definition_of(found: Mapping[str, Any], *, where: str, folder: Path) -> Definition:
