@@ -96,6 +96,7 @@ def compute(
         known = None if run.costly and len(run.views) > taken else cache
         _smooth(run, total, telling, cancelled, known)
         _settle(run, telling)
+        run.finished = run.complete
         sound = True
     except Cancelled:
         sound = True

@@ -63,13 +63,13 @@ def follow(workbench: Workbench) -> Callable[[], None]:
 
 
 def is_settled(now: Snapshot) -> bool:
-    """Whether the run is finished, and scored where it can be."""
+    """Whether the run is finished, and its tracks are scored where they can be."""
     run, sequence, scored = now.run, now.sequence, now.scores.shown
-    if sequence is None or run is None or not run.complete or now.run_state.key != run.key:
+    if sequence is None or run is None or not run.finished or now.run_state.key != run.key:
         return False
-    if sequence.ground_truth is None:
-        return True
-    return scored is not None and scored.key == run.key and scored.evaluation is not None
+    if now.run_state.state != "done":
+        return False
+    return sequence.ground_truth is None or (scored is not None and scored.is_final_of(run))
 
 
 def step_of(now: Snapshot) -> int:

@@ -26,19 +26,33 @@ class Scored:
     tracks: Trajectories
     steps: int
     """Steps 0 … ``steps`` − 1 are there."""
+    revision: int
+    """Of the run's tracks, as :attr:`Run.revision` counts them."""
+    final: bool
+    """Whether these are the tracks that a finished run ended with: of all steps, smoothed and
+    corrected. Figures of any others are provisional."""
     evaluation: Evaluation | None = None
     """None until it is made, and where there is no truth."""
-
-    @property
-    def complete(self) -> bool:
-        """Whether every step is there."""
-        return self.steps == self.sequence.frames
 
     @staticmethod
     def of(run: Run) -> Scored:
         """A run as far as it is computed, not scored yet."""
-        steps = run.done  # first: the tracks may grow meanwhile
-        return Scored(run.key, run.sequence, run.parameters, run.seed, run.tracks, steps)
+        # in this order: the tracks may grow and be smoothed meanwhile
+        final, steps, revision = run.finished, run.done, run.revision
+        return Scored(
+            run.key, run.sequence, run.parameters, run.seed, run.tracks, steps, revision, final
+        )
+
+    def is_of(self, run: Run) -> bool:
+        """Whether these are the tracks of a run as they are now, at least of its first steps."""
+        return self.key == run.key and self.revision == run.revision
+
+    def is_final_of(self, run: Run) -> bool:
+        """Whether the figures are those of a finished run: made of the tracks that it ended with.
+
+        Only such a figure is stored, exported, or compared with another run's.
+        """
+        return self.evaluation is not None and self.final and self.tracks is run.tracks
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,17 +62,17 @@ class Scores:
     shown: Scored | None = None
     """The newest that was scored; while a run computes, this may be the one before."""
     finished: Scored | None = None
-    """The last complete one."""
+    """The last one of a finished run."""
     previous: Scored | None = None
-    """The complete one before that, with other parameters."""
+    """The one of a finished run before that, with other parameters."""
     pinned: Scored | None = None
 
     def add(self, scored: Scored) -> Scores:
         """With one that has just been scored."""
         new = self
-        if self.pinned is not None and self.pinned.key == scored.key and scored.complete:
+        if self.pinned is not None and self.pinned.key == scored.key and scored.final:
             new = replace(new, pinned=scored)
-        if scored.complete:
+        if scored.final:
             before = self.finished
             if before is not None and before.key != scored.key:
                 new = replace(new, previous=before)
@@ -82,7 +96,7 @@ class Scores:
 
     @property
     def before(self) -> Scored | None:
-        """The last complete run with other parameters than the shown one's."""
+        """The last finished run with other parameters than the shown one's."""
         shown, finished = self.shown, self.finished
         if shown is not None and finished is not None and shown.key == finished.key:
             return self.previous

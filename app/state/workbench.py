@@ -148,7 +148,7 @@ class Workbench(ShownRun):
     def pin(self) -> bool:
         """Pin the shown run, to set others against it; whether it was a finished one."""
         with self._edit() as now:
-            if now.run is None or not now.run.complete:
+            if now.run is None or not now.run.finished:
                 return False
             self._put("pinned", scores=now.scores.pin(Scored.of(now.run)))
             return True

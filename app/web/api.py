@@ -260,7 +260,8 @@ def timeline(request: Request, bench: Bench, part: Part) -> models.Timeline:
     responses={200: {"content": {"text/csv": {}}, "description": "The track file."}},
 )
 def export_tracks(bench: Bench) -> Response:
-    """The tracks of the shown run; ``X-Run-Partial`` says whether steps are missing."""
+    """The tracks of the shown run; ``X-Run-Partial`` says whether steps are missing, or these are
+    still the tracks before smoothing."""
     snapshot = bench.snapshot()
     run = snapshot.run
     if run is None or run.done == 0:
@@ -270,7 +271,7 @@ def export_tracks(bench: Bench) -> Response:
             "There are no tracks yet: nothing has been computed.",
             hint="Wait for the run's first steps, or start it again.",
         )
-    done, tracks = run.done, run.tracks
+    finished, done, tracks = run.finished, run.done, run.tracks
     sequence = snapshot.named(run.sequence)
     name = file_name(sequence.name, "tracks.csv")
     stream = io.StringIO(newline="")
@@ -293,7 +294,7 @@ def export_tracks(bench: Bench) -> Response:
             "content-disposition": f'attachment; filename="{name}"',
             "cache-control": "no-store",
             "x-run-key": run.key,
-            "x-run-partial": "false" if run.complete else "true",
+            "x-run-partial": "false" if finished else "true",
             "x-run-steps": f"{done}/{run.sequence.frames}",
         },
     )

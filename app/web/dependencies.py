@@ -74,6 +74,17 @@ def nothing_open() -> ApiError:
     )
 
 
+def not_finished(what: str, done: int, steps: int) -> ApiError:
+    """The answer to whoever asks of a run under way for what only a finished one has."""
+    there = f"{done} of {steps} steps are there" if done < steps else "smoothing is still to come"
+    return ApiError(
+        409,
+        "not_finished",
+        f"Only a finished run {what}: {there}.",
+        hint="Wait for its end, or go on with it by POST /api/run.",
+    )
+
+
 def file_name(name: str, ending: str) -> str:
     """Of a download: plain letters only."""
     plain = "".join(c if c.isascii() and (c.isalnum() or c in "-_.") else "-" for c in name)

@@ -18,6 +18,7 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import TypeAdapter, ValidationError
 
 from app import models
+from app.state.scores import Scored
 from app.state.snapshot import Change, Command, Event, Notice, Snapshot, StudyNews
 from app.state.workbench import Workbench
 from app.web.views import results, steps
@@ -52,7 +53,7 @@ class _Page:
         self.wake.set()
         self.told_step: tuple[Any, ...] = ()
         self.told_timeline: tuple[str, str, int, int] = ("", "", 0, 0)
-        self.told_evaluation: tuple[str, int] | None = None
+        self.told_evaluation: Scored | None = None
         self.due: set[str] = set()
         """Kinds of message that are held back for a moment."""
         self.told_at = dict.fromkeys(SECONDS_BETWEEN, 0.0)
@@ -221,16 +222,15 @@ class Stream:
 
     async def _tell_evaluation(self, socket: WebSocket, page: _Page, snapshot: Snapshot) -> None:
         scored = snapshot.scores.shown
-        key = (scored.key, scored.steps) if scored is not None else None
-        if scored is not None and key != page.told_evaluation:
+        if scored is not None and scored is not page.told_evaluation:
             told = {
                 "type": "evaluation",
                 "run": scored.key,
                 "steps": scored.steps,
-                "partial": not scored.complete,
+                "partial": not scored.final,
             }
             await socket.send_text(json.dumps(told))
-        page.told_evaluation = key
+        page.told_evaluation = scored
 
     async def _tell_progress(
         self, socket: WebSocket, page: _Page, news: set[Change], snapshot: Snapshot

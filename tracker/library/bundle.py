@@ -22,7 +22,7 @@ import numpy as np
 from tracker import __version__, export
 from tracker.library import columns
 from tracker.library.errors import LibraryError
-from tracker.library.keeping import remarks_of
+from tracker.library.keeping import remarks_of, rescored
 from tracker.library.records import KeptRun, Result
 from tracker.library.store import parameters_of
 from tracker.placing import replacing, zip_folder
@@ -69,11 +69,20 @@ def write_bundle(path: Path, result: Result, sequence: Sequence, *, videos: bool
 
 
 def _fill(folder: Path, result: Result, sequence: Sequence, videos: bool) -> None:
+    evaluation = None
+    if sequence.ground_truth is not None:
+        from tracker.evaluation import evaluate_sequence
+
+        evaluation = evaluate_sequence(sequence, result.kept.tracks, steps=result.run.steps)
+        if result.run.provisional and evaluation.steps == sequence.frames:
+            result = rescored(result, evaluation)
     run = result.run
+    listed = run._asdict()
     manifest = {
         "format": FORMAT,
         "program": f"multiview-phd {__version__}",
-        "run": run._asdict(),
+        "final": bool(listed.pop("final")),  # beside the run, whose fields older programs know
+        "run": listed,
         "key": result.key,
         "digest": result.digest,
         "machine": result.machine,
@@ -89,11 +98,9 @@ def _fill(folder: Path, result: Result, sequence: Sequence, videos: bool) -> Non
         export.write_tracks_csv(
             stream, sequence, tracks, result.parameters, run.seed, remarks=remarks_of(result)
         )
-    if sequence.ground_truth is not None:
-        from tracker.evaluation import evaluate_sequence
+    if evaluation is not None:
         from tracker.evaluation.report.page import report_html  # brings plotly
 
-        evaluation = evaluate_sequence(sequence, tracks, steps=run.steps)
         report = report_html(sequence, tracks, result.parameters, evaluation, seed=run.seed)
         (folder / "report.html").write_text(report, encoding="utf-8")
     _write_sequence(folder / FOLDER, sequence, videos)
@@ -212,7 +219,7 @@ def unpack_bundle(path: Path, folder: Path) -> Result:
                 f"{path}: expected a bundle of format {FORMAT}, found {manifest['format']!r}; "
                 "update the program"
             )
-        run = KeptRun(**manifest["run"])
+        run = KeptRun(**manifest["run"], final=int(manifest.get("final", False)))
         parameters, unknown = parameters_of(manifest["parameters"])
         return Result(
             run=run,

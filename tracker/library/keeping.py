@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import itertools
 import platform
+from dataclasses import replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -17,7 +19,7 @@ from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.folders import cache_folder
 from tracker.fusion.protocol import FusionResult
 from tracker.library.columns import KeptTracks
-from tracker.library.records import NewRecording, NewRun, Result, Source
+from tracker.library.records import HEADLINES, NewRecording, NewRun, Result, Source
 from tracker.parameters import changed
 from tracker.runs.fitting import default_parameters
 from tracker.runs.gaps import gaps
@@ -89,7 +91,12 @@ def thumbnail_of(sequence: Sequence, reader: FrameReader | None = None) -> bytes
 
 
 CURVE = 300
-"""Values of a curve that is kept in small."""
+"""Most values of a curve that is stored."""
+
+
+def stride(steps: int, values: int) -> int:
+    """How many steps a value of a curve stands for that has at most so many values."""
+    return max(1, -(-steps // values))
 
 
 def kept_of(run: Run) -> KeptTracks:
@@ -116,18 +123,22 @@ def run_of(
     """What the library keeps of a finished run.
 
     Args:
-        run: Complete.
+        run: Finished.
         source: Who computed it.
         began: When, seconds since 1970.
         seconds: How long it took.
-        evaluation: Where there is a truth.
+        evaluation: Of its tracks, where there is a truth.
+
+    Raises:
+        ValueError: If the run is not finished, or steps of it were not scored.
     """
+    if not run.finished or (evaluation is not None and evaluation.steps != run.done):
+        scored = "" if evaluation is None else f" and {evaluation.steps} scored"
+        raise ValueError(
+            f"expected a finished run of {run.sequence.frames} steps, got {run.done} steps{scored}"
+        )
     parameters = run.parameters
-    figures = {}
-    ospa: tuple[float, ...] = ()
-    if evaluation is not None and evaluation.has_truth:
-        ospa = _in_small(evaluation.series.ospa)
-        figures = {figure.definition.key: figure.value for figure in evaluation.figures}
+    figures = {} if evaluation is None else figures_of(evaluation)
     if missing := sum(gap.missing for gap in gaps(run)):
         figures[MISSING] = missing
     return NewRun(
@@ -148,16 +159,38 @@ def run_of(
         targets=len(np.unique(run.tracks.ids)),
         figures=figures,
         kept=kept_of(run),
-        ospa=ospa,
+        ospa=() if evaluation is None else ospa_of(evaluation),
         corrections=tuple(
             one.model_dump(mode="json", exclude_none=True) for one in run.corrections
         ),
     )
 
 
-def _in_small(values: ndarray) -> tuple[float, ...]:
-    """The mean over each of equally many steps."""
-    starts = np.arange(0, len(values), max(1, -(-len(values) // CURVE)))
+def figures_of(evaluation: Evaluation) -> dict[str, float | int | None]:
+    """The figures of a run by their names; none without a truth."""
+    if not evaluation.has_truth:
+        return {}
+    return {figure.definition.key: figure.value for figure in evaluation.figures}
+
+
+def rescored(result: Result, evaluation: Evaluation) -> Result:
+    """A stored run with the figures of its tracks in place of provisional ones."""
+    figures = figures_of(evaluation)
+    headlines: dict[str, Any] = {name: figures.get(name) for name in HEADLINES}
+    return replace(
+        result,
+        run=result.run._replace(**headlines, final=1),
+        figures={**result.figures, **figures},
+        ospa=ospa_of(evaluation),
+    )
+
+
+def ospa_of(evaluation: Evaluation) -> tuple[float, ...]:
+    """OSPA over time as it is stored: the mean over :func:`stride` steps each, in metres."""
+    if not evaluation.has_truth:
+        return ()
+    values = evaluation.series.ospa
+    starts = np.arange(0, len(values), stride(len(values), CURVE))
     sizes = np.diff(np.append(starts, len(values)))
     means = np.add.reduceat(values, starts) / sizes if len(values) else values
     return tuple(means.round(3).tolist())
@@ -212,6 +245,7 @@ def run_from(sequence: Sequence, result: Result, *, key: str) -> Run:
     nothing = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
     run.views = [(nothing,) * cameras] * steps
     run.done = steps
+    run.finished = run.complete
     return run
 
 

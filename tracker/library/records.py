@@ -16,6 +16,9 @@ HEADLINES = (
 )  # fmt: skip
 """Figures that have a column of their own: runs are listed and sorted by them."""
 
+PROVISIONAL = "made before the run was finished; opening it computes them again"
+"""What is said of figures that an earlier version stored too early."""
+
 
 class Recording(NamedTuple):
     """A recording of which runs are kept, or that was opened."""
@@ -80,6 +83,14 @@ class KeptRun(NamedTuple):
     tags_json: str
     corrected: int = 0
     """How many corrections of a person it obeys."""
+    final: int = 0
+    """Whether the figures were made of the tracks of a finished run: of all steps, smoothed and
+    corrected. Earlier versions stored others, too."""
+
+    @property
+    def provisional(self) -> bool:
+        """Whether the run has figures that are to be computed again."""
+        return not self.final and self.misses is not None
 
     @property
     def changes(self) -> dict[str, Any]:
@@ -104,13 +115,14 @@ class KeptRun(NamedTuple):
     def to_json(self) -> dict[str, Any]:
         """Everything as plain values."""
         told = self._asdict()
-        del told["changes_json"], told["tags_json"]
+        del told["changes_json"], told["tags_json"], told["final"]
         return {
             **told,
             "star": bool(self.star),
             "changes": self.changes,
             "tags": self.tags,
             "steps_per_second": self.steps_per_second,
+            "provisional": self.provisional,
         }
 
 

@@ -41,13 +41,13 @@ def check(path: Path) -> Checked:
         closing(_reader(path)) as connection,
         closing(sqlite3.connect(":memory:", isolation_level=None)) as memory,
     ):
-        schema.version_of(connection, path)
+        version = schema.version_of(connection, path)
         complaints += [
             " ".join(word.split())
             for (word,) in connection.execute(f"PRAGMA integrity_check({_MOST_COMPLAINTS})")
             if word != "ok"
         ]
-        schema.migrate(memory, path)
+        schema.migrate(memory, path, schema.MIGRATIONS[: max(1, version)])
         lost = [f"row {row} of {table} {why}" for table, row, why in _save(connection, memory)]
         # a row that the walk through a damaged table misses is told by the walk alone
         complaints += lost
@@ -75,10 +75,12 @@ def repair(path: Path) -> tuple[Path, int, int]:
         try:
             with closing(_reader(path)) as old, closing(sqlite3.connect(made)) as new:
                 new.isolation_level = None
-                schema.migrate(new, made)
+                version = schema.version_of(old, path)
+                schema.migrate(new, made, schema.MIGRATIONS[: max(1, version)])
                 new.execute("BEGIN")
                 lost = len(_save(old, new, with_tracks=True))
                 new.execute("COMMIT")
+                schema.migrate(new, made)
                 (saved,) = new.execute("SELECT count(*) FROM runs").fetchone()
             for source in beside:
                 source.unlink(missing_ok=True)
@@ -101,7 +103,7 @@ def _save(
 
     Args:
         old: The damaged one.
-        new: An empty one of today's version.
+        new: An empty one of the same version.
         with_tracks: Copy the tracks too, rather than only look at them.
 
     Returns:

@@ -77,6 +77,12 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "ALTER TABLE runs ADD COLUMN corrected INTEGER NOT NULL DEFAULT 0",
         "ALTER TABLE results ADD COLUMN corrections BLOB",
     ),
+    (
+        # whether the figures were made of all steps and of the tracks that the run ended with: the
+        # page stored earlier ones too, `track` and `batch` never did
+        "ALTER TABLE runs ADD COLUMN final INTEGER NOT NULL DEFAULT 0",
+        "UPDATE runs SET final = 1 WHERE source IN ('track', 'batch')",
+    ),
 )
 """What leads from each version to the next, the first from an empty file."""
 

@@ -183,9 +183,7 @@ class Library(LibraryFile):
                     "UPDATE runs SET began = ?, deleted = NULL WHERE id = ?", (new.began, number)
                 )
                 if new.figures:  # scored anew, perhaps by another gate: the list tells the same
-                    told_of = ", ".join(f"{name} = ?" for name in HEADLINES)
-                    told = [new.figures.get(name) for name in HEADLINES]
-                    connection.execute(f"UPDATE runs SET {told_of} WHERE id = ?", (*told, number))
+                    self._list_figures(connection, number, new.figures)
             connection.execute(
                 "INSERT OR REPLACE INTO results (run, parameters, figures, columns, corrections) "
                 "VALUES (?, ?, ?, ?, ?)",
@@ -199,6 +197,25 @@ class Library(LibraryFile):
             )
             connection.execute("DELETE FROM runs WHERE deleted < ?", (time.time() - UNDO_SECONDS,))
             return int(number)
+
+    def score(
+        self, number: int, figures: dict[str, float | int | None], ospa: Sequence[float]
+    ) -> None:
+        """Store the figures of a run anew: those of the tracks that are stored with it.
+
+        Args:
+            number: Of the run.
+            figures: By name; others that the run has stay.
+            ospa: OSPA over time, as :attr:`NewRun.ospa` has it.
+
+        Raises:
+            LibraryError: If there is no such run.
+        """
+        with self._writing() as connection:
+            known = self.result(number).figures
+            stored = _deflated({**known, **figures, OSPA: list(ospa)})
+            connection.execute("UPDATE results SET figures = ? WHERE run = ?", (stored, number))
+            self._list_figures(connection, number, figures)
 
     def move(self, recording: int, place: str) -> None:
         """Have a recording opened from another place from now on.
@@ -316,6 +333,17 @@ class Library(LibraryFile):
         ).fetchone()
         return int(number)
 
+    def _list_figures(
+        self,
+        connection: sqlite3.Connection,
+        number: int,
+        figures: dict[str, float | int | None],
+    ) -> None:
+        """Have the figures of a finished run in the list of runs."""
+        columns = ", ".join(f"{name} = ?" for name in HEADLINES)
+        values = [figures.get(name) for name in HEADLINES]
+        connection.execute(f"UPDATE runs SET {columns}, final = 1 WHERE id = ?", (*values, number))
+
     def _insert(self, connection: sqlite3.Connection, recording: int, new: NewRun) -> int:
         values: dict[str, Any] = {
             "recording": recording,
@@ -329,6 +357,7 @@ class Library(LibraryFile):
             **{name: new.figures.get(name) for name in HEADLINES},
             "changes": json.dumps(new.changes, ensure_ascii=False),
             "corrected": len(new.corrections),
+            "final": 1,
         }  # fmt: skip
         marks = ", ".join("?" * len(values))
         done = connection.execute(

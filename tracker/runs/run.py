@@ -92,6 +92,9 @@ class Run:
     """What became of each of them, once all steps are there."""
     settled: bool = False
     """Whether :attr:`tracks` has them."""
+    finished: bool = False
+    """Whether every stage has been through all steps of the sequence: :attr:`tracks` are replaced
+    no more, and a figure made of them is the run's."""
 
     def __post_init__(self) -> None:
         self.tracks = self.filtered = Trajectories.empty(len(self.sequence.views))

@@ -102,7 +102,7 @@ def run_batch(
         places: Rooms and folders.
         changes: Values by key, against each recording's own defaults.
         seeds: Runs of each recording.
-        library: Keeps the runs; what it has already is not computed again.
+        library: Keeps the runs; what it has already, with final figures, is not computed again.
         budget: How many untouched runs stay in it.
         crew: Makes the workers, once there is something to compute.
         told: Called with the runs that are there and their number.
@@ -129,7 +129,8 @@ def run_batch(
             continue
         for seed in range(seeds):
             key = pipeline.stage_keys(sequence, parameters, seed, told_by_hand)["tracks"]
-            if (kept := library.with_key(key)) is not None:
+            kept = library.with_key(key)
+            if kept is not None and not kept.provisional:
                 found[place, seed] = BatchRun(place, seed, kept)
                 continue
             job = _job(sequence, place, parameters, seed, told_by_hand)

@@ -28,7 +28,7 @@ from tracker.evaluation.figures import BY_KEY, number
 from tracker.evaluation.settings import EvaluationSettings
 from tracker.folders import library_file
 from tracker.library import KEEP, repair
-from tracker.library.records import HEADLINES, KeptRun, Result
+from tracker.library.records import HEADLINES, PROVISIONAL, KeptRun, Result
 from tracker.library.store import Library, open_library
 from tracker.visible import visible
 
@@ -167,12 +167,14 @@ def _tell(command: OfLibrary, found: list[KeptRun]) -> None:
                 time.strftime("%Y-%m-%d %H:%M", time.localtime(run.began)),
                 f"{run.single_view} › {run.fusion_method}",
                 str(len(run.changes)),
-                *(_number(value) for value in (run.mota, run.idf1, run.hota, run.ospa)),
+                *(_marked(run, _number(getattr(run, name))) for name in HEADLINES[:4]),
                 str(run.targets), run.note,
             )
             for run in found
         ],
     )  # fmt: skip
+    if any(run.provisional for run in found):
+        say(f"figures in brackets are provisional: {PROVISIONAL} (`runs open`)")
 
 
 def _show(library: Library, command: ShowRun) -> None:
@@ -197,7 +199,11 @@ def _show(library: Library, command: ShowRun) -> None:
         "methods": f"{run.single_view} › {run.fusion_method}, seed {run.seed}",
         **{f"value {key}": str(value) for key, value in run.changes.items()},
         "tracks": str(run.targets),
-        **{_named(key): _with_unit(key, value) for key, value in result.figures.items()},
+        **({"figures": f"provisional: {PROVISIONAL}"} if run.provisional else {}),
+        **{
+            _named(key): _marked(run, _with_unit(key, value)) if key in BY_KEY else str(value)
+            for key, value in result.figures.items()
+        },
         "star": "yes" if run.star else "no",
         "tags": ", ".join(run.tags),
         "note": run.note,
@@ -256,16 +262,25 @@ def _diff(library: Library, command: DiffRuns) -> None:
     a, b = (library.result(library.find(text).id) for text in (command.first, command.second))
     told = difference(a.run, a.values, b.run, b.values)
     if command.json:
-        print_json({"first": a.run.id, "second": b.run.id, **told})
+        provisional = [run.id for run in (a.run, b.run) if run.provisional]
+        print_json({"first": a.run.id, "second": b.run.id, "provisional": provisional, **told})
         return
     print_table(
         ("what", a.run.title, b.run.title),
         [(key, str(first), str(second)) for key, (first, second) in told["values"].items()]
         + [
-            (_named(key), _with_unit(key, first), _with_unit(key, second))
-            for key, (first, second) in told["figures"].items()
+            (
+                _named(key),
+                *(
+                    _marked(run, _with_unit(key, value)) if key in BY_KEY else _number(value)
+                    for run, value in zip((a.run, b.run), pair, strict=True)
+                ),
+            )
+            for key, pair in told["figures"].items()
         ],
     )
+    if a.run.provisional or b.run.provisional:
+        say(f"figures in brackets are provisional: {PROVISIONAL} (`runs open`)")
 
 
 def difference(
@@ -295,6 +310,11 @@ def _flat(values: dict[str, Any]) -> dict[str, Any]:
 def _named(key: str) -> str:
     """A figure by its name; a count of the library by its own."""
     return BY_KEY[key].name if key in BY_KEY else "Tracks" if key == "targets" else key
+
+
+def _marked(run: KeptRun, text: str) -> str:
+    """A figure of a run, in brackets where it is provisional."""
+    return f"({text})" if run.provisional else text
 
 
 def _with_unit(key: str, value: float | int | None) -> str:

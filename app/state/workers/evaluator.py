@@ -43,7 +43,7 @@ class Evaluator:
         self._not_before = 0.0
         self._newest: tuple[str, bool] = ("", False)
         self._newest_since = 0.0
-        self._failed: set[tuple[str, int]] = set()
+        self._failed: set[tuple[str, int, bool]] = set()
         self._beginnings: OrderedDict[tuple[str, int], tuple[Trajectories, Evaluation]] = (
             OrderedDict()
         )
@@ -94,17 +94,17 @@ class Evaluator:
             return None, None
         pinned = scores.pinned
         if pinned is not None and pinned.evaluation is None:
-            if (pinned.key, pinned.steps) not in self._failed:
+            if _named(pinned) not in self._failed:
                 return pinned, None
         if run is not None and run.done:
             scored, shown = Scored.of(run), scores.shown
-            is_new = shown is None or (shown.key, shown.steps) != (scored.key, scored.steps)
+            is_new = shown is None or _named(shown) != _named(scored)
             is_new = is_new or (shown is not None and shown.tracks is not scored.tracks)
-            if is_new and (scored.key, scored.steps) not in self._failed:
+            if is_new and _named(scored) not in self._failed:
                 computing = snapshot.run_state.state == "computing"
-                if scored.complete and computing and run.key == snapshot.run_state.key:
+                if run.complete and computing and run.key == snapshot.run_state.key:
                     return None, None  # the smoothed people are about to take their place
-                over = scored.complete or not computing
+                over = scored.final or not computing
                 if self._newest != (scored.key, over):
                     self._newest, self._newest_since = (scored.key, over), time.monotonic()
                 since = self._newest_since
@@ -133,7 +133,7 @@ class Evaluator:
                 evaluation = self._score(scored)
             except Exception as error:
                 logger.exception("scoring a run failed")
-                self._failed.add((scored.key, scored.steps))
+                self._failed.add(_named(scored))
                 self._workbench.notify(
                     "error",
                     f"The tracks were not scored against the truth: {sentence(error)}",
@@ -143,3 +143,8 @@ class Evaluator:
                 self._workbench.scored(replace(scored, evaluation=evaluation))
             end = time.monotonic()
             self._not_before = end + max(SECONDS_BETWEEN, (end - begin) / SHARE)
+
+
+def _named(scored: Scored) -> tuple[str, int, bool]:
+    """What tells the states of a run apart that are scored one after the other."""
+    return scored.key, scored.steps, scored.final

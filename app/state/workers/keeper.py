@@ -1,5 +1,7 @@
 """Keeps the runs of a workbench in the library, from a thread of its own.
 
+A figure that was made before a run was finished is replaced once its run is opened and scored.
+
 A library that cannot be used is told of once and tried again now and then; the workbench goes on
 without it.
 """
@@ -11,6 +13,8 @@ import threading
 import time
 from pathlib import Path
 
+import numpy as np
+
 from app.errors import sentence
 from app.state.opening_step import is_settled
 from app.state.snapshot import Change, Snapshot
@@ -18,7 +22,7 @@ from app.state.workbench import Workbench
 from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from tracker.library import KEEP
 from tracker.library.errors import LibraryError
-from tracker.library.keeping import recording_of, run_of, thumbnail_of
+from tracker.library.keeping import figures_of, ospa_of, recording_of, run_of, thumbnail_of
 from tracker.library.store import Library, open_library
 from tracker.runs.gaps import gaps
 from tracker.sequences.sequence import Sequence
@@ -145,7 +149,12 @@ class Keeper:
                 picture = thumbnail_of(sequence, reader)
                 library.open_recording(recording_of(sequence, now.opened_as, picture))
             self._opened = sequence
-        if not self._keep or not is_settled(now) or now.run_state.kept is not None:
+        if not is_settled(now):
+            return
+        if now.run_state.kept is not None:
+            self._score_again(now, now.run_state.kept)
+            return
+        if not self._keep:
             return
         key = now.run_state.key
         if key in self._kept:
@@ -170,7 +179,23 @@ class Keeper:
             source="page",
             began=began,
             seconds=run.done / speed if speed > 0.0 else 0.0,
-            evaluation=scored.evaluation if scored is not None and scored.key == key else None,
+            evaluation=None if scored is None else scored.evaluation,
         )
         library.keep(recording_of(now.named(run.sequence), now.opened_as), new, self._keep)
         self._kept.add(key)
+
+    def _score_again(self, now: Snapshot, number: int) -> None:
+        """Store the figures of a kept run that is shown, where those that it has are provisional.
+
+        They are those of its tracks as long as the recording is the one that was tracked.
+        """
+        run, scored, library = now.run, now.scores.shown, self.library()
+        if run is None or scored is None or not scored.is_final_of(run) or library.read_only:
+            return
+        evaluation = scored.evaluation
+        if evaluation is None or not library.run(number).provisional:
+            return
+        stored = library.result(number)
+        same = np.array_equal(stored.kept.tracks.positions, run.tracks.positions)
+        if same and stored.digest == run.sequence.digest:
+            library.score(number, figures_of(evaluation), ospa_of(evaluation))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -28,7 +29,7 @@ def evaluation_of(scored: Scored, evaluation: Evaluation) -> models.EvaluationIn
     return models.EvaluationInfo(
         run=scored.key,
         steps=scored.steps,
-        partial=not scored.complete,
+        partial=not scored.final,
         settings=evaluation.settings.model_dump(),
         figures=[
             models.FigureInfo(
@@ -91,7 +92,7 @@ def series_of(
         run=scored.key,
         of=of,
         steps=scored.steps,
-        partial=not scored.complete,
+        partial=not scored.final,
         first=window.first,
         stride=window.stride,
         unit=settings.unit,
@@ -197,7 +198,14 @@ def stated_of(evaluation: Evaluation) -> str:
 def comparison_of(
     against: Reference, a: tuple[Scored, Evaluation], b: tuple[Scored, Evaluation]
 ) -> models.Comparison:
-    """Every figure of B against A, and the parameters in which they differ."""
+    """Every figure of A and of B, and the parameters in which they differ.
+
+    The figures are compared once both runs are finished: those of a run under way are of the
+    filter's tracks, which smoothing changes.
+    """
+    compared = compare(a[1], b[1])
+    if not (a[0].final and b[0].final):
+        compared = tuple(replace(row, difference=None, verdict="undefined") for row in compared)
     before, after = a[0].parameters, b[0].parameters
     return models.Comparison(
         against=against,
@@ -219,7 +227,7 @@ def comparison_of(
                     if name not in ("name", "label", "settings")
                 },
             )
-            for row in compare(a[1], b[1])
+            for row in compared
         ],
     )
 
@@ -228,7 +236,7 @@ def _side(scored: Scored) -> models.ComparedRun:
     return models.ComparedRun(
         run=scored.key,
         steps=scored.steps,
-        partial=not scored.complete,
+        partial=not scored.final,
         changed=changed(scored),
     )
 

@@ -96,7 +96,7 @@ class EvaluationInfo(Model):
     steps: int
     """Steps 0 … ``steps`` − 1 were scored."""
     partial: bool
-    """Whether steps of the sequence are missing."""
+    """Whether the run was not finished: steps are missing, or smoothing was still to come."""
     settings: dict[str, Any]
     figures: list[FigureInfo]
     per_person: list[PersonInfo]

@@ -11,7 +11,7 @@ from app.models import State
 from app.state.scores import Scored
 from app.state.snapshot import Snapshot
 from app.state.workers.evaluator import Evaluator
-from app.web.dependencies import ERRORS, Bench, Part, file_name, nothing_open
+from app.web.dependencies import ERRORS, Bench, Part, file_name, not_finished, nothing_open
 from app.web.evaluation import messages, models
 from app.web.views import results
 from app.web.views.link import address_of
@@ -75,8 +75,8 @@ def series(
 def comparison(bench: Bench, evaluator: Scorer) -> models.Comparison | None:
     """The run scored last, B, against the pinned or else the previous finished one, A.
 
-    While B is under way, A counts as far as B has come. Null where there is no A: none is
-    pinned, and none was finished before.
+    While B is under way, both stand as far as B has come, and no figure is called better. Null
+    where there is no A: none is pinned, and none was finished before.
     """
     snapshot = bench.snapshot()
     b = _evaluated(snapshot, snapshot.scores.shown)
@@ -106,13 +106,7 @@ async def pin(bench: Bench) -> State:
         if snapshot.sequence is None:
             raise nothing_open()
         done = snapshot.run.done if snapshot.run is not None else 0
-        raise ApiError(
-            409,
-            "not_finished",
-            f"Only a finished run can be pinned: {done} of {snapshot.sequence.frames} steps "
-            "are there.",
-            hint="Wait for its end, or go on with it by POST /api/run.",
-        )
+        raise not_finished("can be pinned", done, snapshot.sequence.frames)
     return results.state_of(bench.snapshot())
 
 
@@ -129,11 +123,13 @@ async def unpin(bench: Bench) -> State:
     responses={200: {"content": {"text/html": {}}, "description": "The report."}},
 )
 def export_report(request: Request, bench: Bench, evaluator: Scorer) -> Response:
-    """The run scored last as one HTML file; ``X-Run-Partial`` says whether steps are missing."""
+    """The finished run against the truth, as one HTML file."""
     from tracker.evaluation.report.page import report_html  # brings plotly
 
     snapshot = bench.snapshot()
     scored, evaluated = _evaluated(snapshot, snapshot.scores.shown)
+    if not scored.final:
+        raise not_finished("has a report", scored.steps, scored.sequence.frames)
     reference = snapshot.scores.reference
     sequence = snapshot.named(scored.sequence)
     text = report_html(
@@ -155,7 +151,5 @@ def export_report(request: Request, bench: Bench, evaluator: Scorer) -> Response
             "content-disposition": f'attachment; filename="{name}"',
             "cache-control": "no-store",
             "x-run-key": scored.key,
-            "x-run-partial": "false" if scored.complete else "true",
-            "x-run-steps": f"{scored.steps}/{scored.sequence.frames}",
         },
     )

@@ -9,6 +9,7 @@ import numpy as np
 from app.colours import track_index
 from app.models import TrackLife
 from app.web.library.models import ChangeInfo, Course, KeptRunInfo
+from app.web.library.preview import BUCKETS
 from app.web.tables.markup import (
     Cell,
     Markup,
@@ -20,6 +21,8 @@ from app.web.tables.markup import (
     symbol,
     table,
 )
+from tracker.library.keeping import CURVE, stride
+from tracker.library.records import PROVISIONAL
 from tracker.sequences.sequence import Room
 
 MOST_LANES = 6
@@ -46,7 +49,8 @@ def preview(
 
     The room is drawn where it is known: that of the open recording.
     """
-    curves = _curve("People", "", people) + (_curve("OSPA", " m", ospa) if ospa else "")
+    curves = _curve("People", "", people, frames, stride(frames, BUCKETS))
+    curves += _curve("OSPA", " m", ospa, frames, stride(frames, CURVE)) if ospa else ""
     return (
         f'<div class="pv-lanes">{_lanes(run, frames, tracks)}{curves}</div>'
         f'<div class="pv-top">{_ways(courses, room)}</div>'
@@ -70,23 +74,29 @@ def comparison(runs: Sequence[KeptRunInfo]) -> str:
     for key, change in known.items():
         own = [next((c.value for c in run.changes if c.key == key), change.default) for run in runs]
         rows.append((_named(change), *own))
-    for word, name, digits, sign in _FIGURES:
-        values_of = [getattr(run, name) for run in runs]
-        there = [sign * value for value in values_of if value is not None]
-        best = max(there, default=0) if sign and len(there) > 1 else None
-        alone = there.count(best) == 1 if best is not None else False
-        rows.append(
-            (
-                word,
-                *(
-                    Markup(f'<b class="top1">{number(value, digits)}</b>')
-                    if alone and value is not None and sign * value == best
-                    else number(value, digits)
-                    for value in values_of
-                ),
-            )
-        )
+    rows += [_side_by_side(runs, *figure) for figure in _FIGURES]
+    if any(run.provisional for run in runs):
+        rows.append(("Figures", *(PROVISIONAL if run.provisional else "" for run in runs)))
     return table("Runs side by side", ("What", *(f"#{title_of(run)}" for run in runs)), rows)
+
+
+def _side_by_side(
+    runs: Sequence[KeptRunInfo], word: str, name: str, digits: int, sign: int
+) -> tuple[Cell, ...]:
+    """A figure of several runs, the best bold: provisional ones are shown, not compared."""
+    scores = name != "targets"
+    values = [(getattr(run, name), sign != 0 and not (scores and run.provisional)) for run in runs]
+    there = [sign * value for value, compared in values if compared and value is not None]
+    best = max(there) if len(there) > 1 else None
+    alone = best is not None and there.count(best) == 1
+    cells: list[Cell] = []
+    for run, (value, compared) in zip(runs, values, strict=True):
+        text = number(value, digits)
+        if alone and compared and value is not None and sign * value == best:
+            cells.append(Markup(f'<b class="top1">{text}</b>'))
+        else:
+            cells.append(quiet(f"({text})") if scores and run.provisional else text)
+    return (word, *cells)
 
 
 def title_of(run: KeptRunInfo) -> str:
@@ -108,14 +118,16 @@ def _facts(run: KeptRunInfo) -> str:
         f'value="{escaped(run.note)}">'
     )
     error = "–" if run.position_error is None else f"{number(run.position_error, 3)} m"
+    marked = quiet if run.provisional else str
     facts: list[tuple[Cell, Cell]] = [
         ("Note", note),
         *((_named(c), joined(quiet(f"{c.default} → "), c.value)) for c in run.changes),
         *([("Corrections of a person", run.corrected)] if run.corrected else []),
-        ("Missed", number(run.misses, 0)),
-        ("False", number(run.false_positives, 0)),
-        ("Identity switches", number(run.id_switches, 0)),
-        ("Position error", error),
+        *([("Figures", f"provisional: {PROVISIONAL}")] if run.provisional else []),
+        ("Missed", marked(number(run.misses, 0))),
+        ("False", marked(number(run.false_positives, 0))),
+        ("Identity switches", marked(number(run.id_switches, 0))),
+        ("Position error", marked(error)),
         ("Seed", run.seed),
         ("Program", _program(run)),
     ]
@@ -155,16 +167,21 @@ def _ticks(frames: int) -> str:
     )
 
 
-def _curve(word: str, unit: str, values: Sequence[float]) -> str:
-    """A staircase over the steps; people are whole, everything else ends where it is largest."""
+def _curve(word: str, unit: str, values: Sequence[float], frames: int, each: int) -> str:
+    """A staircase over the steps; people are whole, everything else ends where it is largest.
+
+    A value stands for ``each`` steps, so that a curve of fewer steps than the run has ends early.
+    """
     most = max([0.1 if unit else 1.0, *values])
     top = f"{most:.2f}" if unit else f"{most:.0f}"
     points = " ".join(
-        f"{at},{most - value:g}" for k, value in enumerate(values) for at in (k, k + 1)
+        f"{min(at * each, frames)},{most - value:g}"
+        for k, value in enumerate(values)
+        for at in (k, k + 1)
     )
     return (
         f'<div class="crowd"><span>{word}{unit}<br><span class="q">0–{top}</span></span>'
-        f'<svg viewBox="0 0 {max(1, len(values))} {most:g}" preserveAspectRatio="none" role="img" '
+        f'<svg viewBox="0 0 {max(1, frames)} {most:g}" preserveAspectRatio="none" role="img" '
         f'aria-label="{word} over time, at most {top}{unit}"><polyline points="{points}"/></svg>'
         "</div>"
     )

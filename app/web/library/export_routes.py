@@ -13,7 +13,7 @@ from app.errors import ApiError, sentence
 from app.models import Model
 from app.models.base import RowNumber
 from app.state.workers.exporter import Exporter
-from app.web.dependencies import ERRORS, Bench
+from app.web.dependencies import ERRORS, Bench, not_finished
 from app.web.library.routes import Kept, no_library
 from app.web.views.link import address_of
 from tracker.library.errors import LibraryError
@@ -119,7 +119,9 @@ def begin(
                 "There are no tracks yet: nothing has been computed.",
                 hint="Wait for the run's first steps, or start it again.",
             )
-        done = run.done
+        done, frames = run.done, run.sequence.frames
+        if form.needs_truth and not run.finished:
+            raise not_finished("has a report", done, frames)
         rows = slice(0, run.tracks.at(done).start)
         columns = (getattr(run.tracks, name)[rows] for name in type(run.tracks).__slots__)
         named = now.named(run.sequence)

@@ -89,6 +89,8 @@ class KeptRunInfo(Model):
     tags: list[str]
     corrected: int
     """How many corrections of a person it obeys."""
+    provisional: bool
+    """Whether its figures were made before it was finished; opening it computes them again."""
 
 
 class KeptRuns(Model):
@@ -115,7 +117,8 @@ class Preview(Model):
     """Targets at each of equally many steps, their mean."""
     courses: list[Course]
     ospa: list[float]
-    """Its mean over equally many steps each, metres; empty without a truth."""
+    """Its mean over equally many steps each, metres; empty without a truth, and where the figures
+    are provisional."""
 
 
 class Place(Model):

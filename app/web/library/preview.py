@@ -7,6 +7,7 @@ import numpy as np
 from app.models import TrackLife
 from app.web.library.models import Course
 from app.web.views.timeline import Window, lives_of
+from tracker.library.keeping import stride
 from tracker.trajectories import Trajectories
 
 BUCKETS = 600
@@ -24,7 +25,7 @@ def lanes(tracks: Trajectories, steps: int, fps: float) -> list[TrackLife]:
 def people(tracks: Trajectories, steps: int) -> list[float]:
     """The mean number of targets in each of equally many steps."""
     count = np.bincount(tracks.frames, minlength=steps)[:steps]
-    starts = np.arange(0, steps, max(1, -(-steps // BUCKETS)))
+    starts = np.arange(0, steps, stride(steps, BUCKETS))
     sizes = np.diff(np.append(starts, steps))
     mean: list[float] = (np.add.reduceat(count, starts) / sizes).round(2).tolist() if steps else []
     return mean

@@ -168,7 +168,7 @@ def _small(opened: Library, result: Result) -> models.Preview:
         tracks=preview.lanes(tracks, result.run.steps, fps),
         people=preview.people(tracks, result.run.steps),
         courses=preview.courses(tracks, fps),
-        ospa=list(result.ospa),
+        ospa=[] if result.run.provisional else list(result.ospa),
     )
 
 

@@ -56,7 +56,7 @@ def event_table(
         [] if run is None else list(timelines.events(sequence, run))
     )
     scored = snapshot.scores.shown
-    if run is not None and scored is not None and scored.key == run.key and scored.evaluation:
+    if run is not None and scored is not None and scored.is_of(run) and scored.evaluation:
         found += [(s.step, s.track, "switch") for s in messages.switches_of(scored.evaluation)]
     check: IdentityCheck = request.app.state.identity_check
     if kind == "doubt":

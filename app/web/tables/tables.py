@@ -160,8 +160,9 @@ def _curves(snapshot: Snapshot, sequence: Sequence, message: Step) -> str:
     ]
     if sequence.ground_truth is not None:
         rows.insert(0, ("People, true", sum(person.valid for person in message.truth), None))
-    scores = snapshot.scores
-    shown = [scores.shown, scores.reference[1] if scores.reference is not None else None]
+    scores, run = snapshot.scores, snapshot.run
+    b = scores.shown if run is not None and scores.shown and scores.shown.is_of(run) else None
+    shown = [b, scores.reference[1] if scores.reference is not None else None]
     for name, words in (
         ("ospa", "OSPA"),
         ("ospa_localisation", "OSPA, location"),
@@ -395,7 +396,7 @@ def _shown(snapshot: Snapshot, scored: Scored) -> str:
 def _side(words: str, scored: Scored) -> str:
     count = len(messages.changed(scored))
     changes = f"{count} change{'s' if count > 1 else ''}" if count else "default parameters"
-    return f"{words}, {changes}{'' if scored.complete else ', partial'}"
+    return f"{words}, {changes}{'' if scored.final else ', not finished'}"
 
 
 def _verdict(verdict: Verdict) -> Markup:

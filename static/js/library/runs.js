@@ -11,6 +11,13 @@ const FIGURES = /** @type {const} */ ([
 	["ospa", "OSPA m", 0.2, 0, -1],
 ]);
 
+/**
+ * A figure that is compared with those of other runs; none while it is provisional.
+ * @param {Server.KeptRunInfo} run
+ * @param {(typeof FIGURES)[number][0]} key
+ */
+const final = (run, key) => (run.provisional ? null : run[key]);
+
 /** Tracks that begin in a minute, where nothing can be scored. */
 const LIVES = "Tracks/min";
 
@@ -107,6 +114,17 @@ export function runsTable(on) {
 							" older code",
 						)
 					: null,
+				run.provisional
+					? h(
+							"span",
+							{
+								class: "q",
+								title:
+									"Its figures were made before it was finished; opening it computes them again",
+							},
+							" provisional figures",
+						)
+					: null,
 			],
 		},
 		{ word: "When", kind: "q", by: (run) => run.began, cell: (run) => when(run.began) },
@@ -118,8 +136,9 @@ export function runsTable(on) {
 		...FIGURES.map(([key, word, from, to]) => ({
 			word,
 			kind: "num met",
-			by: (/** @type {Server.KeptRunInfo} */ run) => run[key] ?? -Infinity,
+			by: (/** @type {Server.KeptRunInfo} */ run) => final(run, key) ?? -Infinity,
 			cell: (/** @type {Server.KeptRunInfo} */ run) => {
+				if (run.provisional) return h("span", { class: "q" }, `(${figure(run[key])})`);
 				const value = run[key];
 				const share = value === null ? 0 : (value - from) / (to - from);
 				return [
@@ -211,7 +230,7 @@ export function runsTable(on) {
 			ticked = chosen;
 			[fps, scored] = [recording?.fps ?? 0, recording?.people !== null];
 			for (const [key, , , , sign] of FIGURES) {
-				const values = runs.map((run) => run[key]).filter((value) => value !== null);
+				const values = runs.map((run) => final(run, key)).filter((value) => value !== null);
 				best[key] = values.length > 1 ? sign * Math.max(...values.map((v) => sign * v)) : null;
 			}
 			table.show(runs);

@@ -308,7 +308,7 @@ declare namespace Server {
 		run: string;
 		/** Steps 0 … ``steps`` − 1 were scored. */
 		steps: number;
-		/** Whether steps of the sequence are missing. */
+		/** Whether the run was not finished: steps are missing, or smoothing was still to come. */
 		partial: boolean;
 		settings: Record<string, any>;
 		figures: FigureInfo[];
@@ -679,6 +679,8 @@ declare namespace Server {
 		tags: string[];
 		/** How many corrections of a person it obeys. */
 		corrected: number;
+		/** Whether its figures were made before it was finished; opening it computes them again. */
+		provisional: boolean;
 	}
 
 	/** The runs of one recording, the newest first. */
@@ -850,7 +852,10 @@ declare namespace Server {
 		/** Targets at each of equally many steps, their mean. */
 		people: number[];
 		courses: Course[];
-		/** Its mean over equally many steps each, metres; empty without a truth. */
+		/**
+		 * Its mean over equally many steps each, metres; empty without a truth, and where the figures
+		 * are provisional.
+		 */
 		ospa: number[];
 	}
 

@@ -95,6 +95,7 @@ def run(of: Sequence, done: int | None = None, clutter: int = 4, walkers: int = 
         result.fused, cameras=len(of.views), extraction_threshold=0.5
     )
     result.done = len(result.fused)
+    result.finished = result.complete
     return result
 
 
