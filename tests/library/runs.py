@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -70,3 +72,10 @@ def filled(path: Path, count: int) -> Library:
     for number in range(count):
         library.keep(RECORDING, run(number))
     return library
+
+
+def made_by_the_version_before(path: Path) -> None:
+    """Have the file as it was before it told final figures from provisional ones."""
+    with closing(sqlite3.connect(path, isolation_level=None)) as connection:
+        connection.execute("ALTER TABLE runs DROP COLUMN final")
+        connection.execute("PRAGMA user_version = 2")

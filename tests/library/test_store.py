@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.library.runs import KEPT, RECORDING, filled, run
+from tests.library.runs import KEPT, RECORDING, filled, made_by_the_version_before, run
 from tracker.library import schema
 from tracker.library.errors import LibraryError
 from tracker.library.keeping import remarks_of
@@ -163,3 +163,36 @@ def test_what_a_person_corrected_is_kept_with_the_run(path: Path) -> None:
         assert library.result(plain).corrections == ()
         assert remarks_of(library.result(plain)) == ()
         assert remarks_of(library.result(number)) == ("1 correction of a person obeyed",)
+
+
+def test_figures_that_the_page_stored_before_are_provisional_until_they_are_made_anew(
+    path: Path,
+) -> None:
+    with Library(path) as library:
+        library.keep(RECORDING, run(1, source="page", ospa=(0.3, 0.4)))
+        library.keep(RECORDING, run(2, source="track"))
+        library.keep(RECORDING, run(3, source="batch"))
+        library.keep(RECORDING, run(4, source="page", figures={"missing_pictures": 2}))
+    made_by_the_version_before(path)
+    with Library(path) as library:
+        library.keep(RECORDING, run(5, source="page"))
+        assert {one.id: one.provisional for one in library.runs()} == {
+            1: True, 2: False, 3: False, 4: False, 5: False,
+        }  # fmt: skip
+        assert library.run(1).to_json()["provisional"] is True
+        library.score(1, {"mota": 0.7, "misses": 9}, (0.1, 0.2))
+        result = library.result(1)
+        assert not result.run.provisional
+        assert (result.run.mota, result.run.idf1, result.run.misses) == (0.7, None, 9)
+        assert (result.figures["mota"], result.ospa) == (0.7, (0.1, 0.2))
+        np.testing.assert_array_equal(result.kept.tracks.positions, KEPT.tracks.positions)
+
+
+def test_a_run_that_is_computed_again_has_final_figures(path: Path) -> None:
+    with Library(path) as library:
+        library.keep(RECORDING, run(1, source="page"))
+    made_by_the_version_before(path)
+    with Library(path) as library:
+        library.keep(RECORDING, run(1, source="page", figures={"mota": 0.6, "misses": 1}))
+        assert not library.run(1).provisional
+        assert library.run(1).mota == 0.6

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.library.runs import RECORDING, filled, run
+from tests.library.runs import RECORDING, filled, made_by_the_version_before, run
 from tracker.library import repair
 from tracker.library.errors import LibraryError, told
 from tracker.library.store import Library, open_library
@@ -120,3 +120,12 @@ def test_flipped_bytes(path: Path, tmp_path: Path) -> None:
 @pytest.mark.long
 def test_flipped_bytes_500_times(path: Path, tmp_path: Path) -> None:
     try_flipped(path, tmp_path, 500)
+
+
+def test_a_file_of_the_version_before_is_checked_and_repaired(path: Path) -> None:
+    made_by_the_version_before(path)
+    assert repair.check(path) == repair.Checked((), 4)
+    _, saved, lost = repair.repair(path)
+    assert (saved, lost) == (4, 0)
+    with Library(path) as library:
+        assert [one.provisional for one in library.runs()] == [False] * 4

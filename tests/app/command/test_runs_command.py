@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.app.conftest import Runs
-from tests.library.runs import RECORDING, filled
+from tests.library.runs import RECORDING, filled, made_by_the_version_before
 from tests.library.runs import run as made
 from tracker.library.store import Library
 from tracker.parameters import RunParameters, with_values
@@ -154,3 +154,20 @@ def test_check_and_repair(run: Runs, path: Path) -> None:
     assert Path(told["copy"]).is_file()
     assert [r["id"] for r in asked(run, "list", "--library", path)] == [3, 1]
     assert run("library", "check", "--library", path)[0] == 0
+
+
+def test_provisional_figures_are_in_brackets_with_what_to_do(run: Runs, path: Path) -> None:
+    with Library(path) as library:
+        library.keep(RECORDING, made(1, source="page"))
+        library.keep(RECORDING, made(2, source="track"))
+    made_by_the_version_before(path)
+    _, out, err = run("runs", "list", "--library", path)
+    assert out.count("(0.900)") == 1
+    assert out.count(" 0.900") == 1
+    assert "in brackets are provisional: made before the run was finished" in err
+    assert [one["provisional"] for one in asked(run, "list", "--library", path)] == [False, True]
+    _, out, _ = run("runs", "show", "1", "--library", path)
+    assert "provisional: made before" in out
+    assert "(0.900)" in out
+    told = asked(run, "diff", "1", "2", "--library", path)
+    assert told["provisional"] == [1]

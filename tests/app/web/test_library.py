@@ -13,6 +13,7 @@ from starlette.testclient import TestClient
 from app.state.workers import keeper
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, is_evaluated, run_is, wait_until
+from tests.library.runs import made_by_the_version_before
 from tracker.library.errors import LibraryError
 from tracker.library.store import Library
 
@@ -277,3 +278,28 @@ def test_a_damaged_library_is_told_and_the_workbench_goes_on(data: Path, path: P
 def test_a_workbench_without_a_library_keeps_nothing(client: TestClient) -> None:
     told = client.get("/api/library").json()
     assert "without a library" in told["error"]
+
+
+def test_provisional_figures_are_marked_and_made_anew_when_their_run_is_opened(
+    data: Path, path: Path
+) -> None:
+    with application(data, path) as client:
+        wait_until(lambda: len(runs_of(client)) == 1)
+        (true,) = runs_of(client)
+        ospa = client.get(f"/api/library/runs/{true['id']}").json()["ospa"]
+    with Library(path) as library:
+        library.score(true["id"], {"mota": 0.25, "misses": 77}, [0.5] * 50)
+    made_by_the_version_before(path)
+    with application(data, path, "numbers") as client:
+        (before,) = runs_of(client)
+        assert (before["provisional"], before["mota"]) == (True, 0.25)
+        small = client.get(f"/api/library/runs/{true['id']}").json()
+        assert small["ospa"] == []
+        drawn = client.get(f"/api/library/runs/{true['id']}/drawn").text
+        assert "provisional: made before the run was finished" in drawn
+        assert "OSPA over time" not in drawn
+        client.post(f"/api/library/runs/{true['id']}/open")
+        wait_until(lambda: not runs_of(client)[0]["provisional"])
+        assert runs_of(client) == [true]
+        small = client.get(f"/api/library/runs/{true['id']}").json()
+        assert small["ospa"] == ospa
