@@ -367,7 +367,7 @@ def test_which_run_is_the_one_before(sequence: Sequence) -> None:
     run = pipeline.compute(sequence, pipeline.default_parameters(sequence))
     evaluation = evaluate_sequence(sequence, run.tracks)
     a, b, c = (replace(Scored.of(run), key=key, evaluation=evaluation) for key in ("a", "b", "c"))
-    part = replace(b, steps=10)
+    part = replace(b, steps=10, final=False)
     scores = Scores()
     assert scores.reference is None
     for scored, before in [(a, None), (part, "a"), (b, "a"), (b, "a"), (c, "b"), (part, "c")]:
