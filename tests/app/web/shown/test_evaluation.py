@@ -21,7 +21,7 @@ from app.state.scores import Scored, Scores
 from app.state.workbench import Workbench
 from app.state.workers import evaluator as worker
 from app.state.workers.evaluator import Evaluator
-from app.web.evaluation.messages import axis_end
+from app.web.evaluation.messages import axis_end, comparison_of
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, connect, is_evaluated, run_is, wait_until
 from tests.app.folders import FRAMES
@@ -377,6 +377,21 @@ def test_which_run_is_the_one_before(sequence: Sequence) -> None:
     assert scores.pin(a).reference == ("pinned", a)
     unscored = replace(b, evaluation=None)
     assert scores.pin(unscored).pinned is b
+
+
+def test_of_a_run_under_way_no_figure_is_called_better(sequence: Sequence) -> None:
+    parameters = pipeline.default_parameters(sequence)
+    run = pipeline.compute(sequence, parameters)
+    part = pipeline.compute(sequence, with_values(parameters, {P_D: 0.05}), steps=60)
+    a, b = (
+        (Scored.of(one), evaluate_sequence(sequence, one.tracks, steps=part.done))
+        for one in (run, part)
+    )
+    assert (a[0].final, b[0].final) == (True, False)
+    told = comparison_of("previous", a, b)
+    assert (told.a.partial, told.b.partial) == (False, True)
+    assert {(row.difference, row.verdict) for row in told.rows} == {(None, "undefined")}
+    assert [row.b for row in told.rows] == [figure.value for figure in b[1].figures]
 
 
 def test_every_figure_is_json(client: TestClient) -> None:
