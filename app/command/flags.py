@@ -17,7 +17,7 @@ from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subc
 from app.command.arguments.corrections import Corrections, LogFile
 from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
 from app.command.arguments.library import Bundle, FormatName, LibraryCommand, LibraryFile, Runs
-from app.command.arguments.rooms import Benchmark, Parameters, Render, Sequences
+from app.command.arguments.listing import Benchmark, Parameters, Sequences
 from app.command.arguments.studies import Batch, Study, Tune
 from app.command.arguments.templates import Templates
 from tracker import parameters as table
@@ -296,7 +296,6 @@ Arguments = (
     | Formats
     | ExportCalibration
     | Sequences
-    | Render
     | Parameters
     | Runs
     | Bundle
@@ -334,7 +333,6 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         | Annotated[Formats, subcommand("formats")]
         | Annotated[ExportCalibration, subcommand("export-calibration")]
         | Annotated[Sequences, subcommand("sequences")]
-        | Annotated[Render, subcommand("render")]
         | Annotated[Parameters, subcommand("parameters")]
         | Annotated[Runs, subcommand("runs")]
         | Annotated[Bundle, subcommand("bundle")]

@@ -21,7 +21,7 @@ from app.command import supervision
 from app.command.arguments.corrections import Corrections
 from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
 from app.command.arguments.library import Bundle, LibraryCommand, OpenRun, Runs
-from app.command.arguments.rooms import Benchmark, Parameters, Render, Sequences
+from app.command.arguments.listing import Benchmark, Parameters, Sequences
 from app.command.arguments.studies import Batch, Study, Tune
 from app.command.arguments.templates import Templates
 from app.command.flags import (
@@ -97,10 +97,6 @@ def _run(command: Arguments) -> int:
             from app.command.commands.listing import sequences
 
             sequences(command)
-        case Render():
-            from app.command.commands.listing import render
-
-            render(command)
         case Parameters():
             from app.command.commands.listing import parameters
 
@@ -190,6 +186,7 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     from app.web.access.tokens import PARAMETER, Keys, new_token, own_token
     from tracker.library.records import Result
     from tracker.sequences import library
+    from tracker.sequences.built_in import BUILT_IN
 
     gc.freeze()
     gc.enable()
@@ -202,7 +199,7 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     new = new_token() if life is None else life.token
     keys = Keys(own_token(os.environ) or new) if command.token else None
     place = locate(command.sequence, command.data)
-    if not library.is_room(place):
+    if place not in BUILT_IN:
         library.open_sequence(place)  # what cannot be read is told here, before a page is open
     if command.detector is not None:
         from tracker.single_view.onnx.network import Network

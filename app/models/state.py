@@ -67,10 +67,6 @@ class OpeningInfo(Model):
     """A sequence on its way."""
 
     name: str
-    message: str
-    done: int
-    total: int
-    """0 while it is not known."""
 
 
 class MethodsInfo(Model):
@@ -230,8 +226,6 @@ class SequenceEntryInfo(Model):
     kind: Literal["rendered", "folder"]
     cameras: int | None
     frames: int | None
-    ready: bool
-    """Whether it opens without rendering."""
     error: str | None = None
     """Why it cannot be opened."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import threading
 from collections.abc import Callable, Sequence
@@ -17,7 +16,8 @@ from app.state.snapshot import Change
 from app.state.workbench import Workbench
 from tracker.corrections import Correction, CorrectionError
 from tracker.corrections.contradictions import refuse_contradiction, said_again
-from tracker.corrections.log import Log, open_log, own_place, write_log, writing_place
+from tracker.corrections.log import Log, open_log, own_place, remark_on, write_log, writing_place
+from tracker.sequences.built_in import key_of
 from tracker.sequences.sequence import Sequence as Recording
 
 logger = logging.getLogger("app")
@@ -212,12 +212,13 @@ class Correcting:
             self._read_history()
             self._mark = _mark_of(self._log.path)
         self._complain()
+        if remark := remark_on(recording.folder):
+            self._workbench.notify("info", remark)
 
     def _history_file(self) -> Path | None:
         if self._folder is None or self._recording is None:
             return None
-        name = hashlib.sha256(str(self._recording.folder.absolute()).encode()).hexdigest()[:16]
-        return self._folder / f"{name}.history.json"
+        return self._folder / f"{key_of(self._recording.folder)}.history.json"
 
     def _keep_history(self) -> None:
         path = self._history_file()

@@ -90,12 +90,9 @@ class RunState:
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """A sequence that is being rendered or read."""
+    """A sequence that is being read."""
 
     name: str
-    message: str
-    done: int = 0
-    total: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,7 +49,7 @@ async def schema() -> models.Schema:
 
 @router.get("/sequences")
 def sequences(request: Request) -> models.SequenceList:
-    """The rendered rooms and the folders under the data folder."""
+    """The built-in rooms and the folders under the data folder."""
     data: Path | None = request.app.state.settings.data
     return models.SequenceList(
         sequences=[
@@ -59,7 +59,6 @@ def sequences(request: Request) -> models.SequenceList:
                 kind=entry.kind,
                 cameras=entry.cameras,
                 frames=entry.frames,
-                ready=entry.ready,
                 error=entry.error,
             )
             for entry in library.available(data)

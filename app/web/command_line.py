@@ -7,7 +7,7 @@ from typing import Any
 
 from app.state.snapshot import Snapshot
 from tracker import parameters as table
-from tracker.folders import cache_folder
+from tracker.sequences.built_in import opens_by_name
 from tracker.sequences.sequence import Sequence
 
 
@@ -35,9 +35,9 @@ def command_line(snapshot: Snapshot) -> str:
 
 
 def _named(sequence: Sequence) -> str:
-    """A rendered room by its name, anything else by its folder."""
-    rendered = cache_folder() in sequence.folder.absolute().parents
-    return sequence.name if rendered else str(sequence.folder.absolute())
+    """A room by its name, anything else by its folder."""
+    folder = sequence.folder.absolute()
+    return folder.name if opens_by_name(folder) else str(folder)
 
 
 def _written(value: Any) -> str:

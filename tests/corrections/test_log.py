@@ -20,10 +20,12 @@ from tracker.corrections.log import (
     parse,
     place_of,
     read_log,
+    remark_on,
     write_log,
     writing_place,
 )
 from tracker.corrections.merging import difference, merge
+from tracker.sequences.built_in import ROOMS
 
 _NUMBERS = st.floats(-50.0, 50.0).map(lambda v: round(v, 4))
 _TIMES = st.datetimes(datetime(2020, 1, 1), datetime(2030, 1, 1)).map(
@@ -84,6 +86,40 @@ kind = "here"
 time = 2026-11-22T11:32:09Z
 places = [[3, 5.0, 2.0, 0.8]]
 """
+
+
+@pytest.fixture
+def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("MULTIVIEW_PHD_SETTINGS", str(tmp_path / "settings"))
+    monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "settings" / "corrections"
+
+
+def test_the_log_of_a_built_in_room_lies_under_its_name_in_the_settings(settings: Path) -> None:
+    folder = ROOMS / "room44-3p"
+    assert place_of(folder) == writing_place(folder) == settings / "room44-3p.toml"
+    assert remark_on(folder) is None
+
+
+def test_a_log_made_on_a_room_as_it_was_rendered_counts_with_a_remark_until_one_is_added(
+    settings: Path, tmp_path: Path
+) -> None:
+    rendered = tmp_path / "cache" / "rooms" / "version-4" / "room44-3p-2-cameras"
+    rendered.mkdir(parents=True)
+    earlier = place_of(rendered)  # as an earlier version of the program found it
+    write_log(earlier, parse(LOG, "log"))
+    before = earlier.read_bytes()
+    folder = ROOMS / "room44-3p"
+    log = open_log(folder)
+    assert (log.path, len(log.corrections)) == (earlier, 2)
+    assert "as it was rendered before" in str(remark_on(folder))
+    assert remark_on(rendered) is None
+    assert open_log(ROOMS / "room24-2p").corrections == ()
+    added = (*log.corrections, make(kind="name", places=[[3, 5.0, 2.0, 0.8]], name="Anna"))
+    write_log(writing_place(folder), added)
+    assert open_log(folder).corrections == added
+    assert remark_on(folder) is None
+    assert earlier.read_bytes() == before
 
 
 def test_who_is_tied_together_is_not_parted() -> None:

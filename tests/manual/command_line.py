@@ -19,7 +19,6 @@ multiview-phd serve [SEQUENCE] [--data DIR]           # the workbench; without S
 multiview-phd track SEQUENCE -o tracks.csv            # the pipeline without a browser
 multiview-phd track SEQUENCE -o tracks.csv --preset published --set fusion.clutter_rate=1.5
 multiview-phd evaluate SEQUENCE tracks.csv --html report.html
-multiview-phd render room35-2p FOLDER --cameras 3     # a rendered room as an ordinary sequence
 ```
 
 `SEQUENCE` is a folder or a built-in name. Every parameter is a flag of `track` as well; what each

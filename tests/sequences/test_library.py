@@ -1,21 +1,27 @@
-"""Sequences by name: the cache of rendered rooms, folders, and the list of both."""
+"""Sequences by name: the built-in rooms, the cache of earlier versions, folders, and the list."""
 
 from __future__ import annotations
 
 import os
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from tests.synthetic import write_sequence
 from tracker.folders import cache_folder
-from tracker.sequences import library, rendering
+from tracker.sequences import library
+from tracker.sequences.built_in import (
+    BUILT_IN,
+    ROOMS,
+    built_in_name,
+    cached_rooms,
+    key_of,
+    opens_by_name,
+)
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
-from tracker.sequences.rendering.writing import SUMS, is_whole, whole_folder
 from tracker.sequences.sequence import SequenceError
 from tracker.sequences.writing.saving import save, save_copy
 
@@ -27,96 +33,78 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-@pytest.fixture
-def rendered(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The names of the rooms rendered, in order; a quick stand-in draws numbers in their place."""
-    names: list[str] = []
-
-    def quick(
-        name: str, folder: Path, *, cameras: int, progress: library.Told, **_: object
-    ) -> None:
-        names.append(name)
-        progress(1, 2)
-        with whole_folder(folder) as work:
-            write_sequence(work, frames=2, cameras=cameras)
-        progress(2, 2)
-
-    monkeypatch.setattr(rendering, "render", quick)
-    return names
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_a_built_in_room_opens_at_once_with_pictures_truth_and_templates(name: str) -> None:
+    sequence = library.open_sequence(name)
+    assert sequence.name == name
+    assert (len(sequence.views), sequence.frames) == (2, 600)
+    assert sequence.has_pictures
+    assert not sequence.warnings
+    truth = sequence.ground_truth
+    assert truth is not None
+    assert {f"person{one}" for one in truth.ids} == {one.name for one in sequence.templates}
+    with FrameReader(sequence) as reader:
+        assert all(reader.picture(camera, 599) is not None for camera in range(2))
 
 
-def test_a_room_is_rendered_once(rendered: list[str], cache: Path) -> None:
-    told: list[tuple[int, int]] = []
-    first = library.open_sequence("room24-2p", progress=lambda *steps: told.append(steps))
-    again = library.open_sequence("room24-2p")
-    assert rendered == ["room24-2p"]
-    assert told == [(1, 2), (2, 2)]
-    assert first.digest == again.digest
-    assert first.has_pictures
-    assert first.folder.is_relative_to(cache)
-    assert f"version-{rendering.VERSION}" in first.folder.parts
-    entries = {entry.name: entry for entry in library.available()}
-    assert entries["room24-2p"].ready
-    assert not entries["room44-3p"].ready
+def test_the_built_in_rooms_are_small_enough_to_be_part_of_the_program() -> None:
+    files = [path for path in ROOMS.rglob("*") if path.is_file()]
+    assert {path.parent.name for path in files} == set(BUILT_IN)
+    assert sum(path.stat().st_size for path in files) <= 8_000_000
 
 
-def test_another_number_of_cameras_is_another_folder(rendered: list[str]) -> None:
-    def told(*_: int) -> None: ...
-
-    assert len(library.open_sequence("room24-2p", progress=told).views) == 2
-    assert len(library.open_sequence("room24-2p", progress=told, cameras=3).views) == 3
-    assert len(rendered) == 2
+def test_what_a_person_adds_to_a_built_in_room_lies_under_its_name() -> None:
+    assert key_of(library.open_sequence("room24-2p").folder) == "room24-2p"
 
 
-@pytest.mark.parametrize("spoilt", ["sequence.toml", "cam1.mp4"])
-def test_a_cached_room_that_was_spoilt_is_rendered_again(rendered: list[str], spoilt: str) -> None:
-    def told(*_: int) -> None: ...
-
-    folder = library.open_sequence("room24-2p", progress=told).folder
-    (folder / spoilt).unlink()
-    assert library.open_sequence("room24-2p", progress=told).has_pictures
-    assert rendered == ["room24-2p"] * 2
-
-
-def cut(path: Path) -> None:
-    os.truncate(path, path.stat().st_size // 2)
+def test_a_copy_of_a_built_in_room_shares_no_file_with_the_program(tmp_path: Path) -> None:
+    sequence = library.open_sequence("room24-2p")
+    with pytest.raises(SequenceError, match="room24-2p comes with the program and is never writt"):
+        save(sequence, sequence)
+    copied = save_copy(sequence, sequence, tmp_path / "mine")
+    assert copied.frames == sequence.frames
+    assert {path.stat().st_nlink for path in (tmp_path / "mine").iterdir()} == {1}
+    assert built_in_name(copied.folder) is None
 
 
-def flip(path: Path) -> None:
-    data = bytearray(path.read_bytes())
-    data[len(data) // 2] ^= 4
-    path.write_bytes(data)
+@pytest.mark.parametrize(
+    ("name", "place"),
+    [("random-6", "random/random-6"), ("room44-3p-3-cameras", "room44-3p-3-cameras")],
+)
+def test_a_room_of_an_earlier_version_opens_from_the_cache(name: str, place: str) -> None:
+    folder = cached_rooms() / place
+    write_sequence(folder, frames=2, cameras=3)
+    sequence = library.open_sequence(name)
+    assert sequence.folder == folder.resolve()
+    assert len(sequence.views) == 3
+    assert opens_by_name(sequence.folder)
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("spoil", [cut, flip])
-@pytest.mark.parametrize("name", ["sequence.toml", "cam1.mp4", "ground_truth.csv", SUMS])
-def test_a_cached_room_that_is_not_what_was_rendered_is_rendered_again(
-    rendered: list[str], spoil: Callable[[Path], None], name: str
-) -> None:
-    def told(*_: int) -> None: ...
-
-    folder = library.open_sequence("room24-2p", progress=told).folder
-    spoil(folder / name)
-    assert not is_whole(folder)
-    again = library.open_sequence("room24-2p", progress=told)
-    assert is_whole(folder)
-    assert not again.warnings
-    assert rendered == ["room24-2p"] * 2
+def test_rooms_of_seeds_in_the_cache_are_listed() -> None:
+    write_sequence(cached_rooms() / "random" / "random-6", frames=2)
+    (entry,) = (one for one in library.available() if one.name == "random-6")
+    assert (entry.kind, entry.error, entry.frames) == ("rendered", None, 2)
 
 
-def test_what_a_dead_process_began_to_render_is_swept_away(rendered: list[str]) -> None:
-    def told(*_: int) -> None: ...
+@pytest.mark.parametrize(
+    ("name", "makes"),
+    [
+        ("random-7", "random-7"),
+        ("room44-3p-3-cameras", "room44-3p --cameras 3"),
+        ("room24-2p-2-cameras", "room24-2p --cameras 2"),
+    ],
+)
+def test_a_room_that_is_not_in_the_cache_says_how_its_folder_is_made(name: str, makes: str) -> None:
+    assert library.is_room(name)
+    with pytest.raises(SequenceError) as caught:
+        library.open_sequence(name)
+    assert f"`python -m tests.rooms {makes} -o FOLDER`" in str(caught.value)
+    assert not cached_rooms().exists()
 
-    place = library.rendered_folder("room24-2p")
-    left = place.with_name(f".0123abcd.part.{place.name}")
-    (left / "deep").mkdir(parents=True)
-    fresh = place.with_name(f".4567abcd.part.{place.name}")
-    fresh.mkdir()
-    os.utime(left, (1e9, 1e9))
-    library.open_sequence("room24-2p", progress=told)
-    assert not left.exists()
-    assert fresh.exists()  # somebody may be at it now
+
+@pytest.mark.parametrize("name", ["random-x", "random-", "room44-3p-4-cameras", "rooms"])
+def test_other_names_are_no_rooms(name: str) -> None:
+    assert not library.is_room(name)
 
 
 NAMES = ["~nosuch", "a\0b", "x" * 300, "x/" * 3000, "\x1b[31m", "a\nb", "\ud800"]
@@ -162,9 +150,8 @@ def test_a_bad_folder_takes_no_other_from_the_list(tmp_path: Path) -> None:
     begin = time.monotonic()
     entries = {entry.name: entry for entry in library.available(tmp_path)}
     assert time.monotonic() - begin < 60.0
-    assert entries["good"].ready
+    assert entries["good"].error is None
     for name in {*spoilt, "folder", "circle", "zeros", "pipe"}:
-        assert not entries[name].ready, name
         error = entries[name].error
         assert error
         assert error.isprintable()
@@ -199,8 +186,8 @@ def test_an_unknown_name_is_told_what_there_is(tmp_path: Path) -> None:
     with pytest.raises(SequenceError) as caught:
         library.open_sequence("rom44-3p")
     assert str(caught.value) == (
-        'there is no sequence "rom44-3p": expected one of the rendered rooms room24-2p, '
-        "room35-2p, room44-3p and random-SEED, or the path of a folder with a sequence.toml; "
+        'there is no sequence "rom44-3p": expected one of the built-in rooms room24-2p, '
+        "room35-2p and room44-3p, or the path of a folder with a sequence.toml; "
         'did you mean "room44-3p"?'
     )
     with pytest.raises(SequenceError, match="there is no such folder"):
@@ -218,8 +205,8 @@ def test_the_list_has_rooms_and_folders(tmp_path: Path) -> None:
     assert [(e.name, e.kind) for e in entries[:3]] == [
         (name, "rendered") for name in ("room24-2p", "room35-2p", "room44-3p")
     ]
-    assert all(e.cameras == 2 and e.frames > 1000 and e.description for e in entries[:3])
-    assert [(e.name, e.frames, e.cameras, e.ready) for e in entries[3:]] == [
+    assert all(e.cameras == 2 and e.frames == 600 and e.description for e in entries[:3])
+    assert [(e.name, e.frames, e.cameras, e.error is None) for e in entries[3:]] == [
         ("a", 2, 2, True),
         ("b", 3, 3, True),
         ("broken", 0, 0, False),
@@ -239,26 +226,3 @@ def test_where_the_cache_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> 
     monkeypatch.setenv("XDG_CACHE_HOME", "relative is not allowed")
     monkeypatch.setenv("HOME", str(tmp_path))
     assert cache_folder() == tmp_path / ".cache" / "multiview-phd"
-
-
-@pytest.mark.full
-def test_a_room_of_a_seed_is_rendered_once_and_listed(monkeypatch: pytest.MonkeyPatch) -> None:
-    render_random = rendering.render_random
-    seeds = []
-
-    def short(seed: int, folder: Path, **others: Any) -> object:
-        seeds.append(seed)
-        return render_random(seed, folder, frames=2, **others)
-
-    monkeypatch.setattr(rendering, "render_random", short)
-    assert library.next_random(library.available()) == "random-1"
-    for _ in range(2):
-        sequence = library.open_sequence("random-6")
-        assert sequence.has_detections
-        assert sequence.ground_truth is not None
-    assert seeds == [6]
-    entries = library.available()
-    (entry,) = (one for one in entries if one.name == "random-6")
-    assert (entry.kind, entry.ready, entry.frames) == ("rendered", True, 2)
-    assert library.next_random(entries) == "random-7"
-    assert not library.is_room("random-x")

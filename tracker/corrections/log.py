@@ -1,12 +1,11 @@
 """The log of corrections, ``corrections.toml``: read, written whole or not at all, found.
 
-It lies beside ``sequence.toml``; where that folder may only be read, or is rendered by the
-program, in the user's own settings.
+It lies beside ``sequence.toml``; where that folder may only be read, or is the program's own, in
+the user's settings.
 """
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 import tomllib
@@ -20,8 +19,9 @@ from pydantic import ValidationError
 
 from tracker.corrections.contradictions import refuse_contradiction
 from tracker.corrections.kinds import KINDS, Correction, CorrectionError, sentence_of
-from tracker.folders import cache_folder, settings_folder
+from tracker.folders import settings_folder
 from tracker.placing import replacing
+from tracker.sequences.built_in import EARLIER, earlier_key, key_of, opens_by_name
 from tracker.visible import not_utf_8
 
 FILE = "corrections.toml"
@@ -50,15 +50,15 @@ def place_of(folder: Path) -> Path:
         folder: Of the recording.
     """
     beside = folder / FILE
-    rendered = folder.absolute().is_relative_to(cache_folder())
+    if opens_by_name(folder):
+        return _earlier_if_alone(folder)
     if _leads_out(beside):
         return own_place(folder)
-    if not rendered and (
-        os.access(beside, os.W_OK) if beside.exists() else os.access(folder, os.W_OK)
-    ):
+    if os.access(beside if beside.exists() else folder, os.W_OK):
         return beside
     own = own_place(folder)
-    return own if own.exists() or rendered or not beside.exists() else _first_of(own, beside)
+    # what came with a recording that may only be read counts until something is added to it
+    return own if own.exists() or not beside.exists() else beside
 
 
 def _leads_out(beside: Path) -> bool:
@@ -71,17 +71,32 @@ def _leads_out(beside: Path) -> bool:
 
 def own_place(folder: Path) -> Path:
     """Where the log of a recording lies that may only be read: in the user's settings."""
-    name = hashlib.sha256(str(folder.absolute()).encode()).hexdigest()[:16]
-    return settings_folder() / "corrections" / f"{name}.toml"
+    return _kept_as(key_of(folder))
 
 
-def _first_of(own: Path, beside: Path) -> Path:
-    """What came with a recording that may only be read counts until something is added to it."""
-    return own if own.exists() else beside
+def _kept_as(key: str) -> Path:
+    return settings_folder() / "corrections" / f"{key}.toml"
+
+
+def _earlier_if_alone(folder: Path) -> Path:
+    """The log of a built-in sequence as it was rendered before counts until something is added."""
+    own, key = own_place(folder), earlier_key(folder)
+    earlier = own if key is None else _kept_as(key)
+    return earlier if earlier.exists() and not own.exists() else own
+
+
+def remark_on(folder: Path) -> str | None:
+    """What must be said of a recording's log: that it is of an earlier rendering; else None."""
+    earlier = earlier_key(folder)
+    if earlier is None or place_of(folder) != _kept_as(earlier):
+        return None
+    return f"The corrections were {EARLIER}."
 
 
 def writing_place(folder: Path) -> Path:
     """Where the log of a recording is written."""
+    if opens_by_name(folder):
+        return own_place(folder)
     found = place_of(folder)
     if found.parent == folder and not os.access(found if found.exists() else folder, os.W_OK):
         return own_place(folder)

@@ -16,7 +16,6 @@ from numpy import ndarray
 from tracker import __version__
 from tracker.evaluation import Evaluation
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.folders import cache_folder
 from tracker.fusion.protocol import FusionResult
 from tracker.library.columns import KeptTracks
 from tracker.library.records import HEADLINES, NewRecording, NewRun, Result, Source
@@ -25,6 +24,7 @@ from tracker.runs.fitting import default_parameters
 from tracker.runs.gaps import gaps
 from tracker.runs.numbers_version import numbers_version
 from tracker.runs.run import Run, stage_keys
+from tracker.sequences.built_in import opens_by_name
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
@@ -53,7 +53,7 @@ def recording_of(
         opened_as: The room's name or the folder that opened it.
         thumbnail: From :func:`thumbnail_of`.
     """
-    rendered = cache_folder() in sequence.folder.absolute().parents
+    rendered = opens_by_name(sequence.folder)
     truth = sequence.ground_truth
     return NewRecording(
         place=opened_as if rendered else str(sequence.folder.absolute()),

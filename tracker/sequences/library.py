@@ -1,30 +1,24 @@
-"""Where sequences come from: the rendered rooms by name, any folder by its path."""
+"""Where sequences come from: the built-in rooms by name, any folder by its path."""
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import os
 import re
-import shutil
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from tracker.folders import cache_folder
+from tracker.sequences.built_in import BUILT_IN, ROOMS, cached_rooms
 from tracker.sequences.fields import did_you_mean, listed
 from tracker.sequences.reader import FILE, given_folder, read_sequence, read_summary
 from tracker.sequences.sequence import DetectorFile, Sequence, SequenceError
 
-DEFAULT_CAMERAS = 2
-"""Cameras of a rendered room that is opened by its name."""
+_SEEDED = re.compile(r"random-\d{1,9}")
+"""A room that an earlier version of the program rendered by a seed."""
 
-_RANDOM = re.compile(r"random-(\d{1,9})")
-"""A random room by its seed."""
-
-Told = Callable[[int, int], None]
-"""Called with the steps rendered so far and their number."""
+_RENDERED = re.compile(rf"({'|'.join(BUILT_IN)})-([23])-cameras")
+"""A built-in room as an earlier version rendered it, with so many cameras."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,37 +29,22 @@ class SequenceEntry:
     """What :func:`open_sequence` takes, or the folder's name under the data folder."""
     description: str
     kind: Literal["rendered", "folder"]
+    """``rendered`` where the name alone opens it."""
     cameras: int
     frames: int
     """0 where the file leaves it to its videos."""
-    ready: bool
-    """Whether it opens at once; a room that was never rendered does not."""
     folder: Path
-    """Where it is, or will be once it is rendered."""
     error: str | None = None
     """Why it cannot be opened, in one sentence."""
 
 
 def available(data: Path | None = None) -> list[SequenceEntry]:
-    """The rendered rooms, those of seeds that were rendered, then the folders under ``data``.
+    """The built-in rooms, those of seeds that lie in the cache, then the folders under ``data``.
 
     Only heads of files are read: what else is wrong with a folder shows on opening it.
     """
-    from tracker.sequences.rendering import ROOMS  # imports the renderer only where it is needed
-
-    entries = [
-        SequenceEntry(
-            name=name,
-            description=room.description,
-            kind="rendered",
-            cameras=DEFAULT_CAMERAS,
-            frames=room.frames,
-            ready=(rendered_folder(name) / FILE).is_file(),
-            folder=rendered_folder(name),
-        )
-        for name, room in ROOMS.items()
-    ]
-    entries += [_entry(folder, "rendered") for folder in _folders(_random_rooms())]
+    entries = [_entry(ROOMS / name, "rendered") for name in BUILT_IN]
+    entries += [_entry(folder, "rendered") for folder in _folders(cached_rooms() / "random")]
     if data is not None and data.is_dir():
         entries += [_entry(folder) for folder in _folders(data)]
     return entries
@@ -96,76 +75,61 @@ def _entry(folder: Path, kind: Literal["rendered", "folder"] = "folder") -> Sequ
         kind=kind,
         cameras=cameras,
         frames=frames,
-        ready=error is None,
         folder=folder,
         error=error,
     )
 
 
-def rendered_folder(name: str, cameras: int = DEFAULT_CAMERAS) -> Path:
-    """Where a rendered room is kept; another version of the renderer has another place."""
-    return _rooms() / f"{name}-{cameras}-cameras"
-
-
-def _rooms() -> Path:
-    from tracker.sequences.rendering import VERSION
-
-    return cache_folder() / "rooms" / f"version-{VERSION}"
-
-
-def _random_rooms() -> Path:
-    """Where those of seeds are."""
-    return _rooms() / "random"
-
-
 def is_room(name: str) -> bool:
-    """Whether a name is that of a rendered room: a built-in one, or ``random-SEED``."""
-    from tracker.sequences.rendering import ROOMS
-
-    return name in ROOMS or _RANDOM.fullmatch(name) is not None
+    """Whether a name is that of a room: a built-in one, or one that may lie in the cache."""
+    return name in BUILT_IN or _cached(name) is not None
 
 
-def next_random(entries: list[SequenceEntry]) -> str:
-    """The name of a random room that was not rendered yet."""
-    seeds = [int(match[1]) for one in entries if (match := _RANDOM.fullmatch(one.name))]
-    return f"random-{max(seeds, default=0) + 1}"
+def _cached(name: str) -> Path | None:
+    """Where an earlier version of the program rendered the room of a name; None for other names."""
+    if _SEEDED.fullmatch(name):
+        return cached_rooms() / "random" / name
+    return cached_rooms() / name if _RENDERED.fullmatch(name) else None
 
 
-def open_sequence(
-    name_or_folder: str | Path,
-    *,
-    progress: Told | None = None,
-    cancelled: Callable[[], bool] | None = None,
-    cameras: int = DEFAULT_CAMERAS,
-) -> Sequence:
-    """Open a rendered room by its name, or a sequence folder.
+def open_sequence(name_or_folder: str | Path) -> Sequence:
+    """Open a room by its name, or a sequence folder.
 
-    A room that is not in the cache yet is rendered into it first. A folder of the same
-    name as a room is opened by a path with a separator, for instance ``./room44-3p``.
+    A folder of the same name as a room is opened by a path with a separator, for instance
+    ``./room44-3p``.
 
     Args:
-        name_or_folder: Name of a room, ``random-SEED`` for a room of any kind, or path of a folder.
-        progress: Called while rendering.
-        cancelled: Asked while rendering.
-        cameras: Of a rendered room.
+        name_or_folder: Name of a room, or path of a folder.
 
     Raises:
         SequenceError: If there is no such sequence, or it cannot be read.
-        OSError: If a room cannot be written to the cache.
     """
-    from tracker.sequences.rendering import ROOMS
-
     name = str(name_or_folder)
-    if is_room(name):
-        return _open_room(name, progress, cancelled, cameras)
+    if name in BUILT_IN:
+        return read_sequence(ROOMS / name)
+    cached = _cached(name)
+    if cached is not None:
+        if not (cached / FILE).is_file():
+            raise SequenceError(
+                f"{name} is not in the cache, and rooms are no longer rendered here: make a folder "
+                f"with `python -m tests.rooms {_maker(name)} -o FOLDER` in a checkout of the "
+                "source, and open that"
+            )
+        return read_sequence(cached)
     folder = given_folder(name_or_folder)
     if not folder.exists() and len(folder.parts) <= 1:
-        hint = did_you_mean(name, ROOMS)
+        hint = did_you_mean(name, BUILT_IN)
         raise SequenceError(
-            f'there is no sequence "{name}": expected one of the rendered rooms '
-            f"{listed([*ROOMS, 'random-SEED'])}, or the path of a folder with a {FILE}{hint}"
+            f'there is no sequence "{name}": expected one of the built-in rooms '
+            f"{listed(list(BUILT_IN))}, or the path of a folder with a {FILE}{hint}"
         )
     return read_sequence(folder)
+
+
+def _maker(name: str) -> str:
+    """What ``tests.rooms`` takes for a room that is missing."""
+    match = _RENDERED.fullmatch(name)
+    return name if match is None else f"{match[1]} --cameras {match[2]}"
 
 
 def with_detector(sequence: Sequence, path: Path | None) -> Sequence:
@@ -188,26 +152,3 @@ def with_detector(sequence: Sequence, path: Path | None) -> Sequence:
             f"the detector {path} cannot be read ({error.strerror}); name an ONNX file"
         ) from error
     return replace(sequence, detector=DetectorFile(path, digest))
-
-
-def _open_room(
-    name: str, progress: Told | None, cancelled: Callable[[], bool] | None, cameras: int
-) -> Sequence:
-    from tracker.sequences.rendering import render, render_random
-    from tracker.sequences.rendering.writing import is_whole
-
-    random = _RANDOM.fullmatch(name)
-    folder = _random_rooms() / name if random else rendered_folder(name, cameras)
-    if is_whole(folder):
-        with contextlib.suppress(SequenceError):
-            return read_sequence(folder)
-    if folder.exists():  # somebody spoilt it; it can always be rendered again
-        shutil.rmtree(folder)
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    if random:
-        render_random(
-            int(random[1]), folder, detections=True, progress=progress, cancelled=cancelled
-        )
-    else:
-        render(name, folder, cameras=cameras, progress=progress, cancelled=cancelled)
-    return read_sequence(folder)

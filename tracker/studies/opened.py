@@ -9,7 +9,7 @@ from typing import Any
 from tracker import pipeline
 from tracker.parameters import METHODS, RunParameters, changed, value, with_values
 from tracker.runs.fitting import unfit_methods
-from tracker.sequences.library import Told, open_sequence
+from tracker.sequences.library import open_sequence
 from tracker.sequences.sequence import Sequence, SequenceError
 from tracker.studies.defined import objectives
 from tracker.studies.defined.definition import Definition
@@ -27,7 +27,7 @@ class Opened:
     """One recording."""
 
     place: str
-    """What opens it: a rendered room's name, or a folder."""
+    """What opens it: a room's name, or a folder."""
     sequence: Sequence
     content: str
     """Hash of its files."""
@@ -102,14 +102,12 @@ class Recordings:
 def open_recordings(
     definition: Definition,
     tell: Callable[[str], None] = lambda words: None,
-    progress: Told | None = None,
 ) -> Recordings:
     """Open all recordings of a study.
 
     Args:
         definition: Of the study.
         tell: Told what is being waited for.
-        progress: Called while a room is rendered.
 
     Raises:
         StudyError: If one cannot be read, its method cannot work on it, or an objective needs a
@@ -119,7 +117,7 @@ def open_recordings(
     for place in definition.recordings:
         tell(f"opening {place}")
         try:
-            sequence = open_sequence(place, progress=progress)
+            sequence = open_sequence(place)
         except (SequenceError, OSError) as error:
             words = " ".join(str(error).split())
             raise StudyError(f"recordings: {place} cannot be read: {words}") from None

@@ -1,5 +1,4 @@
-"""Arguments of the commands that need no recording: what there is, rooms that are drawn, and
-measurements."""
+"""Arguments of the commands that need no recording: what there is, and measurements."""
 
 from __future__ import annotations
 
@@ -16,29 +15,6 @@ class Sequences:
 
     data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None
     """Folder whose folders are sequences too."""
-
-
-@dataclass
-class Render:
-    """Render a built-in room, or with --random a room of any kind, as an ordinary sequence."""
-
-    places: Annotated[
-        Positional[tuple[str, ...]],
-        arg(
-            metavar="[NAME] FOLDER",
-            help="A room (`sequences` lists the names; none with --random), and a folder that "
-            "must not exist yet.",
-            help_behavior_hint="",
-        ),
-    ]
-    random: Annotated[int | None, arg(metavar="SEED", help_behavior_hint="(optional)")] = None
-    """Draw the room by this seed: cameras, lenses, people, light and what disturbs."""
-    detections: FlagCreatePairsOff[bool] = False
-    """With --random: write the boxes too that a detector would find."""
-    cameras: int = 2
-    """Of a built-in room: two as in the paper, or three."""
-    seed: int = 0
-    """Of a built-in room: seed of the noise."""
 
 
 @dataclass

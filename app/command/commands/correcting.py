@@ -18,7 +18,7 @@ from app.command.arguments.corrections import (
 )
 from app.command.terminal import Bar, CommandError, print_table, say
 from tracker.corrections import Correction, CorrectionError
-from tracker.corrections.log import FILE, place_of, read_log, write_log
+from tracker.corrections.log import FILE, place_of, read_log, remark_on, write_log
 from tracker.corrections.merging import difference, merge
 from tracker.corrections.truth import checked_ranges, write_truth
 from tracker.placing import replacing
@@ -70,6 +70,8 @@ def of_run(sequence: Sequence, file: Path | None, *, none: bool = False) -> tupl
         return ()
     if file is None:
         own = place_of(sequence.folder)
+        if remark := remark_on(sequence.folder):
+            say(remark)
         try:
             return read_log(own)
         except CorrectionError as error:
@@ -129,8 +131,7 @@ def _tracked(name: str, file: Path | None) -> Run:
     from tracker import pipeline
     from tracker.runs.stage_cache import StageCache
 
-    with Bar("rendering", "frame") as rendering:
-        sequence = library.open_sequence(name, progress=rendering.at)
+    sequence = library.open_sequence(name)
     told = of_run(sequence, file)
     with Bar("tracking", "step") as tracking, closing(Compiling(say)) as compiling:
         compiling.wait(lambda done, total: None, lambda: False)

@@ -34,8 +34,7 @@ def detect(command: Detect) -> None:
     changes = set_values(command.set)
     if command.output.exists() and not command.output.is_dir():
         raise CommandError(f"--output {command.output}: expected a folder, found a file")
-    with Bar("rendering", "frame") as rendering:
-        sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    sequence = library.open_sequence(command.sequence)
     sequence = library.with_detector(sequence, command.model)
     if not sequence.has_pictures:
         raise CommandError(f"{sequence.name}: a detector needs pictures of every camera")

@@ -47,8 +47,7 @@ def evaluate(command: Evaluate) -> None:
             raise CommandError(
                 f"--html {command.html}: there is no folder {command.html.parent}; make it first"
             )
-    with Bar("rendering", "frame") as rendering:
-        sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    sequence = library.open_sequence(command.sequence)
     if command.truth is not None:
         truth = truth_of(command.truth, str(command.truth), sequence.frames)
         sequence = replace(sequence, ground_truth=truth)
@@ -101,8 +100,7 @@ def estimate_without_truth(command: Evaluate) -> None:
     from tracker.without_truth import estimate
     from tracker.without_truth.estimate import WARNING
 
-    with Bar("rendering", "frame") as rendering:
-        sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    sequence = library.open_sequence(command.sequence)
     for sentence in sequence.warnings:
         say(sentence)
     with Bar("tracking", "step") as tracking, closing(Compiling(say)) as compiling:

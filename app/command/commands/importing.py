@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
-from app.command.terminal import FAILURE, Bar, CommandError, print_table, say
+from app.command.terminal import FAILURE, CommandError, print_table, say
 from tracker.parameters import ParameterError
 
 if TYPE_CHECKING:
@@ -156,8 +156,7 @@ def _pairs(flag: str, form: str, items: Sequence[str]) -> Iterator[tuple[str, st
 def _check(command: Check) -> int:
     from tracker.sequences import library
 
-    with Bar("rendering", "frame") as rendering:
-        sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    sequence = library.open_sequence(command.sequence)
     return _print_checks(sequence)
 
 
@@ -192,7 +191,6 @@ def _export(command: ExportCalibration) -> None:
 
     if command.output.exists():
         raise CommandError(f"{command.output} exists; name a file that does not")
-    with Bar("rendering", "frame") as rendering:
-        sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    sequence = library.open_sequence(command.sequence)
     save_calibration(command.output, sequence.cameras, command.form)
     say(f"{len(sequence.cameras)} cameras, written to {command.output}")

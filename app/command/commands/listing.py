@@ -1,4 +1,4 @@
-"""The small commands: what there is, rendered rooms, the benchmarks of a checkout."""
+"""The small commands: what there is, the benchmarks of a checkout."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-from app.command.arguments.rooms import Benchmark, Render, Sequences
+from app.command.arguments.listing import Benchmark, Sequences
 from app.command.flags import describe_range, show
-from app.command.terminal import Bar, CommandError, check_data, check_seed, print_table, say
+from app.command.terminal import CommandError, check_data, print_table
 from tracker import parameters as table
-from tracker.parameters import ParameterError
 
 
 def benchmark(command: Benchmark) -> int:
@@ -39,42 +38,11 @@ def sequences(command: Sequences) -> None:
             entry.kind,
             "" if entry.cameras is None else str(entry.cameras),
             "" if entry.frames is None else str(entry.frames),
-            "no" if entry.error else "yes" if entry.ready else "when opened",
             entry.error or entry.description,
         )
         for entry in library.available(command.data)
     ]
-    print_table(("name", "kind", "cameras", "steps", "ready", "description"), rows)
-
-
-def render(command: Render) -> None:
-    from tracker.sequences import rendering
-
-    if len(command.places) != (2 if command.random is None else 1):
-        wanted = "NAME FOLDER" if command.random is None else "FOLDER alone with --random"
-        found = " ".join(command.places) or "nothing"
-        raise ParameterError("[NAME] FOLDER", f"expected {wanted}, got {found}")
-    folder = Path(command.places[-1])
-    name = f"random room {command.random}" if command.random is not None else command.places[0]
-    if command.random is None and name not in rendering.ROOMS:
-        known = ", ".join(rendering.ROOMS)
-        raise ParameterError("NAME", f"expected one of {known}, got {name!r}")
-    check_seed(command.seed)
-    if command.random is not None:
-        check_seed(command.random, "--random")
-    if command.cameras not in (2, 3):
-        raise ParameterError("--cameras", f"expected 2 or 3, got {command.cameras}")
-    if folder.exists():
-        raise CommandError(f"{folder} exists; name a folder that does not")
-    cameras = command.cameras
-    with Bar("rendering", "frame") as bar:
-        if command.random is not None:
-            cameras = rendering.render_random(
-                command.random, folder, detections=command.detections, progress=bar.at
-            ).cameras
-        else:
-            rendering.render(name, folder, cameras=cameras, seed=command.seed, progress=bar.at)
-    say(f"{name} with {cameras} cameras, written to {folder}")
+    print_table(("name", "kind", "cameras", "steps", "description"), rows)
 
 
 def parameters() -> None:

@@ -94,8 +94,7 @@ def bundle(command: Bundle) -> None:
         raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
     with _library(command) as library:
         result = library.result(library.find(command.run).id)
-    with Bar("rendering", "frame") as rendering:
-        sequence = sequences.open_sequence(result.place, progress=rendering.at)
+    sequence = sequences.open_sequence(result.place)
     write_bundle(output, result, sequence, videos=command.videos)
     size = output.stat().st_size
     if command.json:
@@ -219,8 +218,7 @@ def _export(library: Library, command: ExportRun) -> None:
 
     form = format_of(command.output, command.format)
     result = library.result(library.find(command.run).id)
-    with Bar("rendering", "frame") as rendering:
-        sequence = sequences.open_sequence(result.place, progress=rendering.at)
+    sequence = sequences.open_sequence(result.place)
     done = None if result.run.steps >= sequence.frames else result.run.steps
     written = Written(
         sequence,

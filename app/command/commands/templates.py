@@ -45,7 +45,7 @@ def templates(command: Templates) -> None:
 
 
 def _list(action: ListTemplates) -> None:
-    sequence = _opened(action.sequence)
+    sequence = library.open_sequence(action.sequence)
     if action.json:
         print_json([template_values(one) for one in sequence.templates])
     elif not sequence.templates:
@@ -67,7 +67,7 @@ def _offer(action: OfferTemplates) -> None:
     check_seed(action.seed)
     if action.add and action.add_all:
         raise CommandError("--add and --add-all: expected one of them")
-    sequence = _opened(action.sequence)
+    sequence = library.open_sequence(action.sequence)
     if not sequence.has_pictures:
         raise CommandError(f"{sequence.name}: no camera has pictures to cut templates from")
     reason = saving.why_not_in_place(sequence.folder)
@@ -145,7 +145,7 @@ def _values(one: offers.Offer) -> dict[str, Any]:
 
 
 def _remove(action: RemoveTemplates) -> None:
-    sequence = _opened(action.sequence)
+    sequence = library.open_sequence(action.sequence)
     if not action.numbers:
         raise CommandError("expected the number of a template; `templates list` has them")
     _check(action.numbers, len(sequence.templates), "NUMBER")
@@ -170,8 +170,3 @@ def _write(sequence: Sequence, edit: Any) -> None:
     values = copy.deepcopy(taught_values(sequence))
     edit(values)
     saving.save(with_taught(sequence, values, f"{sequence.folder.name}/{FILE}"), sequence)
-
-
-def _opened(name: str) -> Sequence:
-    with Bar("rendering", "frame") as rendering:
-        return library.open_sequence(name, progress=rendering.at)

@@ -42,8 +42,7 @@ def track(command: Track) -> int:
     from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
 
-    with Bar("rendering", "frame") as rendering:
-        sequence = library.open_sequence(command.sequence, progress=rendering.at)
+    sequence = library.open_sequence(command.sequence)
     sequence = library.with_detector(sequence, command.detector)
     form.check(sequence)
     for sentence in sequence.warnings:

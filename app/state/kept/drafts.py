@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 import logging
 from pathlib import Path
 
 from app.state.kept.json_files import read_json, set_aside, write_json
+from tracker.sequences.built_in import earlier_key, key_of
 from tracker.sequences.writing.teaching import Values, changes
 
 logger = logging.getLogger("app")
@@ -38,19 +38,22 @@ class Drafts:
         """As saved and as taught; None where all was saved, or the file cannot be read."""
         if self._folder is None or sequence in self._kept:
             return self._kept.get(sequence)
-        path = self._file(sequence)
-        try:
-            draft = read_json(path)
-            saved, taught = draft["saved"], draft["taught"]
-            changes(saved, taught)  # raises where another version wrote them
-            self._kept[sequence] = saved, taught
-            return saved, taught
-        except FileNotFoundError:
+        draft = _read(self._file(sequence))
+        if draft is not None:
+            self._kept[sequence] = draft
+        return draft
+
+    def take_earlier(self, sequence: Path) -> tuple[Values, Values] | None:
+        """As saved and as taught on a built-in sequence as it was rendered before; None where
+        nothing was. The file gets another name, so that it is taken up once and nothing is lost."""
+        key = earlier_key(sequence)
+        if self._folder is None or key is None:
             return None
-        except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
-            aside = set_aside(path)
-            logger.warning("%s cannot be read and is now %s: %s", path, aside or path, error)
-            return None
+        path = self._folder / f"{key}.json"
+        draft = _read(path)
+        if draft is not None:
+            path.rename(path.with_suffix(".taken-up.json"))
+        return draft
 
     def forget(self, sequence: Path) -> None:
         """All of it is saved, or it cannot be taken up any more."""
@@ -65,5 +68,18 @@ class Drafts:
 
     def _file(self, sequence: Path) -> Path:
         assert self._folder is not None
-        name = hashlib.sha256(str(sequence.absolute()).encode()).hexdigest()[:16]
-        return self._folder / f"{name}.json"
+        return self._folder / f"{key_of(sequence)}.json"
+
+
+def _read(path: Path) -> tuple[Values, Values] | None:
+    try:
+        draft = read_json(path)
+        saved, taught = draft["saved"], draft["taught"]
+        changes(saved, taught)  # raises where another version wrote them
+        return saved, taught
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+        aside = set_aside(path)
+        logger.warning("%s cannot be read and is now %s: %s", path, aside or path, error)
+        return None

@@ -7,7 +7,7 @@ import logging
 import os
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from app.state.workbench import Workbench
 from tracker.folders import cache_folder
 from tracker.placing import locked, write_whole
 from tracker.sequences import library
+from tracker.sequences.built_in import opens_by_name
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import FILE
 from tracker.sequences.sequence import SequenceError
@@ -73,8 +74,8 @@ class Recents:
         if change != "sequence" or sequence is None:
             return
         folder = sequence.folder.absolute()
-        if folder.is_relative_to(cache_folder()):
-            return  # a rendered room, which is always there
+        if opens_by_name(folder):
+            return  # the list has it anyway
         one = Recent(
             sequence.name,
             str(folder),
@@ -112,7 +113,7 @@ def _read(file: Path | None) -> list[Recent]:
         return []
 
 
-def thumbnail(folder: Path, cancelled: Callable[[], bool] = lambda: False) -> bytes | None:
+def thumbnail(folder: Path) -> bytes | None:
     """A small picture of a recording's first camera, as JPEG; made once.
 
     Returns:
@@ -124,7 +125,7 @@ def thumbnail(folder: Path, cancelled: Callable[[], bool] = lambda: False) -> by
         place = cache_folder() / "thumbnails" / f"{key}.jpg"
         if place.is_file():
             return place.read_bytes() or None
-        sequence = library.open_sequence(folder, cancelled=cancelled)
+        sequence = library.open_sequence(folder)
         with FrameReader(sequence) as reader:
             steps = (sequence.frames // 2, 0)
             found = (reader.picture(0, step) for step in steps)

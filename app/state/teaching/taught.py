@@ -22,10 +22,17 @@ from app.state.snapshot import Change
 from app.state.workbench import Workbench
 from tracker import pipeline
 from tracker.parameters import RunParameters
+from tracker.sequences.built_in import EARLIER
 from tracker.sequences.reader import FILE
 from tracker.sequences.sequence import Sequence, SequenceError
 from tracker.sequences.writing import saving
-from tracker.sequences.writing.teaching import Values, changes, taught_values, with_taught
+from tracker.sequences.writing.teaching import (
+    Values,
+    carried_over,
+    changes,
+    taught_values,
+    with_taught,
+)
 
 KEPT_STATES = 500
 """Rooms and templates that can be gone back to."""
@@ -195,6 +202,7 @@ class Taught:
         """Go on with what was not saved when the sequence was open before."""
         draft = self._drafts.read(sequence.folder)
         if draft is None:
+            self._take_up_earlier(sequence)
             return
         saved, taught = draft
         count = len(changes(saved, taught))
@@ -214,6 +222,25 @@ class Taught:
             self._workbench.notify(
                 "info", f"{words} not saved, as you left it", "Save or discard it."
             )
+
+    def _take_up_earlier(self, sequence: Sequence) -> None:
+        """Go on with what was taught on a built-in sequence as it was rendered before."""
+        draft = self._drafts.take_earlier(sequence.folder)
+        if draft is None:
+            return
+        now = taught_values(sequence)
+        values = carried_over(*draft, now, sequence.frames)
+        try:
+            self._put(values)
+        except SequenceError:  # a template whose box is no longer in the picture
+            self._put({**values, "template": now["template"]})
+        taken = changes(now, taught_values(self.sequence()))
+        left = [words for words in changes(*draft) if words not in taken]
+        self._workbench.notify(
+            "warn" if left else "info",
+            f"Changes of {sequence.name} are taken up that were {EARLIER}",
+            f"Left out: {'; '.join(left)}." if left else "Save or discard them.",
+        )
 
 
 def _moved(sequence: Sequence, copied: Sequence) -> Sequence:

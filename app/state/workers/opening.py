@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import logging
 import threading
-import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +22,6 @@ from tracker.sequences import library
 from tracker.sequences.pictures.frames import FrameReader
 
 logger = logging.getLogger("app")
-
-TELLS_SECONDS = 0.1
-"""At most this often an opening tells how far it is."""
 
 
 def locate(name: str, data: Path | None) -> str:
@@ -113,7 +108,7 @@ class Opener:
                 daemon=True,
             )
             self._threads = [t for t in self._threads if t.is_alive()] + [thread]
-        self._workbench.set_opening(Opening(name, "reading"))
+        self._workbench.set_opening(Opening(name))
         thread.start()
         return future
 
@@ -142,25 +137,9 @@ class Opener:
         future: Future[None],
     ) -> None:
         be_nice()
-
-        told_at = 0.0
-
-        def progress(words: str, done: int, total: int) -> None:
-            nonlocal told_at
-            now = time.monotonic()
-            if cancelled.is_set():
-                return
-            if now - told_at >= TELLS_SECONDS or done == total:
-                told_at = now
-                self._workbench.set_opening(Opening(name, words, done, total))
-
         try:
             with self._crashes.opening(name):
-                sequence = library.open_sequence(
-                    locate(name, self._data),
-                    progress=partial(progress, "rendering"),
-                    cancelled=cancelled.is_set,
-                )
+                sequence = library.open_sequence(locate(name, self._data))
                 detector = self._own_detectors.get(name, self._detector)
                 sequence = library.with_detector(sequence, detector)
                 parameters = RunParameters()

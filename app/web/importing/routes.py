@@ -72,7 +72,7 @@ def _complaining() -> Iterator[None]:
 
 @router.get("/recordings")
 def recordings(request: Request, desk: AtDesk, bench: Bench) -> Recordings:
-    """What was open last, the folders of the data folder, the rendered rooms."""
+    """What was open last, the folders of the data folder, the built-in rooms."""
     recents: Recents = request.app.state.recents
     data: Path | None = request.app.state.settings.data
     cards = [
@@ -89,7 +89,7 @@ def recordings(request: Request, desk: AtDesk, bench: Bench) -> Recordings:
         RecordingCard(
             name=entry.name, opens=entry.name, kind=entry.kind, description=entry.description,
             cameras=entry.cameras, frames=entry.frames, fps=0.0, opened=0.0,
-            picture=f"/api/recordings/picture?name={quote(entry.name)}" if entry.ready else "",
+            picture=f"/api/recordings/picture?name={quote(entry.name)}",
         )
         for entry in entries
         if str(entry.folder.absolute()) not in listed and entry.error is None
@@ -101,9 +101,7 @@ def recordings(request: Request, desk: AtDesk, bench: Bench) -> Recordings:
     known = Recordings(
         recordings=cards, folders=desk.folders(), data=str(desk.home), free=desk.free(), sheet=""
     )
-    return known.model_copy(
-        update={"sheet": start_sheet(known, open_as, library.next_random(entries))}
-    )
+    return known.model_copy(update={"sheet": start_sheet(known, open_as)})
 
 
 @router.get(

@@ -13,6 +13,7 @@ from app.state.teaching import Part, Side, Teaching
 from app.web.dependencies import ERRORS, Bench, nothing_open
 from app.web.tables.markup import Cell, Markup, escaped, id_tag, line, quiet, table
 from tracker.parameters import METHODS, method_of
+from tracker.sequences.built_in import opens_by_name
 from tracker.sequences.sequence import PRESETS, Sequence, Template
 from tracker.sequences.writing.teaching import AXES, changes, taught_values
 
@@ -257,8 +258,8 @@ def _saving(snapshot: Snapshot, teaching: Teaching) -> str:
             buttons += _send("Save", "POST teach/save", label=f"Save in {place}", main=True).html
     label = "Copy in"
     if reason:
-        rendered = "rendered" in reason
-        label = f"{'A rendered room' if rendered else 'Read only'}: save a copy in"
+        room = opens_by_name(sequence.folder)
+        label = f"{'A rendered room' if room else 'Read only'}: save a copy in"
     copy = (
         '<form class="row" data-send="POST teach/copy">'
         f'<label class="wide" title="{escaped(reason or "")}">{label}'

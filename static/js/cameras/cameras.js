@@ -327,18 +327,10 @@ export function mountCameras(root, { store, actions, playback }) {
 			blank,
 			icon("i-folder", "l"),
 			h("h3", {}, opening ? `Opening ${opening.name}` : "No sequence is open"),
-			opening &&
-				h(
-					"span",
-					{ class: "bar", "--part": opening.total ? opening.done / opening.total : 0 },
-					h("i"),
-				),
 			h(
 				"p",
 				{},
-				opening
-					? `${opening.message}${opening.total ? `, ${opening.done} of ${opening.total}` : ""}`
-					: "Choose one at the top left: a rendered room needs no data.",
+				opening ? "reading" : "Choose one at the top left: a rendered room needs no data.",
 			),
 			sample &&
 				h(

@@ -37,7 +37,6 @@ export function mountTop(root, { store, actions }) {
 				cameras,
 				frames,
 				kind,
-				ready,
 				error,
 			},
 		) => {
@@ -46,12 +45,11 @@ export function mountTop(root, { store, actions }) {
 				: cameras && frames
 					? `${cameras} cameras, ${frames} steps`
 					: kind;
-			const wait = kind === "rendered" && !ready ? ", rendered on first use" : "";
 			// The chosen one stands in the bar, where its name is enough.
 			return h(
 				"option",
 				{ value: name, title: error ?? description },
-				name === open ? name : `${name}  ·  ${size}${wait}`,
+				name === open ? name : `${name}  ·  ${size}`,
 			);
 		};
 		const group = (
@@ -119,12 +117,12 @@ export function mountTop(root, { store, actions }) {
 							? runWords(run)
 							: ["", "nothing open"];
 		say(kind, text);
-		const { done, total } = opening ?? run ?? { done: 0, total: 0 };
+		const { done, total } = (!opening && run) || { done: 0, total: 0 };
 		bar.style.setProperty("--part", String(total > 0 ? done / total : 0));
 		bar.setAttribute("aria-valuemax", String(total));
 		bar.setAttribute("aria-valuenow", String(done));
 		fill(number, total > 0 && [h("b", {}, done), `/${total}`]);
-		write(rate, opening ? opening.message : run ? rateText(run) : "");
+		write(rate, opening ? "reading" : run ? rateText(run) : "");
 	}
 
 	store.watch(["server", "sequences", "schema", "link"], lists);

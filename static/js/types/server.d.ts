@@ -742,10 +742,6 @@ declare namespace Server {
 	/** A sequence on its way. */
 	interface OpeningInfo {
 		name: string;
-		message: string;
-		done: number;
-		/** 0 while it is not known. */
-		total: number;
 	}
 
 	/** A parameter that the two runs do not share. */
@@ -1007,8 +1003,6 @@ declare namespace Server {
 		kind: "rendered" | "folder";
 		cameras: number | null;
 		frames: number | null;
-		/** Whether it opens without rendering. */
-		ready: boolean;
 		/** Why it cannot be opened. */
 		error: string | null;
 	}

@@ -311,9 +311,9 @@ def test_sequences(run: Runs, data: Path) -> None:
     status, stdout, stderr = run("sequences", "--data", data)
     assert (status, stderr) == (0, "")
     rows = {line.split()[0]: line for line in stdout.splitlines()}
-    assert rows["name"].split() == ["name", "kind", "cameras", "steps", "ready", "description"]
+    assert rows["name"].split() == ["name", "kind", "cameras", "steps", "description"]
     assert {"room24-2p", "room35-2p", "room44-3p", "crossing", "numbers"} <= set(rows)
-    assert rows["crossing"].split()[1:5] == ["folder", "3", "120", "yes"]
+    assert rows["crossing"].split()[1:4] == ["folder", "3", "120"]
     assert run("sequences", "--data", data / "nowhere")[0] == 1
 
 
@@ -329,62 +329,6 @@ def test_parameters(run: Runs) -> None:
         assert parameter.help in table[key]
         if parameter.minimum is not None:
             assert f"{parameter.minimum:g} … {parameter.maximum:g}" in table[key]
-
-
-def test_render_refuses_what_it_cannot_do(run: Runs, tmp_path: Path) -> None:
-    status, _, stderr = run("render", "room99", tmp_path / "new")
-    assert status == 2
-    assert "expected one of room24-2p, room35-2p, room44-3p, got 'room99'" in stderr
-    status, _, stderr = run("render", "room24-2p", tmp_path)
-    assert status == 1
-    assert "name a folder that does not" in stderr
-    status, _, stderr = run("render", "room24-2p", tmp_path / "new", "--cameras", 7)
-    assert status == 2
-    assert "--cameras: expected 2 or 3, got 7" in stderr
-    status, _, stderr = run("render", "room24-2p", tmp_path / "new", "--random", 3)
-    assert status == 2
-    assert "expected FOLDER alone with --random, got room24-2p" in stderr
-    status, _, stderr = run("render", tmp_path / "new")
-    assert status == 2
-    assert "expected NAME FOLDER, got" in stderr
-    status, _, stderr = run("render", tmp_path / "new", "--random", "-1")
-    assert status == 2
-    assert "--random: expected a whole number from 0, got -1" in stderr
-    assert not (tmp_path / "new").exists()
-
-
-@pytest.mark.full
-def test_render_draws_a_room_by_its_seed(
-    run: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from tracker.sequences import rendering
-
-    real = rendering.render_random
-    monkeypatch.setattr(
-        rendering, "render_random", lambda *args, **kwargs: real(*args, frames=2, **kwargs)
-    )
-    status, _, stderr = run("render", "--random", 71, tmp_path / "room", "--detections")
-    assert status == 0, stderr
-    cameras = rendering.choose(71).cameras
-    assert f"random room 71 with {cameras} cameras, written to" in stderr
-    assert read_sequence(tmp_path / "room").has_detections
-
-
-@pytest.mark.full
-def test_render_writes_what_track_reads(
-    run: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from tracker.sequences import rendering
-
-    real = rendering.render
-    monkeypatch.setattr(
-        rendering, "render", lambda *args, **kwargs: real(*args, frames=3, **kwargs)
-    )
-    status, _, stderr = run("render", "room24-2p", tmp_path / "room", "--cameras", 3)
-    assert status == 0, stderr
-    sequence = read_sequence(tmp_path / "room")
-    assert len(sequence.views) == 3
-    assert sequence.frames == 3
 
 
 def test_changes_of_a_flag_beat_those_of_a_preset() -> None:

@@ -81,12 +81,7 @@ def test_a_number_that_is_none_is_refused(
     assert (walkers / FILE).read_bytes() == before
 
 
-def test_a_rendered_room_is_looked_at_and_not_written(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(
-        "tracker.sequences.writing.saving.why_not_in_place", lambda folder: "it is only read"
-    )
+def test_a_built_in_room_is_looked_at_and_not_written(capsys: pytest.CaptureFixture[str]) -> None:
     status, _, err = told(capsys, "offer", "room24-2p", "--add-all")
     assert status == 1
-    assert "nothing can be added, since it is only read; copy it first" in err
+    assert "room24-2p comes with the program and is never written to; copy it first" in err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import re
 import tomllib
 from collections.abc import Iterator
@@ -14,6 +15,8 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.state.kept.drafts import Drafts
+from app.state.snapshot import Event
+from app.state.teaching.taught import Taught
 from app.state.workbench import Workbench
 from app.web.server import Settings, create_app
 from app.web.views import results
@@ -21,7 +24,10 @@ from tests.app.conftest import ADDRESS, connect, run_is, wait_until
 from tests.browser.walkers import write_walkers
 from tests.engine.single_view.networks import answering, pooling
 from tracker import pipeline
+from tracker.sequences.library import open_sequence
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import FILE, read_sequence
+from tracker.sequences.writing.teaching import taught_values
 
 BOX = {"camera": "cam1", "step": 5, "left": 40, "top": 30, "width": 24, "height": 48}
 
@@ -319,7 +325,7 @@ def test_a_rendered_room_is_offered_as_a_copy(
     assert "A rendered room: save a copy in" in panel
     assert 'data-send="POST teach/save"' not in panel
     words = complaint(client.post("/api/teach/save"))
-    assert words.startswith("Walkers/sequence.toml: cannot be saved, since walkers is rendered")
+    assert words.startswith("Walkers/sequence.toml: cannot be saved, since walkers lies in the ")
     assert state(client)["teaching"]["unsaved"] == 1
 
 
@@ -384,6 +390,46 @@ def test_what_is_not_saved_outlives_the_server(
         assert state(client)["teaching"]["unsaved"] == 0
     with started() as (client, heard):
         assert "taken up" not in heard
+
+
+def test_what_was_taught_on_a_room_as_it_was_rendered_before_is_taken_up_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(tmp_path / "cache"))
+    room = open_sequence("room24-2p")
+    saved = taught_values(room)
+    taught = copy.deepcopy(saved)
+    taught["room"]["max"][2] = 2.5
+    one = {**saved["template"][0], "name": "Anna", "frame": 300}
+    taught["template"] += [one, {**one, "name": "late", "frame": 900}]
+    before = {**saved, "template": saved["template"][1:]}  # of more steps, others were chosen
+    rendered = tmp_path / "cache" / "rooms" / "version-4" / "room24-2p-2-cameras"
+    drafts = tmp_path / "drafts"
+    Drafts(drafts).keep(rendered, before, {**taught, "template": taught["template"][1:]})
+    (kept,) = drafts.iterdir()
+    draft = kept.read_bytes()
+
+    def opened() -> tuple[Workbench, list[Event]]:
+        bench, heard = Workbench(), list[Event]()
+        bench.subscribe_events(heard.append)
+        Taught(bench, drafts)
+        bench.open(room, "key", FrameReader(room), pipeline.default_parameters(room))
+        return bench, heard
+
+    bench, heard = opened()
+    now = bench.snapshot().sequence
+    assert now is not None
+    assert now.room.maximum[2] == 2.5
+    assert [t.name for t in now.templates] == [*(t.name for t in room.templates), "Anna"]
+    assert "as it was rendered before" in str(heard)
+    assert "Left out: template late added" in str(heard)
+    assert sorted(path.name for path in drafts.iterdir()) == sorted(
+        [f"{kept.stem}.taken-up.json", "room24-2p.json"]
+    )
+    assert kept.with_suffix(".taken-up.json").read_bytes() == draft
+    again, heard = opened()
+    assert again.snapshot().sequence.digest == now.digest  # type: ignore[union-attr]
+    assert "as you left it" in str(heard)
 
 
 def test_a_draft_that_cannot_be_read_is_left_alone(

@@ -406,4 +406,6 @@ def test_recordings_have_pictures(client: TestClient) -> None:
     cards = client.get("/api/recordings").json()["recordings"]
     rooms = [card for card in cards if card["kind"] == "rendered"]
     assert "room44-3p" in [card["name"] for card in rooms]
+    pictures = [client.get(card["picture"]) for card in rooms]
+    assert [one.headers.get("content-type") for one in pictures] == ["image/jpeg"] * 3
     assert client.get("/api/recordings/picture?name=../secret").status_code == 404

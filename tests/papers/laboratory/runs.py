@@ -12,7 +12,8 @@ from tracker import pipeline
 from tracker.parameters import RunParameters
 from tracker.pipeline import Cancelled, Progress, Run
 from tracker.runs.processes import WorkerControl
-from tracker.sequences import library, rendering
+from tracker.sequences import rendering
+from tracker.sequences.built_in import cached_rooms
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence, SequenceError
@@ -45,10 +46,8 @@ def room(context: Context, name: str, steps: int | None = None) -> Sequence:
         context.told(f"rendering {name}", done, total)
 
     try:
-        if steps is None or steps >= rendering.ROOMS[name].frames:
-            return library.open_sequence(name, progress=told, cancelled=context.cancelled)
-        whole = library.rendered_folder(name)
-        folder = whole.with_name(f"{whole.name}-{steps}-steps")
+        whole = cached_rooms() / f"{name}-2-cameras"
+        folder = whole if steps is None else whole.with_name(f"{whole.name}-{steps}-steps")
         if folder.exists():
             try:
                 return read_sequence(folder)

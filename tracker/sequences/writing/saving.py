@@ -16,6 +16,7 @@ from typing import Any
 
 from tracker.folders import cache_folder
 from tracker.placing import beside, replacing, sweep, sync_file, sync_folder
+from tracker.sequences.built_in import built_in_name
 from tracker.sequences.reader import FILE, check_own_file, given_folder, read_sequence
 from tracker.sequences.sequence import Sequence, SequenceError
 
@@ -25,8 +26,10 @@ BACKUP = f"{FILE}.bak"
 
 def why_not_in_place(folder: Path) -> str | None:
     """Why a sequence cannot be saved where it is, in one sentence; None where it can."""
+    if built_in_name(folder) is not None:
+        return f"{folder.name} comes with the program and is never written to"
     if folder.is_relative_to(cache_folder()):
-        return f"{folder.name} is rendered by the program, which may render it again at any time"
+        return f"{folder.name} lies in the cache, which may be emptied at any time"
     if not os.access(folder, os.W_OK) or not os.access(folder / FILE, os.W_OK):
         return f"{folder} is a place that you may only read"
     return None
@@ -88,7 +91,7 @@ def save_copy(sequence: Sequence, saved: Sequence, folder: Path) -> Sequence:
     """
     from tracker.sequences.writing.rewriting import rewritten
 
-    source = sequence.folder
+    source, built_in = sequence.folder, built_in_name(sequence.folder) is not None
     folder = given_folder(folder).absolute()
     _check_place(folder, source)
     with _complaining(folder):
@@ -103,7 +106,8 @@ def save_copy(sequence: Sequence, saved: Sequence, folder: Path) -> Sequence:
             for path in _files(read_sequence(source), tomllib.loads(text)):
                 place = building / path.relative_to(source)
                 place.parent.mkdir(parents=True, exist_ok=True)
-                _copy(path, place, link=path.suffix.lower() != ".csv")
+                # a link to a file of the program could be written through
+                _copy(path, place, link=path.suffix.lower() != ".csv" and not built_in)
             (building / FILE).write_bytes(text.encode("utf-8"))
             read_sequence(building)
             for written in (building / FILE, *building.rglob("*.csv")):

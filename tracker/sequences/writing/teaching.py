@@ -11,6 +11,7 @@ metres in the world, pixels in a picture. They are checked by what checks the fi
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
 from collections.abc import Callable
@@ -90,6 +91,30 @@ def with_taught(opened: Sequence, values: Values, where: str) -> Sequence:
     return replace(
         opened, room=room, target_half_extents=half_extents, templates=templates, digest=digest
     )
+
+
+def carried_over(before: Values, after: Values, now: Values, steps: int) -> Values:
+    """What was taught on another rendering of the same scene, on this one.
+
+    Room and target are taken where they were changed, and templates that were added where their
+    step is still there. Other changes of templates are of boxes that this rendering may not have.
+
+    Args:
+        before: As the other rendering's file had it.
+        after: As it was taught.
+        now: As this rendering's file has it.
+        steps: Its number of steps.
+    """
+    values = copy.deepcopy(now)
+    for part in ("room", "target"):
+        if after[part] != before[part]:
+            values[part] = copy.deepcopy(after[part])
+    values["template"] += [
+        after["template"][new]
+        for old, new in paired_templates(before["template"], after["template"])
+        if old is None and new is not None and after["template"][new]["frame"] < steps
+    ]
+    return values
 
 
 def changes(before: Values, after: Values) -> list[str]:

@@ -129,8 +129,8 @@ def definition_of(found: Mapping[str, Any], *, where: str, folder: Path) -> Defi
 
 
 def _recordings(fields: _Fields, folder: Path) -> tuple[str, ...]:
+    from tracker.sequences.built_in import BUILT_IN
     from tracker.sequences.library import is_room
-    from tracker.sequences.rendering import ROOMS
 
     found: list[str] = []
     for name in fields.texts("recordings", None):
@@ -149,8 +149,8 @@ def _recordings(fields: _Fields, folder: Path) -> tuple[str, ...]:
         if not some:
             raise fields.error(
                 "recordings",
-                f"expected the name of a rendered room, a folder or a pattern of folders with a "
-                f"sequence.toml, found nothing at {_shown(name)}{did_you_mean(name, ROOMS)}",
+                f"expected the name of a built-in room, a folder or a pattern of folders with a "
+                f"sequence.toml, found nothing at {_shown(name)}{did_you_mean(name, BUILT_IN)}",
             )
         found += some
     if not found:

@@ -1,4 +1,4 @@
-"""The sheet before anything was dropped: files, what was open last, the rendered rooms."""
+"""The sheet before anything was dropped: files, what was open last, the built-in rooms."""
 
 from __future__ import annotations
 
@@ -34,13 +34,12 @@ UNDERSTOOD = (
 DAY = 86400.0
 
 
-def start_sheet(known: Recordings, open_as: Sequence[str], another: str) -> str:
+def start_sheet(known: Recordings, open_as: Sequence[str]) -> str:
     """All of it.
 
     Args:
         known: What can be opened.
         open_as: Names and folders of what is open.
-        another: Name of a random room that was not rendered yet.
     """
     head = element(
         "header",
@@ -53,7 +52,7 @@ def start_sheet(known: Recordings, open_as: Sequence[str], another: str) -> str:
         CLOSE,
         class_="s-head",
     )  # fmt: skip
-    body = element("div", _files(known), _lists(known, open_as, another), class_="open-body")
+    body = element("div", _files(known), _lists(known, open_as), class_="open-body")
     return joined(head, body).html
 
 
@@ -98,7 +97,7 @@ def _files(known: Recordings) -> Markup:
     )  # fmt: skip
 
 
-def _lists(known: Recordings, open_as: Sequence[str], another: str) -> Markup:
+def _lists(known: Recordings, open_as: Sequence[str]) -> Markup:
     own = [card for card in known.recordings if card.kind != "rendered"]
     rooms = [card for card in known.recordings if card.kind == "rendered"]
     return element(
@@ -113,17 +112,9 @@ def _lists(known: Recordings, open_as: Sequence[str], another: str) -> Markup:
         ),
         _cards(
             "Rendered rooms",
-            "made here in a minute, with truth",
+            "they come with the program, with truth",
             rooms,
             open_as,
-            GROW,
-            button(
-                "Render another…",
-                "recording",
-                "end",
-                data_value=another,
-                title="A room of any kind: other cameras, people, light and disturbances",
-            ),
         ),
         class_="open-list",
         aria_label="Recordings",
@@ -143,7 +134,6 @@ def _cards(
 
 def _card(card: RecordingCard, open_as: Sequence[str]) -> Markup:
     is_open = card.opens in open_as
-    waits = card.kind == "rendered" and not card.picture
     length = (
         f"{card.fps:g} Hz · {_duration(card.frames / card.fps)}"
         if card.fps
@@ -162,9 +152,7 @@ def _card(card: RecordingCard, open_as: Sequence[str]) -> Markup:
         element(
             "span",
             element("span", length, class_="cut"),
-            element(
-                "span", "open now" if is_open else "renders first" if waits else _ago(card.opened)
-            ),
+            element("span", "open now" if is_open else _ago(card.opened)),
             class_="small",
         ),
         class_="rec",
