@@ -66,7 +66,6 @@ TESTED_BY = {
 NOT_DRAWN = (
     "kernels/compilation.py",  # does nothing where kernels are not compiled
     "kernels/checked_cache.py",
-    "sequences/rendering/",
 )
 NOT_RUN = ("test_compilation.py", "test_checked_cache.py")
 """Tests of compiled kernels alone."""

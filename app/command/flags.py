@@ -26,7 +26,7 @@ from tracker.parameters import FOLLOWS, METHODS, PRESETS, Parameter, ParameterEr
 
 DEFAULT_SEQUENCE = "room44-3p"
 
-ONLY_IN_A_CHECKOUT = {"experiment": "python -m tests.papers"}
+ONLY_IN_A_CHECKOUT = {"experiment": "python -m tests.papers", "render": "python -m tests.rooms"}
 """Commands of earlier versions that only developers need, and what replaces each."""
 
 

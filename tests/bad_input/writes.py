@@ -19,6 +19,7 @@ from app.state.kept.presets import OwnPresets, keep_preset
 from app.state.workbench import Workbench
 from tests.engine import synthetic
 from tests.library.runs import RECORDING, run
+from tests.rooms.writing import whole_folder
 from tests.studies.small import definition
 from tests.synthetic import write_sequence
 from tests.test_export import PARAMETERS_OF_RUN, SEQUENCE, TRACKS
@@ -31,7 +32,6 @@ from tracker.library.store import Library
 from tracker.placing import filling, write_whole
 from tracker.runs.stage_files import StageFiles
 from tracker.sequences.reader import read_sequence
-from tracker.sequences.rendering.writing import whole_folder
 from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing import saving
 from tracker.sequences.writing.teaching import Values, taught_values, with_taught

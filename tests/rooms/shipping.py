@@ -11,9 +11,9 @@ from pathlib import Path
 import av
 from numpy import ndarray
 
+from tests.rooms.folder import render
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import FILE, read_sequence
-from tracker.sequences.rendering import render
 
 STEPS = 600
 """The first of a room: people enter, meet and hide each other, and everybody is in view."""
@@ -22,10 +22,10 @@ TRUTH = "ground_truth.csv"
 
 ENCODER = {
     "crf": "21",  # the three rooms together are just below 8 MB
-    "preset": "slow",
-    "bf": "0",  # with the next line, a jump decodes at most 24 pictures more than are wanted
-    "g": "25",
-    "keyint_min": "25",
+    "preset": "veryslow",
+    "bf": "0",  # with the next line a jump decodes few pictures more than the one that is wanted
+    "g": "16",
+    "keyint_min": "16",
     "sc_threshold": "0",
     "threads": "1",  # the same file on every machine with the same x264
 }
@@ -60,13 +60,14 @@ def write_shipped(rendered: Path, folder: Path) -> None:
         for index, camera in enumerate(sequence.cameras):
             path = folder / f"{camera.name}.mp4"
             encode(reader.iterate(index), path, camera.image_size, sequence.fps)
-    (folder / FILE).write_text(shipped_text(rendered), encoding="utf-8")
+    text = (rendered / FILE).read_text(encoding="utf-8")
+    (folder / FILE).write_text(shipped_text(text), encoding="utf-8")
     shutil.copyfile(rendered / TRUTH, folder / TRUTH)
 
 
-def shipped_text(rendered: Path) -> str:
-    """The ``sequence.toml`` of a rendered folder as it is shipped: with the other videos."""
-    return (rendered / FILE).read_text(encoding="utf-8").replace('.avi"', '.mp4"')
+def shipped_text(rendered: str) -> str:
+    """The text of a rendered ``sequence.toml`` as it is shipped: with the other videos."""
+    return rendered.replace('.avi"', '.mp4"')
 
 
 def encode(

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.rooms import render_random
 from tests.training import boosting, samples
-from tracker.sequences.rendering import render_random
 from tracker.single_view.shape.trees import FILE, Trees
 
 SEEDS = tuple(range(41, 100))

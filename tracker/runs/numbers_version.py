@@ -18,7 +18,7 @@ from tracker.parameters.registry import ORIGINS
 
 _ROOT = Path(__file__).resolve().parents[1]
 
-_NO_PART = ("evaluation", "sequences/rendering", "export.py", "library", "writing",
+_NO_PART = ("evaluation", "export.py", "library", "writing",
             "doubts", "corrections/log.py", "corrections/merging.py", "studies")  # fmt: skip
 """What looks at results or makes recordings; a change of it changes no run."""
 

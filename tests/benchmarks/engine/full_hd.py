@@ -16,13 +16,13 @@ from typing import Any
 import av
 
 from tests.benchmarks.measure import Measurement
+from tests.rooms.random_rooms import choose, render_chosen
 from tracker import pipeline
 from tracker.runs.run import Progress, Run
 from tracker.runs.single_views import _CameraWorker
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.pictures.video import VideoDecoder
 from tracker.sequences.reader import read_sequence
-from tracker.sequences.rendering.random_rooms import choose, render_chosen
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.appearance import Appearance
 from tracker.single_view.colour.peaks import PeakFinder

@@ -73,4 +73,4 @@ def _import_seconds(bytecode: Path) -> float:
 def _waits_for(state: dict) -> str:
     """The server's own words for what is not there yet."""
     opening = state["opening"]
-    return str((opening or state["run"])["message"])
+    return "reading" if opening else str(state["run"]["message"])

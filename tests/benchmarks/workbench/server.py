@@ -19,15 +19,12 @@ from websockets.sync.client import connect
 from tests.benchmarks.measure import Measurement
 from tests.browser.serving import Server
 from tests.browser.walkers import write_walkers
-from tracker.sequences.rendering import ROOMS
 
 
 def run(short: bool) -> Iterator[Measurement]:
     """Start it, then seek at random: step data and both pictures, idle and during a run."""
     with tempfile.TemporaryDirectory() as name:
-        folder: Path | str = (
-            write_walkers(Path(name) / "walkers") if short else next(reversed(ROOMS))
-        )
+        folder: Path | str = write_walkers(Path(name) / "walkers") if short else "room44-3p"
         begin = time.perf_counter()
         server = Server(folder, None if not short else Path(name) / "cache", wait=False)
         yield Measurement("serve: the page answers", time.perf_counter() - begin, "s")
@@ -36,7 +33,7 @@ def run(short: bool) -> Iterator[Measurement]:
             "serve: the first steps are there",
             time.perf_counter() - begin,
             "s",
-            "≤ 5 s once rendered",
+            "≤ 5 s",
         )
         try:
             if not short:

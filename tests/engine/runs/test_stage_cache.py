@@ -289,7 +289,6 @@ def test_other_code_has_other_keys(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         ("smoothing/stage.py", {"smoothing", "tracks"}),
         ("trajectories.py", {"smoothing", "tracks"}),
         ("evaluation/measures/ospa.py", set()),
-        ("sequences/rendering/walls/paint.py", set()),
     ):
         path = copy / name
         text = path.read_text(encoding="utf-8")

@@ -389,7 +389,7 @@ def test_the_command_writes_boxes_that_a_sequence_reads(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from app.command import main as cli
-    from tracker.sequences.rendering import render
+    from tests.rooms import render
 
     render("room24-2p", tmp_path / "room", frames=3)
     model = answering(tmp_path / "model.onnx", {"output0": end_to_end()})

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from scipy.special import logit
 
+from tests.rooms import render_random
 from tracker import pipeline
 from tracker.boxes import Boxes
 from tracker.parameters import RunParameters, with_values
 from tracker.pictures.foreground import BackgroundModel
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
-from tracker.sequences.rendering import render_random
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
 from tracker.single_view.colour.evidence import colour_ratios

@@ -18,10 +18,10 @@ from typing import Any
 
 from tests.golden.exact import of_run
 from tests.manual.places import RECORDS, ROOT
+from tests.rooms import render
 from tracker import pipeline
 from tracker.parameters import RunParameters
 from tracker.sequences.reader import read_sequence
-from tracker.sequences.rendering import render
 
 FILE = RECORDS / "machines.json"
 ROOM = "room24-2p"

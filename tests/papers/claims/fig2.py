@@ -10,12 +10,12 @@ import numpy as np
 from tests.papers.claims.fig1 import QUICK_STEPS, ROOM
 from tests.papers.laboratory import runs
 from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result
+from tests.rooms import read_visibility
 from tracker.boxes import box_overlaps
 from tracker.evaluation.figures import number
 from tracker.evaluation.measures.matching import assign
 from tracker.pipeline import Run
 from tracker.sequences.pictures.frames import FrameReader
-from tracker.sequences.rendering import read_visibility
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

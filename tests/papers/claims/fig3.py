@@ -15,6 +15,7 @@ from tests.papers.claims.fig1 import QUICK_STEPS, ROOM
 from tests.papers.laboratory import runs
 from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result, Verdict
 from tests.papers.laboratory.noise import NoisyReader
+from tests.rooms import read_visibility
 from tracker import parameters as table
 from tracker import pipeline
 from tracker.evaluation import EvaluationSettings, evaluate
@@ -22,7 +23,6 @@ from tracker.evaluation.figures import number
 from tracker.parameters import RunParameters
 from tracker.runs.processes import WorkerControl
 from tracker.sequences.reader import read_sequence
-from tracker.sequences.rendering import read_visibility
 from tracker.sequences.sequence import Sequence
 from tracker.trajectories import Trajectories
 

@@ -1,6 +1,6 @@
 """Rendered clips of one camera whose truth is exact: coloured ellipses in front of a wall.
 
-The rooms of :mod:`tracker.sequences.rendering` say what a method is worth in a room;
+The rooms of :mod:`tests.rooms` say what a method is worth in a room;
 these say what it does in one picture when two who look alike meet, when one hides
 another, and when the light changes. Nothing in them is estimated: where an actor
 is, how large, and how much of it is seen.

@@ -7,12 +7,12 @@ import time
 from collections.abc import Sequence as Items
 from dataclasses import dataclass, replace
 
+from tests import rooms
 from tests.papers.laboratory.experiment import Context, Unavailable
 from tracker import pipeline
 from tracker.parameters import RunParameters
 from tracker.pipeline import Cancelled, Progress, Run
 from tracker.runs.processes import WorkerControl
-from tracker.sequences import rendering
 from tracker.sequences.built_in import cached_rooms
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
@@ -38,7 +38,7 @@ def room(context: Context, name: str, steps: int | None = None) -> Sequence:
 
     Args:
         context: Whom to tell.
-        name: One of ``rendering.ROOMS``.
+        name: One of ``rooms.ROOMS``.
         steps: Only so many, as a sequence of its own.
     """
 
@@ -53,9 +53,9 @@ def room(context: Context, name: str, steps: int | None = None) -> Sequence:
                 return read_sequence(folder)
             except SequenceError:
                 pass  # somebody spoilt it; it is replaced
-        rendering.render(name, folder, frames=steps, progress=told, cancelled=context.cancelled)
+        rooms.render(name, folder, frames=steps, progress=told, cancelled=context.cancelled)
         return read_sequence(folder)
-    except rendering.RenderCancelled:
+    except rooms.RenderCancelled:
         raise Cancelled from None
 
 

@@ -14,6 +14,8 @@ from typing import Any
 
 from tests.papers.laboratory import runs
 from tests.papers.rooms.kept import keep_row
+from tests.rooms import RenderCancelled, choose, render_random
+from tests.rooms.random_rooms import VERSION
 from tracker import parameters as table
 from tracker import pipeline
 from tracker.evaluation import evaluate_sequence
@@ -21,8 +23,6 @@ from tracker.parameters import METHODS, RunParameters, Stage, method_of
 from tracker.runs.numbers_version import method_version, numbers_version
 from tracker.runs.processes import WorkerControl
 from tracker.sequences.reader import read_sequence
-from tracker.sequences.rendering import RenderCancelled, choose, render_random
-from tracker.sequences.rendering.random_rooms import VERSION
 from tracker.sequences.sequence import Sequence
 
 NICENESS = 5

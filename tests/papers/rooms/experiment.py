@@ -117,7 +117,7 @@ def _summed_up(found: dict[Case, list[dict[str, Any]]], seeds: range) -> Result:
         f"Rooms {seeds.start} to {seeds.stop - 1}; a tenth: the value that one room in ten does "
         f"not reach; found and false {settings.stated(('near',))}; IDF1 "
         f"{settings.stated(('distance', 'gate'))}. Default parameters, seed 0. "
-        f"`multiview-phd render --random SEED FOLDER` makes any of the rooms again."
+        f"`python -m tests.rooms random-SEED -o FOLDER` makes any of the rooms again."
     )
     return Result(
         head=(
