@@ -76,7 +76,7 @@ def encode(
     """Write pictures (blue-green-red) as H.264 with colours at full resolution.
 
     At half the resolution, which is usual, clothes lose so much that the filter's error in the
-    hardest room grew from 0.072 to 0.086 m; at full resolution it is 0.073 m, in as many bytes.
+    hardest room grew from 0.072 to 0.086 m; at full resolution it is 0.069 m, in as many bytes.
     """
     with av.open(str(path), "w", format="mp4", options=CONTAINER) as file:
         stream = file.add_stream("libx264", rate=Fraction(fps), options=ENCODER)

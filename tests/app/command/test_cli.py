@@ -352,7 +352,7 @@ def test_help_is_there_at_once_and_without_the_engine() -> None:
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    for command in ("serve", "track", "sequences", "render", "parameters"):
+    for command in ("serve", "track", "sequences", "parameters"):
         assert command in done.stdout
 
 
