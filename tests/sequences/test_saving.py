@@ -312,7 +312,7 @@ def test_a_rendered_room_is_never_altered(folder: Path, monkeypatch: pytest.Monk
     monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(folder.parent))
     opened = read_sequence(folder)
     before = (folder / FILE).read_bytes()
-    with pytest.raises(SequenceError, match=r"rendered by the program.*save a copy"):
+    with pytest.raises(SequenceError, match=r"lies in the cache.*save a copy"):
         saving.save(taught(opened, add), opened)
     assert (folder / FILE).read_bytes() == before
 

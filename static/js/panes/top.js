@@ -31,14 +31,7 @@ export function mountTop(root, { store, actions }) {
 		const { server, sequences, schema, link } = store.get();
 		const open = server?.opening?.name ?? server?.sequence?.name ?? "";
 		const option = (
-			/** @type {Server.SequenceEntryInfo} */ {
-				name,
-				description,
-				cameras,
-				frames,
-				kind,
-				error,
-			},
+			/** @type {Server.SequenceEntryInfo} */ { name, description, cameras, frames, kind, error },
 		) => {
 			const size = error
 				? "cannot be read"
