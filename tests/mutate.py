@@ -407,6 +407,7 @@ def outcome(root: Path, tests: tuple[str, ...], seconds: float = SECONDS) -> tup
         "OMP_NUM_THREADS": "1",
     }
     line = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider"]
+    line += ["-m", "not browser"]  # which is no part of a package's own tests
     # what overflows in compiled code does so silently
     line += ["-W", "ignore::RuntimeWarning", *tests]
     try:
