@@ -30,7 +30,7 @@ from tracker.parameters import (
 from tracker.sequences.sequence import Room, Sequence, View
 from tracker.trajectories import Trajectories
 
-ACCEPTED = Path(__file__).with_name("report.golden.html")
+ACCEPTED = Path(__file__).with_name("accepted_report.html")
 
 
 def scene() -> tuple[Sequence, Trajectories, Trajectories]:
