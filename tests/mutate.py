@@ -370,12 +370,15 @@ def draw(root: Path, packages: Many[str], count: int, seed: int) -> list[Drawn]:
     places: dict[str, list[Drawn]] = {sort: [] for sort in SORTS}
     for file in modules(root, packages):
         for change in changes(root, file):
-            if (change.file, *change.lines) not in harmless:
-                places[change.sort].append(change)
-    rng, chosen = random.Random(seed), []
+            places[change.sort].append(change)
+    rng = random.Random(seed)
+    chosen: list[Drawn] = []
     while len(chosen) < count and any(places.values()):
         sort = rng.choice([sort for sort in SORTS if places[sort]])
-        chosen.append(places[sort].pop(rng.randrange(len(places[sort]))))
+        change = places[sort].pop(rng.randrange(len(places[sort])))
+        # one of no effect is replaced by the next draw; all others stay the same
+        if (change.file, *change.lines) not in harmless:
+            chosen.append(change)
     return [replace(one, rounds=package_tests(root, one.file)) for one in chosen]
 
 
