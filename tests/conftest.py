@@ -15,13 +15,14 @@ from playwright.sync_api import Browser, sync_playwright
 
 from tracker.kernels.compilation import kernel_folder
 
-# the same examples every time; how long one takes says nothing of whether it is right
+# the same examples every time; how long one takes says nothing of whether it is right. Where
+# kernels are interpreted (``tests.mutate``), each example takes a hundred times as long
 settings.register_profile(
     "repeatable",
     derandomize=True,
     database=None,
     deadline=None,
-    max_examples=60,
+    max_examples=8 if os.environ.get("NUMBA_DISABLE_JIT") == "1" else 60,
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("repeatable")

@@ -95,6 +95,11 @@ class Mutant:
     equivalent: str = ""
     """Why no test can notice it, where that is so."""
 
+    @property
+    def rounds(self) -> tuple[tuple[str, ...], ...]:
+        """Tests that are run together."""
+        return (self.tests,)
+
     def __str__(self) -> str:
         return f"{self.file}: {_joined(self.old)} → {_joined(self.new)}"
 
@@ -126,7 +131,8 @@ class Drawn:
     """Counted from 1."""
     lines: tuple[str, str]
     """The whole line as it is and as it will be, with single spaces."""
-    tests: tuple[str, ...] = ()
+    rounds: tuple[tuple[str, ...], ...] = ()
+    """Tests that are run one after the other, until one fails."""
 
     def __str__(self) -> str:
         return f"{self.file}:{self.line} ({self.sort}) {self.lines[0]} → {self.lines[1]}"
@@ -331,8 +337,8 @@ def modules(root: Path, packages: Many[str]) -> Iterator[str]:
                 yield f"tracker/{name}"
 
 
-def package_tests(root: Path, file: str) -> tuple[str, ...]:
-    """The tests of the package that a module belongs to, first those that import the module."""
+def package_tests(root: Path, file: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The tests of a module's package: those that import the module, and the others."""
     name = file.removeprefix("tracker/")
     special = [key for key in TESTED_BY if name.startswith(key)]
     folders = TESTED_BY[special[0]] if special else (name.split("/")[0],)
@@ -347,10 +353,14 @@ def package_tests(root: Path, file: str) -> tuple[str, ...]:
         rf"(from|import) {re.escape(module)}\b|from {re.escape(package)} import [^\n]*\b{last}\b"
     )
     chosen = [path for path in found if path.name not in NOT_RUN]
-    chosen.sort(key=lambda path: not imports.search(path.read_text(encoding="utf-8")))
     if not chosen:
         raise Unfit(f"{file}: there are no tests of its package")
-    return tuple(path.relative_to(root).as_posix() for path in chosen)
+    near: list[str] = []
+    others: list[str] = []
+    for path in chosen:
+        imported = imports.search(path.read_text(encoding="utf-8"))
+        (near if imported else others).append(path.relative_to(root).as_posix())
+    return tuple(near), tuple(others)
 
 
 def draw(root: Path, packages: Many[str], count: int, seed: int) -> list[Drawn]:
@@ -359,13 +369,16 @@ def draw(root: Path, packages: Many[str], count: int, seed: int) -> list[Drawn]:
     places: dict[str, list[Drawn]] = {sort: [] for sort in SORTS}
     for file in modules(root, packages):
         for change in changes(root, file):
-            if (change.file, *change.lines) not in harmless:
-                places[change.sort].append(change)
-    rng, chosen = random.Random(seed), []
+            places[change.sort].append(change)
+    rng = random.Random(seed)
+    chosen: list[Drawn] = []
     while len(chosen) < count and any(places.values()):
         sort = rng.choice([sort for sort in SORTS if places[sort]])
-        chosen.append(places[sort].pop(rng.randrange(len(places[sort]))))
-    return [replace(change, tests=package_tests(root, change.file)) for change in chosen]
+        change = places[sort].pop(rng.randrange(len(places[sort])))
+        # one of no effect is replaced by the next draw; all others stay the same
+        if (change.file, *change.lines) not in harmless:
+            chosen.append(change)
+    return [replace(one, rounds=package_tests(root, one.file)) for one in chosen]
 
 
 # ── trying them
@@ -396,6 +409,7 @@ def outcome(root: Path, tests: tuple[str, ...], seconds: float = SECONDS) -> tup
         "OMP_NUM_THREADS": "1",
     }
     line = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider"]
+    line += ["-m", "not browser"]  # which is no part of a package's own tests
     # what overflows in compiled code does so silently
     line += ["-W", "ignore::RuntimeWarning", *tests]
     try:
@@ -428,8 +442,12 @@ def is_killed(
     """
     root, begin = copies.get(), time.monotonic()
     try:
+        status, printed = PASSED, ""
         with changed(mutant, root):
-            status, printed = outcome(root, mutant.tests, seconds)
+            for tests in filter(None, mutant.rounds):
+                status, printed = outcome(root, tests, seconds)
+                if status != PASSED:
+                    break
     finally:
         copies.put(root)
     # a drawn change may be one that nobody can even import; one of the list may not
@@ -448,7 +466,7 @@ def try_all(mutants: Many[Mutant | Drawn], workers: int) -> list[Mutant | Drawn]
         for mutant in mutants:
             mutant.text(Path(folder) / "0")
         # what fails anyway would notice everything
-        every = sorted({test for mutant in mutants for test in mutant.tests})
+        every = sorted({test for one in mutants for tests in one.rounds for test in tests})
         shares = [tuple(every[number::workers]) for number in range(workers)]
         roots = [Path(folder) / str(number) for number in range(workers)]
         begin = time.monotonic()

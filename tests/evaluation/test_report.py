@@ -117,7 +117,7 @@ def test_names_cannot_break_out():
 
 @pytest.mark.parametrize("truth", [None, truth_of([]), walks(1)])
 @pytest.mark.parametrize("tracks", [Trajectories.empty(1), perturbed(walks(1), 2)])
-@pytest.mark.parametrize("steps", [0, 1, 40])
+@pytest.mark.parametrize("steps", [0, 40])
 def test_nothing_to_show_is_shown(truth, tracks, steps: int):
     sequence = sequence_of(truth)
     evaluation = evaluate_sequence(sequence, tracks, steps=steps)

@@ -12,7 +12,7 @@ import numpy as np
 
 from tests.benchmarks.measure import Measurement, seconds
 from tests.engine import synthetic
-from tests.engine.mixtures import random_mixture
+from tests.filters.mixtures import random_mixture
 from tracker import pipeline
 from tracker.camera import Camera
 from tracker.filters import gaussian_mixture

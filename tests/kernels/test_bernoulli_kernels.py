@@ -159,14 +159,3 @@ def test_duplicates_are_those_of_the_table_of_pairs(count: int) -> None:
         assert_array_equal(duplicate, reference_duplicates(*given))
         found += int(duplicate.sum())
     assert found > 0 or count < 2
-
-
-def test_indices_within_bounds_are_those_of_the_table() -> None:
-    points = np.random.default_rng(1).uniform(-2.0, 2.0, (200, 6))
-    points[0, :3], points[1, :3] = [-1.0, -1.0, 0.0], [1.0, 1.5, 1.0000001]
-    low, high = np.array([-1.0, -1.0, 0.0]), np.array([1.0, 1.5, 1.0])
-    found = linear_algebra.inside_bounds(points, low, high)
-    places = points[:, :3]
-    assert_array_equal(found, np.flatnonzero(((places >= low) & (places <= high)).all(axis=1)))
-    assert found[0] == 0
-    assert 1 not in found

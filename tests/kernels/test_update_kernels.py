@@ -16,7 +16,6 @@ from tracker import association
 from tracker.camera import stacked
 from tracker.fusion.target_model import MeasurementKind, TargetModel
 from tracker.kernels import births as birth_kernels
-from tracker.kernels import linear_algebra
 from tracker.kernels.gating import Measurements
 from tracker.kernels.labelled import marginals as marginal_kernels
 from tracker.kernels.labelled.marginals import LabelledWeights, PairOdds
@@ -93,32 +92,6 @@ def test_shared_boxes(seed: int, size: int, boxes: int) -> None:
     assert_allclose(factors, expected[0], rtol=1e-9)
     assert_allclose(shares, expected[1], rtol=1e-9)
     assert_array_equal(known, labels[parents] < births.start)
-
-
-@given(st.lists(st.integers(-3, 6), max_size=12))
-def test_labels_are_grouped_as_by_numpy(labels: list[int]) -> None:
-    distinct, place = linear_algebra.group_labels(np.array(labels, dtype=np.int64))
-    expected = np.unique(np.array(labels, dtype=np.int64), return_inverse=True)
-    assert_array_equal(distinct, expected[0])
-    assert_array_equal(place, expected[1])
-
-
-@given(seeds, st.integers(0, 30), st.integers(0, 6))
-def test_pairs_are_summed_by_camera_component_and_box(seed: int, count: int, size: int) -> None:
-    rng = np.random.default_rng(seed)
-    labels = rng.integers(0, 8, size)
-    cameras, names, boxes = (rng.integers(0, most, count) for most in (3, 8, 4))
-    weights = rng.random(count)
-    expected: dict[tuple[int, int, int], float] = {}
-    rows = zip(cameras.tolist(), names.tolist(), boxes.tolist(), weights.tolist(), strict=True)
-    for camera, name, box, weight in rows:
-        if name in labels:
-            key = (camera, labels.tolist().index(name), box)
-            expected[key] = expected.get(key, 0.0) + weight
-    found = linear_algebra.sum_pairs(labels, cameras, names, boxes, weights)
-    assert [tuple(map(int, key)) for key in zip(*found[:3], strict=True)] == sorted(expected)
-    assert found[3].dtype == np.float32
-    assert_allclose(found[3], [min(expected[key], 1.0) for key in sorted(expected)], rtol=1e-6)
 
 
 @given(seeds, st.lists(st.integers(0, 4), min_size=1, max_size=4))

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tests.engine.mixtures import (
+from tests.filters.mixtures import (
     assert_positive_definite,
     first_moment,
     mixtures,

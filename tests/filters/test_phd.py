@@ -13,14 +13,14 @@ from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import chi2
 
-from tests.engine.mixtures import (
+from tests.engine.synthetic import CAMERAS, walk
+from tests.filters.mixtures import (
     assert_positive_definite,
     mixtures,
     random_covariances,
     random_mixture,
     reference_update,
 )
-from tests.engine.synthetic import CAMERAS, walk
 from tracker.filters import gaussian_mixture, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.kernels import kalman as update_kernels

@@ -7,8 +7,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import expm
 
+from tests import world
 from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, ROOM, look_at
 from tracker.filters import models
+from tracker.filters.models import Motion
+from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Room
 
 NO_DOORS = Room(ROOM.minimum, ROOM.maximum)
@@ -48,6 +51,41 @@ def test_two_steps_of_constant_velocity_are_one_of_twice_the_length() -> None:
     assert_allclose(f1 @ q1 @ f1.T + q1, q2, atol=1e-12)
 
 
+@pytest.mark.parametrize("step_time", [0.04, 0.5])
+def test_the_motion_is_the_one_that_the_parameters_name(step_time: float) -> None:
+    walk = Motion.of(FusionParams(motion="random_walk", motion_sigma=0.3), step_time)
+    assert (walk.dimension, walk.start_velocity) == (3, 0.0)
+    assert_array_equal(walk.transition, np.eye(3))
+    assert_allclose(walk.noise, 0.09 * step_time * np.eye(3))
+    p = FusionParams(
+        motion="constant_velocity", acceleration_sigma=1.5, vertical_share=0.2,
+        velocity_memory=1.7, start_velocity=0.6,
+    )  # fmt: skip
+    straight = Motion.of(p, step_time)
+    transition, noise = models.constant_velocity(np.array([1.5, 1.5, 0.3]), step_time, 1.7)
+    assert (straight.dimension, straight.start_velocity) == (6, 0.6)
+    assert_array_equal(straight.transition, transition)
+    assert_allclose(straight.noise, noise)
+    state = world.gaussians(np.array([[1.0, 2.0, 0.85]]), weights=0.7)
+    moved = straight.predict(state, 0.9)
+    assert_allclose(moved.weights, [0.63])
+    assert_allclose(moved.covariances[0], transition @ state.covariances[0] @ transition.T + noise)
+
+
+def test_a_newcomer_is_at_rest_and_how_fast_it_may_be_is_stated() -> None:
+    places = world.gaussians(
+        np.array([[1.0, 2.0, 0.85], [0.0, 1.0, 0.8]]), weights=0.3, sigma=0.2, speed_sigma=None
+    )
+    walk = Motion(np.eye(3), np.eye(3), 0.0)
+    assert walk.at_rest(places) is places
+    newcomers = Motion(np.eye(6), np.eye(6), 0.7).at_rest(places)
+    wanted = world.gaussians(places.means, weights=0.3, sigma=0.2, speed_sigma=0.7)
+    assert_array_equal(newcomers.labels, wanted.labels)
+    assert_array_equal(newcomers.weights, wanted.weights)
+    assert_array_equal(newcomers.means, wanted.means)
+    assert_allclose(newcomers.covariances, wanted.covariances)
+
+
 def test_everybody_is_born_at_an_entrance() -> None:
     births = models.entrance_births(ROOM, 0.02)
     assert births.size == len(ROOM.entrances)
@@ -76,14 +114,14 @@ def test_the_visible_area_is_that_of_the_room_in_the_picture() -> None:
     for camera in CAMERAS:
         area = models.visible_area(camera, ROOM)
         # counted pixel by pixel: those whose ray meets the room's volume
-        across, down = np.meshgrid(np.arange(0.0, width, 2.0), np.arange(0.0, height, 2.0))
+        across, down = np.meshgrid(np.arange(0.0, width, 8.0), np.arange(0.0, height, 8.0))
         rays = camera.back_project(np.stack([across, down], axis=-1).reshape(-1, 2))
         with np.errstate(divide="ignore"):
             near = (ROOM.minimum - camera.centre) / rays
             far = (ROOM.maximum - camera.centre) / rays
         entry = np.minimum(near, far).max(axis=1)
         leaving = np.maximum(near, far).min(axis=1)
-        counted = 4.0 * float(((entry < leaving) & (leaving > 0.0)).sum())
+        counted = 64.0 * float(((entry < leaving) & (leaving > 0.0)).sum())
         assert area == pytest.approx(counted, rel=0.05)
         assert area <= width * height
 
