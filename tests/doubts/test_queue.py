@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.corrections.test_runs import run_of, with_a_gap
+from tests.engine.runs.test_corrected_runs import run_of, with_a_gap
 from tests.engine.synthetic import crossing, sequence, walk
 from tracker.corrections import Place
 from tracker.corrections.kinds import Kind

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.corrections.test_runs import run_of
+from tests.engine.runs.test_corrected_runs import run_of
 from tests.engine.synthetic import HALF_EXTENTS, sequence, walk
 from tracker.corrections import Place
 from tracker.doubts import queue

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from tests.association.test_association import problem
 from tests.benchmarks.measure import Measurement, ratio, seconds
-from tests.engine.association.test_association import problem
 from tests.engine.stone_soup_jpda import Cluster, associators, cluster
 from tracker.association import exact_marginals, marginals, simplified_murty
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy import ndarray
 
-from tests.engine.smoothing.test_positions_laws import PLAIN, STEPS
 from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, sequence, walk
+from tests.smoothing.test_positions_laws import PLAIN, STEPS
 from tracker import pipeline
 from tracker.parameters import METHODS, RunParameters, method_of, with_values
 from tracker.runs.run import Run

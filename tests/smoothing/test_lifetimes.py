@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.engine.smoothing.test_positions_laws import PLAIN, STEPS, alone
 from tests.engine.synthetic import CAMERAS, sequence, walk
+from tests.smoothing.test_positions_laws import PLAIN, STEPS, alone
 from tracker import pipeline
 from tracker.parameters import with_values
 from tracker.smoothing.lifetimes import lifetimes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tests.corrections.test_runs import place, run_of, with_a_gap
+from tests.engine.runs.test_corrected_runs import place, run_of, with_a_gap
 from tracker import pipeline
 from tracker.corrections.kinds import make
 from tracker.corrections.resting import resting

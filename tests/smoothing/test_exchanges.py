@@ -7,9 +7,9 @@ import pytest
 from numpy import ndarray
 from scipy.optimize import linear_sum_assignment
 
-from tests.engine.smoothing.measured import STEP, fitted_to, measured
-from tests.engine.smoothing.test_positions_laws import PLAIN
 from tests.random_rooms import random_room
+from tests.smoothing.measured import STEP, fitted_to, measured
+from tests.smoothing.test_positions_laws import PLAIN
 from tracker import pipeline
 from tracker.parameters import with_values
 from tracker.pipeline import Run

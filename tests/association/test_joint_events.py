@@ -13,7 +13,7 @@ from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import linear_sum_assignment
 
-from tests.engine.association.test_association import exact, problem
+from tests.association.test_association import exact, problem
 from tracker import association
 from tracker.association import (
     JointEvents,

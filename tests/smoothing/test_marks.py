@@ -9,8 +9,8 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose
 
-from tests.engine.smoothing.test_positions_laws import PLAIN, alone, one_walker, smoother_of
 from tests.engine.synthetic import CAMERAS, HALF_EXTENTS
+from tests.smoothing.test_positions_laws import PLAIN, alone, one_walker, smoother_of
 from tracker import pipeline
 from tracker.boxes import Boxes
 from tracker.camera import Camera

@@ -83,21 +83,6 @@ def test_nobody_is_less_likely_to_exist_for_a_frame_that_is_not_there(method: st
 
 
 @every_method
-def test_a_blind_camera_leaves_the_others_as_if_it_were_not_there(method: str) -> None:
-    sequence = random_room(2, cameras=4, people=3, steps=40)
-    without = replace(sequence, views=sequence.views[1:], digest="without")
-    blind = slowed(sequence, {0: (1000, 999)})
-    one, other = run(without, method), run(blind, method)
-    for a, b in zip(one.fused, other.fused, strict=True):
-        assert_array_equal(a.posterior.weights, b.posterior.weights)
-        assert_array_equal(a.posterior.means, b.posterior.means)
-        assert_array_equal(a.detection_probabilities, b.detection_probabilities[1:])
-        assert_array_equal(a.sources, b.sources[1:])
-        assert_array_equal(a.associations.cameras + 1, b.associations.cameras)
-        assert (b.sources[0] == -1).all()
-
-
-@every_method
 def test_where_every_frame_is_there_nothing_changes(method: str) -> None:
     sequence = random_room(3, cameras=3, people=3, steps=30)
     always = slowed(sequence, {0: (1, 0)})

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy import ndarray
 
-from tests.engine.smoothing.test_joining import worth_of
+from tests.smoothing.test_joining import worth_of
 from tracker.smoothing.identity.joining import chains, join
 from tracker.smoothing.identity.ties import Said, Ties, possible
 

@@ -64,13 +64,6 @@ def test_the_faint_rest_of_the_old_label_goes_on_under_the_new_one() -> None:
     assert labels.tolist() == [1, 11], "no label twice"
 
 
-def test_an_older_label_is_no_newcomer() -> None:
-    # label 2 was there before label 1 was lost, only unsure
-    before = people((1, 0.9, 0.0, 0.0), (2, 0.3, 0.3, 0.0))
-    labels, _ = run(before, people((2, 0.8, 0.2, 0.0)))
-    assert labels.tolist() == [2]
-
-
 def test_who_left_the_room_is_not_waited_for() -> None:
     away = people((1, 0.9, 2.15, 0.0))
     away.means[0, 3] = 1.0  # walking out

@@ -1,0 +1,237 @@
+"""Thresholds of the smoothing at, one below and one above, and links by integration."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy import ndarray
+from numpy.testing import assert_allclose
+from scipy.stats import multivariate_normal
+
+from tracker.filters.models import Motion
+from tracker.kernels.gating import Measurements
+from tracker.parameters import FusionParams
+from tracker.smoothing.identity.appearance import Appearance
+from tracker.smoothing.identity.ends import Ends
+from tracker.smoothing.identity.pieces import (
+    Pairs,
+    log_integral,
+    motion_gains,
+    near_pairs,
+    same_label,
+)
+from tracker.smoothing.identity.ties import Said, Ties, possible
+from tracker.smoothing.lifetimes import independence
+from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.recording import CameraBoxes
+from tracker.smoothing.smoother import Fitted
+
+PRIOR = np.diag([100.0] * 3 + [0.49] * 3)
+
+
+def standing(*pieces: tuple[int, int, int, float]) -> Paths:
+    """Label, first step, last step and x of each piece."""
+    states, spread = [], []
+    for _, first, last, x in pieces:
+        state = np.zeros((last - first + 1, 6))
+        state[:, 0], state[:, 2] = x, 0.85
+        states.append(state)
+        spread.append(np.tile(np.diag([0.01, 0.01, 0.01, 0.1, 0.1, 0.1]), (len(state), 1, 1)))
+    labels, firsts = [p[0] for p in pieces], [p[1] for p in pieces]
+    return Paths.of(labels, firsts, states, spread, 6)
+
+
+def fitted(paths: Paths, restlessness: ndarray | float = 1.0) -> Fitted:
+    """Paths that are fitted already."""
+    rows = len(paths.states)
+    restless = np.broadcast_to(restlessness, rows).astype(float)
+    return Fitted(paths, np.zeros(rows), paths.states, paths.covariances, np.zeros(rows), restless)
+
+
+def pairs_of(found: Pairs) -> list[tuple[int, int]]:
+    return list(zip(found.earlier.tolist(), found.later.tolist(), strict=True))
+
+
+# ── which pieces may be linked
+
+
+@pytest.mark.parametrize(
+    ("first", "linked"), [(4, False), (5, True), (6, True), (14, True), (15, False)]
+)
+def test_a_gap_is_at_least_a_step_and_at_most_the_longest(first: int, linked: bool) -> None:
+    found = near_pairs(standing((1, 0, 4, 0.0), (2, first, 20, 0.0)), longest=10, fastest=0.3)
+    # a gap of one step is no gap: the later piece begins at the next step
+    assert pairs_of(found) == ([(0, 1)] if linked and first > 4 else [])
+    assert found.gaps.tolist() == ([first - 4] if linked else [])
+
+
+@pytest.mark.parametrize(("x", "linked"), [(2.5, True), (2.5 + 1e-9, False)])
+def test_nobody_goes_farther_than_a_metre_and_what_the_fastest_does(x: float, linked: bool) -> None:
+    paths = standing((1, 0, 4, 0.0), (2, 7, 9, x))
+    assert pairs_of(near_pairs(paths, longest=10, fastest=0.5)) == ([(0, 1)] if linked else [])
+    same = standing((1, 0, 4, 0.0), (1, 7, 9, 99.0))
+    assert pairs_of(near_pairs(same, longest=10, fastest=0.5)) == [(0, 1)]
+
+
+def test_a_piece_goes_on_under_its_label_as_the_next_that_does_not_overlap() -> None:
+    paths = standing((2, 5, 9, 0), (1, 0, 3, 0), (2, 0, 4, 0), (1, 3, 6, 0), (1, 7, 8, 0))
+    assert sorted(same_label(paths)) == [(2, 0), (3, 4)]
+
+
+@pytest.mark.parametrize(("gap", "near"), [(10, True), (11, False)])
+def test_a_constraint_over_the_longest_gap_is_one_over_a_short_gap(gap: int, near: bool) -> None:
+    cut = standing((1, 0, 4, 0.0), (2, 4 + gap, 30, 0.0))
+    now, later = Ties(together=((0, 1),), apart=((0, 1),)).parted(cut, 10)
+    assert now.together == (((0, 1),) if near else ())
+    assert later.together == (() if near else ((0, 1),))
+    assert now.apart == later.apart == ((0, 1),)
+
+
+def test_pieces_of_one_person_follow_one_another() -> None:
+    firsts = np.array([0, 5, 6])
+    for last, together in ((4, ((0, 1),)), (5, ())):
+        found = possible(firsts, np.array([last, 8, 9]), [Said([(0, 1)])])
+        assert found is not None
+        assert found.together == together
+    assert possible(firsts, np.array([5, 8, 9]), [Said([(0, 1)])], strict=True) is None
+
+
+def test_who_is_not_somebody_else_ends_before_that_one_begins() -> None:
+    cut = standing((1, 0, 4, 0.0), (2, 8, 9, 0.0), (3, 2, 6, 0.0))
+    apart = Ties(apart=((1, 0), (0, 2)))
+    assert apart.limits([[0], [1], [2]], cut) == {
+        0: (0, 7), 1: (5, int(np.iinfo(np.int64).max))
+    }  # fmt: skip
+    own = Ties(firsts=frozenset({1}), lasts=frozenset({0}))
+    assert own.limits([[0], [1]], cut)[0] == (0, 4)
+    assert own.limits([[0], [1]], cut)[1][0] == 8
+    assert own.limits([[0, 1]], cut) == {0: (0, int(np.iinfo(np.int64).max))}
+
+
+# ── what a link is worth
+
+
+def test_the_log_integral_is_the_integral() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(5):
+        root, told = rng.normal(size=(2, 3, 3))
+        mean, vector = rng.normal(size=(2, 3))
+        covariance, information = root @ root.T + 0.1 * np.eye(3), 0.3 * told @ told.T
+        found = log_integral(mean[None], covariance[None], information[None], vector[None])[0]
+        # of what is N(y; x, Λ⁻¹) up to a constant it is N(y; m, P + Λ⁻¹)
+        inverse = np.linalg.inv(information)
+        y = inverse @ vector
+        constant = 0.5 * y @ vector + 0.5 * np.linalg.slogdet(2.0 * np.pi * inverse)[1]
+        assert found == pytest.approx(
+            multivariate_normal(mean, covariance + inverse).logpdf(y) + constant, abs=1e-6
+        )
+
+
+def test_a_link_is_worth_as_much_as_its_motion_is_likelier_than_a_newcomer() -> None:
+    """By the densities themselves: two ends known as Gaussians, over a gap of three steps, as
+    restless as the one is at its end and the other at its beginning."""
+    motion = Motion.of(FusionParams(), 0.1)
+    paths = standing((1, 0, 4, 0.0), (2, 7, 9, 0.4))
+    restless = np.array([9.0, 1.0, 1.0, 1.0, 0.04, 0.25, 1.0, 9.0])
+    known = Ends.alone(fitted(paths, restless), PRIOR)
+    assert_allclose(known.restlessness, [[9.0, 0.04], [0.25, 9.0]])
+    pair = Pairs(np.array([0]), np.array([1]), np.array([3]), np.zeros(1))
+    found = motion_gains(paths, pair, known, motion, PRIOR, 1.5)[0]
+    f, q = np.eye(6), np.zeros((6, 6))
+    for _ in range(3):
+        f, q = motion.transition @ f, motion.transition @ q @ motion.transition.T + motion.noise
+    told = known.information[1:], known.vectors[1:]
+    ahead, spread = f @ paths.states[4], f @ paths.covariances[4] @ f.T
+    ways = [
+        np.log(weight) + log_integral(ahead[None], (spread + s * q)[None], *told)[0]
+        for weight, s in ((0.9, np.sqrt(0.04 * 0.25)), (0.1, 1.0))
+    ]
+    newcomer = log_integral(paths.states[5][None], PRIOR[None], *told)[0]
+    assert found == pytest.approx(np.logaddexp(*ways) - newcomer - 1.5, abs=1e-8)
+
+
+def test_the_first_pieces_own_prior_is_not_evidence() -> None:
+    """Ends.alone: the information of a piece is its posterior's less the prior's."""
+    paths = standing((1, 0, 4, 0.7))
+    known = Ends.alone(fitted(paths), PRIOR)
+    total = known.information[0] + np.linalg.inv(PRIOR)
+    assert_allclose(np.linalg.inv(total), paths.covariances[0], atol=1e-9)
+    centre = np.array([0.7, 0.0, 0.85, 0.0, 0.0, 0.0])
+    mean = np.linalg.solve(total, known.vectors[0] + np.linalg.solve(PRIOR, centre))
+    assert_allclose(mean, paths.states[0], atol=1e-9)
+    half = known.told_by(0.5)
+    assert_allclose(half.covariances, 2.0 * known.covariances)
+    assert_allclose(half.information, 0.5 * known.information)
+    assert_allclose(half.vectors, 0.5 * known.vectors)
+
+
+@pytest.mark.parametrize(
+    ("step_time", "memory", "share"), [(0.1, 0.25, 0.4), (0.25, 0.25, 1.0), (0.5, 0.25, 1.0)]
+)
+def test_the_share_of_new_evidence_is_a_steps_time_over_the_memory(
+    step_time: float, memory: float, share: float
+) -> None:
+    assert independence(step_time, memory) == pytest.approx(share)
+
+
+# ── looks
+
+
+def looking(angles: list[list[float]], first: int = 0) -> tuple[Paths, Links, CameraBoxes, ndarray]:
+    """Pieces side by side, of whose boxes each looks in its direction, radians."""
+    steps = len(angles[0])
+    paths = standing(*((k, first, first + steps - 1, 3.0 * k) for k in range(len(angles))))
+    boxes = np.array(
+        [[100.0 * k, 50.0, 5.0, 10.0] for _ in range(steps) for k in range(len(angles))]
+    )
+    starts = np.arange(steps + 1) * len(angles)
+    nothing = Measurements(np.zeros((len(boxes), 3)), np.zeros((len(boxes), 3, 3)))
+    camera = CameraBoxes(starts, np.zeros(steps, bool), nothing, boxes, np.ones(len(boxes)))
+    rows = np.arange(len(boxes))
+    of = np.array([step * len(angles) + k for k in range(len(angles)) for step in range(steps)])
+    links = Links(np.zeros(len(rows), dtype=np.int64), rows, of, np.ones(len(rows)))
+    looks = np.array([[np.cos(angles[k][s]), np.sin(angles[k][s])] for s in range(steps)
+                      for k in range(len(angles))])  # fmt: skip
+    return paths, links, camera, looks
+
+
+def test_looks_are_compared_by_the_medians_of_the_recording() -> None:
+    """Of few pieces the medians are 0.15 + 0.05 for one person and 0.8 for two: between these the
+    ratio is that of the two normal densities, with a doubt of 0.02 on either side."""
+    paths, links, camera, looks = looking([[0.0] * 4, [2.0] * 4, [4.0] * 4])
+    found = Appearance(paths, links, [camera], [looks], 0.1)
+    ratio, known = found.log_ratio(np.array([0, 0, 1]), np.array([1, 2, 2]))
+    assert known.all()
+    common = looks[:3].mean(axis=0)
+    own = looks[:3] - common
+    own /= np.linalg.norm(own, axis=1, keepdims=True)
+    for (i, j), value in zip(((0, 1), (0, 2), (1, 2)), ratio, strict=True):
+        d = np.clip((1.0 - own[i] @ own[j]) / 2.0, 0.2, 0.8)
+        wide = np.hypot(0.15, 0.1)
+        one = np.exp(-0.5 * ((d - 0.2) / wide) ** 2) / wide
+        two = np.exp(-0.5 * ((d - 0.8) / 0.15) ** 2) / 0.15
+        assert value == pytest.approx(
+            np.log((0.98 * one + 0.02 * two) / (0.02 * one + 0.98 * two)), abs=1e-9
+        )
+
+
+@pytest.mark.parametrize(
+    ("steps", "step_time", "known"),
+    [(2, 0.1, False), (3, 0.1, True), (4, 0.04, False), (5, 0.04, True)],
+)
+def test_looks_need_three_boxes_and_a_fifth_of_a_second(
+    steps: int, step_time: float, known: bool
+) -> None:
+    paths, links, camera, looks = looking([[0.0] * steps, [2.0] * steps])
+    found = Appearance(paths, links, [camera], [looks], step_time)
+    assert found.log_ratio(np.array([0]), np.array([1]))[1].tolist() == [known]
+
+
+@pytest.mark.parametrize(("share", "known"), [(0.7, False), (0.7 + 1e-9, True)])
+def test_a_box_that_is_hardly_ones_own_tells_nothing_of_looks(share: float, known: bool) -> None:
+    paths, links, camera, looks = looking([[0.0] * 4, [2.0] * 4])
+    less = replace(links, shares=np.full(len(links.shares), share))
+    found = Appearance(paths, less, [camera], [looks], 0.1)
+    assert found.log_ratio(np.array([0]), np.array([1]))[1].tolist() == [known]
