@@ -55,10 +55,10 @@ TESTED_BY = {
     "kernels/pictures": ("kernels", "pictures"),
     "kernels/smoothing": ("kernels", "smoothing"),
     "kernels/association": ("kernels", "association"),
-    "kernels/lens.py": ("kernels", "geometry", "runs/test_camera.py"),
+    "kernels/lens.py": ("kernels", "geometry"),
     "kernels": ("kernels", "filters"),
-    "boxes.py": ("geometry", "pictures/test_boxes.py"),
-    "camera.py": ("geometry", "runs/test_camera.py"),
+    "boxes.py": ("geometry",),
+    "camera.py": ("geometry",),
     "assignment.py": ("geometry", "association"),
 }
 """Whose tests are not only in the folder of the same name; the first that fits counts."""

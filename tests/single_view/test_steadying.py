@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.engine.pictures.shaken import SIZE, shaken
+from tests.single_view.shaken import SIZE, shaken
 from tests.golden.pieces import cut
 from tracker import pipeline
 from tracker.parameters import ForegroundParams, RunParameters, with_values

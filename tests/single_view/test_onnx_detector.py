@@ -14,7 +14,7 @@ from numpy import ndarray
 from onnx import TensorProto
 
 from tests.engine.painted import RED, painted_sequence, true_boxes
-from tests.engine.single_view.networks import answering, pooling, sized
+from tests.single_view.networks import answering, pooling, sized
 from tests.engine.synthetic import look_at
 from tracker import pipeline
 from tracker.boxes import Boxes
