@@ -1,181 +1,197 @@
-"""A GM-PHD filter on a detector's boxes, and which boxes contradict the room."""
+"""The GM-PHD filters over boxes: one step by Bayes' rule, who begins, and what goes on."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tests.engine.standing import CAMERAS, HALF_EXTENTS, ROOM, empty_room, line, watch
+from tests import world
+from tests.single_view.detected import ANYWHERE, CAMERA, detected, normal, run
 from tracker import single_view
-from tracker.fusion.target_model import TargetModel
-from tracker.parameters import RunParameters
-from tracker.sequences.sequence import Detections, Room, Sequence, View
-from tracker.single_view.detection_phd import DetectionPhd
-from tracker.single_view.detector_boxes import meets, standing_between
-from tracker.single_view.none import DetectionBoxes
-from tracker.single_view.protocol import ViewResult
+from tracker.filters.gaussian_mixture import GaussianMixture, gate_distance
+from tracker.parameters import RunParameters, with_values
+from tracker.sequences.pictures.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.box_sizes import entrance_boxes
+from tracker.single_view.colour_phd import ColourPhd, ColourPhdState
+from tracker.single_view.detection_phd import DetectionPhd, DetectionPhdState
+from tracker.single_view.detector_boxes import trust
 
-STEPS = 60
-
-
-def recorded(
-    paths: list[ndarray], *, clutter_rate: float = 0.0, clutter_score: float = 1.0, seed: int = 0
-) -> Sequence:
-    """What the first camera's detector wrote of people; false boxes have their own score."""
-    places = np.stack(paths, axis=1) if paths else np.full((STEPS, 1, 3), np.nan)
-    frames, boxes, scores = [], [], []
-    for rate, score, number in ((0.0, 1.0, seed), (clutter_rate, clutter_score, seed + 1)):
-        people = places if rate == 0.0 else np.full_like(places, np.nan)
-        for step, views in enumerate(watch(people, clutter_rate=rate, seed=number)):
-            for x, y, half_width, half_height in views[0].boxes:
-                frames.append(step)
-                boxes.append([x - half_width, y - half_height, 2 * half_width, 2 * half_height])
-                scores.append(score)
-    order = np.argsort(frames, kind="stable")
-    detections = Detections(
-        np.array(frames, dtype=np.int64)[order],
-        np.array(boxes).reshape(-1, 4)[order],
-        np.array(scores)[order],
-    )
-    whole = empty_room(10.0, CAMERAS[:1], STEPS)
-    return replace(whole, views=(View(CAMERAS[0], detections=detections),))
+NUMBERS: dict[str, object] = {
+    "clutter_rate": 3.0, "score_clutter": 2.0, "detection_probability": 0.8,
+    "survival_probability": 0.95, "birth_rate": 0.7, "motion_sigma": 0.9, "growth_sigma": 0.3,
+    "gate_probability": 0.9999, "merging_threshold": 1e-6, "pruning_threshold": 1e-8,
+    "extraction_threshold": 0.4,
+}  # fmt: skip
+FPS = 10.0
 
 
-def filtered(whole: Sequence, **changes: object) -> list[ViewResult]:
-    """Every step of the filter."""
-    method = DetectionPhd(whole, 0, RunParameters(detection_phd=changes))
-    state, results = method.start(), []
-    for frame in range(whole.frames):
-        state, result = method.step(state, frame, None, np.random.default_rng(0))
-        results.append(result)
-    return results
+def parameters(**changes: object) -> RunParameters:
+    values = {f"detection_phd.{key}": value for key, value in (NUMBERS | changes).items()}
+    return with_values(RunParameters(), ANYWHERE | values)
 
 
-WALK = line([(-1.0, -1.0), (0.5, 1.0)], [0, STEPS / 10], 10.0)
-STAND = line([(1.0, -1.2), (1.0, -1.2)], [0, STEPS / 10], 10.0)
+def people(boxes: ndarray, weights: list[float], first_label: int = 1) -> GaussianMixture:
+    covariances = np.tile(np.diag([9.0, 16.0, 4.0, 9.0]), (len(boxes), 1, 1))
+    labels = first_label + np.arange(len(boxes))
+    return GaussianMixture(np.array(weights), boxes, covariances, labels)
 
 
-def test_people_are_followed_in_the_picture() -> None:
-    results = filtered(recorded([WALK, STAND]))
-    model = TargetModel(HALF_EXTENTS, "box")
+KNOWN = np.array([[300.0, 300.0, 20.0, 50.0], [312.0, 306.0, 22.0, 52.0]])
+SEEN = np.array([[303.0, 302.0, 21.0, 51.0], [318.0, 310.0, 20.0, 50.0], [900.0, 90.0, 15.0, 40.0]])
+SCORES = [0.9, 0.3, 0.6]
+
+
+def walked(boxes: ndarray, time: float = 1.0 / FPS) -> ndarray:
+    """Variances of one step: in half heights along and across, and of the half sizes in shares."""
+    height, width = boxes[:, 3], boxes[:, 2]
+    sigmas = np.column_stack([0.9 * height, 0.9 * height, 0.3 * width, 0.3 * height])
+    return sigmas**2 * time
+
+
+def test_a_step_is_bayes_rule_with_a_clutter_that_falls_with_the_score() -> None:
+    p = parameters()
+    method = DetectionPhd(detected([SEEN], SCORES, fps=FPS), 0, p)
+    state = DetectionPhdState(people(KNOWN, [0.9, 0.6]), np.zeros((0, 4)), next_label=3)
+    after, result = method.step(state, 0, None, np.random.default_rng(0))
+    width, height = CAMERA.image_size
+    clutter = 3.0 * np.exp(2.0 * 2.0 * (0.5 - np.array(SCORES))) / (width * height) ** 2 * 4.0
+    spread = np.diag([9.0, 16.0, 4.0, 9.0]) + walked(KNOWN)[:, :, None] * np.eye(4)
+    noise = trust(SEEN, p.detection_phd)[:, :, None] ** 2 * np.eye(4)
+    pairs = np.zeros((2, 3))
+    for j, z in np.ndindex(2, 3):
+        offset, covariance = SEEN[z] - KNOWN[j], spread[j] + noise[z]
+        if offset @ np.linalg.solve(covariance, offset) <= gate_distance(0.9999, 4):
+            pairs[j, z] = 0.8 * 0.95 * [0.9, 0.6][j] * normal(offset, covariance)
+    weights = pairs / (clutter + pairs.sum(axis=0))
+    behind = weights.sum(axis=0)
+    believed = behind > 0.5
+    assert believed.any()
+    assert not believed.all()
+    assert_allclose(result.boxes, SEEN[believed])
+    assert_allclose(result.weights, behind[believed])
+    assert_allclose(result.sigmas, np.sqrt(np.diagonal(noise[believed], axis1=1, axis2=2)))
+    assert_array_equal(result.labels, 1 + weights[:, believed].argmax(axis=0))
+    assert_array_equal(after.unexplained, SEEN[behind < 0.5])
+    missed = 0.95 * (1.0 - 0.8) * 1.5
+    assert after.mixture.cardinality == pytest.approx(missed + weights.sum(), abs=1e-6)
+    assert result.information == {
+        "boxes outside the room": 0.0, "cardinality": after.mixture.cardinality,
+    }  # fmt: skip
+    assert_array_equal(result.measurements, SEEN)
+    assert_array_equal(result.measurement_scores, SCORES)
+    # a component of one measurement is a Kalman update of its own
+    mean = KNOWN[0] + spread[0] @ np.linalg.solve(spread[0] + noise[0], SEEN[0] - KNOWN[0])
+    assert np.abs(after.mixture.means - mean).max(axis=1).min() < 1e-9
+    assert_array_equal(result.estimates, after.mixture.means[after.mixture.weights > 0.4])
+
+
+def test_a_newcomer_begins_where_a_box_was_left_unexplained_as_unsure_as_box_and_step() -> None:
+    for rate, weight in ((0.7, 0.07), (50.0, 1.0)):  # at most one person a box
+        p = parameters(birth_rate=rate)
+        method = DetectionPhd(detected([[], []], fps=FPS), 0, p)
+        state = DetectionPhdState(GaussianMixture.empty(4), SEEN, next_label=5)
+        after, _ = method.step(state, 0, None, np.random.default_rng(0))
+        assert_allclose(after.mixture.weights, 0.2 * weight)
+        assert_array_equal(np.sort(after.mixture.labels), [5, 6, 7])
+        assert after.next_label == 8
+        assert after.unexplained.shape == (0, 4)
+        order = np.argsort(after.mixture.labels)
+        assert_allclose(after.mixture.means[order], SEEN)
+        born = trust(SEEN, p.detection_phd) ** 2 + walked(SEEN)
+        assert_allclose(after.mixture.covariances[order], born[:, :, None] * np.eye(4))
+        later, _ = method.step(after, 1, None, np.random.default_rng(0))
+        assert_allclose(later.mixture.weights, 0.95 * 0.2**2 * weight)
+        order = np.argsort(later.mixture.labels)
+        assert_allclose(
+            later.mixture.covariances[order], (born + walked(SEEN))[:, :, None] * np.eye(4)
+        )
+
+
+def test_estimates_go_on_where_asked_as_sure_as_the_filter() -> None:
+    method = DetectionPhd(detected([SEEN], SCORES, fps=FPS), 0, parameters(output="estimates"))
+    state = DetectionPhdState(people(KNOWN, [0.9, 0.9]), np.zeros((0, 4)), next_label=3)
+    after, result = method.step(state, 0, None, np.random.default_rng(0))
+    assert len(result.boxes) > 0
+    assert_array_equal(result.boxes, result.estimates)
+    assert_array_equal(result.labels, result.estimate_labels)
+    for box, sigma in zip(result.boxes, result.sigmas, strict=True):
+        row = np.flatnonzero((after.mixture.means == box).all(axis=1))[0]
+        assert_allclose(sigma**2, np.diagonal(after.mixture.covariances[row]))
+
+
+def test_two_people_keep_a_label_each_among_misses_and_clutter() -> None:
+    rng = np.random.default_rng(2)
+    walks = [world.walk([(-1.0, -1.0), (0.5, 1.0)], [0, 6], FPS), world.stand([1.0, -1.2], 60)]
+    paths = world.together(*walks)
+    seen = world.boxes((CAMERA,), paths, 1.0, rng, misses=0.1, clutter=0.5)[0]
+    steps = [seen.boxes[seen.frames == step] for step in range(60)]
     labels: list[set[int]] = [set(), set()]
-    for step in range(5, STEPS):
-        expected = model.expected(CAMERAS[0], np.stack([WALK[step], STAND[step]])).boxes
-        centres = (expected[:, :2] + expected[:, 2:]) / 2.0
-        result = results[step]
-        distances = np.linalg.norm(result.estimates[None, :, :2] - centres[:, None], axis=2)
-        assert (distances.min(axis=1) < 20.0).mean() >= 0.5
-        for person, row in enumerate(distances):
-            if row.min() < 20.0:
-                labels[person].add(int(result.estimate_labels[row.argmin()]))
+    for step, result in enumerate(run("detection_phd", detected(steps, fps=FPS))):
+        for person, box in enumerate(world.upright(CAMERA, paths[step])):
+            apart = np.abs(result.estimates[:, :2] - box[:2]).max(axis=1)
+            if step > 5 and len(apart) and apart.min() < 8.0:
+                labels[person].add(int(result.estimate_labels[apart.argmin()]))
     assert [len(names) for names in labels] == [1, 1]
     assert labels[0] != labels[1]
 
 
-def test_what_is_believed_goes_on_and_clutter_does_not() -> None:
-    whole = recorded([WALK], clutter_rate=2.0, seed=3)
-    results = filtered(whole)
-    measured = sum(len(result.measurements) for result in results)
-    handed_on = sum(len(result.boxes) for result in results)
-    assert measured > 1.5 * STEPS
-    assert 0.9 * STEPS < handed_on < 1.2 * STEPS
-    for result in results[5:]:
-        assert len(result.boxes) == len(result.weights) == len(result.labels) == len(result.sigmas)
-        assert (result.weights > 0.5).all()
+def test_without_detections_the_methods_say_what_to_do() -> None:
+    bare = world.sequence((CAMERA,), np.zeros((0, 0, 3)))
+    for name in ("none", "detection_phd"):
+        with pytest.raises(ValueError, match="has no detections; name a CSV file"):
+            single_view.create(name, bare, 0, RunParameters(), None)  # type: ignore[arg-type]
 
 
-def test_a_low_score_makes_clutter_likelier() -> None:
-    # a box that stays where it is, with a poor score: a coat on a hook
-    whole = recorded([STAND])
-    view = whole.views[0]
-    assert view.detections is not None
-    poor = replace(view.detections, scores=np.full(len(view.detections.scores), 0.05))
-    dubious = replace(whole, views=(replace(view, detections=poor),))
-    first = [
-        next(i for i, r in enumerate(filtered(s, score_clutter=5.0)) if len(r.estimates))
-        for s in (whole, dubious)
-    ]
-    assert first[1] >= first[0]
-    weights = [filtered(s, score_clutter=5.0)[first[0]].estimate_weights for s in (whole, dubious)]
-    assert weights[0].sum() > weights[1].sum()
-    assert not any(len(r.measurements) for r in filtered(dubious, score_threshold=0.1))
+# ── the filter on colours, where it needs no picture
 
 
-def test_estimates_go_on_where_asked() -> None:
-    for result in filtered(recorded([WALK]), output="estimates")[5:]:
-        assert_array_equal(result.boxes, result.estimates)
-        assert_array_equal(result.labels, result.estimate_labels)
-        assert (result.sigmas > 0.0).all()
+def colour_phd(heads: Sequence, reader: FrameReader, **changes: object) -> ColourPhd:
+    numbers = {
+        "birth_rate": 0.8, "survival_probability": 0.9, "motion_sigma": 2.0, "growth_sigma": 0.5,
+        "centre_sigma": 0.4, "size_sigma": 0.3, "merging_threshold": 1e-6, "shapes": "never",
+        "pruning_threshold": 1e-6, "carry_templates": False, "foreground_weight": 0.0,
+        "surroundings_weight": 0.0, "acceptance_foreground": 0.0, "foreground_samples": 0.0,
+    }  # fmt: skip
+    values = {f"colour_phd.{key}": value for key, value in (numbers | changes).items()}
+    made = single_view.create("colour_phd", heads, 0, with_values(RunParameters(), values), reader)
+    assert isinstance(made, ColourPhd)
+    return made
 
 
-def test_nobody_and_no_boxes() -> None:
-    for result in filtered(recorded([])):
-        assert result.boxes.shape == result.estimates.shape == result.measurements.shape == (0, 4)
-
-
-def test_the_method_is_made_by_name() -> None:
-    made = single_view.create(
-        "detection_phd",
-        recorded([WALK]),
-        0,
-        RunParameters(),
-        None,  # type: ignore[arg-type]
-    )
-    assert isinstance(made, DetectionPhd)
-    with pytest.raises(ValueError, match="has no detections; name a CSV file"):
-        DetectionPhd(empty_room(10.0), 0, RunParameters())
-
-
-@given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.integers(0, 3))
-def test_a_box_tells_where_its_target_stands(x: float, y: float, camera: int) -> None:
-    place = np.array([[x, y, 0.85]])
-    corners = TargetModel(HALF_EXTENTS, "box").expected(CAMERAS[camera], place).boxes
-    boxes = np.concatenate([corners[:, :2] + corners[:, 2:], corners[:, 2:] - corners[:, :2]], 1)
-    near, far = standing_between(CAMERAS[camera], boxes / 2.0, HALF_EXTENTS[2], np.zeros(1))
-    assert_allclose(near, far)
-    assert_allclose(near, place, atol=0.12)
-    near, far = standing_between(CAMERAS[camera], boxes / 2.0, HALF_EXTENTS[2], np.full(1, 0.2))
-    lens = CAMERAS[camera].centre
-    assert np.linalg.norm(near - lens) < np.linalg.norm(place - lens) < np.linalg.norm(far - lens)
-
-
-@pytest.mark.full
-@given(st.integers(0, 10_000), st.floats(0.0, 1.0))
-def test_a_way_meets_the_room_where_some_point_of_it_does(seed: int, margin: float) -> None:
-    rng = np.random.default_rng(seed)
-    room = Room(np.array([-1.0, -1.0, 0.0]), np.array([1.0, 1.0, 2.0]))
-    starts, ends = rng.uniform(-4, 4, (2, 20, 3))
-    ends[:5, 0] = starts[:5, 0]  # along a pair of walls
-    ends[5] = starts[5]
-    points = starts + np.linspace(0, 1, 2001)[:, None, None] * (ends - starts)
-    inside = room.contains(points.reshape(-1, 3), margin).reshape(2001, 20).any(axis=0)
-    wider = room.contains(points.reshape(-1, 3), margin + 0.01).reshape(2001, 20).any(axis=0)
-    found = meets(room, starts, ends, margin)
-    assert (found | ~inside).all()
-    assert (wider | ~found).all()
-
-
-def test_a_box_that_contradicts_the_room_is_shown_and_not_used() -> None:
-    corners = TargetModel(HALF_EXTENTS, "box").expected(CAMERAS[0], WALK[:1]).boxes[0]
-    good = np.array([corners[0], corners[1], *(corners[2:] - corners[:2])])
-    giant = np.array([400.0, 20.0, 300.0, 760.0])  # as near as the lens allows
-    dwarf = np.array([640.0, 300.0, 4.0, 10.0])  # far beyond the room
-    detections = Detections(np.zeros(3, dtype=np.int64), np.stack([good, giant, dwarf]), np.ones(3))
-    whole = replace(
-        empty_room(10.0, CAMERAS[:1], 1), views=(View(CAMERAS[0], detections=detections),)
-    )
-    parameters = RunParameters(detection_boxes={"room_tolerance": 0.3})
-    _, result = DetectionBoxes(whole, 0, parameters).step(None, 0, None, np.random.default_rng(0))
-    assert len(result.boxes) == 1
-    assert len(result.measurements) == 3
-    assert result.information["boxes outside the room"] == 2.0
-    wide = RunParameters(detection_boxes={"room_tolerance": 100.0})
-    _, everything = DetectionBoxes(whole, 0, wide).step(None, 0, None, np.random.default_rng(0))
-    assert len(everything.boxes) == 3
-    assert ROOM.contains(WALK[:1]).all()
+@pytest.mark.parametrize("birth", ["peaks", "entrances", "both"])
+def test_without_a_picture_people_walk_and_begin_where_the_parameters_say(
+    heads: Sequence, reader: FrameReader, birth: str
+) -> None:
+    method = colour_phd(heads, reader, birth=birth)
+    time = heads.step_time
+    known, peaks = np.array([[30.0, 30.0, 3.0, 5.0]]), np.array([[60.0, 40.0, 4.0, 6.0]])
+    before = ColourPhdState(people(known, [0.7]), peaks, 5, None)
+    after, result = method.step(before, 3, None, np.random.default_rng(0))
+    entrances = entrance_boxes(heads.cameras[0], heads.room, heads.target_half_extents, 0.8 * time)
+    assert entrances.size == 2
+    count = {"peaks": 1, "entrances": 2, "both": 3}[birth]
+    assert after.next_label == 5 + count
+    assert after.unexplained.shape == (0, 4)
+    assert len(result.boxes) == len(result.samples) == len(result.measurements) == 0
+    by_label = {int(label): row for row, label in enumerate(after.mixture.labels)}
+    assert sorted(by_label) == [1, *range(5, 5 + count)]
+    row = by_label[1]
+    assert after.mixture.weights[row] == pytest.approx(0.9 * 0.7)
+    moved = np.array([2.0 * 3.0, 2.0 * 5.0, 0.5 * 3.0, 0.5 * 5.0]) ** 2 * time
+    assert_allclose(after.mixture.covariances[row], np.diag([9.0, 16.0, 4.0, 9.0]) + np.diag(moved))
+    if birth != "entrances":
+        row = by_label[5]
+        assert after.mixture.weights[row] == pytest.approx(0.8 * time)
+        assert_allclose(after.mixture.means[row], peaks[0])
+        around = np.diag([1.6, 2.4, 1.2, 1.8]) ** 2
+        assert_allclose(after.mixture.covariances[row], around)
+    if birth != "peaks":
+        for index in range(2):
+            row = by_label[5 + count - 2 + index]
+            assert after.mixture.weights[row] == pytest.approx(0.8 * time)
+            assert_allclose(after.mixture.means[row], entrances.means[index])
+            assert_allclose(after.mixture.covariances[row], entrances.covariances[index])
+    assert_array_equal(result.estimates, after.mixture.means[after.mixture.weights > 0.5])
