@@ -68,8 +68,8 @@ NOT_DRAWN = (
     "kernels/checked_cache.py",
     "sequences/rendering/",
 )
-NOT_RUN = ("test_compilation.py", "test_checked_cache.py", "test_robustness.py")
-"""Tests of compiled kernels alone, and of what must raise nothing, which takes long interpreted."""
+NOT_RUN = ("test_compilation.py", "test_checked_cache.py", "test_robustness.py", "test_shape.py")
+"""Tests of compiled kernels alone, and of many or large pictures, which take long interpreted."""
 
 SORTS = ("bound", "sign", "off by one", "factor", "swapped", "and/or", "negated")
 

@@ -127,7 +127,7 @@ def test_with_entrances_most_sizes_are_of_their_heights() -> None:
         BoxSizes.of(LENS, bare, HALF, at_entrance_heights=True).sizes,
         BoxSizes.of(LENS, bare, HALF).sizes,
     )
-    away = Room(np.array([50.0, 50.0, 0.0]), np.array([51.0, 51.0, 2.0]))
+    away = Room(np.array([-51.0, -51.0, 0.0]), np.array([-50.0, -50.0, 2.0]))
     nothing = BoxSizes.of(LENS, away, HALF)
     assert_array_equal([nothing.smallest, nothing.largest], [[1.0, 1.0], [2.0, 2.0]])
     assert not nothing.contains(places(5)[:, :2]).any()
