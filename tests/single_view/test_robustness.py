@@ -11,9 +11,17 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from tests import world
-from tests.single_view.test_scenes import VARIANTS, every_variant, film, method_of, numbers, run
-from tracker import single_view
-from tracker.parameters import RunParameters
+from tests.single_view.test_scenes import (
+    SMALL,
+    VARIANTS,
+    every_variant,
+    film,
+    method_of,
+    numbers,
+    run,
+)
+from tracker import pipeline, single_view
+from tracker.parameters import RunParameters, with_values
 from tracker.pictures.foreground import unpack
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, View
@@ -134,3 +142,29 @@ def test_a_template_that_cannot_be_used_is_named(heads: Sequence, reader: FrameR
                 method_of(variant, replace(heads, templates=templates), reader)
     with pytest.raises(ValueError, match=r"one of colour_phd, .*, none, got 'magic'"):
         single_view.create("magic", heads, 0, RunParameters(), reader)
+
+
+@pytest.mark.parametrize("name", ["colour_phd", "pseudo_particle", "jpda", "association_matrix"])
+def test_every_method_with_pictures_tells_whose_colours_its_boxes_have(
+    heads: Sequence, name: str
+) -> None:
+    parameters = with_values(RunParameters(), SMALL | {"single_view": name})
+    found = pipeline.compute(heads, parameters, seed=0)
+    boxes = [view for views in found.views for view in views if len(view.boxes)]
+    assert all(view.likenesses.shape == (len(view.boxes), 2) for view in boxes)
+    sure = np.concatenate([view.likenesses for view in boxes]).max(axis=1)
+    assert np.median(sure) > 0.9
+
+
+@pytest.mark.parametrize("spoilt", ["missing", "frozen"])
+def test_a_spoilt_camera_takes_nothing_from_the_others(heads: Sequence, spoilt: str) -> None:
+    view = heads.views[0]
+    images = (Path("nowhere.png"),) * 8 if spoilt == "missing" else view.images[:1] * 8
+    second = replace(view, camera=replace(view.camera, name="second"), images=images)
+    parameters = with_values(RunParameters(), SMALL | {"single_view": "jpda"})
+    alone = pipeline.compute(heads, parameters)
+    both = replace(heads, views=(view, second), digest=f"{heads.digest} {spoilt}")
+    together = pipeline.compute(both, parameters)
+    assert together.complete
+    for ours, theirs in zip(alone.views, together.views, strict=True):
+        assert numbers(ours[0]) == numbers(theirs[0])
