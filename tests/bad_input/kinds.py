@@ -18,10 +18,10 @@ from app.state.kept.presets import OwnPresets
 from app.state.snapshot import Event, Notice
 from app.state.workbench import Workbench
 from tests.corrections.test_log import LOG
-from tests.engine.single_view.networks import answering
 from tests.formats.recorded import detections, settled_of, toml
 from tests.library.runs import filled, tracks
 from tests.library.runs import run as kept_run
+from tests.single_view.networks import answering
 from tests.studies.small import recording
 from tests.synthetic import write_sequence
 from tests.test_export import PARAMETERS_OF_RUN, SEQUENCE, TRACKS

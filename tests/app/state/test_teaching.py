@@ -22,7 +22,7 @@ from app.web.server import Settings, create_app
 from app.web.views import results
 from tests.app.conftest import ADDRESS, connect, run_is, wait_until
 from tests.browser.walkers import write_walkers
-from tests.engine.single_view.networks import answering, pooling
+from tests.single_view.networks import answering, pooling
 from tracker import pipeline
 from tracker.sequences.library import open_sequence
 from tracker.sequences.pictures.frames import FrameReader

@@ -18,10 +18,10 @@ from app.web.importing.models import ImportInfo
 from app.web.importing.sheet.draft import draft_sheet
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
-from tests.engine.pictures.shaken import SIZE as SHAKEN_SIZE
-from tests.engine.pictures.shaken import shaken
 from tests.formats.recorded import PLACES, detections, settled_of, toml, videos
 from tests.importing.test_angles import lay_out
+from tests.single_view.shaken import SIZE as SHAKEN_SIZE
+from tests.single_view.shaken import shaken
 from tracker.importing import bringing
 from tracker.importing.writing import write
 from tracker.pipeline import Cancelled

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.engine.single_view.networks import answering
+from tests.single_view.networks import answering
 from tracker import pipeline, warm_up
 from tracker.parameters import (
     METHODS,

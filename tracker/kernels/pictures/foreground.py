@@ -93,7 +93,10 @@ def two_classes(
         count, s0, s1, s2 = 0, 0, 0, 0
         for y in range(height):
             for x in range(width):
-                d0, d1, d2 = difference[y, x, 0], difference[y, x, 1], difference[y, x, 2]
+                # bytes are added up with more bits
+                d0 = np.int64(difference[y, x, 0])
+                d1 = np.int64(difference[y, x, 1])
+                d2 = np.int64(difference[y, x, 2])
                 if d0 > t0 or d1 > t1 or d2 > t2:
                     count += 1
                     s0 += d0
@@ -214,7 +217,7 @@ def update_background(
             d0 = np.int64(picture[y, x, 0]) - np.int64(shown[y, x, 0])
             d1 = np.int64(picture[y, x, 1]) - np.int64(shown[y, x, 1])
             d2 = np.int64(picture[y, x, 2]) - np.int64(shown[y, x, 2])
-            counts[y, x] = min(still[y, x] + 1, 255)
+            counts[y, x] = min(np.int64(still[y, x]) + 1, 255)
             if counts[y, x] < frames or max(abs(d0), abs(d1), abs(d2)) >= limit:
                 continue
             after[y, x, 0] = min(max(np.int64(after[y, x, 0]) + steps[d0 + limit], 0), 65280)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tracker.boxes import Boxes
+from tracker.boxes import Boxes, box_overlaps, paired_overlaps
 
 CENTRED = np.array([[10.0, 20.0, 3.0, 5.0], [0.5, -1.0, 0.5, 0.25]])
 CORNERS = np.array([[7.0, 15.0, 13.0, 25.0], [0.0, -1.25, 1.0, -0.75]])
@@ -36,3 +37,25 @@ def test_any_number_of_axes_there_and_back(shape: tuple[int, ...]) -> None:
 def test_what_is_no_box_is_refused() -> None:
     with pytest.raises(ValueError, match=r"expected four numbers each, got an array of shape \(2,"):
         Boxes(np.zeros((2, 3)))
+
+
+def test_boxes_share_what_both_cover_of_what_either_covers() -> None:
+    first = np.array([[0.0, 0.0, 4.0, 2.0], [10.0, 10.0, 3.0, 3.0], [1.0, 1.0, 0.0, 0.0]])
+    second = np.array([[2.0, 1.0, 4.0, 2.0], [4.0, 0.0, 1.0, 2.0], [0.0, 0.0, 4.0, 2.0]])
+    # 2 × 1 of 8 + 8 - 2; edge to edge nothing; all of it
+    assert_allclose(box_overlaps(first, second), [[2.0 / 14.0, 0.0, 1.0], [0.0] * 3, [0.0] * 3])
+    assert_allclose(paired_overlaps(first, second), [2.0 / 14.0, 0.0, 0.0])
+    assert box_overlaps(first[:0], second).shape == (0, 3)
+    # the area of a mask drawn pixel by pixel, whichever of both comes first
+    rng = np.random.default_rng(5)
+    boxes = rng.integers(0, 12, (2, 40, 4)).astype(float)
+    y, x = np.indices((24, 24)) + 0.5
+
+    def inside(box: ndarray) -> ndarray:
+        left, top, width, height = box
+        return (x > left) & (x < left + width) & (y > top) & (y < top + height)
+
+    for one, other, share in zip(*boxes, paired_overlaps(*boxes), strict=True):
+        a, b = inside(one), inside(other)
+        assert share == pytest.approx((a & b).sum() / max((a | b).sum(), 1))
+    assert_allclose(paired_overlaps(*boxes), paired_overlaps(*boxes[::-1]))

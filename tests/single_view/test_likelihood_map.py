@@ -62,18 +62,3 @@ def test_it_is_the_likelihood_of_the_boxes_one_by_one_and_peaks_on_the_people(
         assert part.max() > -0.7
         on_people[top - 1 : bottom + 2, left - 1 : right + 2] = True
     assert values[on_people].max() > values[~on_people].max() + 0.7
-
-
-def test_sizes_are_typical_of_what_can_be_there(painted: Sequence) -> None:
-    sizes = BoxSizes.of(painted.cameras[0], painted.room, painted.target_half_extents)
-    width, height = painted.cameras[0].image_size
-    rng = np.random.default_rng(3)
-    centres = rng.uniform(0, [width, height], (200, 2))
-    typical, possible = sizes.typical(centres)
-    np.testing.assert_array_equal(possible, sizes.contains(centres))
-    assert np.isnan(typical[~possible]).all()
-    assert (typical[possible] >= sizes.smallest).all()
-    assert (typical[possible] <= sizes.largest).all()
-    drawn = np.array([sizes.draw(centres, rng)[0] for _ in range(200)])
-    larger = (drawn > typical).mean(axis=0)[possible]
-    assert larger.mean() == pytest.approx(0.5, abs=0.05)

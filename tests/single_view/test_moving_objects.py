@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.engine.pieces import PUBLISHED, Rectangle, labels_by_place, person, play
+from tests.single_view.pieces import PUBLISHED, Rectangle, labels_by_place, person, play
 from tracker.single_view.association_matrix.moving_objects import Situation
 from tracker.single_view.protocol import ViewEvent
 

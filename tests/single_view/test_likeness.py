@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
-from typing import cast
 
 import numpy as np
 import pytest
@@ -12,8 +11,6 @@ from numpy.testing import assert_allclose
 
 from tests.engine.painted import GREEN, RED, painted_sequence
 from tests.engine.standing import line
-from tracker import pipeline
-from tracker.parameters import RunParameters
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
@@ -79,18 +76,6 @@ def test_a_template_that_cannot_be_read_is_told_and_hinders_nobody(
     with caplog.at_level(logging.WARNING):
         assert likeness_of(broken) is None
     assert 'template "person2"' in caplog.text
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("method", ["colour_phd", "pseudo_particle", "jpda", "association_matrix"])
-def test_every_method_with_pictures_passes_it_on(painted: Sequence, method: str) -> None:
-    parameters = RunParameters(single_view=cast(str, method))
-    found = pipeline.compute(painted, parameters, seed=0)
-    boxes = [view for views in found.views for view in views if len(view.boxes)]
-    assert all(view.likenesses.shape == (len(view.boxes), 2) for view in boxes)
-    assert boxes
-    sure = np.concatenate([view.likenesses for view in boxes]).max(axis=1)
-    assert np.median(sure) > 0.9
 
 
 def test_the_templates_of_a_run_are_read_once(

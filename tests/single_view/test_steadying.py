@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.engine.pictures.shaken import SIZE, shaken
 from tests.golden.pieces import cut
+from tests.single_view.shaken import SIZE, shaken
 from tracker import pipeline
 from tracker.parameters import ForegroundParams, RunParameters, with_values
 from tracker.pictures.foreground import BackgroundModel

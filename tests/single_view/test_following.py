@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
 
-from tests.engine.pieces import COLOURS, draw, person
+from tests.single_view.pieces import COLOURS, draw, person
 from tracker.single_view.association_matrix.following import coefficients, follow, object_histograms
 
 RED, BLUE = 1, 2

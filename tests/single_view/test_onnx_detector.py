@@ -14,8 +14,8 @@ from numpy import ndarray
 from onnx import TensorProto
 
 from tests.engine.painted import RED, painted_sequence, true_boxes
-from tests.engine.single_view.networks import answering, pooling, sized
 from tests.engine.synthetic import look_at
+from tests.single_view.networks import answering, pooling, sized
 from tracker import pipeline
 from tracker.boxes import Boxes
 from tracker.camera import Camera

@@ -14,7 +14,7 @@ from tracker.parameters import AssociationMatrixParams
 from tracker.pictures.blobs import blobs
 from tracker.single_view.association_matrix.joining import join
 from tracker.single_view.association_matrix.silhouettes import Fits, Silhouettes
-from tracker.single_view.box_sizes import BoxSizes, upright_boxes
+from tracker.single_view.box_sizes import upright_boxes
 
 CAMERA = CAMERAS[0]
 NUMBERS = AssociationMatrixParams(acceptance=-2.0, further_acceptance=-1.4, spare_acceptance=-0.7)
@@ -96,35 +96,6 @@ def test_what_is_no_person_gives_no_error(silhouettes: Silhouettes, kind: str) -
     assert len(fits.boxes) == len(fits.scores) == len(fits.owners)
     assert len(fits.boxes) <= 1
     assert len(silhouettes.half_heights(pieces.boxes[:, :2])) == pieces.size
-
-
-def test_sizes_are_mostly_those_at_the_heights_of_the_entrances() -> None:
-    """At the entrances' heights a place in the picture tells the distance, and that the size."""
-    spreads = []
-    for at_heights in (False, True):
-        sizes = BoxSizes.of(CAMERA, ROOM, HALF_EXTENTS, at_entrance_heights=at_heights)
-        table, there = sizes.quantiles(5)
-        assert table.shape == (sizes.columns * sizes.rows, 5, 2)
-        assert np.all(np.diff(table[there][:, :, 1], axis=1) >= 0.0)
-        assert not table[~there].any()
-        spreads.append(np.mean(np.log(table[there][:, 3, 1] / table[there][:, 1, 1])))
-    assert spreads[1] < 0.85 * spreads[0]
-
-
-def test_quantiles_are_those_of_the_sizes_at_each_place() -> None:
-    sizes = BoxSizes.of(CAMERA, ROOM, HALF_EXTENTS)
-    table, there = sizes.quantiles(4)
-    for cell in np.flatnonzero(there)[::11]:
-        heights = np.sort(sizes.sizes[sizes.starts[cell] : sizes.starts[cell + 1], 1])
-        ranks = ((np.arange(4) + 0.5) / 4 * len(heights)).astype(int)
-        np.testing.assert_array_equal(table[cell, :, 1], heights[ranks])
-
-
-def test_the_middle_of_each_cell_lies_in_it() -> None:
-    sizes = BoxSizes.of(CAMERA, ROOM, HALF_EXTENTS)
-    places = sizes.places()
-    np.testing.assert_array_equal(sizes.cells(places), np.arange(sizes.rows * sizes.columns))
-    np.testing.assert_array_equal(sizes.typical(places)[1], sizes.contains(places))
 
 
 def stacked(gap: int, shift: int = 0) -> ndarray:

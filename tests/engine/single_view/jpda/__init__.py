@@ -1,1 +1,0 @@
-"""Joint probabilistic data association."""

@@ -1,0 +1,1 @@
+"""Cameras, boxes and assignments."""

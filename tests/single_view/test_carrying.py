@@ -1,0 +1,104 @@
+"""Templates of one camera are carried to the others, and tell how far foreground is believed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy import ndarray
+from numpy.testing import assert_allclose
+
+from tests import world
+from tests.single_view.conftest import COLOURS
+from tracker.boxes import Boxes
+from tracker.parameters import ForegroundParams
+from tracker.pictures.foreground import learn
+from tracker.sequences.pictures.frames import FrameReader
+from tracker.sequences.reader import read_sequence
+from tracker.sequences.sequence import Sequence, Template
+from tracker.single_view.colour.carrying import with_carried
+from tracker.single_view.colour.trust import template_trust
+
+STEPS, TAUGHT = 6, 3
+PATHS = world.together(
+    world.walk([(-0.8, 0.1, 1.2), (0.1, 0.4, 1.2)], [0, 1], STEPS),
+    world.stand([0.5, -0.2, 1.1], STEPS),
+)
+CAMERAS = tuple(
+    world.look_at(name, place, (0.0, 0.0, 1.1), focal=90.0, image_size=(96, 72))
+    for name, place in (("left", (-1.9, -1.8, 1.7)), ("right", (1.9, -1.9, 1.6)))
+)
+
+
+def filmed(folder: Path, paths: ndarray = PATHS) -> Sequence:
+    """Somebody who walks and somebody who does not, taught in the first camera."""
+    exact = world.upright(CAMERAS[0], PATHS[TAUGHT], world.HEAD)
+    templates = [
+        Template(name, "left", TAUGHT, Boxes(box).left_top)
+        for name, box in zip(("walks", "sits"), exact, strict=True)
+    ]
+    whole = world.sequence(
+        CAMERAS, PATHS, fps=STEPS, room=world.volume(1.2, 1.9), half_extents=world.HEAD,
+        templates=templates,
+    )  # fmt: skip
+    own = world.painted(CAMERAS, PATHS, COLOURS, half_extents=world.HEAD)
+    other = world.painted(CAMERAS, paths, COLOURS, half_extents=world.HEAD)
+    return read_sequence(
+        world.folder(folder / "two", whole, lambda camera, step: (own, other)[camera](camera, step))
+    )
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> Sequence:
+    return filmed(tmp_path_factory.mktemp("two"))
+
+
+def carried_by(sequence: Sequence) -> dict[str, Template]:
+    with FrameReader(sequence) as reader:
+        carried = with_carried(sequence, "hue_saturation", "epanechnikov", reader)
+    return {template.name: template for template in carried.templates[len(sequence.templates) :]}
+
+
+def test_a_template_is_carried_to_where_the_other_camera_has_the_person(two: Sequence) -> None:
+    carried = carried_by(two)
+    assert set(carried) == {"walks", "sits"}
+    exact = world.upright(CAMERAS[1], PATHS[TAUGHT], world.HEAD)
+    for name, box in zip(("walks", "sits"), exact, strict=True):
+        found = Boxes.from_left_top(carried[name].box).centred
+        assert carried[name].camera == "right"
+        assert carried[name].frame == TAUGHT
+        assert_allclose((found[:2] - box[:2]) / box[2:], 0.0, atol=0.5)
+        assert_allclose(found[2:] / box[2:], 1.0, atol=0.25)
+
+
+def test_nothing_is_carried_to_whoever_has_a_template_or_is_not_seen(
+    two: Sequence, tmp_path: Path
+) -> None:
+    own = replace(two.templates[0], camera="right")
+    assert set(carried_by(replace(two, templates=(*two.templates, own)))) == {"sits"}
+    assert carried_by(replace(two, templates=())) == {}
+    gone = PATHS.copy()
+    gone[:, 1] = np.nan
+    assert set(carried_by(filmed(tmp_path, gone))) == {"walks"}
+
+
+def test_the_foreground_is_believed_by_its_share_in_the_templates(two: Sequence) -> None:
+    p = ForegroundParams(threshold=30.0)
+    with FrameReader(two) as reader:
+        trust = [template_trust(two, camera, reader, p) for camera in range(2)]
+        model = learn(two, 0, reader, p)
+        picture = reader.picture(0, TAUGHT)
+        assert model is not None
+        assert picture is not None
+        _, found = model.step(model.start(), picture)
+    y, x = np.indices(found.mask.shape)
+    for template in two.templates:
+        left, top, width, height = template.box
+        inside = (x >= left) & (x <= left + width) & (y >= top) & (y <= top + height)
+        u = np.clip((found.mask[inside].mean() - 0.1) / 0.2, 0.0, 1.0)
+        assert trust[0][template.name] == pytest.approx(3.0 * u**2 - 2.0 * u**3)
+    assert trust[0]["walks"] == 1.0
+    assert trust[0]["sits"] == 0.0
+    assert trust[1] == trust[0]  # who has no template there is judged by those elsewhere

@@ -1,0 +1,137 @@
+"""One scene for every method with pictures: two heads before a small camera.
+
+What each finds is compared with ``scenes.json``; ``--update-golden`` accepts it as it is.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy import ndarray
+from numpy.testing import assert_allclose
+
+from tests import world
+from tracker import single_view
+from tracker.parameters import PRESETS, RunParameters, with_values
+from tracker.pictures.foreground import unpack
+from tracker.sequences.pictures.frames import FrameReader, Picture
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.protocol import ViewResult
+
+KEPT = Path(__file__).with_name("scenes.json")
+
+SMALL = {"foreground.minimum_area": 4, "foreground.threshold": 30.0}
+PUBLISHED = PRESETS["published"] | SMALL
+
+VARIANTS: dict[str, dict[str, Any]] = {
+    "colours": {"single_view": "colour_phd", "colour_phd.samples": 60,
+                "colour_phd.mean_shift_starts": 4, "colour_phd.birth": "both"},
+    "colours and shapes": {"single_view": "colour_phd", "colour_phd.samples": 40,
+                           "colour_phd.mean_shift_starts": 3, "colour_phd.shapes": "always",
+                           "colour_phd.shape_odds": -1.0},
+    "colours, published": PUBLISHED | {"single_view": "colour_phd", "colour_phd.samples": 90,
+                                       "colour_phd.mean_shift_starts": 6},
+    "particles": {"single_view": "pseudo_particle", "pseudo_particle.samples": 80,
+                  "pseudo_particle.confirmation": 2},
+    "particles, published": PUBLISHED | {"single_view": "pseudo_particle",
+                                         "pseudo_particle.samples": 160},
+    "particles, classical": {"single_view": "pseudo_particle", "pseudo_particle.samples": 60,
+                             "pseudo_particle.filter": "classical"},
+    "crowns": {"single_view": "jpda", "jpda.confirmation_steps": 2},
+    "pieces": {"single_view": "jpda", "jpda.confirmation_steps": 2,
+               "jpda.foreground_box": "piece", "jpda.output": "measurements"},
+    "associated peaks": {"single_view": "jpda", "jpda.confirmation_steps": 1,
+                         "jpda.measurements": "colour", "colour_phd.samples": 60,
+                         "colour_phd.mean_shift_starts": 4},
+    "matrices": {"single_view": "association_matrix", "association_matrix.confirmation_steps": 2},
+    "matrices, published": PUBLISHED | {
+        "single_view": "association_matrix", "foreground.least_threshold": 20.0,
+    },
+    "shapes": {"single_view": "shapes", "shapes.least_odds": -2.0, "shapes.passed_odds": -3.0,
+               "jpda.confirmation_steps": 1},
+}  # fmt: skip
+every_variant = pytest.mark.parametrize("variant", VARIANTS)
+
+
+def method_of(
+    variant: str, sequence: Sequence, reader: FrameReader, **changes: Any
+) -> single_view.SingleViewMethod:
+    values = SMALL | VARIANTS[variant] | changes
+    parameters = with_values(RunParameters(), values)
+    return single_view.create(parameters.single_view, sequence, 0, parameters, reader)
+
+
+def run(
+    method: single_view.SingleViewMethod, pictures: Iterable[Picture | None], seed: int = 0
+) -> tuple[Any, list[ViewResult]]:
+    state, results = method.start(), []
+    for step, picture in enumerate(pictures):
+        state, result = method.step(state, step, picture, np.random.default_rng((seed, step)))
+        results.append(result)
+    return state, results
+
+
+def film(reader: FrameReader, steps: int = 8) -> list[Picture | None]:
+    return [reader.picture(0, step) for step in range(steps)]
+
+
+def numbers(result: ViewResult) -> list[float]:
+    """Counts, and sums of all columns: swapped ones or rows that are another's would show."""
+    parts: list[ndarray] = []
+    for boxes, beside in (
+        (result.boxes, result.weights), (result.sigmas, result.labels),
+        (result.estimates, result.estimate_weights), (result.estimates, result.estimate_labels),
+        (result.measurements, result.measurement_scores), (result.samples, result.sample_weights),
+        (result.gates, np.ones(len(result.gates))), (result.dropped.boxes, result.dropped.gates),
+    ):  # fmt: skip
+        rows = np.column_stack([boxes, beside]).astype(float)
+        rows = rows[np.lexsort(np.round(rows, 3).T)]
+        places = 1.0 + 0.1 * np.arange(len(rows))
+        parts += [np.array([len(rows)]), places @ rows]
+    mask = np.zeros((1, 1)) if result.foreground is None else unpack(result.foreground)
+    parts += [np.array([mask.sum(), np.flatnonzero(mask).sum()])]
+    parts += [np.array([result.log_ratios.sum(), len(result.events),
+                        sum(sum(event.labels) for event in result.events)])]  # fmt: skip
+    parts += [np.array([value for _, value in sorted(result.information.items())])]
+    return [float(f"{number:.9g}") for number in np.concatenate(parts)]
+
+
+@every_variant
+def test_what_a_method_finds_stays_what_it_was(
+    variant: str, heads: Sequence, reader: FrameReader, request: pytest.FixtureRequest
+) -> None:
+    _, results = run(method_of(variant, heads, reader), film(reader))
+    found = [numbers(result) for result in (results[1], results[3], results[6])]
+    kept = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.is_file() else {}
+    if request.config.getoption("--update-golden"):
+        lines = [f" {json.dumps(name)}: {json.dumps(row)}" for name, row in
+                 (kept | {variant: found}).items()]  # fmt: skip
+        KEPT.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
+        return
+    for step, (row, expected) in enumerate(zip(found, kept[variant], strict=True)):
+        assert_allclose(row, expected, rtol=1e-6, atol=1e-7, err_msg=f"the {step}th of the steps")
+
+
+def truth(heads: Sequence, step: int) -> ndarray:
+    assert heads.ground_truth is not None
+    places = heads.ground_truth.positions[heads.ground_truth.at(step)]
+    return world.upright(heads.cameras[0], places, world.HEAD)
+
+
+@pytest.mark.parametrize("variant", [one for one in VARIANTS if one != "shapes"])
+def test_both_heads_are_found_where_they_are(
+    variant: str, heads: Sequence, reader: FrameReader
+) -> None:
+    _, results = run(method_of(variant, heads, reader), film(reader))
+    near = []
+    for step in range(3, 8):
+        boxes = results[step].measurements
+        for box in truth(heads, step):
+            apart = np.abs((boxes[:, :2] - box[:2]) / box[2:]).max(axis=1, initial=0.0)
+            near.append(len(apart) > 0 and apart.min() < 1.0)
+    assert np.mean(near) > (0.3 if "classical" in variant else 0.65)

@@ -1,0 +1,172 @@
+"""Windows where people can be, the best of those that overlap, channels, and what colours add."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from numpy.testing import assert_allclose, assert_array_equal
+
+from tests import world
+from tracker.pictures.foreground import BackgroundModel
+from tracker.sequences.pictures.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.box_sizes import upright_boxes
+from tracker.single_view.colour.evidence import colour_ratios
+from tracker.single_view.colour.trust import taught_well
+from tracker.single_view.shape.channels import Channels
+from tracker.single_view.shape.finder import ShapeFinder, Shapes, strongest
+from tracker.single_view.shape.windows import ABOVE, BELOW, CROWNS, WIDTH, Windows
+
+CAMERA = world.look_at("cam", (0.4, -3.4, 2.2), (0.0, 0.0, 1.0), image_size=(640, 400), focal=320.0)
+ROOM = world.volume(1.6, 2.2)
+HALF = np.array([0.28, 0.28, 0.86])
+
+
+def test_a_window_hangs_from_the_crown_and_the_targets_box_reaches_the_floor() -> None:
+    crowns = np.array([[0.3, 0.2, 1.2], [-0.4, 0.6, 1.8], [0.0, -30.0, 1.7]])
+    found, there = Windows.at(CAMERA, crowns, HALF, floor=0.1)
+    assert there.tolist() == [True, True, False]
+    # of somebody who sits the box is half as high as the crown; who stands is as tall as a target
+    sits, _ = upright_boxes(CAMERA, np.array([[0.3, 0.2, 0.65]]), np.array([0.28, 0.28, 0.55]))
+    stands, _ = upright_boxes(CAMERA, np.array([[-0.4, 0.6, 0.95]]), np.array([0.28, 0.28, 0.85]))
+    assert_allclose(found.boxes[:2], np.concatenate([sits, stands]))
+    around = np.array([WIDTH / 2.0, WIDTH / 2.0, (ABOVE + BELOW) / 2.0])
+    seen, _ = upright_boxes(CAMERA, crowns[:2] - [0.0, 0.0, (BELOW - ABOVE) / 2.0], around)
+    edges = np.concatenate([seen[:, :2] - seen[:, 2:], seen[:, :2] + seen[:, 2:]], axis=1)
+    assert_allclose(found.edges[:2], edges)
+    assert_allclose(found.sizes[:2], 2.0 * seen[:, 2:] / [WIDTH, ABOVE + BELOW])
+    assert_array_equal(found.take(np.array([1])).edges, found.edges[[1]])
+    # a head stays as large as it is, wherever it is
+    heads, _ = Windows.at(CAMERA, crowns[:1], world.HEAD)
+    expected, _ = upright_boxes(CAMERA, crowns[:1] - [0.0, 0.0, 0.12], world.HEAD)
+    assert_allclose(heads.boxes, expected)
+
+
+def test_windows_cover_everybody_in_the_room_and_no_two_are_alike() -> None:
+    windows = Windows.of(CAMERA, ROOM, HALF)
+    rng = np.random.default_rng(0)
+    crowns = np.column_stack([rng.uniform(-1.5, 1.5, (200, 2)), rng.choice(CROWNS, 200)])
+    people, there = Windows.at(CAMERA, crowns, HALF, floor=0.0)
+    assert there.sum() > 100
+    for edges in people.edges[there]:
+        away = np.abs(windows.edges - edges) / np.tile(edges[2:] - edges[:2], 2)
+        assert away.max(axis=1).min() < 0.2
+    # those of one place and size to a grid are one
+    spans = windows.edges[:, 2:] - windows.edges[:, :2]
+    level = np.round(np.log(spans) / 0.16)
+    middles = (windows.edges[:, :2] + windows.edges[:, 2:]) / 2.0
+    cells = np.column_stack([np.round(middles / (0.1 * np.exp(0.16 * level))), level])
+    assert len(np.unique(cells, axis=0)) == len(cells)
+    # a floor narrower than the spacing has one row in its middle
+    narrow = replace(ROOM, minimum=np.array([-0.04, 0.2, 0.0]), maximum=np.array([0.06, 0.25, 2.2]))
+    few = Windows.of(CAMERA, narrow, HALF)
+    expected, seen = Windows.at(
+        CAMERA, np.array([[0.01, 0.225, crown] for crown in CROWNS]), HALF, floor=0.0
+    )
+    assert 3 < len(few.edges) <= seen.sum()
+    for edges in few.edges:
+        assert np.abs(expected.edges[seen] - edges).max(axis=1).min() < 1e-9
+
+
+def test_a_finder_is_made_once_for_a_room_and_anew_where_its_walls_are_moved(
+    heads: Sequence, reader: FrameReader
+) -> None:
+    smaller = replace(heads.room, maximum=heads.room.maximum - [0.4, 0.0, 0.0])
+    first = ShapeFinder.of(heads, 0, reader)
+    assert ShapeFinder.of(heads, 0, reader) is first
+    assert ShapeFinder.of(replace(heads, room=smaller), 0, reader) is not first
+
+
+def test_whoever_only_watches_knows_as_much_of_what_moved(
+    heads: Sequence, reader: FrameReader
+) -> None:
+    finder = ShapeFinder.of(heads, 0, reader)
+    looked, watched = finder.start(), finder.start()
+    for step in range(3):
+        picture = reader.picture(0, step)
+        assert picture is not None
+        looked, _ = finder.find(looked, picture, 0.5, 0.3)
+        watched = finder.watch(watched, picture)
+    assert looked is not None
+    assert watched is not None
+    assert_array_equal(looked.activity, watched.activity)
+    for one, other in zip(looked.before, watched.before, strict=True):
+        assert_array_equal(one, other)
+
+
+def test_colours_are_guessed_where_somebody_is_not_taught_in_every_camera_and_twice_in_one(
+    heads: Sequence,
+) -> None:
+    first = heads.templates[0]
+    second = replace(heads.views[0], camera=replace(heads.cameras[0], name="cam2"))
+    both = replace(heads, views=(heads.views[0], second))
+    each = tuple(replace(first, camera=camera.name) for camera in both.cameras)
+    assert taught_well(replace(both, templates=(*each, first)))
+    assert not taught_well(replace(both, templates=each))
+    assert not taught_well(replace(both, templates=each[1:] + each[1:]))
+    another = replace(first, name="another")
+    assert not taught_well(replace(both, templates=(*each, first, another)))
+
+
+def test_the_best_of_windows_that_overlap_takes_the_others() -> None:
+    edges = np.array([[0, 0, 10, 10], [1, 0, 11, 10], [40, 0, 50, 10], [2, 1, 12, 11]], float)
+    owners, best = strongest(edges, np.array([1.0, 3.0, 2.0, 0.5]), 0.3)
+    assert best.tolist() == [1, 2]
+    assert owners.tolist() == [1, 1, 2, 1]
+    nobody = strongest(np.zeros((0, 4)), np.zeros(0), 0.3)
+    assert [len(one) for one in nobody] == [0, 0]
+
+
+def test_a_box_is_supported_by_the_best_window_at_its_place() -> None:
+    boxes = np.array([[50, 60, 8, 20], [54, 60, 8, 20], [90, 60, 8, 20]], float)
+    edges = np.array([[30, 30, 70, 80], [34, 30, 74, 80], [70, 30, 110, 80]], float)
+    none = np.zeros((0, 4))
+    odds = np.array([1.0, 3.0, -2.0])
+    found = Shapes(none, np.zeros(0), none[:, :2], 0, Windows(edges, boxes), odds)
+    # 40 pixels a metre: within 0.35 m are 14 pixels
+    there = found.support(
+        np.array([[51, 60, 9, 9], [91, 61, 9, 9], [70, 60, 9, 9], [51, 90, 9, 9]])
+    )
+    assert there.tolist() == [3.0, -2.0, -np.inf, -np.inf]
+    assert found.support(none).shape == (0,)
+
+
+def test_another_exposure_neither_moves_nor_differs_and_a_person_does_both() -> None:
+    rng = np.random.default_rng(1)
+    empty = cv2.GaussianBlur(rng.integers(40, 160, (80, 100, 3)).astype(np.uint8), (0, 0), 3.0)
+    background = BackgroundModel.learn([empty] * 3)
+    assert background is not None
+    channels = Channels(background, 1.0, 40.0, 0.1)
+    state, _ = channels.step(channels.initial(), empty)
+    brighter = cv2.convertScaleAbs(empty, alpha=1.25)
+    state, sums = channels.step(state, brighter)
+    difference, motion, activity, spread = (sums[-1, -1, 7:] / empty[..., 0].size).tolist()
+    assert difference < 16.0
+    assert motion < 16.0
+    person = brighter.copy()
+    person[20:60, 40:60] = 250
+    _, sums = channels.step(state, person)
+
+    def mean(plane: int) -> float:
+        part = sums[55, 55] - sums[25, 55] - sums[55, 45] + sums[25, 45]
+        return float(part[plane] / 300.0)
+
+    assert mean(7) > difference + 60.0
+    assert mean(8) > motion + 60.0
+    assert mean(9) > activity
+    assert spread == 0.0
+
+
+def test_colours_speak_for_a_shape_by_a_peak_and_against_it_by_its_own_box() -> None:
+    vouched = np.array([[True, False], [False, True], [False, False], [False, False]])
+    of_peaks, of_shapes = np.array([0.3, 0.6]), np.array([0.9, 0.9, 0.3, 0.9])
+    ratios = colour_ratios(vouched, of_peaks, of_shapes, sigma=0.1)
+    np.testing.assert_allclose(ratios, [1.5, -1.5, 0.0, -1.0])
+    # a wider likelihood tells less
+    np.testing.assert_allclose(colour_ratios(vouched, of_peaks, of_shapes, 0.2)[:2], [0.75, -0.75])
+    assert colour_ratios(np.zeros((0, 2), bool), of_peaks, np.zeros(0), 0.1).shape == (0,)
+    np.testing.assert_allclose(
+        colour_ratios(np.zeros((2, 0), bool), np.zeros(0), of_shapes[2:], 0.1), [0.0, -1.0]
+    )
