@@ -162,8 +162,8 @@ def study(work: Path) -> None:
 
 def rooms(work: Path) -> None:
     """The room of three cameras, whose first steps are enough, and each room without its files."""
-    from tracker.sequences.rendering import render
-    from tracker.sequences.rendering.writing import seal
+    from tests.rooms import render
+    from tests.rooms.writing import seal
 
     three = work / "cache/rooms/version-4/room24-2p-3-cameras"
     if not three.is_dir():
