@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from tests.benchmarks.measure import Measurement, ratio, seconds
-from tests.pictures.test_particles import reference_climb
 from tests.filters.mixtures import random_mixture, reference_merge, reference_update
+from tests.pictures.test_particles import reference_climb
 from tracker.filters import gaussian_mixture, phd
 from tracker.kernels.kalman import Expected
 from tracker.pictures import colour, particles
