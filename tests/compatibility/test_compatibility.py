@@ -27,11 +27,13 @@ from starlette.testclient import TestClient
 
 from app.command.main import main
 from app.web.server import Settings, create_app
+from tests.studies.small import Serial, run
 from tracker.export import read_tracks_csv
 from tracker.kernels.compilation import kernel_folder
 from tracker.library.bundle import unpack_bundle
 from tracker.library.store import Library
 from tracker.sequences.library import open_sequence
+from tracker.studies.kept.store import find
 
 HERE = Path(__file__).resolve().parent
 ADDRESSES = json.loads((HERE / "addresses.json").read_text(encoding="utf-8"))
@@ -430,18 +432,18 @@ def test_a_study_that_was_stopped_is_shown_with_its_trials(
         assert json.dumps(one["values"]["fusion.clutter_rate"]) in text
 
 
-@pytest.mark.full
-def test_a_study_that_was_stopped_goes_on(home: Home, capsys: pytest.CaptureFixture[str]) -> None:
-    before = json.loads(command(capsys, "study", "show", "half", 2, "--json")[1])
-    status, _, error = command(capsys, "study", "resume", "half", "--workers", 1)
-    assert status == 0, error
-    after = json.loads(command(capsys, "study", "show", "half", 2, "--json")[1])
-    assert after["values"] == before["values"]
-    assert after["ended"] == before["ended"], "what had ended is not computed again"
-    last = json.loads(command(capsys, "study", "show", "half", 5, "--json")[1])
-    assert last["state"] == "complete"
-    listed = command(capsys, "study", "list")[1]
-    assert any(line.split()[:4] == ["half", "done", "6", "6"] for line in listed.splitlines())
+def test_a_study_that_was_stopped_goes_on_with_its_next_trial(home: Home) -> None:
+    store = find("half", home.studies)
+    before = store.trials()
+    crew = Serial()
+    status = run(store, crew, stopped=lambda: len(store.trials()) > len(before))
+    first, second, third, *new = store.trials()
+    assert [first, second, third] == before, "what had ended is as it was"
+    assert new[0].state == "complete", new
+    assert new[0].number == 3
+    assert 0.1 <= new[0].values["fusion.clutter_rate"] <= 10.0
+    assert not {row.key for one in before for row in one.jobs} & set(crew.done)
+    assert status.state == "stopped"
 
 
 # files that leave the program
