@@ -34,6 +34,7 @@ from tracker.library.bundle import unpack_bundle
 from tracker.library.store import Library
 from tracker.sequences.library import open_sequence
 from tracker.studies.kept.store import find
+from tracker.studies.work.jobs import code_version
 
 HERE = Path(__file__).resolve().parent
 ADDRESSES = json.loads((HERE / "addresses.json").read_text(encoding="utf-8"))
@@ -432,9 +433,26 @@ def test_a_study_that_was_stopped_is_shown_with_its_trials(
         assert json.dumps(one["values"]["fusion.clutter_rate"]) in text
 
 
+def test_a_study_of_another_version_is_refused_in_a_sentence_and_stays_as_it_is(
+    home: Home, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store = find("half", home.studies)
+    before = store.trials()
+    with closing(sqlite3.connect(store.folder / "results.sqlite3", isolation_level=None)) as file:
+        file.execute("""UPDATE told SET value = '"another"' WHERE name = 'code'""")
+    status, _, error = command(capsys, "study", "resume", "half", "--workers", 1)
+    assert status == 1
+    assert_told(error)
+    assert store.trials() == before
+
+
 def test_a_study_that_was_stopped_goes_on_with_its_next_trial(home: Home) -> None:
     store = find("half", home.studies)
     before = store.trials()
+    # only the version that began a study goes on with it: let it be this one
+    with closing(sqlite3.connect(store.folder / "results.sqlite3", isolation_level=None)) as file:
+        own = (json.dumps(code_version()),)
+        file.execute("UPDATE told SET value = ? WHERE name = 'code'", own)
     crew = Serial()
     status = run(store, crew, stopped=lambda: len(store.trials()) > len(before))
     first, second, third, *new = store.trials()
@@ -442,7 +460,7 @@ def test_a_study_that_was_stopped_goes_on_with_its_next_trial(home: Home) -> Non
     assert new[0].state == "complete", new
     assert new[0].number == 3
     assert 0.1 <= new[0].values["fusion.clutter_rate"] <= 10.0
-    assert not {row.key for one in before for row in one.jobs} & set(crew.done)
+    assert len(crew.done) == 1, "nothing that had ended is computed again"
     assert status.state == "stopped"
 
 
