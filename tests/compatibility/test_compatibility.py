@@ -318,22 +318,37 @@ def test_a_log_has_every_kind_of_correction_and_all_that_it_says_is_read(
         assert {**other, "time": time} == {key: one[key] for key in other}
 
 
-def test_corrections_give_the_tracks_that_they_gave(
+def test_corrections_give_the_track_file_that_they_gave(
     home: Home, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out, library = home.folder / "again.csv", home.folder / "again.sqlite3"
-    status, _, error = command(
-        capsys, "track", home.crossing, "-o", out, "--library", library, "--no-cache"
-    )
+    out = home.folder / "again.csv"
+    status, _, error = command(capsys, "track", home.crossing, "-o", out, "--keep", 0)
     assert status == 0, error
     kept = (HERE / "tracks.csv").read_text(encoding="utf-8")
     assert rows_of(out.read_text(encoding="utf-8")) == rows_of(kept)
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (HELD, ["--no-corrections"]),
+        (CORRECTED, []),
+        ("5", [
+            "--fusion", "sequential_phd", "--smoothing", "positions", "--seed", "3",
+            "--set", "fusion.clutter_rate=1.5", "--set", "fusion.detection_probability=0.85",
+        ]),
+        ("6", ["--preset", "published"]),
+    ],
+)  # fmt: skip
+def test_corrections_give_the_tracks_that_they_gave_bit_for_bit(
+    home: Home, capsys: pytest.CaptureFixture[str], number: str, words: list[str]
+) -> None:
+    library = home.folder / "again.sqlite3"
+    places = ("-o", home.folder / "again.csv", "--library", library)
+    status, _, error = command(capsys, "track", home.crossing, *places, *words)
+    assert status == 0, error
     with Library(library) as again:
-        assert facts_of(again.result(1))["tracks"] == RUNS[CORRECTED]["tracks"]
-    command(capsys, "track", home.crossing, "-o", out, "--library", library, "--no-corrections")
-    with Library(library) as again:
-        assert facts_of(again.result(2))["tracks"] == RUNS[HELD]["tracks"]
-    assert RUNS[HELD]["tracks"] != RUNS[CORRECTED]["tracks"]
+        assert facts_of(again.result(1))["tracks"] == RUNS[number]["tracks"]
 
 
 def test_what_was_said_last_can_be_taken_back_after_a_start(home: Home) -> None:
