@@ -153,13 +153,16 @@ class ShownRun(Store):
                 self._last_good = run
                 self._put("run", run=run)
 
-    def show_kept(self, run: Run, number: int, stands_for: str = "") -> None:
+    def show_kept(
+        self, run: Run, number: int, stands_for: str = "", warnings: Iterable[str] = ()
+    ) -> None:
         """Show a run of the library with its parameters, in one change.
 
         Args:
             run: Its tracks; of the open recording.
             number: Its number in the library.
             stands_for: The key that a computation with its values would have, if another.
+            warnings: What of it cannot be shown, a sentence each.
         """
         with self._edit() as now:
             if now.sequence is None or run.sequence is not now.sequence:
@@ -171,6 +174,7 @@ class ShownRun(Store):
                 total=now.sequence.frames,
                 kept=number,
                 stands_for=stands_for,
+                warnings=tuple(warnings),
             )
             self._last_good = run
             self._put("run", run=run, run_state=state, parameters=run.parameters)

@@ -181,7 +181,8 @@ class Jobs:
             if self._under_way is not None:
                 self._under_way.cancelled.set()
             self._wanted = None
-            self._workbench.show_kept(run, result.run.id, "" if run.key == wanted else wanted)
+            stands_for = "" if run.key == wanted else wanted
+            self._workbench.show_kept(run, result.run.id, stands_for, _beyond_the_end(run, result))
 
     def kept_run(self, sequence: Sequence, result: Result) -> Run:
         """A run of the library to set others against, known by a key of its own.
@@ -385,6 +386,17 @@ def silence(now: RunState, seconds: float) -> str:
     """
     what = "hindsight" if 0 < now.total == now.done else "no new step"
     return f"{what} for {seconds:.0f} s"
+
+
+def _beyond_the_end(run: Run, result: Result) -> tuple[str, ...]:
+    """The warning that a stored run has more steps than its recording has now, if it does."""
+    stored, shown = result.run.steps, run.done
+    if stored <= shown:
+        return ()
+    return (
+        f"{result.run.title} has {stored} steps and the recording {shown} now: the first {shown} "
+        "are shown, of the recording as it was; `runs export` writes all of them",
+    )
 
 
 def _meanwhile(snapshot: Snapshot, seed: int) -> Trajectories | None:
