@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import json
-import time
-from dataclasses import replace
 
-import numpy as np
 import pytest
 from pydantic import ValidationError
 
 from tests.evaluation.scenes import (
     HALF_EXTENTS,
-    as_truth,
     by_hand,
     perturbed,
     recording,
-    scattered,
     walks,
 )
 from tracker.evaluation import DEFINITIONS, EvaluationSettings, compare, evaluate
@@ -153,29 +148,3 @@ def test_cameras_of_a_recording():
         assert score.overlap is not None
         assert score.overlap > 0.7
     assert result["pixel_error"] > 0.0
-
-
-@pytest.mark.data
-def test_a_recording_is_evaluated_in_time():
-    sequence = recording("cmc2")
-    truth = sequence.ground_truth
-    assert truth is not None
-    tracks = perturbed(truth, 1)
-    assert least_seconds(lambda: evaluate_sequence(sequence, tracks)) < 2.0
-
-
-def test_many_steps_are_evaluated_in_time():
-    truth = as_truth(scattered(1, ids=3, steps=1500, share=1.0))
-    tracks = scattered(1, ids=3, steps=1500, share=1.0)
-    tracks = replace(tracks, positions=tracks.positions + np.array([0.1, 0.0, 0.0]))
-    assert least_seconds(lambda: evaluate(truth, tracks)) < 1.0
-
-
-def least_seconds(work) -> float:
-    """The fastest of three: the others were disturbed."""
-    times = []
-    for _ in range(3):
-        begin = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - begin)
-    return min(times)

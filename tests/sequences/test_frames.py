@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.app.conftest import wait_until
 from tests.synthetic import CODECS, Container, number_in, numbered_picture, write_sequence
 from tracker.sequences.pictures import frames as frames_module
 from tracker.sequences.pictures.frames import FrameReader
@@ -148,10 +149,7 @@ def test_playing_is_read_ahead(folders: dict[str, Path]) -> None:
     with FrameReader(read_sequence(folders["mp4"])) as reader:
         for step in (10, 11, 12):
             number_at(reader, 0, step)
-        for _ in range(200):
-            if reader._cache.has(0, 12 + frames_module.AHEAD):
-                break
-            time.sleep(0.01)
+        wait_until(lambda: reader._cache.has(0, 12 + frames_module.AHEAD))
         assert all(reader._cache.has(0, step) for step in range(13, 13 + frames_module.AHEAD))
         assert not reader._cache.has(0, 13 + frames_module.AHEAD)
         assert not reader._cache.has(1, 13)

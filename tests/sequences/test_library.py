@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -147,9 +146,7 @@ def test_a_bad_folder_takes_no_other_from_the_list(tmp_path: Path) -> None:
     (tmp_path / "zeros" / "sequence.toml").symlink_to("/dev/zero")
     (tmp_path / "pipe").mkdir()
     os.mkfifo(tmp_path / "pipe" / "sequence.toml")
-    begin = time.monotonic()
     entries = {entry.name: entry for entry in library.available(tmp_path)}
-    assert time.monotonic() - begin < 60.0
     assert entries["good"].error is None
     for name in {*spoilt, "folder", "circle", "zeros", "pipe"}:
         error = entries[name].error

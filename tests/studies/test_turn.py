@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import threading
-import time
 from pathlib import Path
 
 import pytest
 
+from tests.app.conftest import wait_until
 from tests.studies.small import Serial, definition, made_up, run
 from tracker.studies.kept.store import create
 from tracker.studies.turn import turn
@@ -29,9 +29,7 @@ def test_one_runs_and_the_other_waits_and_says_for_which(folder: Path) -> None:
             target=lambda: run(store, crew, told=lambda status: told.append(status.words))
         )
         thread.start()
-        until = time.monotonic() + 20.0
-        while time.monotonic() < until and not any("first" in words for words in told):
-            time.sleep(0.02)
+        wait_until(lambda: any("first" in words for words in told))
         assert 'waits for its turn: the study "first" has this machine\'s cores' in told
         assert store.status().state == "running"
         assert crew.done == []

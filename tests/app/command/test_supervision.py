@@ -70,11 +70,9 @@ def test_a_crash_in_a_run_ends_that_run_and_nothing_else(server: Server, number:
             break
     assert state["run"]["state"] == "computing"  # in the middle of it
     crash(server, number)
-    begin = time.monotonic()
     after = server.wait(
         lambda state: state["sequence"] is not None and state["run"]["state"] == "failed"
     )
-    assert time.monotonic() - begin < 60.0
     assert after["session"] != state["session"]
     assert after["sequence"]["key"] == state["sequence"]["key"]
     assert after["parameters"]["fusion.clutter_rate"] == rate

@@ -5,8 +5,10 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
+from queue import SimpleQueue
 
 import pytest
 
@@ -14,6 +16,7 @@ from app.state.kept.crashes import LAST, Crashes, Note
 from app.state.kept.json_files import write_json
 from app.state.memory import LEAST_BYTES, Budget, machine_memory
 from app.state.workers.watchdog import Watchdog
+from tests.app.conftest import wait_until
 
 START = """
 import os, sys
@@ -83,19 +86,14 @@ def test_notes_of_a_start_that_runs_are_left(tmp_path: Path) -> None:
 
 
 def test_silence_is_told_and_news_end_it() -> None:
-    told: list[float] = []
-    with Watchdog(told.append, after=0.15, looks=0.02) as dog:
-        for _ in range(10):
-            time.sleep(0.02)
-            dog.heard()
-        before = len(told)
-        time.sleep(0.4)
-    assert before == 0
-    assert told
-    assert min(told) >= 0.15
-    count = len(told)
-    time.sleep(0.1)
-    assert len(told) == count
+    told: SimpleQueue[float] = SimpleQueue()
+    with Watchdog(told.put, after=0.05, looks=0.01) as dog:
+        assert told.get() >= 0.05
+        before = time.monotonic()
+        dog.heard()
+        told.get()  # may have been measured before the news
+        assert 0.05 <= told.get() <= time.monotonic() - before
+    wait_until(lambda: all(thread.name != "watchdog" for thread in threading.enumerate()))
 
 
 def test_a_budget_is_shared(monkeypatch: pytest.MonkeyPatch) -> None:

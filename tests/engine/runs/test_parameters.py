@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from itertools import product
+from math import inf, nextafter
 from typing import Any
 
 import pytest
@@ -29,48 +31,47 @@ from tracker.parameters import (
 STAGES: tuple[Stage, ...] = ("single_view", "fusion", "smoothing", "tracks")
 DEFAULTS = RunParameters()
 
-every_parameter = pytest.mark.parametrize("parameter", PARAMETERS.values(), ids=lambda p: p.key)
-
 
 def numbers(kind: str) -> list[Parameter]:
     """The parameters of one kind."""
     return [p for p in PARAMETERS.values() if p.kind == kind]
 
 
-@every_parameter
-def test_every_parameter_has_a_face(parameter: Parameter) -> None:
-    assert parameter.help.endswith("."), "help is a sentence"
-    assert parameter.help[0].isupper()
-    assert parameter.symbol
-    assert parameter.label
-    assert parameter.key == f"{parameter.group}.{parameter.name}"
-    assert parameter.group in GROUPS
-    assert parameter.stage in STAGES
-    assert value(DEFAULTS, parameter.key) == parameter.default
+def refusal(key: str, wrong: Any) -> str:
+    """The sentence by which a value is refused; none where it is taken."""
+    try:
+        with_values(DEFAULTS, {key: wrong})
+    except ParameterError as error:
+        return str(error)
+    return ""
 
 
-@every_parameter
-def test_every_range_holds_its_default_and_its_published_value(parameter: Parameter) -> None:
-    values = [
-        parameter.default,
-        *([parameter.published] if parameter.published is not None else []),
-    ]
-    if parameter.kind == "choice":
-        assert len(parameter.choices) >= 2
-        assert set(values) <= set(parameter.choices)
-    elif parameter.kind == "bool":
-        assert {type(v) for v in values} == {bool}
-    else:
-        assert parameter.minimum is not None
-        assert parameter.maximum is not None
-        assert parameter.minimum < parameter.maximum
-        assert all(parameter.minimum <= v <= parameter.maximum for v in values)
-        if parameter.log:
-            assert parameter.minimum > 0.0, "a logarithmic slider needs a positive range"
-        if parameter.step is not None:
-            assert 0.0 < parameter.step <= parameter.maximum - parameter.minimum
-        if parameter.kind == "int":
-            assert all(isinstance(v, int) for v in values)
+def test_every_parameter_has_a_sentence_a_symbol_and_a_range_around_its_values() -> None:
+    def faults(p: Parameter) -> Iterator[str]:
+        values = [v for v in (p.default, p.published) if v is not None]
+        if not (p.help.endswith(".") and p.help[0].isupper()):
+            yield f"the help is no sentence: {p.help!r}"
+        if not (p.symbol and p.label and p.group in GROUPS):
+            yield "symbol, label and group are needed"
+        if p.kind == "choice":
+            if len(p.choices) < 2 or not set(values) <= set(p.choices):
+                yield f"{values} are not among {p.choices}"
+        elif p.kind == "bool":
+            if {type(v) for v in values} != {bool}:
+                yield f"{values} are no switches"
+        elif p.minimum is None or p.maximum is None or p.minimum >= p.maximum:
+            yield f"no range: {p.minimum} … {p.maximum}"
+        else:
+            if not all(p.minimum <= v <= p.maximum for v in values):
+                yield f"{values} are not in {p.minimum} … {p.maximum}"
+            if p.log and p.minimum <= 0.0:
+                yield "a logarithmic slider needs a positive range"
+            if p.step is not None and not 0.0 < p.step <= p.maximum - p.minimum:
+                yield f"a slider cannot move by {p.step}"
+            if p.kind == "int" and not all(isinstance(v, int) for v in values):
+                yield f"{values} are no whole numbers"
+
+    assert not [f"{p.key}: {fault}" for p in PARAMETERS.values() for fault in faults(p)]
 
 
 def test_every_group_says_what_it_is_for() -> None:
@@ -100,21 +101,23 @@ def test_the_extraction_threshold_reruns_nothing_but_the_tracks() -> None:
         assert same == (stage != "tracks")
 
 
-@pytest.mark.parametrize("parameter", [*numbers("float"), *numbers("int")], ids=lambda p: p.key)
-def test_a_value_out_of_range_is_refused_with_range_and_value(parameter: Parameter) -> None:
-    assert parameter.minimum is not None
-    assert parameter.maximum is not None
-    for wrong in (parameter.minimum - 1, parameter.maximum + 1):
-        with pytest.raises(ParameterError) as caught:
-            with_values(DEFAULTS, {parameter.key: wrong})
-        message = str(caught.value)
-        assert caught.value.key == parameter.key
-        assert message.startswith(f"{parameter.key}: must be between ")
-        assert f"{parameter.minimum:g} and {parameter.maximum:g}" in message
-        assert message.endswith(f"got {wrong}")
-        assert parameter.unit in message
-    for right in (parameter.minimum, parameter.maximum):
-        assert value(with_values(DEFAULTS, {parameter.key: right}), parameter.key) == right
+def test_both_bounds_are_taken_and_what_lies_beyond_is_refused_with_range_and_value() -> None:
+    faults = []
+    for p in (*numbers("float"), *numbers("int")):
+        assert p.minimum is not None
+        assert p.maximum is not None
+        beyond = (p.minimum - 1, p.maximum + 1)
+        if p.kind == "float":
+            beyond = (nextafter(p.minimum, -inf), nextafter(p.maximum, inf))
+        for wrong in beyond:
+            said = refusal(p.key, wrong)
+            expected = f"{p.key}: must be between {p.minimum:g} and {p.maximum:g}"
+            if not (said.startswith(expected) and p.unit in said and said.endswith(f"got {wrong}")):
+                faults.append(f"{p.key}: {wrong} is refused by {said!r}")
+        for right in (p.minimum, p.maximum):
+            if value(with_values(DEFAULTS, {p.key: right}), p.key) != right:
+                faults.append(f"{p.key}: {right} is not taken as it is")
+    assert not faults
 
 
 @pytest.mark.parametrize("wrong", ["nan", "inf", "-inf", float("nan"), float("inf")])
@@ -145,24 +148,29 @@ def test_a_count_is_a_whole_number(wrong: Any) -> None:
         with_values(DEFAULTS, {"fusion.max_components": wrong})
 
 
-@pytest.mark.parametrize("parameter", numbers("bool"), ids=lambda p: p.key)
-def test_a_switch_understands_words(parameter: Parameter) -> None:
-    for word, meant in (("true", True), ("Off", False), (True, True), (0, False), ("1", True)):
-        assert value(with_values(DEFAULTS, {parameter.key: word}), parameter.key) is meant
-    with pytest.raises(ParameterError, match="expected true or false, got 'perhaps'"):
-        with_values(DEFAULTS, {parameter.key: "perhaps"})
+def test_a_switch_understands_words() -> None:
+    words = {"true": True, "Off": False, True: True, 0: False, "1": True}
+    faults = []
+    for p in numbers("bool"):
+        for word, meant in words.items():
+            if value(with_values(DEFAULTS, {p.key: word}), p.key) is not meant:
+                faults.append(f"{p.key}: {word!r} is not {meant}")
+        if not refusal(p.key, "perhaps").endswith("expected true or false, got 'perhaps'"):
+            faults.append(f"{p.key}: 'perhaps' is refused by {refusal(p.key, 'perhaps')!r}")
+    assert not faults
 
 
-@pytest.mark.parametrize("key", [*METHODS, *(p.key for p in numbers("choice"))])
-def test_a_choice_that_does_not_exist_is_told_the_ones_that_do(key: str) -> None:
-    choices = METHODS[key] if key in METHODS else PARAMETERS[key].choices
-    for choice in choices:
-        assert value(with_values(DEFAULTS, {key: choice}), key) == choice
-    for wrong in ("magic", 3, None):
-        with pytest.raises(ParameterError) as caught:
-            with_values(DEFAULTS, {key: wrong})
-        expected = f"{key}: expected one of {', '.join(choices)}, got {wrong!r}"
-        assert str(caught.value) == expected
+def test_a_choice_that_does_not_exist_is_told_the_ones_that_do() -> None:
+    faults = []
+    for key, choices in {**METHODS, **{p.key: p.choices for p in numbers("choice")}}.items():
+        for choice in choices:
+            if value(with_values(DEFAULTS, {key: choice}), key) != choice:
+                faults.append(f"{key}: {choice} is not taken")
+        for wrong in ("magic", 3, None):
+            expected = f"{key}: expected one of {', '.join(choices)}, got {wrong!r}"
+            if refusal(key, wrong) != expected:
+                faults.append(f"{key}: {wrong!r} is refused by {refusal(key, wrong)!r}")
+    assert not faults
 
 
 @pytest.mark.parametrize(
