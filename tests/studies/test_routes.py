@@ -80,7 +80,7 @@ def test_it_is_told_what_a_study_takes_or_why_it_is_refused(client: TestClient) 
 def test_the_time_goes_by_the_workers_that_are_wanted(
     client: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(routes, "cores", lambda: 4)
+    monkeypatch.setattr(routes, "available_cores", lambda: 4)
     monkeypatch.setattr(routes, "FEWEST_STEPS", 1)
     # so many runs that a recording of a second takes hours
     wish = {"name": "mine", "parameters": RANGES, "trials": 10**6}

@@ -1,4 +1,4 @@
-"""All scenes in one table, filter and smoothed: the rendered rooms and the real recordings."""
+"""All scenes in one table, filter and smoothed: the built-in sequences and the real recordings."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from tests.papers.laboratory.experiment import (
 )
 from tracker.evaluation import evaluate_sequence
 from tracker.evaluation.figures import number
+from tracker.sequences.library import open_sequence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,7 +52,7 @@ def run(context: Context) -> Result:
             if name in recordings:
                 sequence = runs.recording(context, name)
             else:
-                sequence = runs.room(context, name, steps)
+                sequence = open_sequence(name)
         except Unavailable as missing:
             notes.append(f"Left out: {missing}.")
             continue
