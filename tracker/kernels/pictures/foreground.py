@@ -90,7 +90,7 @@ def two_classes(
             thresholds[k, c] = max((m_b[c] + ratio * m_f[c]) / (1.0 + ratio), least)
         # differences are whole numbers: above t is above its floor
         t0, t1, t2 = int(thresholds[k, 0]), int(thresholds[k, 1]), int(thresholds[k, 2])
-        count, s0, s1, s2 = 0, 0, 0, 0
+        count, s0, s1, s2 = 0, np.int64(0), np.int64(0), np.int64(0)
         for y in range(height):
             for x in range(width):
                 # bytes are added up with more bits
