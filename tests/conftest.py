@@ -22,7 +22,7 @@ settings.register_profile(
     derandomize=True,
     database=None,
     deadline=None,
-    max_examples=8 if os.environ.get("NUMBA_DISABLE_JIT") == "1" else 60,
+    max_examples=30 if os.environ.get("NUMBA_DISABLE_JIT") == "1" else 60,
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("repeatable")
