@@ -208,6 +208,10 @@ def in_order(checks: Iterable[Check]) -> list[str]:
 
 def main() -> int:
     """Run the checks, tell every failure, and return 1 if there was one."""
+    # else each process compiles all that it imports again, installed packages too
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    # each process has a core: threads that wait for each other there cost a fifth more
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
     page, code = page_checks(), code_checks()
     # at once for all processes that the tests start
     kernels = Check("kernels", ((PYTHON, "-m", "tracker.warm_up"),))

@@ -8,6 +8,7 @@ import signal
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from types import FrameType
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -38,6 +39,10 @@ os.environ["MULTIVIEW_PHD_STUDIES"] = str(Path(_LIBRARY.name) / "studies")
 os.environ["MULTIVIEW_PHD_SETTINGS"] = str(Path(_LIBRARY.name) / "settings")
 
 
+LONGEST = 600
+"""Seconds after which a test is taken to hang; the slowest takes a tenth of it."""
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     """``--long``: also what takes long; each such test has a short form that always runs."""
     parser.addoption("--long", action="store_true", help="also run the tests marked long")
@@ -65,6 +70,21 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if long:
         config.hook.pytest_deselected(items=long)
         items[:] = [item for item in items if item not in long]
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
+    """End a test that waits for what never comes, so that the others still run."""
+
+    def end(number: int, frame: FrameType | None) -> None:
+        pytest.fail(f"not done within {LONGEST} s")
+
+    signal.signal(signal.SIGALRM, end)
+    signal.alarm(LONGEST)
+    try:
+        return (yield)
+    finally:
+        signal.alarm(0)
 
 
 @pytest.fixture

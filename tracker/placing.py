@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import glob
 import os
 import secrets
 import shutil
+import stat
 import time
 import zipfile
 from collections.abc import Iterator, Sequence
@@ -77,6 +79,18 @@ def write_whole(path: Path, data: bytes) -> None:
     """
     with replacing(path) as temporary:
         temporary.write_bytes(data)
+
+
+def size_of(path: Path) -> int:
+    """The bytes of an ordinary file.
+
+    Raises:
+        OSError: If there is none: whoever reads a pipe waits, and a device has no end.
+    """
+    there = path.stat()
+    if not stat.S_ISREG(there.st_mode):
+        raise OSError(errno.EINVAL, "it is a folder, pipe or device")
+    return there.st_size
 
 
 def sync_file(path: Path) -> None:

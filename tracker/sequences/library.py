@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+from tracker.placing import size_of
 from tracker.sequences.built_in import BUILT_IN, ROOMS, cached_rooms
 from tracker.sequences.fields import did_you_mean, listed
 from tracker.sequences.reader import FILE, given_folder, read_sequence, read_summary
@@ -145,6 +146,7 @@ def with_detector(sequence: Sequence, path: Path | None) -> Sequence:
     if path is None:
         return sequence
     try:
+        size_of(path)  # a pipe would be waited for
         with path.open("rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()[:16]
     except OSError as error:

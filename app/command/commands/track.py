@@ -44,6 +44,12 @@ def track(command: Track) -> int:
 
     sequence = library.open_sequence(command.sequence)
     sequence = library.with_detector(sequence, command.detector)
+    if command.detector is not None:
+        from tracker.single_view.onnx.network import Network
+
+        Network.tried(command.detector)  # before anything is computed, and without pictures too
+        if not sequence.has_pictures:
+            say(f"{sequence.name} has no pictures: the detector finds nobody in it")
     form.check(sequence)
     for sentence in sequence.warnings:
         say(sentence)

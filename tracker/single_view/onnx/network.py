@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import errno
-import stat
 import threading
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
+from tracker.placing import size_of
 from tracker.single_view.onnx.file import INT64, UINT8, Port, ports_of
 from tracker.single_view.onnx.layouts import FOUND_OUT, proposals
 
@@ -213,11 +213,9 @@ class Network:
 
 def _content(path: Path) -> bytes:
     """The bytes of a model: of an ordinary file, and of no more than ONNX allows."""
-    there = path.stat()
-    if not stat.S_ISREG(there.st_mode):  # a pipe is waited for, a device has no end
-        raise OSError(errno.EINVAL, "it is a folder, pipe or device")
-    if there.st_size > MOST_BYTES:
-        raise OSError(errno.EFBIG, f"it has {there.st_size >> 20:,} MB, expected at most 2,048")
+    size = size_of(path)
+    if size > MOST_BYTES:
+        raise OSError(errno.EFBIG, f"it has {size >> 20:,} MB, expected at most 2,048")
     return path.read_bytes()
 
 
