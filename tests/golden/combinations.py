@@ -36,7 +36,6 @@ class Combination:
             RunParameters(),
             {
                 **PRESETS[self.preset],
-                "smoothing_method": "none",
                 "single_view": self.single_view,
                 "fusion_method": self.fusion_method,
                 **dict(self.changes),
