@@ -94,7 +94,7 @@ def followed(
 @given(seeds, st.sampled_from((0, 1, 2, 15)), st.sampled_from((0.0, 0.4)))
 def test_colours_are_followed_by_the_mean_shift(seed: int, most: int, least: float) -> None:
     rng = np.random.default_rng(seed)
-    bins = rng.integers(0, 30, (12, 15))
+    bins = rng.integers(0, 30, (12, 15)).astype(np.uint16)
     moving = rng.random((12, 15)) < rng.choice([0.3, 0.9])
     histogram = rng.dirichlet(np.ones(30)) * (rng.random(30) < 0.7)
     place = rng.integers([-1, -1], [16, 13]) + rng.choice([0.0, 0.25])
@@ -108,7 +108,7 @@ def test_a_shift_as_long_as_the_tolerance_is_not_the_last(least: float, x: float
     moving = np.zeros((20, 30), dtype=bool)
     moving[10, [11, 15]] = True  # the second comes into reach by the first shift
     box = np.array([10.0, 10.0, 4.5, 4.5])
-    found = follow_colours(np.zeros((20, 30), dtype=np.int64), moving, box, np.ones(1), 9, least)
+    found = follow_colours(np.zeros((20, 30), dtype=np.uint16), moving, box, np.ones(1), 9, least)
     assert_array_equal(found, [x, 10.0])
 
 
@@ -395,7 +395,7 @@ def test_means_of_cells_and_the_trees_that_ask_for_them(seed: int) -> None:
 @given(seeds, st.integers(1, 3))
 def test_candidates_hang_from_the_highest_pixels_of_their_piece(seed: int, stride: int) -> None:
     rng = np.random.default_rng(seed)
-    owners = np.full((24, 30), -1)
+    owners = np.full((24, 30), -1, dtype=np.int32)
     pieces = []
     # the last row and column of each are odd, the first column too
     for j, (left, top, right, bottom) in enumerate(((1, 0, 8, 14), (11, 3, 24, 22))):
