@@ -268,6 +268,16 @@ def test_shadows_are_cleared_by_the_same_rule(seed: int, least: float) -> None:
     assert_array_equal(difference, wanted)
 
 
+@pytest.mark.parametrize("channel", [0, 1, 2])
+@pytest.mark.parametrize(("level", "count"), [(26, 0), (27, 1)])
+def test_a_difference_at_the_threshold_is_background(channel: int, level: int, count: int) -> None:
+    difference = np.zeros((3, 4, 3), dtype=np.uint8)
+    difference[1, 2, channel] = level
+    found = foreground.two_classes(difference, 6.0, 46.0, 1.0, 1.0, 99, 1)
+    assert found.counts.tolist() == [count]
+    assert foreground.above(difference, found.thresholds[0]).sum() == count
+
+
 @pytest.mark.parametrize(("enough", "moved"), [(5, True), (6, True), (7, False)])
 def test_a_class_of_too_few_pixels_keeps_its_centres(enough: int, moved: bool) -> None:
     difference = np.zeros((3, 4, 3), dtype=np.uint8)
