@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
+from tests import world
 from tracker.evaluation.measures.matching import Comparison, Measure, prepare
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import GroundTruth, Sequence
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
-HALF_EXTENTS = np.array([0.3, 0.3, 0.85])
+HALF_EXTENTS = world.PERSON
 
 
 @dataclass(frozen=True)
@@ -52,28 +53,17 @@ def columns_of(truth: GroundTruth) -> Columns:
     return Columns(truth.frames, truth.ids, truth.positions)
 
 
-def walks(
-    seed: int, *, people: int = 4, steps: int = 40, uncertain: float = 0.0, size: float = 4.0
-) -> GroundTruth:
+def walks(seed: int, *, people: int = 4, steps: int = 40, uncertain: float = 0.0) -> GroundTruth:
     """People who walk at random through a room, come late, leave, and some come back."""
     rng = np.random.default_rng(seed)
-    frames, ids, positions = [], [], []
+    paths = world.together(*(world.wander(rng, steps) for _ in range(people)))
+    paths += np.array([2.0, 2.0, 0.0])
     for person in range(people):
-        path = rng.uniform(0.0, size, 3) + rng.normal(0.0, 0.15, (steps, 3)).cumsum(axis=0)
-        path[:, 2] = 0.9 + 0.05 * rng.normal(size=steps)
-        there = np.ones(steps, dtype=bool)
         first, last = np.sort(rng.integers(0, steps, 2))
-        if person % 3 == 1:
-            there[:first] = False
-        elif person % 3 == 2:
-            there[first:last] = False
-        frames.append(np.flatnonzero(there))
-        ids.append(np.full(int(there.sum()), 7 * person + 3))
-        positions.append(path[there])
-    frame, name = np.concatenate(frames), np.concatenate(ids)
-    order = np.lexsort((name, frame))
-    valid = rng.random(len(frame)) >= uncertain
-    return GroundTruth(frame[order], name[order], np.concatenate(positions)[order], valid[order])
+        away = (slice(0), slice(first), slice(first, last))[person % 3]
+        paths[away, person] = np.nan
+    truth = world.truth(paths, 7 * np.arange(people) + 3)
+    return replace(truth, valid=rng.random(len(truth.frames)) >= uncertain)
 
 
 def perturbed(

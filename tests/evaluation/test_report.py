@@ -153,6 +153,15 @@ def test_lines_break_at_gaps():
     assert len(broken(np.zeros(0, int), np.zeros(0))[0]) == 0
 
 
+@pytest.mark.parametrize("steps", [9, 10, 40])
+def test_paths_end_with_the_steps_that_are_scored(scene, steps: int):
+    sequence, tracks = scene
+    figure = top_view(sequence, tracks, evaluate_sequence(sequence, tracks, steps=steps))
+    for word in ("person", "track"):
+        shown = [t.customdata for t in figure.data if word in str(t.hovertemplate)]
+        assert np.nanmax(np.concatenate(shown)) == steps - 1
+
+
 def test_paths_that_cannot_be_written(scene, tmp_path):
     sequence, tracks = scene
     evaluation = evaluate_sequence(sequence, tracks)

@@ -1,4 +1,4 @@
-"""The figures as people see them: names, help, JSON, differences, and the time they take."""
+"""The figures as people see them: names, help, JSON and differences."""
 
 from __future__ import annotations
 
@@ -11,13 +11,11 @@ from tests.evaluation.scenes import (
     HALF_EXTENTS,
     by_hand,
     perturbed,
-    recording,
     walks,
 )
 from tracker.evaluation import DEFINITIONS, EvaluationSettings, compare, evaluate
 from tracker.evaluation.difference import verdict
 from tracker.evaluation.figures import SOURCES, number
-from tracker.evaluation.summary import evaluate_sequence
 
 
 def test_every_figure_explains_itself():
@@ -72,17 +70,6 @@ def test_json_holds_everything():
     assert [row["id"] for row in data["tracks"]] == [10, 20, 30]
 
 
-def test_rows_of_people_and_tracks():
-    result = evaluate(*by_hand())
-    first, second = result.people
-    assert (first.steps, first.tracked, first.switches, first.status) == (4, 3, 1, "partly tracked")
-    assert (second.fragmentations, second.found_share) == (1, 0.5)
-    ten, _, ghost = result.tracks
-    assert (ten.first, ten.last, ten.steps, ten.matched, ten.person) == (0, 3, 4, 4, 1)
-    assert ten.person_share == 0.5
-    assert (ghost.kind, ghost.person, ghost.error) == ("false", None, None)
-
-
 def test_compare():
     truth = walks(3)
     rough = evaluate(truth, perturbed(truth, 1, noise=0.3, missing=0.3))
@@ -132,19 +119,3 @@ def test_numbers_are_written_alike():
     assert number(-2.5, 1, sign=True) == "−2.5"
     assert number(7, 0, sign=True) == "+7"
     assert number(None, 3) == "–"
-
-
-@pytest.mark.data
-def test_cameras_of_a_recording():
-    sequence = recording("cmc1")
-    truth = sequence.ground_truth
-    assert truth is not None
-    result = evaluate_sequence(sequence, perturbed(truth, 1, noise=0.05))
-    assert [score.camera for score in result.cameras] == [c.name for c in sequence.cameras]
-    for score in result.cameras:
-        assert score.people > 0
-        assert score.found_share is not None
-        assert score.found_share > 0.8
-        assert score.overlap is not None
-        assert score.overlap > 0.7
-    assert result["pixel_error"] > 0.0

@@ -126,7 +126,7 @@ def reference_update(
     jacobians: ndarray,
     noises: ndarray,
     detection_probability: ndarray,
-    clutter_intensity: float,
+    clutter_intensity: float | ndarray,
     gate: float = np.inf,
 ) -> dict[tuple[int, int], tuple[float, ndarray, ndarray]]:
     """Eq. (28)–(33) of [VM06] pair by pair: weight, mean, covariance by (component, measurement).
@@ -155,7 +155,8 @@ def reference_update(
                 predicted.means[j] + gain @ innovation,
                 p - gain @ s @ gain.T,
             )
-        total = clutter_intensity + sum(weight for weight, _, _ in unnormalised.values())
+        kappa = np.broadcast_to(clutter_intensity, len(measurements))[z]
+        total = kappa + sum(weight for weight, _, _ in unnormalised.values())
         for j, (weight, mean, covariance) in unnormalised.items():
             pairs[j, z] = (weight / total, mean, covariance)
     return pairs

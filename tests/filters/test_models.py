@@ -8,12 +8,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import expm
 
 from tests import world
-from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, ROOM, look_at
+from tests.world import look_at
 from tracker.filters import models
 from tracker.filters.models import Motion
 from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Room
 
+ROOM = world.volume(1.5, 2.0, [(-1.2, 0.0, 1.0), (1.2, 0.1, 1.0)], (0.25, 0.3, 0.15))
+CAMERAS = world.ring(3, 4.4, distortion=world.BARREL)
 NO_DOORS = Room(ROOM.minimum, ROOM.maximum)
 
 
@@ -114,33 +116,32 @@ def test_the_visible_area_is_that_of_the_room_in_the_picture() -> None:
     for camera in CAMERAS:
         area = models.visible_area(camera, ROOM)
         # counted pixel by pixel: those whose ray meets the room's volume
-        across, down = np.meshgrid(np.arange(0.0, width, 8.0), np.arange(0.0, height, 8.0))
+        across, down = np.meshgrid(np.arange(0.0, width, 24.0), np.arange(0.0, height, 24.0))
         rays = camera.back_project(np.stack([across, down], axis=-1).reshape(-1, 2))
         with np.errstate(divide="ignore"):
             near = (ROOM.minimum - camera.centre) / rays
             far = (ROOM.maximum - camera.centre) / rays
         entry = np.minimum(near, far).max(axis=1)
         leaving = np.maximum(near, far).min(axis=1)
-        counted = 64.0 * float(((entry < leaving) & (leaving > 0.0)).sum())
+        counted = 576.0 * float(((entry < leaving) & (leaving > 0.0)).sum())
         assert area == pytest.approx(counted, rel=0.05)
         assert area <= width * height
 
 
 def test_a_camera_that_looks_elsewhere_still_has_an_area() -> None:
     away = look_at("away", (-3.4, -3.2, 2.6), (-9.0, -9.0, 1.0))
-    assert models.visible_area(away, ROOM) == pytest.approx(0.01 * 360 * 288)
-    assert not away.project_boxes(np.array([[0.0, 0.0, 1.0]]), HALF_EXTENTS)[1].any()
+    assert models.visible_area(away, ROOM) == pytest.approx(0.01 * 1280 * 800)
 
 
 def test_a_camera_within_the_room_sees_at_most_its_picture() -> None:
-    inside = look_at("inside", (0.0, -1.0, 1.2), (0.0, 1.0, 1.0))
+    inside = look_at("inside", (0.0, -1.0, 1.2), (0.0, 1.0, 1.0), focal=1390.0)
     area = models.visible_area(inside, ROOM)
-    assert 0.5 * 360 * 288 < area <= 360 * 288
+    assert 0.5 * 1280 * 800 < area <= 1280 * 800
 
 
 @pytest.mark.parametrize("size", [2, 3, 4])
 def test_the_space_of_boxes_grows_with_what_is_measured(size: int) -> None:
     camera = CAMERAS[0]
     volume = models.measurement_volume(camera, ROOM, size)
-    factors = [288 / 2, 360 / 2][: size - 2]
+    factors = [800 / 2, 1280 / 2][: size - 2]
     assert volume == pytest.approx(models.visible_area(camera, ROOM) * np.prod(factors))

@@ -10,7 +10,6 @@ from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.benchmarks.plane import scenario as scene
-from tests.engine import plain_phd
 from tests.filters.mixtures import random_covariances, random_mixture
 from tracker.filters import gaussian_mixture, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
@@ -191,69 +190,39 @@ def test_prediction_is_the_formula(seed: int, size: int, shared: bool) -> None:
     assert_allclose(found.weights, 0.9 * mixture.weights)
 
 
-@pytest.mark.parametrize(("targets", "steps"), [(10, 4), (40, 1)])
-def test_the_recursion_is_the_one_of_plain_numpy(targets: int, steps: int) -> None:
-    case = scene.scenario(targets, steps)
-    births = GaussianMixture(
-        np.full(len(case.births), case.birth_weight),
-        case.births,
-        np.tile(scene.START, (len(case.births), 1, 1)),
-        np.zeros(len(case.births), dtype=np.int64),
-    )
-    mixture = GaussianMixture(
-        np.ones(targets), case.first, np.tile(scene.START, (targets, 1, 1)), np.arange(targets)
-    )
-    for scan in case.measurements:
-        ours = gaussian_mixture.predict(
-            mixture, scene.TRANSITION, scene.MOTION_NOISE, scene.SURVIVAL
-        )
-        theirs = plain_phd.predict(mixture, scene.TRANSITION, scene.MOTION_NOISE, scene.SURVIVAL)
-        assert_allclose(ours.covariances, theirs.covariances, rtol=1e-9)
-        predicted = gaussian_mixture.concatenate([ours, births])
-        updated = phd.update(
-            predicted,
-            scan,
-            expected=Expected.of(
-                predicted.means @ scene.POSITION.T,
-                np.broadcast_to(scene.POSITION, (predicted.size, 2, 4)),
-            ),
-            noise=scene.NOISE[None],
-            detection_probability=scene.DETECTION,
-            clutter_intensity=case.clutter_intensity,
-            gate=18.0,
-        )
-        plain, measured = plain_phd.update(
-            predicted,
-            scan,
-            jacobian=scene.POSITION,
-            noise=scene.NOISE,
-            detection=scene.DETECTION,
-            clutter_intensity=case.clutter_intensity,
-            gate=18.0,
-        )
-        assert_array_equal(updated.measurements, measured)
-        assert_allclose(updated.posterior.weights, plain.weights, rtol=1e-7, atol=1e-12)
-        assert_allclose(updated.posterior.means, plain.means, atol=1e-7)
-        assert_allclose(updated.posterior.covariances, plain.covariances, atol=1e-6)
-        found = phd.extract_measured(predicted, updated, 0.5)
-        wanted = plain_phd.extract_measured(
-            plain, updated.parents, measured,
-            np.concatenate([np.zeros(predicted.size), updated.log_odds])[measured >= 0],
-            predicted.weights, 0.5, phd.SPARE,
-        )  # fmt: skip
-        assert_allclose(found.weights, [weight for weight, _ in wanted], rtol=1e-6)
-        assert_allclose(found.means, np.array([mean for _, mean in wanted]), atol=1e-6)
-        settings = (scene.PRUNING, scene.MERGING, case.most_components)
-        expected, leaders = plain_phd.reduce(updated.posterior, *settings)
-        mixture, ours_led = gaussian_mixture.reduce(
-            updated.posterior,
-            pruning_threshold=scene.PRUNING,
-            merging_threshold=scene.MERGING,
-            max_components=case.most_components,
-        )
-        assert_array_equal(np.sort(ours_led), np.sort(leaders))
-        assert_allclose(mixture.weights, expected.weights, rtol=1e-7)
-        assert_allclose(mixture.means, expected.means, atol=1e-6)
+@given(st.integers(0, 2**32 - 1), st.integers(0, 5), st.sampled_from((0.3, 0.5)))
+def test_measurements_are_paid_for_by_their_components_the_surest_first(
+    seed: int, count: int, threshold: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    predicted = random_mixture(rng, 4, 2)
+    predicted.weights[:] = rng.choice([0.1, 0.25, 1.0, 1.75], 4)
+    pairs = np.argwhere(rng.random((count, 4)) < 0.7).reshape(-1, 2)
+    weights = rng.choice([0.125, 0.25, 0.5, 0.75], len(pairs))
+    odds = rng.integers(0, 4, len(pairs)).astype(float)
+    whole = random_mixture(rng, 4 + len(pairs), 2)
+    whole.weights[:] = np.append(rng.choice([0.1, threshold, 0.7], 4), weights)
+    sums = np.bincount(pairs[:, 0], weights, count) if len(pairs) else np.zeros(count)
+    update = phd.PhdUpdate(
+        whole, np.append(np.arange(4), pairs[:, 1]), np.append(np.full(4, -1), pairs[:, 0]),
+        odds, sums,
+    )  # fmt: skip
+    found = phd.extract_measured(predicted, update, threshold)
+    left = np.maximum(predicted.weights, 1.0) + phd.SPARE
+    wanted = []
+    surest = [odds[pairs[:, 0] == z].max(initial=-np.inf) for z in range(count)]
+    for z in np.argsort(-np.array(surest), kind="stable"):
+        own = np.flatnonzero(pairs[:, 0] == z)
+        spent = np.minimum(weights[own], left[pairs[own, 1]])
+        if sums[z] > threshold and spent.sum() > threshold:
+            left[pairs[own, 1]] -= spent
+            heaviest = own[len(own) - 1 - spent[::-1].argmax()]
+            mean = spent @ whole.means[4 + own] / spent.sum()
+            wanted.append((spent.sum(), *mean, whole.labels[4 + heaviest]))
+    for j in np.flatnonzero(whole.weights[:4] > threshold):
+        wanted.append((whole.weights[j], *whole.means[j], whole.labels[j]))
+    table = np.column_stack([found.weights, found.means, found.labels])
+    assert_allclose(table, np.reshape(wanted, (-1, 4)), rtol=1e-9, atol=1e-9)
 
 
 def pairs_of(

@@ -122,6 +122,14 @@ def test_jumps_compare_what_is_before_with_what_is_from_here_on(seed: int) -> No
         assert found[k] == pytest.approx(offset @ np.linalg.solve(spread, offset), rel=1e-3)
 
 
+def test_where_nothing_is_learnt_a_jump_stays_finite() -> None:
+    covariances = np.tile(np.diag([1.0, 2.0, 6.0]), (2, 1, 1))
+    means = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 1.0]])
+    found = passes.jumps(np.array([0, 2]), means, covariances, np.zeros((2, 3)), covariances)
+    # against 1e-9 of the mean variance, which is 3
+    assert_allclose(found, [0.0, 5.0 / 3e-9])
+
+
 @given(seeds)
 def test_drives_are_the_trace_of_their_formula(seed: int) -> None:
     paths, axes = Paths(seed, 6), np.array([0, 1, 3, 4])
@@ -191,6 +199,14 @@ def test_presence_is_the_best_of_all_sequences(
     # a path of one row that neither begins nor ends the recording comes and goes
     leaves = 0.0 if end <= 99 else HABITS.enter
     assert found.odds[1] == pytest.approx(HABITS.enter + votes[count] + leaves)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_however_sure_the_votes_a_probability_is_a_number(sign: float) -> None:
+    found = presence.presence(
+        np.array([0, 2]), np.array([0]), np.full(2, sign * 3000.0), HABITS, 1
+    ).probabilities
+    assert_allclose(found, 1.0 / (1.0 + np.exp(-sign * 500.0)), rtol=1e-9)
 
 
 # ── boxes and paths
@@ -307,6 +323,28 @@ def test_a_camera_without_a_frame_says_nothing() -> None:
     assert_array_equal(found.hidden_by[:3], -1)
     assert set(found.links.rows.tolist()) == {3}
     assert found.links.boxes.min() >= 4
+
+
+def test_at_its_threshold_a_track_hides_nobody_and_a_pair_is_returned() -> None:
+    scene = Scene(1, 0.0)  # the first, of existence 0.9, stands before the second
+    for confirmed, by in ((0.9, -1), (0.899, 4)):
+        assert scene.shared(rule=RULE._replace(confirmed=confirmed)).hidden_by[1] == by
+    every = scene.shared().links
+    least = float(np.sort(every.shares)[1])
+    for bound in (least, np.nextafter(least, 1.0)):
+        found = scene.shared(rule=RULE._replace(least_told=bound)).links
+        assert_array_equal(found.shares, every.shares[every.shares >= bound])
+
+
+@pytest.mark.parametrize(("share", "counts"), [(0.99e-6, False), (1e-6, True)])
+def test_a_box_of_next_to_no_share_is_left_out(share: float, counts: bool) -> None:
+    scene = Scene(1, 0.0)
+    information = evidence.BoxInformation(np.zeros((4, 3, 3)), np.zeros((4, 3)), np.zeros(4))
+    evidence.add_information(
+        evidence.BoxLinks(np.array([0]), np.array([1]), np.array([share])), scene.states,
+        scene.covariances, scene.seen.expected, scene.measurements, information,
+    )  # fmt: skip
+    assert all(part[0].any() == counts and not part[1:].any() for part in information)
 
 
 @given(seeds, st.sampled_from((0.0, 0.3)), st.sampled_from(("extended", "unscented")))

@@ -9,7 +9,8 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tests.engine.synthetic import CAMERAS, people
+from tests.kernels.test_bernoulli_kernels import people
+from tests.world import PERSON, gaussians, ring
 from tracker.camera import stacked
 from tracker.filters import gaussian_mixture
 from tracker.filters.gaussian_mixture import GaussianMixture, concatenate
@@ -20,6 +21,7 @@ from tracker.kernels.labelled import camera_update, step
 from tracker.kernels.labelled.camera_update import CameraRule, Tracks
 from tracker.kernels.measurement import ExpectedBoxes
 
+CAMERAS = ring(3)
 CLUTTER = np.array([1e-6, 3e-6, 2e-6])
 GATE, P_D, P_S, CONFIRMED, STRENGTH, NEAR, COVERED = 30.0, 0.9, 0.98, 0.5, 0.8, 0.3, 0.2
 TOLD, LEAST, FACTOR = 0.01, 1e-4, 1.3
@@ -139,7 +141,7 @@ def test_one_call_is_all_cameras(
     update: Any, tracks: int, unseen: int, posture_share: float
 ) -> None:
     rng = np.random.default_rng(7 + tracks)
-    model = TargetModel(np.array([0.3, 0.3, 0.84]), "box", update, posture_share)
+    model = TargetModel(PERSON, "box", update, posture_share)
     known, undetected, births = people(rng, tracks, 10), people(rng, unseen, 0), people(rng, 2, 0)
     births = GaussianMixture(np.full(2, 0.2), births.means, births.covariances, births.labels)
     places = np.concatenate([known.means, undetected.means, births.means[:1]])
@@ -202,13 +204,101 @@ def test_one_call_is_all_cameras(
     assert found.noises.shape == (len(found.values), 3, 3)
 
 
+def one_step(
+    tracks: GaussianMixture,
+    boxes: list[ndarray],
+    *,
+    unseen: float = 0.0,
+    least: float = LEAST,
+    survival: float = 1.0,
+    **rule: float,
+) -> step.StepResult:
+    """A step of people who stand still, with somebody never yet detected in their midst."""
+    model = TargetModel(PERSON, "box")
+    transform, products = model.transforms
+    whole = np.concatenate(boxes)
+    undetected = gaussians(tracks.means[:1, :3], weights=unseen)
+    found: step.StepResult = step.predict_and_update(
+        Tracks(tracks.weights, tracks.means, tracks.covariances, tracks.labels), 50,
+        undetected.gaussians,
+        step.CameraBoxes(
+            whole, np.full(whole.shape, 9.0), np.cumsum([0, *(len(one) for one in boxes)]),
+            np.ones(len(whole)), np.ones((0, len(whole))),
+        ),
+        step.StepModel(
+            transition=np.eye(6), motion_noise=1e-6 * np.eye(6)[None],
+            survival_probability=survival, birth_weights=np.zeros(0),
+            birth_means=np.zeros((0, 6)), birth_covariances=np.zeros((0, 6, 6)),
+            transform=transform, products=products, sigma_factor=1.0,
+            clutter=np.full(len(boxes), 1e-7), least_existence=least,
+        ),
+        model.target(6), stacked(CAMERAS[: len(boxes)]), RULE._replace(**rule),
+    )  # fmt: skip
+    return found
+
+
+@pytest.mark.parametrize(
+    ("existence", "survival", "hides"), [(0.5, 1.0, False), (0.501, 1.0, True), (0.9, 0.55, False)]
+)
+def test_who_hides_others_is_known_before_the_first_camera(
+    existence: float, survival: float, hides: bool
+) -> None:
+    place = np.array([0.1, 0.2, 0.85])
+    ahead = 0.2 * (CAMERAS[0].centre - place) * [1.0, 1.0, 0.0]
+    pair = gaussians(np.array([place, place + ahead]), weights=np.array([0.9, existence]))
+    found = one_step(pair, [np.zeros((0, 4))], survival=survival)
+    assert found.hidden_by.tolist() == [[2 if hides else -1, -1]]
+
+
+def test_a_track_begins_above_its_least_existence_and_is_a_pair_from_the_least_on() -> None:
+    far = gaussians(np.array([[0.0, 0.0, 0.85]]), weights=1e-6)
+    model = TargetModel(PERSON, "box")
+    corners = model.expected(CAMERAS[0], far.means).boxes
+    box = np.concatenate([corners[:, :2] + corners[:, 2:], corners[:, 2:] - corners[:, :2]], 1) / 2
+    born = one_step(far, [box], unseen=0.3)
+    assert born.labels.tolist() == [1, 50]
+    assert born.next_label == 51
+    assert born.sources[0, 1] == 0
+    assert born.shares[0, 1] == 1.0
+    existence = float(born.existences[1])
+    for least, count in ((existence, 1), (np.nextafter(existence, 0.0), 2)):
+        found = one_step(far, [box], unseen=0.3, least=least)
+        assert len(found.existences) == count
+        assert found.next_label == 49 + count
+    for told, pairs in ((existence, [50]), (np.nextafter(existence, 1.0), [])):
+        found = one_step(far, [box], unseen=0.3, least_told=told)
+        assert found.pair_labels.tolist() == pairs
+        assert found.pair_probabilities.tolist() == [existence] * len(pairs)
+
+
+def test_of_many_pairs_none_is_lost() -> None:
+    rng = np.random.default_rng(1)
+    crowd = gaussians(np.array([0.1, 0.2, 0.85]) + rng.normal(0.0, 0.02, (8, 3)), weights=0.6)
+    model = TargetModel(PERSON, "box")
+    boxes = []
+    for camera in CAMERAS[:2]:
+        corners = model.expected(camera, crowd.means[:1]).boxes
+        box = np.concatenate([corners[:, :2] + corners[:, 2:], corners[:, 2:] - corners[:, :2]], 1)
+        boxes.append(box / 2.0 + rng.normal(0.0, 3.0, (10, 4)))
+    found = one_step(crowd, boxes, least_told=0.0)
+    table = np.zeros((2, 8, 10))
+    table[found.pair_cameras, found.pair_labels - 1, found.pair_boxes] = found.pair_probabilities
+    assert len(found.pair_labels) == np.count_nonzero(table) == table.size
+    missed = 1.0 - table.sum(axis=2)
+    likeliest = np.where(table.max(axis=2) > missed, table.argmax(axis=2), -1)
+    assert_array_equal(found.sources, likeliest)
+    places = np.lexsort((found.pair_boxes, found.pair_labels, found.pair_cameras))
+    assert_array_equal(places, np.arange(table.size))
+
+
 def test_the_kept_are_neither_faint_nor_strayed_nor_duplicates_nor_too_many() -> None:
     rng = np.random.default_rng(3)
     low, high = np.full(3, -1.0), np.full(3, 1.0)
     for _ in range(30):
         count = int(rng.integers(0, 12))
-        means = rng.uniform(-1.2, 1.2, (count, 6))
-        existences, labels = rng.random(count), rng.permutation(count)
+        means = rng.choice([-1.001, -1.0, -0.4, 0.3, 1.0, 1.001], (count, 6))
+        existences = rng.choice([0.1, 0.2, 0.3, 0.6, 0.9], count)
+        labels = rng.permutation(count)
         sources = rng.integers(-1, 3, (2, count))
         alive = [
             i for i in range(count) if existences[i] >= 0.2 and (np.abs(means[i, :3]) <= 1.0).all()

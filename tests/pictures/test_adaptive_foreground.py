@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy import ndarray
 
 from tests.engine.rooms import SKIN, clip, empty_room, person_mask, photograph, with_person
-from tracker.kernels.pictures.foreground import above, update_background
+from tracker.kernels.pictures.foreground import above
 from tracker.parameters import ForegroundParams
 from tracker.pictures.foreground import AdaptiveForeground, first_background
 from tracker.pictures.foreground.adaptive import AdaptiveState, choose_iteration, clean, cluster
@@ -226,34 +226,6 @@ def test_cleaning_drops_small_pieces_and_closes_cracks() -> None:
     assert not clean(np.zeros_like(mask), 1).any()
     full = np.ones_like(mask)
     np.testing.assert_array_equal(clean(full, 1), full)
-
-
-def updated_in_numpy(
-    background: ndarray, still: ndarray, picture: ndarray, shown: ndarray, near: ndarray
-) -> tuple[ndarray, ndarray]:
-    """The selective update with Th = 6, w = 3, α = 0.1."""
-    step = picture.astype(int) - shown
-    counts = np.where(near == 0, np.minimum(still.astype(int) + 1, 255), 0)
-    moving = (counts >= 3) & (np.abs(step).max(axis=2) < 6)
-    moved = np.clip(background + np.round(25.6 * step), 0, 65280)
-    return np.where(moving[:, :, None], moved, background), counts
-
-
-def test_the_background_changes_only_where_it_may() -> None:
-    rng = np.random.default_rng(4)
-    shown = rng.integers(0, 256, (30, 40, 3), dtype=np.uint8)
-    background = shown.astype(np.uint16) * 256
-    picture = np.clip(shown + rng.normal(0.0, 3.0, shown.shape), 0, 255).astype(np.uint8)
-    still = rng.integers(0, 5, (30, 40)).astype(np.uint8)
-    still[0] = 255
-    near = (rng.random((30, 40)) < 0.2).astype(np.uint8)
-    found = update_background(background, still, picture, shown, near, 6, 3, 0.1)
-    after, counts = found.levels, found.still
-    wanted, wanted_counts = updated_in_numpy(background, still, picture, shown, near)
-    np.testing.assert_array_equal(counts, wanted_counts)
-    np.testing.assert_array_equal(after, wanted)
-    assert np.all(after[near == 1] == background[near == 1])
-    assert np.any(after != background)
 
 
 def test_a_tenth_of_a_grey_level_counts() -> None:

@@ -9,11 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from numpy import ndarray
-from numpy.testing import assert_array_equal
 
 from tests.engine.rooms import SKIN, clip, empty_room, person_mask, photograph, with_person
 from tracker.kernels.pictures import images
-from tracker.kernels.pictures.foreground import level_medians, upper_medians
 from tracker.parameters import ForegroundParams
 from tracker.pictures import foreground
 from tracker.pictures.foreground import BackgroundModel, LearntForeground, tone_curve
@@ -153,30 +151,6 @@ def test_a_mask_of_people_is_packed_into_little() -> None:
 def test_what_is_no_packed_mask_is_refused(size: int) -> None:
     with pytest.raises(ValueError, match=f"expected a packed mask, got {size} bytes"):
         foreground.unpack(np.full(size, 7, dtype=np.uint8))
-
-
-@pytest.mark.parametrize("count", [1, 2, 5, 32])
-def test_medians_agree_with_sorting(count: int) -> None:
-    rng = np.random.default_rng(count)
-    values = rng.choice(np.array([0, 3, 16, 17, 200, 255], dtype=np.uint8), (count, 2500))
-    values[:, 1000:] = rng.integers(0, 256, (count, 1500))
-    assert_array_equal(upper_medians(values), np.sort(values, axis=0)[count // 2])
-
-
-def test_medians_of_levels_agree_with_counting_one_by_one() -> None:
-    rng = np.random.default_rng(4)
-    source = rng.integers(0, 200, (900, 3), dtype=np.uint8)
-    target = rng.integers(0, 256, (900, 3), dtype=np.uint8)
-    found = level_medians(source, target, 16)
-    totals, medians = found.totals, found.medians
-    for channel in range(3):
-        for group in range(16):
-            here = source[:, channel] // 16 == group
-            assert totals[channel, group] == here.sum()
-            assert found.sums[channel, group] == source[here, channel].sum()
-            values = np.sort(target[here, channel])
-            assert medians[channel, group] == (values[(len(values) - 1) // 2] if len(values) else 0)
-    assert (totals[:, 13:] == 0).all()
 
 
 def test_whoever_is_to_stop_stops_while_a_background_is_learnt() -> None:

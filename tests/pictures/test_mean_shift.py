@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
 
-from tracker.kernels.pictures import images
 from tracker.pictures import mean_shift
 
 CENTRES = np.array([[60.0, 50.0, 10.0, 15.0], [110.0, 52.0, 12.0, 16.0], [62.0, 140.0, 8.0, 12.0]])
@@ -76,17 +75,6 @@ def test_spread_starts_reach_the_weak_person_beside_the_strong_one() -> None:
     assert len(heaviest) == 20
 
 
-def test_starts_keep_a_half_box_apart_and_never_have_weight_0() -> None:
-    rng = np.random.default_rng(1)
-    boxes = np.column_stack([rng.uniform(0, 200, (300, 2)), np.full((300, 2), 10.0)])
-    weights = np.where(rng.random(300) < 0.5, rng.random(300), 0.0)
-    starts = mean_shift.starts(boxes, weights, 50, spread=True)
-    between = np.linalg.norm(boxes[starts, None, :2] - boxes[None, starts, :2], axis=2)
-    assert between[~np.eye(len(starts), dtype=bool)].min() >= 10.0
-    assert weights[starts].min() > 0.0
-    assert starts[0] == weights.argmax()
-
-
 def test_an_empty_sample_has_no_modes() -> None:
     nothing = np.zeros((0, 4))
     assert len(mean_shift.starts(nothing, np.zeros(0), 20, spread=True)) == 0
@@ -103,29 +91,3 @@ def test_samples_without_weight_have_no_modes() -> None:
     assert len(mean_shift.starts(boxes, np.zeros(30), 20, spread=False)) == 0
     modes, _ = mean_shift.modes(boxes, np.zeros(30), CENTRES, bandwidth=0.5, merge_distance=1.0)
     assert len(modes) == 0
-
-
-def test_one_step_of_the_kernel_is_the_formula() -> None:
-    boxes = boxes_around(CENTRES[:1], [50])
-    weights = np.random.default_rng(2).random(50)
-    start = CENTRES[:1] + np.array([3.0, -4.0, 1.0, 0.5])
-    moved, _ = images.mean_shift(boxes, weights, start, 0.9, 1, 0.0)
-    offsets = (boxes - start) / (0.9 * start[:, [2, 3, 2, 3]])
-    squared = (offsets**2).sum(axis=1)
-    kernel = weights * np.exp(-0.5 * squared) * (squared <= 12.0)
-    np.testing.assert_allclose(moved[0], kernel @ boxes / kernel.sum())
-
-
-def test_modes_kept_apart_are_those_of_a_plain_loop() -> None:
-    rng = np.random.default_rng(6)
-    for _ in range(30):
-        boxes = np.concatenate([rng.uniform(0, 60, (25, 2)), rng.uniform(5, 15, (25, 2))], axis=1)
-        densities = np.maximum(rng.normal(0.5, 0.5, 25), 0.0)
-        order = np.argsort(-densities, kind="stable")
-        kept: list[int] = []
-        for i in order:
-            apart = (boxes[kept, :2] - boxes[i, :2]) / boxes[kept, 2:]
-            if densities[i] > 0.0 and ((apart**2).sum(axis=1) >= 0.64).all():
-                kept.append(int(i))
-        assert images.keep_apart(boxes, densities, order, 0.8).tolist() == kept
-        assert 1 < len(kept) < 25

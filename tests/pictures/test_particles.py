@@ -41,22 +41,6 @@ def together(
     )
 
 
-def reference_climb(boxes: ndarray, counts: ndarray, start: ndarray, bandwidth: float) -> ndarray:
-    """The definition, one box at a time."""
-    point = start.copy()
-    for _ in range(particles.ITERATIONS):
-        offsets = (boxes[:, :2] - point[:2]) / (bandwidth * point[2:])
-        inside = counts * ((offsets**2).sum(axis=1) < 1.0)
-        if not inside.any():
-            break
-        mean = inside @ boxes / inside.sum()
-        step = np.linalg.norm((mean - point)[:2] / point[2:])
-        point = mean
-        if step < particles.TOLERANCE:
-            break
-    return point
-
-
 def test_a_weight_is_that_of_the_target_it_fits_best() -> None:
     distances = np.array([[0.2, 0.9], [0.8, 0.4], [1.0, 1.0]])
     weights = np.exp(particles.log_likelihoods(distances, 20.0))
@@ -119,21 +103,6 @@ def test_the_modes_are_the_targets_the_largest_cluster_first() -> None:
     np.testing.assert_allclose(found.shares, [1 / 2, 1 / 3, 1 / 6], atol=0.03)
     assert np.abs((found.modes - CENTRES)[:, :2] / CENTRES[:, 2:]).max() < 0.12
     assert np.mean(found.owners == np.repeat([0, 1, 2], [90, 60, 30])) > 0.99
-
-
-@pytest.mark.parametrize("bandwidth", [0.5, 1.0, 1.7])
-def test_each_particle_climbs_as_the_definition_says(bandwidth: float) -> None:
-    boxes = around(CENTRES, [40, 30, 20], spread=0.6)
-    counts = np.random.default_rng(3).integers(0, 4, len(boxes)).astype(float)
-    points, densities = particle_kernels.epanechnikov_climb(
-        boxes, counts, one_group(boxes), bandwidth, particles.ITERATIONS, particles.TOLERANCE
-    )
-    for start, count, point, density in zip(boxes, counts, points, densities, strict=True):
-        if count == 0:
-            np.testing.assert_array_equal(point, start)
-            assert density == 0.0
-        else:
-            np.testing.assert_allclose(point, reference_climb(boxes, counts, start, bandwidth))
 
 
 def test_a_climb_never_goes_down() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy import ndarray
 from scipy.stats import chi2
 
+from tests.benchmarks.plane import plain_phd
 from tests.benchmarks.plane.scenario import (
     DETECTION,
     MERGING,
@@ -24,7 +25,6 @@ from tests.benchmarks.plane.scenario import (
     TRANSITION,
     Scenario,
 )
-from tests.engine import plain_phd
 from tracker.filters import gaussian_mixture, phd, pmb
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.kernels import linear_algebra

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tests.engine.stone_soup_jpda import associators, cluster
+from tests.association.stone_soup_jpda import associators, cluster
 from tracker.association import exact_marginals, log_weights, marginals_of, murty
 
 
