@@ -7,8 +7,8 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose
 
+from tests.smoothing.known import PLAIN
 from tests.smoothing.measured import PRIOR, STEP, fitted_to, measured
-from tests.smoothing.test_positions_laws import PLAIN
 from tracker.filters.models import Motion
 from tracker.kernels.smoothing import passes
 from tracker.smoothing.identity.ends import Ends
