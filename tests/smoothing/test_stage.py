@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tests import world
 from tests.smoothing.known import CAMERAS, PLAIN, Known, backwards, known
+from tracker.corrections.kinds import make
+from tracker.corrections.outcomes import outcomes
 from tracker.parameters import RunParameters, with_values
 from tracker.smoothing import create
 from tracker.smoothing.result import Smoothed
@@ -152,3 +155,114 @@ def test_a_camera_without_a_frame_says_nothing_against_somebody() -> None:
     found = create(scene.whole, POSITIONS).smooth(blind, scene.fused(labels))
     assert found is not None
     assert (found.existences > missed.existences).all()
+
+
+# ── what a person said holds
+
+
+def place(scene: Known, person: int, step: int, aside: float = 0.0) -> list[float]:
+    """Where somebody is, as a log has it."""
+    x, y, z = scene.places[step, person].tolist()
+    return [step, x, y + aside, z]
+
+
+@pytest.mark.parametrize(
+    ("kind", "of", "aside"),
+    [
+        ("came", [(0, 14)], 0.0),
+        ("left", [(0, 14)], 0.0),
+        ("different", [(0, 4), (0, 25)], 0.0),
+        ("exchanged", [(0, 8), (1, 8), (1, 18), (0, 18)], 0.0),
+        ("nobody", [(1, 0), (1, 29)], 0.0),
+        ("here", [(0, 24), (0, 24)], 1.0),
+    ],
+)
+def test_each_kind_of_correction_holds_where_it_did_not(
+    kind: str, of: list[tuple[int, int]], aside: float
+) -> None:
+    """And taken back it leaves no trace; bit for bit, whatever was kept of earlier runs."""
+    scene, labels = passing(), np.tile([4, 7], (STEPS, 1))
+    places = [place(scene, *one) for one in of]
+    places[0] = place(scene, *of[0], aside)
+    said = make(kind=kind, places=places)
+    stage = create(scene.whole, SETTLED)
+    kept: dict[str, object] = {}
+    # runs that differ in where somebody is said to be have nothing in common
+    known_earlier = SimpleNamespace(get=kept.get, put=kept.__setitem__)
+    earlier = None if kind == "here" else known_earlier
+    plain, told, again = (
+        stage.smooth(scene.views, scene.fused(labels), corrections=log, earlier=earlier)
+        for log in ((), (said,), ())
+    )
+    assert plain is not None
+    assert told is not None
+    assert again is not None
+    for found, met in ((plain, False), (told, True)):
+        there = found.existences > 0.5
+        (outcome,) = outcomes(
+            found.frames[there], found.labels[there], found.means[there, :3], [said], leeway=10
+        )
+        assert outcome.met is met, outcome.why
+    assert_array_equal(plain.means, again.means)
+    assert_array_equal(plain.labels, again.labels)
+    alone = stage.smooth(scene.views, scene.fused(labels), corrections=(said,))
+    assert alone is not None
+    assert_array_equal(alone.means, told.means)
+    assert_array_equal(alone.labels, told.labels)
+    if kind in ("came", "left"):
+        at = (told.frames == 14) & (told.means[:, 1] > 0.0)
+        there = told.frames[(told.labels == told.labels[at][0]) & (told.existences > 0.5)]
+        assert (there.min() if kind == "came" else there.max()) == 14
+
+
+def test_who_was_away_too_long_is_joined_where_somebody_says_so() -> None:
+    path = world.stand((0.3, 0.2), 24)[:, None]
+    scene = known(path, hidden=lambda camera, person, step: 8 <= step < 16)
+    labels = np.full((24, 1), 3)
+    labels[8:16], labels[16:] = -1, 5
+    p = with_values(SETTLED, {"smoothing.longest": 0.5})
+    said = make(kind="same", places=[place(scene, 0, 4), place(scene, 0, 20)])
+    found = create(scene.whole, p).smooth(scene.views, scene.fused(labels), corrections=[said])
+    assert found is not None
+    assert len(set(found.labels.tolist())) == 1
+    assert found.frames[found.existences > 0.5].tolist() == [*range(8), *range(16, 24)]
+    (one,) = found.decisions
+    assert (one.kind, one.step, one.reason) == ("joined", 16, "a person said so")
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.0])
+def test_who_comes_back_on_the_other_side_is_known_by_looks(weight: float) -> None:
+    """Two leave for two and a half seconds and come back as each other's neighbours; a network's
+    vectors beside the boxes say who is who."""
+    left, right = ([-0.8, 0.2], [0.8, -0.3])
+    paths = np.full((45, 2, 3), np.nan)
+    paths[:10, 0], paths[:10, 1] = world.stand(left, 10), world.stand(right, 10)
+    paths[35:, 0], paths[35:, 1] = world.stand(right, 10), world.stand(left, 10)
+    rng = np.random.default_rng(5)
+    vectors = rng.normal(size=(2, 16))
+    seen = world.boxes(CAMERAS, paths, 2.0, rng)
+    scene = Known(world.sequence(CAMERAS, paths, seen), seen, paths)
+    views = []
+    for step, own in enumerate(scene.views):
+        looks = []
+        for view, one in zip(own, seen, strict=True):
+            noisy = vectors[one.people[one.frames == step]]
+            noisy = noisy + 0.3 * rng.normal(size=noisy.shape)
+            noisy /= np.linalg.norm(noisy, axis=1, keepdims=True)
+            looks.append(replace(view, looks=noisy))
+        views.append(tuple(looks))
+    labels = np.tile([4, 7], (45, 1))
+    labels[10:35], labels[35:] = -1, [8, 9]
+    p = with_values(SETTLED, {"smoothing.appearance": weight})
+    found = create(scene.whole, p).smooth(views, scene.fused(labels))
+    assert found is not None
+
+    def of(step: int) -> dict[bool, int]:
+        """The label of whoever is on the left, and of the other."""
+        own = found.frames == step
+        return dict(zip((found.means[own, 0] < 0.0).tolist(), found.labels[own].tolist(),
+                        strict=True))  # fmt: skip
+
+    before, after = of(5), of(40)
+    assert (before[True] == after[False] and before[False] == after[True]) is (weight == 1.0)
+    assert not weight or {d.kind for d in found.decisions} == {"joined"}
