@@ -88,6 +88,58 @@ places = [[3, 5.0, 2.0, 0.8]]
 """
 
 
+def test_what_is_added_and_taken_back_leaves_the_log_as_it_was(tmp_path: Path) -> None:
+    path = tmp_path / FILE
+    write_log(path, parse(LOG, "log"))
+    before = path.read_bytes()
+    added = make(kind="name", places=[[3, 5.0, 2.0, 0.8]], name="Anna")
+    write_log(path, (*read_log(path), added))
+    assert [one.id for one in read_log(path)][-1] == added.id
+    write_log(path, [one for one in read_log(path) if one.id != added.id])
+    assert path.read_bytes() == before
+
+
+SAME = LOG[LOG.index("[[correction]]") : LOG.rindex("[[correction]]")]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (LOG + "places\n", "expected TOML"),
+        (LOG.replace('"here"', '"hear"'), "line 12: kind: expected one of same, .* found 'hear'"),
+        (LOG.replace("[[3, 5.0", "[[-3, 5.0"), "line 14: places: a step is a whole number"),
+        (LOG + "accuracy = 9.0\n", "line 15: accuracy"),
+        (LOG + "size = 1\n", "line 15: size"),
+        (LOG.replace("places = [[3", "at = [[3"), "line 1[14]: (at|places)"),
+        (LOG.replace("[9, 1.2", "[2, 1.2"), "line 6: places: same goes forward in time"),
+        (LOG.replace("format = 1", "format = 1\nstrange = 2"), "line 2: expected format"),
+        (LOG.replace("format = 1", "# a word\nformat = 3"), "line 2: expected format = 1, found 3"),
+        ("format = 1\ncorrection = 3\n", r"line 2: expected tables \[\[correction"),
+        (LOG.replace("time =", 'id = "a"\ntime ='), "line 12: id: .* found a again"),
+        (LOG + "\n" + SAME.replace("same", "different"), "line 16: .* contradicts"),
+        ("a = " + "[" * 3000, "expected a few levels"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_told_with_its_line(text: str, message: str) -> None:
+    assert parse(LOG, "log")
+    with pytest.raises(CorrectionError, match=f"^log[,:] {message}"):
+        parse(text, "log")
+
+
+def test_a_log_is_a_file_of_text_or_not_there(tmp_path: Path) -> None:
+    path = tmp_path / FILE
+    assert read_log(path) == ()
+    path.mkdir()
+    with pytest.raises(CorrectionError, match="expected a file, found a folder"):
+        read_log(path)
+    path.rmdir()
+    path.write_bytes(b"\xef\xbb\xbf" + LOG.encode())
+    assert read_log(path) == parse(LOG, "log")
+    path.write_bytes(LOG.encode() + b"# \xff")
+    with pytest.raises(CorrectionError, match=r"corrections\.toml, line 15"):
+        read_log(path)
+
+
 @pytest.fixture
 def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("MULTIVIEW_PHD_SETTINGS", str(tmp_path / "settings"))

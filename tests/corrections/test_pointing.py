@@ -61,3 +61,19 @@ def test_what_says_nothing_of_a_place_is_refused() -> None:
         triangulated([one])
     with pytest.raises(CorrectionError, match="same side"):
         triangulated([one, one])
+
+
+@pytest.mark.parametrize(("angle", "refused"), [(0.03, True), (0.05, False), (0.2, False)])
+def test_two_pictures_from_nearly_the_same_side_are_refused(angle: float, refused: bool) -> None:
+    """Of two rays the condition is 4 / θ²: below 0.04 rad they say nothing of how far away."""
+    point = np.array([0.0, 0.0, 1.0])
+    cameras = [
+        world.look_at(name, (5.0 * np.sin(turn), -5.0 * np.cos(turn), 1.0), point.tolist())
+        for name, turn in (("a", 0.0), ("b", angle))
+    ]
+    clicks = [(one, tuple(one.project(point[None])[0][0].tolist())) for one in cameras]
+    if refused:
+        with pytest.raises(CorrectionError, match="same side"):
+            triangulated(clicks)
+    else:
+        assert triangulated(clicks) == pytest.approx(point, abs=1e-6)

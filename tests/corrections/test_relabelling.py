@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import random
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,7 +13,6 @@ from tracker.corrections import Correction
 from tracker.corrections.kinds import make
 from tracker.corrections.outcomes import outcomes
 from tracker.corrections.relabelling import relabelled
-from tracker.corrections.resting import resting
 
 STEPS, LEEWAY = 60, 5
 
@@ -66,6 +67,47 @@ def test_only_who_is_who_changes(told: list[Correction]) -> None:
     assert (still == kept).all()
 
 
+def partition(steps: ndarray, ids: ndarray, kept: ndarray) -> set[tuple[int, ...]]:
+    """The rows of each track, whatever its number."""
+    return {tuple(kept[ids[kept] == name].tolist()) for name in set(ids[kept].tolist())}
+
+
+@given(said())
+def test_what_was_made_to_hold_is_not_made_to_hold_again(one: Correction) -> None:
+    steps, ids, places = walkers(4)
+    new, kept = relabelled(steps, ids, places, [one], leeway=LEEWAY)
+    own = steps[kept], new[kept], places[kept]
+    again, still = relabelled(*own, [one], leeway=LEEWAY)
+    assert len(still) == len(kept)
+    every = np.arange(len(kept))
+    assert partition(own[0], again, every) == partition(own[0], own[1], every)
+
+
+@given(st.lists(said(), max_size=3), st.lists(said(), max_size=3), st.randoms())
+def test_the_order_of_those_that_speak_of_different_people_does_not_matter(
+    first: list[Correction], second: list[Correction], order: random.Random
+) -> None:
+    """The second four walk thirty metres away; each four's own order stays."""
+
+    def away(one: Correction) -> Correction:
+        return make(kind=one.kind, places=[[k, x + 30.0, y, z] for k, x, y, z in one.places])
+
+    steps, ids, places = walkers(4)
+    steps, ids = np.tile(steps, 2), np.concatenate([ids, ids + 4])
+    places = np.concatenate([places, places + np.array([30.0, 0.0, 0.0])])
+    other = [away(one) for one in second]
+    mixed, left, right = list[Correction](), list(first), list(other)
+    while left or right:
+        mixed.append((left if not right or (left and order.random() < 0.5) else right).pop(0))
+    found = []
+    for told in ([*first, *other], [*other, *first], mixed):
+        new, kept = relabelled(steps, ids, places, told, leeway=LEEWAY)
+        became = outcomes(steps[kept], new[kept], places[kept], told, leeway=LEEWAY)
+        met = {one.id: one.met for one in became}
+        found.append((partition(steps, new, kept), kept.tolist(), met))
+    assert found[0] == found[1] == found[2]
+
+
 def test_each_kind_is_met_alone() -> None:
     steps, ids, places = walkers(3)
     gone = (ids == 1) & (steps > 20) | (ids == 2) & (steps < 30)
@@ -92,14 +134,6 @@ def test_each_kind_is_met_alone() -> None:
         assert len(kept) == expected, one.words
 
 
-def test_who_was_joined_keeps_the_longer_ones_number() -> None:
-    steps, ids, places = walkers(2)
-    rows = (ids == 1) & (steps < 10) | (ids == 2) & (steps >= 12)
-    told = [make(kind="same", places=[at(1, 9), at(2, 12)])]
-    new, _ = relabelled(steps[rows], ids[rows], places[rows], told, leeway=LEEWAY)
-    assert set(new.tolist()) == {2}
-
-
 def test_an_exchange_and_its_way_back_touch_what_is_between() -> None:
     steps, ids, places = walkers(2)
     told = [exchanged(1, 2, 20), exchanged(1, 2, 40)]
@@ -118,32 +152,6 @@ def test_who_is_not_found_is_told_and_changes_nothing() -> None:
     found = outcomes(steps, ids, places, told, leeway=LEEWAY)[0]
     assert not found.met
     assert "found nobody near (90.00, 0.00) at step 3" in found.why
-
-
-def test_what_stands_against_one_that_is_not_met_is_told() -> None:
-    steps, ids, places = walkers(2)
-    told = [
-        make(kind="same", places=[at(1, 10), at(1, 40)]),
-        make(kind="different", places=[at(1, 20), at(1, 30)]),
-        make(kind="different", places=[at(2, 20), at(2, 30)]),
-    ]
-    against, alone = outcomes(steps, ids, places, told, leeway=LEEWAY)[1:]
-    assert against.why == 'they are one track, 1; "same person, steps 10 – 40" holds there'
-    assert alone.why == "they are one track, 2"
-
-
-def test_rows_rest_on_a_join_from_where_somebody_comes_back() -> None:
-    steps, ids, places = walkers(2)
-    there = (ids == 2) | (steps < 20) | (steps >= 30)
-    steps, ids, places = steps[there], ids[there], places[there]
-    told = [
-        make(kind="same", places=[at(1, 10), at(1, 40)]),
-        make(kind="same", places=[at(2, 10), at(2, 40)]),
-    ]
-    met = outcomes(steps, ids, places, told, leeway=LEEWAY)
-    rests = np.array(resting(steps, ids, places, told, met))
-    assert steps[rests == told[0].id].tolist() == list(range(30, STEPS))
-    assert steps[rests == told[1].id].tolist() == list(range(40, STEPS))
 
 
 def test_nobody_at_all() -> None:

@@ -9,9 +9,13 @@ from numpy import ndarray
 
 from tests import world
 from tracker.camera import Camera
+from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths
+from tracker.fusion.model import all_boxes
 from tracker.fusion.multi_bernoulli import MultiBernoulli
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.sequential_phd import SequentialPhd
+from tracker.fusion.target_model import MeasurementKind, TargetModel
+from tracker.kernels.gating import Measurements
 from tracker.parameters import FusionParams, RunParameters
 from tracker.sequences.sequence import Room, Sequence
 from tracker.single_view.protocol import ViewResult
@@ -68,3 +72,25 @@ def exact(places: Many[Many[float]], cameras: Many[Camera] = CAMERAS, sigma: flo
     """What every camera shows of people at some places, without error, in their order."""
     where = np.array(places, dtype=float).reshape(-1, 3)
     return tuple(of_boxes(world.upright(camera, where), sigma) for camera in cameras)
+
+
+def births(
+    kind: MeasurementKind = "box", margin: float = 0.0, p_d: float = 0.95, gap: float = 1.0
+) -> MeasurementBirths:
+    """Of the room with four cameras."""
+    model = BirthModel(
+        0.005, p_d, np.full(4, 1e-8 if kind != "centre" else 1e-6), 21.0, margin, gap
+    )
+    return MeasurementBirths(CAMERAS, ROOM, TargetModel(HALF_EXTENTS, kind), model)
+
+
+def evidence(
+    views: tuple[ViewResult, ...], kind: MeasurementKind = "box", unexplained: float = 1.0
+) -> Evidence:
+    """Of boxes that are equally unexplained."""
+    seen, model = all_boxes(views), TargetModel(HALF_EXTENTS, kind)
+    values, noises = model.measured_boxes(seen.boxes, seen.sigmas, 1.0)
+    share = np.full(len(seen.boxes), unexplained)
+    return Evidence(
+        seen.boxes[:, :2], Measurements(values, noises), share, seen.starts, seen.clutter_factors
+    )

@@ -10,53 +10,40 @@ from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests import world
-from tests.fusion.rooms import CAMERAS, NO_BOXES, NO_FRAME, ROOM, empty_room, exact, of_boxes
+from tests.fusion.rooms import (
+    CAMERAS,
+    NO_BOXES,
+    NO_FRAME,
+    ROOM,
+    births,
+    empty_room,
+    evidence,
+    exact,
+    of_boxes,
+)
 from tracker.camera import stacked
 from tracker.corrections.kinds import make
 from tracker.filters.gaussian_mixture import GaussianMixture, gate_distance
 from tracker.fusion import sight
 from tracker.fusion.labels.memory import Memory, recall
 from tracker.fusion.labels.reidentification import Identities
-from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths, Newborns
+from tracker.fusion.measurement_births import Newborns
 from tracker.fusion.model import FusionModel, all_boxes
 from tracker.fusion.multi_bernoulli import MultiBernoulli, MultiBernoulliState
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import Ledger, Record, summed
 from tracker.fusion.sequential_phd import SequentialPhd, SequentialPhdState
 from tracker.fusion.sight import Glimpse
-from tracker.fusion.target_model import MeasurementKind, TargetModel
+from tracker.fusion.target_model import TargetModel
 from tracker.fusion.told import obey, told_by_step
 from tracker.kernels import births as kernels
 from tracker.kernels.births import Refinement
-from tracker.kernels.gating import Measurements
 from tracker.parameters import FusionParams, RunParameters
 from tracker.single_view.protocol import ViewResult
 from tracker.trajectories import Bounds, by_boxes, extract
 
 PLACE = np.array([0.4, -0.3, 0.85])
 ABOVE = 1e-9
-
-
-def births(
-    kind: MeasurementKind = "box", margin: float = 0.0, p_d: float = 0.95, gap: float = 1.0
-) -> MeasurementBirths:
-    """Of the room with four cameras."""
-    model = BirthModel(
-        0.005, p_d, np.full(4, 1e-8 if kind != "centre" else 1e-6), 21.0, margin, gap
-    )
-    return MeasurementBirths(CAMERAS, ROOM, TargetModel(world.PERSON, kind), model)
-
-
-def evidence(
-    views: tuple[ViewResult, ...], kind: MeasurementKind = "box", unexplained: float = 1.0
-) -> Evidence:
-    """Of boxes that are equally unexplained."""
-    seen, model = all_boxes(views), TargetModel(world.PERSON, kind)
-    values, noises = model.measured_boxes(seen.boxes, seen.sigmas, 1.0)
-    share = np.full(len(seen.boxes), unexplained)
-    return Evidence(
-        seen.boxes[:, :2], Measurements(values, noises), share, seen.starts, seen.clutter_factors
-    )
 
 
 def some(views: tuple[ViewResult, ...], *cameras: int) -> tuple[ViewResult, ...]:

@@ -11,60 +11,19 @@ from numpy.testing import assert_allclose
 from scipy.special import logit, logsumexp
 from scipy.stats import multivariate_normal
 
-from tests.engine.standing import CAMERAS, HALF_EXTENTS, ROOM, watch
-from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths, Newborns
-from tracker.fusion.model import all_boxes
+from tests import world
+from tests.fusion.rooms import CAMERAS, HALF_EXTENTS, NO_BOXES, ROOM, births, evidence
+from tracker.fusion.measurement_births import Newborns
 from tracker.fusion.target_model import MeasurementKind, TargetModel
-from tracker.kernels.gating import Measurements
 from tracker.single_view.protocol import ViewResult
 
-BIRTH_RATE, P_D = 0.005, 0.98
+BIRTH_RATE, P_D = 0.005, 0.95
 
 
-def clutter_of(kind: MeasurementKind) -> float:
-    """κ, per unit of the measurement space."""
-    return 1e-8 if kind != "centre" else 1e-6
-
-
-def births(kind: MeasurementKind = "box", margin: float = 0.0) -> MeasurementBirths:
-    """With the numbers of the defaults at ten steps a second."""
-    return MeasurementBirths(
-        CAMERAS,
-        ROOM,
-        TargetModel(HALF_EXTENTS, kind),
-        BirthModel(
-            birth_rate=BIRTH_RATE,
-            detection_probability=P_D,
-            clutter=np.full(len(CAMERAS), clutter_of(kind)),
-            gate=21.0,
-            margin=margin,
-            largest_gap=1.0,
-        ),
-    )
-
-
-def evidence(
-    views: tuple[ViewResult, ...], kind: MeasurementKind = "box", unexplained: float = 1.0
-) -> Evidence:
-    """All boxes equally unexplained."""
-    seen = all_boxes(views)
-    model = TargetModel(HALF_EXTENTS, kind)
-    each = [model.measured(view, 1.0) for view in views]
-    measured = Measurements(
-        np.concatenate([one.values for one in each]), np.concatenate([one.noises for one in each])
-    )
-    return Evidence(
-        seen.boxes[:, :2],
-        measured,
-        np.full(len(seen.boxes), unexplained),
-        seen.starts,
-        seen.clutter_factors,
-    )
-
-
-def seen(places: ndarray, clutter_rate: float = 0.0, seed: int = 0) -> tuple[ViewResult, ...]:
-    """One step's boxes of people at some places."""
-    return watch(places[None], miss_rate=0.0, clutter_rate=clutter_rate, seed=seed)[0]
+def seen(places: ndarray, clutter: float = 0.0, seed: int = 0) -> tuple[ViewResult, ...]:
+    """One step's boxes of people at some places, each side known to three pixels."""
+    rng = np.random.default_rng(seed)
+    return world.views(world.boxes(CAMERAS, places[None], 3.0, rng, clutter=clutter))[0]
 
 
 def proposed(newborns: Newborns | None) -> Newborns:
@@ -90,16 +49,15 @@ def test_the_odds_are_the_integral_over_the_room(
     kind: MeasurementKind, missing: int | None
 ) -> None:
     """Λ by importance sampling, term by term as the class says it."""
-    none = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
     views = tuple(
-        none if c == missing else view
+        NO_BOXES if c == missing else view
         for c, view in enumerate(seen(np.array([[0.5, -0.3, 0.85]]), seed=3))
     )
     found = proposed(births(kind).propose(evidence(views, kind))).take(np.array([0]))
     assert (found.sources[:, 0] >= 0).tolist() == [c != missing for c in range(4)]
 
     proposal = multivariate_normal(found.positions[0], 2.0 * found.covariances[0], seed=1)
-    places = np.atleast_2d(proposal.rvs(20_000))
+    places = np.atleast_2d(proposal.rvs(4_000))
     model = TargetModel(HALF_EXTENTS, kind)
     log_terms = np.full(len(places), np.log(BIRTH_RATE / np.prod(ROOM.maximum - ROOM.minimum)))
     for camera, view in zip(CAMERAS, views, strict=True):
@@ -109,7 +67,7 @@ def test_the_odds_are_the_integral_over_the_room(
         (value,), (noise,) = model.measured(view, 1.0)
         residuals = model.expected(camera, places).values - value
         density = multivariate_normal(np.zeros(len(value)), noise).logpdf(residuals)
-        log_terms += np.log(P_D) + density - np.log(clutter_of(kind))
+        log_terms += np.log(P_D) + density - np.log(1e-8 if kind != "centre" else 1e-6)
     log_odds = logsumexp(log_terms - proposal.logpdf(places)) - np.log(len(places))
     assert logit(found.existences[0]) == pytest.approx(log_odds, abs=0.1)
 
@@ -141,19 +99,16 @@ def test_no_box_is_used_twice() -> None:
 
 def test_the_more_cameras_agree_the_surer() -> None:
     views = seen(np.array([[0.3, 0.2, 0.85]]))
-    none = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
     odds = []
     for count in (2, 3, 4):
-        some = tuple(view if c < count else none for c, view in enumerate(views))
+        some = tuple(view if c < count else NO_BOXES for c, view in enumerate(views))
         found = proposed(births().propose(evidence(some)))
         odds.append(found.existences[0] / (1.0 - found.existences[0] + 1e-15))
     assert odds[0] < odds[1] < odds[2]
 
 
-def test_boxes_that_somebody_explains_start_nobody() -> None:
-    views = seen(np.array([[0.5, -0.8, 0.85]]))
-    assert births().propose(evidence(views, unexplained=0.3)) is None
-    mixed = evidence(views)
+def test_a_box_that_somebody_made_is_no_source_of_a_newcomer() -> None:
+    mixed = evidence(seen(np.array([[0.5, -0.8, 0.85]])))
     mixed.unexplained[mixed.starts[2]] = 0.0
     found = proposed(births().propose(mixed))
     assert found.sources[:, 0].tolist() == [0, 0, -1, 0]

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from numpy import ndarray
 
-from tests.engine.standing import RECOMMENDED, empty_room
+from tests.fusion.rooms import empty_room
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.labels.memory import Memory, recall
 from tracker.fusion.model import FusionModel
+from tracker.parameters import FusionParams
 
-MODEL = FusionModel(empty_room(10.0), RECOMMENDED)
+MODEL = FusionModel(empty_room(), FusionParams())
 
 
 def people(*who: tuple[int, float, float, float]) -> GaussianMixture:
@@ -51,14 +52,6 @@ def test_far_away_it_is_somebody_else() -> None:
     assert memory.lost.labels.tolist() == [1]
 
 
-def test_after_a_while_he_is_forgotten() -> None:
-    steps = round(RECOMMENDED.memory * 10) + 1
-    _, memory = run(people((1, 0.9, 0.0, 0.0)), *[NOBODY] * (steps - 1))
-    assert memory.lost.labels.tolist() == [1]
-    _, memory = run(people((1, 0.9, 0.0, 0.0)), *[NOBODY] * (steps + 1))
-    assert memory.lost.size == 0
-
-
 def test_the_faint_rest_of_the_old_label_goes_on_under_the_new_one() -> None:
     labels, _ = run(people((1, 0.9, 0.0, 0.0)), people((11, 0.9, 0.1, 0.0), (1, 0.2, 0.3, 0.0)))
     assert labels.tolist() == [1, 11], "no label twice"
@@ -81,7 +74,7 @@ def test_two_who_return_together_each_get_the_nearer_name() -> None:
 
 
 def test_without_a_memory_nothing_is_renamed() -> None:
-    model = FusionModel(empty_room(10.0), RECOMMENDED.model_copy(update={"memory": 0.0}))
+    model = FusionModel(empty_room(), FusionParams().model_copy(update={"memory": 0.0}))
     memory = Memory.start(6)
     for step in (people((1, 0.9, 0.0, 0.0)), NOBODY):
         _, memory = recall(memory, step, model, 10)

@@ -7,10 +7,11 @@ from collections.abc import Sequence as Many
 import numpy as np
 import pytest
 
-from tests.engine.standing import HALF_EXTENTS, RECOMMENDED, empty_room
+from tests.fusion.rooms import HALF_EXTENTS, empty_room
 from tracker.filters import models
 from tracker.fusion.model import FusionModel
 from tracker.fusion.target_model import SIZES, MeasurementKind
+from tracker.parameters import FusionParams
 
 KINDS: Many[MeasurementKind] = ("centre", "box", "box_and_width")
 every_kind = pytest.mark.parametrize("kind", KINDS)
@@ -18,7 +19,7 @@ every_kind = pytest.mark.parametrize("kind", KINDS)
 
 def model(fps: float = 10.0, **changes: object) -> FusionModel:
     """Of the room with a door and four cameras."""
-    return FusionModel(empty_room(fps), RECOMMENDED.model_copy(update=changes))
+    return FusionModel(empty_room(fps), FusionParams().model_copy(update=changes))
 
 
 @every_kind

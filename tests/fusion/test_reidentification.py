@@ -1,4 +1,4 @@
-"""People with templates keep their labels by their looks: laws, and a return after long absence."""
+"""People with templates keep their labels by their looks: also after they were gone."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy import ndarray
 
-from tests.engine.standing import RECOMMENDED, fuse, ids_of, line, watch
+from tests.fusion.rooms import NO_BOXES, exact, filtered
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.labels.reidentification import Identities, reidentify, resemblance
 from tracker.fusion.multi_bernoulli import MultiBernoulli
@@ -137,7 +136,7 @@ def test_looks_that_nobody_renews_are_forgotten_at_the_rate_of_the_leak() -> Non
 
 def test_no_evidence_lasts_for_ever() -> None:
     soon = watched(Identities.none(), [1, 2], [FIRST, SECOND], 200)
-    late = watched(soon, [1, 2], [FIRST, SECOND], 2000)
+    late = watched(soon, [1, 2], [FIRST, SECOND], 400)
     odds = [float(np.ptp(names.looks[0])) for names in (soon, late)]
     assert odds[1] == pytest.approx(odds[0], abs=0.01)
     assert odds[1] < 10.0
@@ -164,7 +163,7 @@ def test_without_two_people_to_tell_apart_nothing_is_done() -> None:
 def test_labels_stay_unique_and_what_is_kept_is_bounded(seed: int) -> None:
     rng = np.random.default_rng(seed)
     names, labels, free = Identities.none(), [1, 2, 3], 4
-    for _ in range(40):
+    for _ in range(25):
         looks = rng.dirichlet([0.3, 0.3, 0.3], len(labels)).tolist()
         renamed, names = step(names, labels, looks, seconds=0.5)
         labels = [renamed.get(label, label) for label in labels]
@@ -176,25 +175,22 @@ def test_labels_stay_unique_and_what_is_kept_is_bounded(seed: int) -> None:
             labels[int(rng.integers(3))], free = free, free + 1
 
 
-def two_visits() -> tuple[ndarray, list[tuple[ViewResult, ...]]]:
-    """Somebody walks out by one side and comes in at the other eight seconds later."""
-    out = line([(-1.8, -1.8), (0.0, 0.0), (2.9, 0.0)], [0, 3, 6], 10.0)
-    back = line([(-2.6, 1.0), (0.5, 1.0), (0.5, 0.5)], [0, 4, 7], 10.0)
-    path = np.concatenate([out, np.full((80, 3), np.nan), back])
-    views = watch(path[:, None], seed=3, clutter_rate=0.0, miss_rate=0.0)
-    told = [
-        tuple(replace(view, likenesses=np.tile([0.9, 0.1], (len(view.boxes), 1))) for view in row)
-        for row in views
+@pytest.mark.parametrize("recognition", [True, False])
+def test_recognition_gives_the_label_back_at_another_place_and_can_be_switched_off(
+    recognition: bool,
+) -> None:
+    """Two seconds here, a second away, two seconds two metres off."""
+
+    def seen(place: list[float]) -> tuple[ViewResult, ...]:
+        return tuple(
+            replace(view, likenesses=np.tile([0.9, 0.1], (len(view.boxes), 1)))
+            for view in exact([place])
+        )
+
+    views = [seen([-0.8, -0.5, 0.85])] * 20 + [(NO_BOXES,) * 4] * 10 + [seen([1.2, 0.5, 0.85])] * 20
+    results = filtered(MultiBernoulli, views, recognition=recognition, memory=0.0)
+    labels = [
+        int(results[step].posterior.labels[results[step].posterior.weights.argmax()])
+        for step in (19, -1)
     ]
-    return path, told
-
-
-def test_recognition_gives_the_id_back_and_can_be_switched_off() -> None:
-    path, views = two_visits()
-    _, tracks = fuse(MultiBernoulli, views)
-    ids = ids_of(tracks, path)
-    assert ids[-1] == ids[40] > 0
-    off = RECOMMENDED.model_copy(update={"recognition": False})
-    _, tracks = fuse(MultiBernoulli, views, parameters=off)
-    ids = ids_of(tracks, path)
-    assert ids[-1] != ids[40]
+    assert (labels[0] == labels[1]) is recognition

@@ -172,6 +172,22 @@ def test_cameras_without_a_frame_leave_the_others_as_if_they_were_not_there(meth
             assert not b.detection_probabilities[list(blind)].any()
 
 
+@both_methods
+def test_a_camera_that_looks_elsewhere_has_no_say(method: Method) -> None:
+    away = world.look_at("away", (-5.0, -5.2, 2.6), (-15.0, -15.0, 1.0))
+    places = np.array([[0.3, 0.2, 0.85], [-1.0, 1.0, 0.85]])
+    tracks, views = world.gaussians(places + 0.05), exact(places, CAMERAS[:3])
+    results = []
+    for cameras, seen in ((CAMERAS[:3], views), ((*CAMERAS[:3], away), (*views, NO_BOXES))):
+        fusion = method(empty_room(cameras=cameras), RunParameters(fusion=PLAIN))
+        results.append(fusion.step(known(tracks, method=method), seen)[1])
+    without, with_it = results
+    assert_allclose(with_it.posterior.weights, without.posterior.weights, rtol=1e-9)
+    assert_allclose(with_it.posterior.means, without.posterior.means, atol=1e-9)
+    assert (with_it.sources[3] == -1).all()
+    assert not with_it.detection_probabilities[3].any()
+
+
 # ── symmetries
 
 
@@ -289,6 +305,80 @@ def test_a_step_is_pure(method: Method) -> None:
     assert_array_equal(before, after)
 
 
+# ── who begins
+
+
+@both_methods
+@pytest.mark.parametrize("first", [False, True])
+def test_a_newcomer_is_recorded_with_the_boxes_that_began_it(method: Method, first: bool) -> None:
+    """Box 0 is one like any; nobody begins otherwise."""
+    views = exact([[0.4, -0.3, 0.85]], sigma=4.0)
+    if not first:
+        aside = np.array([[5.0, 5.0, 4.0, 12.0]])
+        views = tuple(of_boxes(np.concatenate([aside, view.boxes]), 4.0) for view in views)
+    views = (*views[:2], NO_FRAME, views[3])
+    (result,) = filtered(method, [views], birth="measurements")
+    (component,) = np.flatnonzero(result.posterior.weights > 0.5)
+    assert_allclose(result.posterior.means[component, :3], [0.4, -0.3, 0.85], atol=0.02)
+    box = 0 if first else 1
+    assert result.sources[:, component].tolist() == [box, box, -1, box]
+    assert result.source_weights[:, component].tolist() == [1.0, 1.0, 0.0, 1.0]
+    p_d = FusionParams().detection_probability
+    assert result.detection_probabilities[:, component].tolist() == [p_d, p_d, 0.0, p_d]
+
+
+@pytest.mark.parametrize("box", [0, 1])
+def test_a_box_that_began_a_newcomer_begins_nobody_at_the_entrance_on_its_ray(box: int) -> None:
+    """The entrance lies behind the newcomer, as the first camera sees them; other cameras do not
+    take the one for the other. Box 0 is one like any."""
+    door = ROOM.entrances[0].position
+    place = door + 0.3 * (CAMERAS[0].centre - door)
+    views = [
+        of_boxes(np.concatenate([np.tile([20.0, 20.0, 4.0, 12.0], (box, 1)), view.boxes]))
+        for view in exact([place], CAMERAS[:3])
+    ]
+    p = {"measurement": "centre", "pruning_threshold": 1e-9, "duplicate_distance": 0.0}
+    for birth, count in (("entrances", 1), ("both", 1)):
+        (result,) = filtered(MultiBernoulli, [tuple(views)], cameras=CAMERAS[:3], birth=birth, **p)
+        made = np.flatnonzero(result.sources[0] == box)
+        assert len(made) == count
+        at = door if birth == "entrances" else place
+        assert np.linalg.norm(result.posterior.means[made[0], :3] - at) < 0.5
+
+
+@both_methods
+@pytest.mark.parametrize(("gap", "begins"), [(1, True), (4, True), (5, False)])
+def test_cameras_that_take_turns_begin_a_track_within_a_fifth_of_a_second(
+    method: Method, gap: int, begins: bool
+) -> None:
+    """Twenty steps a second; only boxes of this step are recorded as sources."""
+    one, other = exact([[0.4, -0.3, 0.85]], CAMERAS[:2], sigma=4.0)
+    views = [(one, NO_FRAME), *[(NO_FRAME, NO_FRAME)] * (gap - 1), (NO_FRAME, other)]
+    result = filtered(method, views, cameras=CAMERAS[:2], fps=20.0, birth="measurements")[-1]
+    assert result.sources.T.tolist() == ([[-1, 0]] if begins else [])
+
+
+@both_methods
+def test_one_camera_alone_finds_who_comes_in_by_the_entrance(method: Method) -> None:
+    place = ROOM.entrances[0].position
+    result = filtered(method, [exact([place], CAMERAS[:1])] * 4, cameras=CAMERAS[:1])[-1]
+    best = result.posterior.weights.argmax()
+    assert result.posterior.weights[best] > 0.5
+    assert_allclose(result.posterior.means[best, :3], place, atol=0.5)
+    elsewhere = filtered(method, [exact([[0.4, -0.3, 0.85]], CAMERAS[:1])], cameras=CAMERAS[:1])
+    assert elsewhere[0].posterior.weights.max(initial=0.0) < 0.1
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("axis", range(3))
+def test_people_are_followed_to_the_margin_around_the_room(axis: int, side: float) -> None:
+    margin = FusionParams().followed_margin
+    edge = (ROOM.maximum if side > 0 else ROOM.minimum)[axis] + side * margin
+    places = np.tile([0.3, 0.2, 0.85], (2, 1))
+    places[:, axis] = edge - side * 1e-9, edge + side * 1e-9
+    assert FusionModel(empty_room(), FusionParams()).stays(world.gaussians(places)).tolist() == [0]
+
+
 # ── what every step reports
 
 
@@ -359,7 +449,11 @@ def test_who_is_hidden_is_reported_with_who_hides_him(method: Method) -> None:
 def test_the_ends_of_the_ranges_give_no_nonsense(
     method: Method, changes: dict[str, object]
 ) -> None:
-    views = three_walkers(3, clutter=1.0)
+    absurd = [[640, 400, 0.5, 0.5], [640, 400, 640, 400], [-500, 400, 600, 900], [640, 400, 640, 1]]
+    views = [
+        tuple(of_boxes(np.concatenate([view.boxes, absurd]), 3.0) for view in step)
+        for step in three_walkers(3, clutter=1.0)
+    ]
     views.append((NO_BOXES,) * 4)
     for result in filtered(method, views, **changes):
         posterior = result.posterior

@@ -10,8 +10,8 @@ from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import norm
 
-from tests.engine.standing import CAMERAS, HALF_EXTENTS
-from tests.engine.synthetic import look_at
+from tests.fusion.rooms import CAMERAS, HALF_EXTENTS
+from tests.world import look_at
 from tracker.camera import Camera
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.target_model import ExpectedBoxes, TargetModel

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy import ndarray
 
-from tests.smoothing.test_positions_laws import PLAIN
+from tests.smoothing.known import PLAIN
 from tracker.filters.models import Motion
 from tracker.kernels.smoothing import passes
 from tracker.kernels.smoothing.passes import SmoothedRows

@@ -8,54 +8,46 @@ import numpy as np
 import pytest
 from numpy import ndarray
 
-from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, sequence, walk
-from tests.smoothing.test_positions_laws import PLAIN, STEPS
-from tracker import pipeline
+from tests import world
+from tests.smoothing.known import PLAIN, Known, Step, known
 from tracker.parameters import METHODS, RunParameters, method_of, with_values
-from tracker.runs.run import Run
-from tracker.sequences.sequence import Sequence
-from tracker.single_view.protocol import ViewResult
 from tracker.smoothing import create
 from tracker.smoothing.apart import shown_apart
 from tracker.smoothing.lifetimes import lifetimes
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Shared, Smoother
 
-WIDTH = 2.0 * float(HALF_EXTENTS[0])
-BEGIN, END = 10, 30
-ALONE = walk((-1.0, 0.2, 1.0), (0.9, -0.3, 1.1), STEPS)
+WIDTH = 2.0 * float(world.PERSON[0])
+STEPS, BEGIN, END = 30, 8, 24
+ALONE = world.walk([(-1.0, 0.2), (0.9, -0.3)], [0.0, STEPS / 10.0], 10.0)
 DOUBTFUL = -3.5
 """Two cameras cannot outweigh it, a third does."""
 
 
 def second(offset_at_first: float, offset_at_last: float) -> ndarray:
     """Somebody who is there for a while, so many metres beside the one who is always there."""
-    offsets = np.linspace(offset_at_first, offset_at_last, END - BEGIN)
-    return ALONE[BEGIN:END] + np.stack([0.0 * offsets, offsets, 0.0 * offsets], axis=1)
+    path = np.full_like(ALONE, np.nan)
+    path[BEGIN:END] = ALONE[BEGIN:END]
+    path[BEGIN:END, 1] += np.linspace(offset_at_first, offset_at_last, END - BEGIN)
+    return path
 
 
-def filtered(other: ndarray) -> tuple[Sequence, Run, list[tuple[ViewResult, ...]]]:
-    """The sequence of both, what the filter says, and stage 1 with every box looking doubtful."""
-    whole = sequence([(0, ALONE), (BEGIN, other)], STEPS, CAMERAS)
-    run = pipeline.compute(whole, with_values(PLAIN, {"smoothing_method": "none"}))
-    views = [
+def doubtful(scene: Known) -> list[Step]:
+    """Stage 1 with every box looking doubtful."""
+    return [
         tuple(replace(view, log_ratios=np.full(len(view.boxes), DOUBTFUL)) for view in step)
-        for step in run.views
+        for step in scene.views
     ]
-    return whole, run, views
 
 
 def tracked(
     other: ndarray, *, swapped: bool = False, several: bool = True, looks: bool = True
 ) -> tuple[Smoother, Paths, Shared]:
     """Both as they were, and whose box each is."""
-    whole, run, views = filtered(other)
-    views = views if looks else run.views
-    smoother = Smoother(whole, PLAIN.fusion, views, several_boxes=several)
-    walked = [(0, ALONE), (BEGIN, other)][:: -1 if swapped else 1]
-    states = [np.concatenate([path, np.zeros_like(path)], axis=1) for _, path in walked]
-    spread = [np.tile(1e-3 * np.eye(6), (len(path), 1, 1)) for _, path in walked]
-    paths = Paths.of([1, 2], [first for first, _ in walked], states, spread, 6)
+    scene = known(world.together(*([other, ALONE] if swapped else [ALONE, other])))
+    views = doubtful(scene) if looks else scene.views
+    smoother = Smoother(scene.whole, PLAIN.fusion, views, several_boxes=several)
+    paths, _ = scene.paths(sigma=0.03)
     return smoother, paths, smoother.share(paths)
 
 
@@ -123,14 +115,15 @@ def test_who_looks_at_pictures_by_itself_may_draw_several_boxes(name: str) -> No
 
 
 def test_whoever_the_filter_had_and_hindsight_has_not_is_told_of() -> None:
-    whole, run, views = filtered(second(0.6 * WIDTH, 0.9 * WIDTH))
-    on_pictures = with_values(PLAIN, {"single_view": "shapes"})
-    smoothed = create(whole, on_pictures).smooth(views, run.fused)
+    scene = known(world.together(ALONE, second(0.6 * WIDTH, 0.9 * WIDTH)))
+    on_pictures = with_values(PLAIN, {"single_view": "shapes", "smoothing_method": "positions"})
+    fused = scene.fused(np.tile([3, 5], (STEPS, 1)))
+    smoothed = create(scene.whole, on_pictures).smooth(doubtful(scene), fused)
     assert smoothed is not None
-    had = set(run.filtered.labels.tolist())
-    gone = had - set(smoothed.labels.tolist())
-    assert len(had) == 2
-    assert len(gone) == 1
-    told = [one for one in smoothed.decisions if one.kind == "removed"]
-    assert {one.label for one in told} == gone
-    assert all(0.5 < one.probability <= 1.0 and BEGIN <= one.step < END for one in told)
+    assert set(smoothed.labels.tolist()) == {3}
+    (gone,) = smoothed.decisions
+    assert (gone.kind, gone.label, gone.other) == ("removed", 5, 5)
+    assert 0.5 < gone.probability <= 1.0
+    assert gone.against == pytest.approx(1.0 - gone.probability)
+    assert gone.step <= BEGIN
+    assert gone.reason == "over its whole life it is likelier nobody"

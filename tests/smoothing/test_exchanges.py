@@ -5,15 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy import ndarray
-from scipy.optimize import linear_sum_assignment
+from scipy.stats import multivariate_normal
 
-from tests.random_rooms import random_room
 from tests.smoothing.measured import STEP, fitted_to, measured
-from tests.smoothing.test_positions_laws import PLAIN
-from tracker import pipeline
-from tracker.parameters import with_values
-from tracker.pipeline import Run
-from tracker.smoothing.identity.exchanges import exchange_breaks, turn
+from tracker.smoothing.identity.exchanges import exchange_breaks, gains_of, turn
 from tracker.smoothing.smoother import Fitted
 
 SIGMA = 0.05
@@ -68,32 +63,45 @@ def test_nobody_and_one_alone_have_nothing_to_exchange() -> None:
     assert not exchange_breaks(fitted(two(20, 10)[:1]), reach=2.5, least=0.0, apart=4).any()
 
 
-def exchanged(run: Run) -> int:
-    """How often a person's track is another one than at the step before."""
-    truth = run.sequence.ground_truth
-    assert truth is not None
-    count, before = 0, dict[int, int]()
-    for step in range(run.sequence.frames):
-        own, tracks = truth.at(step), run.tracks.at(step)
-        apart = np.linalg.norm(
-            truth.positions[own][:, None, :2] - run.tracks.positions[tracks][None, :, :2], axis=2
+def test_what_an_exchange_gains_is_by_the_integrals_and_the_same_from_either_side() -> None:
+    """ℓ by the densities: what the rows from one on say is N(y; x, Λ⁻¹) up to a constant, which
+    both ways have alike."""
+    paths = fitted(two(20, 10))
+    one, other = np.array([6, 10, 13]), np.array([26, 30, 33])
+    found = gains_of(paths, one, other)
+    assert found == pytest.approx(gains_of(paths, other, one))
+    states, spread = paths.paths.states, paths.paths.covariances
+
+    def fits(before: int, after: int) -> float:
+        ahead = paths.ahead_covariances[after]
+        information = np.linalg.inv(spread[after]) - np.linalg.inv(ahead)
+        noise = np.linalg.pinv(information, 1e-7)
+        told = np.linalg.solve(spread[after], states[after])
+        told -= np.linalg.solve(ahead, paths.ahead[after])
+        return float(
+            multivariate_normal(
+                paths.ahead[before], paths.ahead_covariances[before] + noise, allow_singular=True
+            ).logpdf(noise @ told)
         )
-        for i, j in zip(*linear_sum_assignment(apart), strict=True):
-            person, track = int(truth.ids[own][i]), int(run.tracks.ids[tracks][j])
-            count += apart[i, j] < 0.5 and before.get(person, track) != track
-            before[person] = track
-    return count
+
+    for gain, i, j in zip(found, one.tolist(), other.tolist(), strict=True):
+        by_hand = fits(i, j) + fits(j, i) - fits(i, i) - fits(j, j)
+        assert gain == pytest.approx(by_hand, rel=1e-3, abs=1e-3)
+    assert found[1] > max(found[0], found[2])
 
 
-def test_a_crowded_room_at_two_steps_a_second_keeps_its_people() -> None:
-    whole = random_room(6, fps=2.0, people=6, cameras=4, steps=60)
-    of = {
-        least: exchanged(
-            pipeline.compute(
-                whole,
-                with_values(PLAIN, {"smoothing_method": "identities", "smoothing.exchange": least}),
-            )
-        )
-        for least in (-2.0, 50.0)
-    }
-    assert of[-2.0] < of[50.0]
+def test_only_who_come_near_each_other_are_exchanged() -> None:
+    """By where the rows before have them, at the step of the exchange."""
+    paths = fitted(two(20, 10))
+    apart = np.hypot(*(paths.ahead[:20, :2] - paths.ahead[20:, :2]).T)
+    nearest = apart[1:].min()
+    for reach, cut in ((nearest - 1e-6, False), (apart[10] + 1e-6, True)):
+        assert exchange_breaks(paths, reach=reach, least=-1e6, apart=40).any() == cut
+
+
+@pytest.mark.parametrize(("least", "cut"), [(-1e-6, True), (1e-6, False)])
+def test_both_are_cut_from_the_least_odds_on(least: float, cut: bool) -> None:
+    paths = fitted(two(20, 10))
+    most = gains_of(paths, np.array([10]), np.array([30]))[0]
+    found = exchange_breaks(paths, reach=2.5, least=most + least, apart=40)
+    assert found.any() == cut

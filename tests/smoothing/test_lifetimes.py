@@ -6,49 +6,98 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
-from tests.engine.synthetic import CAMERAS, sequence, walk
-from tests.smoothing.test_positions_laws import PLAIN, STEPS, alone
-from tracker import pipeline
-from tracker.parameters import with_values
-from tracker.smoothing.lifetimes import lifetimes
-from tracker.smoothing.smoother import Smoother
+from tests import world
+from tests.smoothing.known import PLAIN, backwards, known
+from tests.smoothing.test_boundaries import standing
+from tracker.smoothing.lifetimes import UNSURE, extended, independence, lifetimes, misses
+from tracker.smoothing.paths import Links
+from tracker.smoothing.smoother import Shared, Smoother
+
+STEPS = 12
+HIT = -np.log(0.05)
+"""Log odds by which a camera of p_D = 0.95 votes."""
 
 
 def odds_of(cameras: int, log_ratio: float | None) -> float:
-    """Of one walker whom so many cameras show, whose every box looks so much like a person."""
-    whole = sequence(
-        [(0, walk((-1.0, 0.2, 1.0), (0.9, -0.3, 1.1), STEPS, sway=0.4))], STEPS, CAMERAS[:cameras]
-    )
-    run = pipeline.compute(whole, with_values(PLAIN, {"smoothing_method": "none"}))
-    views = run.views
+    """Of somebody whom so many cameras show, whose every box looks so much like a person."""
+    scene = known(world.stand((0.3, 0.2), STEPS)[:, None], cameras=world.ring(cameras))
+    views = scene.views
     if log_ratio is not None:
         views = [
             tuple(replace(view, log_ratios=np.full(len(view.boxes), log_ratio)) for view in step)
             for step in views
         ]
-    smoother = Smoother(whole, PLAIN.fusion, views)
-    paths, links = alone(smoother)
-    paths = smoother.fit(paths, links, iterations=5).paths
-    shared = smoother.share(paths)
-    shared = replace(shared, links=links, missed=np.zeros_like(shared.missed))
+    smoother = Smoother(scene.whole, PLAIN.fusion, views)
+    paths, links = scene.paths()
+    nothing = np.zeros((cameras, STEPS))
+    shared = Shared(links, nothing, nothing, nothing.astype(np.int64))
     return float(lifetimes(smoother, paths, shared, PLAIN.smoothing)[1][0])
 
 
-def test_a_third_camera_outweighs_doubt_that_two_do_not() -> None:
-    doubtful = -3.5
-    assert odds_of(2, doubtful) < 0.0 < odds_of(3, doubtful)
+@pytest.mark.parametrize(
+    ("cameras", "log_ratio", "vote"),
+    [
+        # where nothing is told of looks every camera votes
+        (1, None, HIT), (2, None, 2 * HIT), (3, None, 3 * HIT),
+        # of a box in one camera only its looks count
+        (1, 0.01, 0.01), (1, -1.0, -1.0), (1, 2.0, 2.0),
+        # two meet anyway: each beyond the second outweighs as much doubt as a vote
+        (2, 2.0, 2 * HIT + 4.0), (2, -3.5, 2 * HIT - 7.0),
+        (3, 2.0, 3 * HIT + 6.0), (3, -3.5, 4 * HIT - 10.5), (3, -0.5, 3 * HIT),
+        (4, -3.5, 6 * HIT - 14.0),
+    ],
+)  # fmt: skip
+def test_what_cameras_and_looks_say_of_a_whole_life(
+    cameras: int, log_ratio: float | None, vote: float
+) -> None:
+    """All of a recording's steps, of which a share is new evidence; nobody comes or goes."""
+    new = independence(0.1, PLAIN.smoothing.memory)
+    stays = (STEPS - 1) * np.log(PLAIN.fusion.survival_probability)
+    expected = STEPS * new * vote + stays
+    if vote < 0.0:  # who is likelier nobody was there for a single step
+        assert odds_of(cameras, log_ratio) < 0.0
+        return
+    assert odds_of(cameras, log_ratio) == pytest.approx(expected, rel=1e-6)
 
 
-def test_of_a_box_in_one_camera_only_its_looks_count() -> None:
-    assert odds_of(1, None) > 10.0
-    assert odds_of(1, 0.01) == pytest.approx(odds_of(1, 0.02), abs=1.0)
-    assert odds_of(1, 0.01) < 1.0
-    assert odds_of(1, -1.0) < odds_of(1, 0.01) < odds_of(1, 2.0)
-    assert odds_of(1, 2.0) > 5.0
+def test_a_miss_says_as_much_against_somebody_as_the_camera_should_have_seen() -> None:
+    nothing = Links(*(np.zeros(0, dtype=np.int64) for _ in range(3)), np.zeros(0))
+    chances = np.array([[0.5, 1.0], [0.9, 0.0]])
+    missed = np.array([[1.0, 0.5], [0.2, 1.0]])
+    found = misses(Shared(nothing, chances, missed, np.zeros((2, 2), dtype=np.int64)))
+    assert found == pytest.approx([np.log(0.5) + 0.2 * np.log(0.1), 0.5 * np.log(1e-6)])
 
 
-def test_where_nothing_is_told_of_looks_every_camera_votes() -> None:
-    assert odds_of(1, None) < odds_of(2, None) < odds_of(3, None)
-    # nobody is surer of who is seen well by two than of whom no looks are told
-    assert odds_of(2, 1e-6) == pytest.approx(odds_of(2, None), rel=0.01)
+def test_paths_are_carried_on_to_both_sides_alike_and_within_the_recording() -> None:
+    """One who walks and one who is there at both ends; seen backwards it is the same."""
+    scene = known(world.stand((0.3, 0.2), 10)[:, None])
+    smoother = scene.smoother()
+    paths = standing((1, 2, 6, 0.0), (2, 0, 9, 1.0))
+    states = paths.states.copy()
+    states[:5, 0], states[:5, 3] = 0.1 * np.arange(5), 1.0
+    walking = paths.with_states(states, paths.covariances)
+    longer, there = extended(smoother, walking, 3)
+    assert longer.firsts.tolist() == [0, 0]
+    assert longer.lasts.tolist() == [9, 9]
+    assert there.tolist() == [UNSURE] * 2 + [1.0] * 5 + [UNSURE] * 3 + [1.0] * 10
+    motion = smoother.model.motion
+    state, spread = states[4], paths.covariances[4]
+    for row in (7, 8, 9):
+        state = motion.transition @ state
+        spread = motion.transition @ spread @ motion.transition.T + motion.noise
+        assert_allclose(longer.states[row], state)
+        assert_allclose(longer.covariances[row], spread)
+    # the same seen from behind
+    turned = states.copy()
+    turned[:5], turned[5:] = states[:5][::-1], states[5:][::-1]
+    turned[:, 3:] *= -1.0
+    back = standing((1, 3, 7, 0.0), (2, 0, 9, 1.0)).with_states(turned, paths.covariances)
+    other, _ = extended(backwards(scene).smoother(), back, 3)
+    assert other.firsts.tolist() == [0, 0]
+    assert_allclose(other.states[:10, :3], longer.states[:10, :3][::-1], atol=1e-12)
+    variances = longer.covariances[:, range(3), range(3)]
+    assert (np.diff(variances[:3], axis=0) < 0.0).all(), "the farther back the less is known"
+    none, _ = extended(smoother, walking, 0)
+    assert_allclose(none.states, states)

@@ -9,13 +9,14 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose
 
-from tests.engine.synthetic import CAMERAS, HALF_EXTENTS
-from tests.smoothing.test_positions_laws import PLAIN, alone, one_walker, smoother_of
-from tracker import pipeline
+from tests.smoothing.known import CAMERAS, PLAIN, Known
+from tests.smoothing.test_positions_laws import one_walker
+from tests.world import PERSON as HALF_EXTENTS
 from tracker.boxes import Boxes
 from tracker.camera import Camera
 from tracker.parameters import with_values
 from tracker.sequences.sequence import Sequence, Template
+from tracker.smoothing import create
 from tracker.smoothing.calibration import Calibration, lower, upright
 from tracker.smoothing.marks import RIDGE, Marks, shifts
 from tracker.smoothing.paths import Paths
@@ -55,42 +56,42 @@ def marked(whole: Sequence, steps: list[int]) -> Sequence:
     return replace(whole, templates=templates, digest=f"{whole.digest}-{steps}")
 
 
-def lowered(whole: Sequence) -> Sequence:
+def lowered(scene: Known) -> Known:
     """With every box of the detector lower by its share of its height."""
-    views = []
-    for view in whole.views:
-        assert view.detections is not None
-        boxes = view.detections.boxes.copy()
-        boxes[:, 1] += LOW * boxes[:, 3] / 2.0
-        views.append(replace(view, detections=replace(view.detections, boxes=boxes)))
-    return replace(whole, views=tuple(views), digest=f"{whole.digest}-low")
+    seen = []
+    for one in scene.seen:
+        boxes = one.boxes.copy()
+        boxes[:, 1] += LOW * boxes[:, 3]
+        seen.append(replace(one, boxes=boxes))
+    return replace(scene, seen=seen)
 
 
-def heights_off(whole: Sequence) -> float:
+def heights_off(scene: Known, marks: list[int]) -> float:
     """Mean of how far above the truth the smoothed person is, metres."""
-    truth = whole.ground_truth
-    assert truth is not None
-    found = pipeline.compute(whole, LEARNING).tracks
-    assert len(found.frames) > 30
-    return float((found.positions[:, 2] - truth.positions[found.frames, 2]).mean())
+    whole = marked(scene.whole, marks) if marks else scene.whole
+    fused = scene.fused(np.full((len(scene.places), 1), 3))
+    found = create(whole, LEARNING).smooth(scene.views, fused)
+    assert found is not None
+    assert len(found.frames) == len(scene.places)
+    return float((found.means[:, 2] - scene.places[:, 0, 2]).mean())
 
 
 def test_marked_boxes_take_away_what_all_cameras_err_alike() -> None:
     low = lowered(one_walker())
-    plain = heights_off(low)
+    plain = heights_off(low, [])
     assert plain < -0.5 * LOW * HALF_EXTENTS[2]
-    told = heights_off(marked(low, [12, 25]))  # six boxes against a prior of one
+    told = heights_off(low, [6, 12])  # six boxes against a prior of one
     assert abs(told) < 0.35 * abs(plain)
 
 
 def test_where_the_boxes_lie_right_marked_ones_change_little() -> None:
-    whole = one_walker()
-    assert abs(heights_off(marked(whole, [12, 25])) - heights_off(whole)) < 0.005
+    scene = one_walker()
+    assert abs(heights_off(scene, [6, 12]) - heights_off(scene, [])) < 0.01
 
 
 @pytest.mark.parametrize("below", [-0.02, 0.03])
 def test_a_shift_is_what_the_marked_boxes_say_drawn_to_nothing(below: float) -> None:
-    whole = marked(one_walker(), [20])
+    whole = marked(one_walker().whole, [10])
     found = shifts(Marks.of(whole), CAMERAS, HALF_EXTENTS, path_of(whole, below))
     marks = len(CAMERAS)
     share = below / HALF_EXTENTS[2] * marks / (marks + RIDGE)
@@ -98,7 +99,7 @@ def test_a_shift_is_what_the_marked_boxes_say_drawn_to_nothing(below: float) -> 
 
 
 def test_a_marked_box_elsewhere_or_of_somebody_lying_tells_nothing() -> None:
-    whole = marked(one_walker(), [20])
+    whole = marked(one_walker().whole, [10])
     path = path_of(whole, 0.03)
     boxes = Marks.of(whole).boxes
     for change in ([2.1, 0.0, 1.0, 1.0], [0.0, 0.8, 1.0, 1.0], [0.0, 0.0, 2.0, 0.4]):
@@ -113,8 +114,8 @@ def test_a_marked_box_elsewhere_or_of_somebody_lying_tells_nothing() -> None:
 
 @pytest.mark.parametrize(("turn", "tells"), [(20.0, True), (90.0, False)])
 def test_a_camera_on_its_side_tells_nothing_of_heights(turn: float, tells: bool) -> None:
-    whole = one_walker()
-    path, place = path_of(whole, 0.03), path_of(whole).states[20, :3]
+    whole = one_walker().whole
+    path, place = path_of(whole, 0.03), path_of(whole).states[10, :3]
     upright, angle = CAMERAS[0], np.deg2rad(turn)
     roll = np.array(
         [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
@@ -123,12 +124,12 @@ def test_a_camera_on_its_side_tells_nothing_of_heights(turn: float, tells: bool)
         upright, rotation=roll @ upright.rotation, translation=roll @ upright.translation
     )
     box = Boxes.from_left_top(cylinder(rolled, place)[None]).centred
-    marks = Marks(np.array([20]), np.array([0]), box)
+    marks = Marks(np.array([10]), np.array([0]), box)
     assert shifts(marks, [rolled], HALF_EXTENTS, path).any() == tells
 
 
 def test_the_nearest_of_two_people_is_the_one_who_was_marked() -> None:
-    whole = marked(one_walker(), [20])
+    whole = marked(one_walker().whole, [10])
     own, higher = path_of(whole, 0.03), path_of(whole, -0.045)
     both = Paths.of(
         [1, 2], [0, 0], [higher.states, own.states], [own.covariances, own.covariances], 6
@@ -139,9 +140,9 @@ def test_the_nearest_of_two_people_is_the_one_who_was_marked() -> None:
 
 
 def test_the_calibration_lowers_top_and_bottom_and_keeps_the_height() -> None:
-    whole = one_walker()
-    smoother = smoother_of(whole)
-    path, _ = alone(smoother)
+    scene = one_walker()
+    smoother = scene.smoother()
+    path, _ = scene.paths()
     target = smoother.model.target
     learnt = replace(Calibration.none(1, len(CAMERAS), target.size), shifts=np.array([LOW]))
     seen = target.expected(CAMERAS[0], path.states[:1], path.covariances[:1])
@@ -153,9 +154,9 @@ def test_the_calibration_lowers_top_and_bottom_and_keeps_the_height() -> None:
 
 
 def test_what_is_known_of_the_shift_is_not_learnt_again_as_an_offset() -> None:
-    smoother = smoother_of(one_walker())
-    _, links = alone(smoother)
-    path = path_of(one_walker())
+    scene = one_walker()
+    smoother, path = scene.smoother(), path_of(scene.whole)
+    _, links = scene.paths()
     nothing = smoother.stated(path)
     known = replace(nothing, shifts=np.array([LOW]))
     for c, camera in enumerate(smoother.cameras):
@@ -165,14 +166,14 @@ def test_what_is_known_of_the_shift_is_not_learnt_again_as_an_offset() -> None:
         values[own.boxes] = seen.values + known.shift(c, np.zeros(len(own.rows), dtype=int), seen)
         measurements = camera.measurements._replace(values=values)
         smoother.cameras[c] = replace(camera, measurements=measurements)
-    assert smoother.learn(path, links, nothing).offsets[:, 1:].min() > 0.02
+    assert smoother.learn(path, links, nothing).offsets[:, 1:].min() > 0.01
     assert_allclose(smoother.learn(path, links, known).offsets, 0.0, atol=1e-12)
 
 
 def test_marks_are_the_templates_of_cameras_that_are_there() -> None:
-    whole = marked(one_walker(), [3])
+    whole = marked(one_walker().whole, [3])
     strange = Template("one", "elsewhere", 3, np.array([1.0, 2.0, 3.0, 4.0]))
     marks = Marks.of(replace(whole, templates=(*whole.templates, strange)))
     assert marks.cameras.tolist() == [0, 1, 2]
     assert_allclose(Boxes(marks.boxes).left_top, [one.box for one in whole.templates])
-    assert Marks.of(one_walker()).boxes.shape == (0, 4)
+    assert Marks.of(one_walker().whole).boxes.shape == (0, 4)

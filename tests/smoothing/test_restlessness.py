@@ -7,8 +7,8 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose
 
+from tests.smoothing.known import PLAIN
 from tests.smoothing.measured import PRIOR, STEP, fitted_to, measured
-from tests.smoothing.test_positions_laws import PLAIN
 from tracker.filters.models import Motion
 from tracker.kernels.smoothing import passes
 from tracker.smoothing.identity.ends import Ends
@@ -77,6 +77,31 @@ def test_without_boxes_nothing_is_learnt() -> None:
         starts, np.zeros((2, 6)), np.zeros((6, 3, 3)), np.zeros((6, 3)), rule, np.ones(6)
     )
     assert_allclose(restlessness(starts, found, motion.noise, np.ones(6), STEP), 1.0, atol=1e-6)
+
+
+def test_restlessness_is_the_mean_of_what_drove_the_person() -> None:
+    """tr Q⁻¹ (ŵ ŵᵀ + W) / d by the formulas as they are written, of two paths that were taken for
+    differently restless, each row's at most twice what it was."""
+    before = np.random.default_rng(8).uniform(0.2, 2.0, 12)
+    paths, smooth = measured([standing(5, 0.0, 1), moving(7, 2)], SIGMA)
+    found, noise = smooth(before), Motion.of(PLAIN.fusion, STEP).noise
+    ground = np.ix_([0, 1, 3, 4], [0, 1, 3, 4])
+    squares = np.zeros(12)
+    for row, s in enumerate(before):
+        inverse = np.linalg.inv(found.ahead_covariances[row])
+        pull = inverse @ (found.means[row] - found.ahead[row])
+        less = inverse - inverse @ found.covariances[row] @ inverse
+        drive = s * noise[ground] @ pull[[0, 1, 3, 4]]
+        spread = s * noise[ground] - s * noise[ground] @ less[ground] @ (s * noise[ground])
+        squares[row] = np.trace(np.linalg.solve(noise[ground], np.outer(drive, drive) + spread))
+    squares = np.minimum(squares, 2.0 * 4.0 * before)
+    inner = ~np.isin(np.arange(12), [0, 5])
+    prior, told = 0.5 * 4.0 / STEP, []
+    for row in range(12):
+        own = inner & ((np.arange(12) < 5) == (row < 5))
+        kept = np.exp(-STEP / 8.0 * np.abs(np.arange(12) - row))[own]
+        told.append((prior + kept @ squares[own]) / (prior + 4.0 * kept.sum()))
+    assert_allclose(restlessness(paths.starts, found, noise, before, STEP), told, rtol=1e-6)
 
 
 def test_drives_are_what_they_say() -> None:

@@ -48,5 +48,9 @@ def test_what_was_in_no_piece_of_anybody_and_what_was_two_peoples_has_its_own_od
     more = Staying(lost).gains(PAIRS, CUT, rows) - PAIRS.gains
     assert (more[[0, 3, 4]] == 0.0).all()
     assert (more[[1, 2]] > 0.0).all()
+    # of those who were one person every join stays, the first label's too
+    assert ((Staying(WHO).gains(PAIRS, CUT, rows) - PAIRS.gains) > 0.0).tolist() == [
+        True, True, True, False, False
+    ]  # fmt: skip
     nothing = Pairs(EARLIER[:0], LATER[:0], LATER[:0], np.zeros(0))
     assert len(Staying(WHO).gains(nothing, CUT, rows)) == 0

@@ -1,0 +1,122 @@
+"""Walkers whose boxes are known to be theirs, as a filter without fault would hand them on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Many
+from dataclasses import dataclass
+
+import numpy as np
+from numpy import ndarray
+
+from tests import world
+from tracker.camera import Camera
+from tracker.fusion.protocol import Associations, FusionResult
+from tracker.parameters import RunParameters, with_values
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.protocol import ViewResult
+from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.smoother import Smoother
+
+CAMERAS = world.ring(3)
+PLAIN = with_values(
+    RunParameters(single_view="none"), {"fusion.posture_share": 0.0, "smoothing.learning": False}
+)
+
+Step = tuple[ViewResult, ...]
+
+
+@dataclass(frozen=True)
+class Known:
+    """Walkers, their boxes, and which box is whose."""
+
+    whole: Sequence
+    seen: list[world.Boxes]
+    """Of each camera; every box is somebody's."""
+    places: ndarray
+    """(steps, people, 3), NaN where a person is not followed."""
+
+    @property
+    def views(self) -> list[Step]:
+        """Stage 1 of every step."""
+        return world.views(self.seen)
+
+    def smoother(self, parameters: RunParameters = PLAIN, **changes: bool) -> Smoother:
+        """With all boxes."""
+        learning = parameters.smoothing.learning
+        values = {"learning": learning, **changes}
+        return Smoother(self.whole, parameters.fusion, self.views, **values)
+
+    def paths(self, sigma: float = 1.0) -> tuple[Paths, Links]:
+        """A path a person from the first place to the last, at rest, and all boxes as theirs."""
+        first, states = [], []
+        for person in range(self.places.shape[1]):
+            there = np.flatnonzero(np.isfinite(self.places[:, person, 0]))
+            first.append(int(there[0]))
+            own = self.places[there[0] : there[-1] + 1, person]
+            states.append(np.hstack([own, np.zeros_like(own)]))
+        spread = [np.tile(sigma**2 * np.eye(6), (len(own), 1, 1)) for own in states]
+        paths = Paths.of(list(range(1, len(states) + 1)), first, states, spread, 6)
+        cameras = np.repeat(np.arange(len(self.seen)), [len(one.frames) for one in self.seen])
+        boxes = np.concatenate([np.arange(len(one.frames)) for one in self.seen])
+        people = np.concatenate([one.people for one in self.seen])
+        frames = np.concatenate([one.frames for one in self.seen])
+        rows = paths.starts[people] + frames - paths.firsts[people]
+        return paths, Links(cameras, rows, boxes, np.ones(len(rows)))
+
+    def fused(self, labels: ndarray) -> list[FusionResult]:
+        """Stage 2 of every step: everybody at the place, under a label; of label -1 nobody.
+
+        Args:
+            labels: (steps, people).
+        """
+        results = []
+        for step, (places, names) in enumerate(zip(self.places, labels, strict=True)):
+            there = np.flatnonzero((names >= 0) & np.isfinite(places[:, 0]))
+            posterior = world.gaussians(places[there], weights=0.99, sigma=0.05)
+            posterior = posterior.relabelled(
+                dict(zip(posterior.labels.tolist(), names[there].tolist(), strict=True))
+            )
+            sources = np.full((len(self.seen), len(there)), -1, dtype=np.int64)
+            for c, one in enumerate(self.seen):
+                own = one.people[slice(*np.searchsorted(one.frames, [step, step + 1]).tolist())]
+                for component, person in enumerate(there.tolist()):
+                    sources[c, component] = next(iter(np.flatnonzero(own == person)), -1)
+            cameras, components = np.nonzero(sources >= 0)
+            pairs = Associations(
+                cameras.astype(np.int32), components.astype(np.int32),
+                sources[cameras, components].astype(np.int32), np.ones(len(cameras), np.float32),
+            )  # fmt: skip
+            weights = (sources >= 0).astype(float)
+            nobody = np.full_like(sources, -1)
+            results.append(
+                FusionResult(posterior, 0.95 + 0.0 * weights, sources, weights, nobody, pairs)
+            )
+        return results
+
+
+def known(
+    places: ndarray,
+    *,
+    cameras: Many[Camera] = CAMERAS,
+    sigma: float = 2.0,
+    seed: int = 0,
+    fps: float = 10.0,
+    hidden: world.Hidden = lambda camera, person, step: False,
+) -> Known:
+    """Walkers of some paths, (steps, people, 3), whom every camera sees but where it does not."""
+    rng = np.random.default_rng(seed)
+    seen = world.boxes(cameras, places, sigma, rng, hidden=hidden)
+    return Known(world.sequence(cameras, places, seen, fps=fps), seen, places)
+
+
+def backwards(forward: Known) -> Known:
+    """The last step first."""
+    last = len(forward.places) - 1
+    seen = []
+    for one in forward.seen:
+        order = np.argsort(last - one.frames, kind="stable")
+        rows = one.boxes[order], one.sigmas[order], one.people[order]
+        seen.append(world.Boxes(last - one.frames[order], *rows, one.steps))
+    places = forward.places[::-1]
+    whole = world.sequence(forward.whole.cameras, places, seen, fps=forward.whole.fps)
+    return Known(whole, seen, places)

@@ -1,0 +1,151 @@
+"""What pieces and their links are worth, by hand."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from tests.smoothing.test_boundaries import PRIOR, fitted, looking, standing
+from tracker.filters.models import Motion
+from tracker.parameters import FusionParams, SmoothingParams
+from tracker.smoothing.identity import decisions, odds
+from tracker.smoothing.identity.appearance import Appearance
+from tracker.smoothing.identity.ends import Ends
+from tracker.smoothing.identity.pieces import Pairs, motion_gains
+from tracker.smoothing.paths import Links
+from tracker.smoothing.smoother import Shared
+
+STEP, FRAMES, SURVIVAL, BIRTH = 0.1, 20, 0.9, 0.4
+
+
+def smoother(*cameras: object) -> Any:
+    """What the odds ask of a smoother: 20 steps of 0.1 s."""
+    parameters = FusionParams(survival_probability=SURVIVAL, birth_rate=BIRTH)
+    model = SimpleNamespace(step_time=STEP, motion=Motion.of(parameters, STEP), cameras=[])
+    return SimpleNamespace(
+        parameters=parameters, model=model, frames=FRAMES, cameras=list(cameras), prior=PRIOR,
+        log_place=1.5,
+    )  # fmt: skip
+
+
+NOBODYS = Links(*(np.zeros(0, dtype=np.int64) for _ in range(3)), np.zeros(0))
+P = SmoothingParams(memory=0.25)
+"""Two fifths of a step's evidence are new."""
+
+
+def test_a_piece_is_worth_its_boxes_less_its_misses_and_comes_and_goes_inside_the_recording() -> (
+    None
+):
+    """A piece from the first step on has not come, and one to the last step has not left."""
+    paths = standing((1, 0, 18, 0.0), (2, 1, 19, 0.0), (3, 5, 7, 0.0))
+    rows = len(paths.states)
+    own = fitted(paths)
+    own.odds[:] = np.arange(rows) / 10.0
+    chances, missed = np.full((2, rows), 0.5), np.zeros((2, rows))
+    chances[1], missed[0, 0], missed[1, 20] = 1.0, 1.0, 0.5
+    shared = Shared(NOBODYS, chances, missed, np.full((2, rows), -1))
+    worths, births, deaths = odds.of_pieces(smoother(), own, shared, P)
+    bounds = ((0, 19), (19, 38), (38, 41))
+    expected = [own.odds[a:b].sum() + (b - a) * np.log(SURVIVAL) + 1.5 for a, b in bounds]
+    expected[0] += 0.4 * np.log(0.5)
+    expected[1] += 0.4 * 0.5 * np.log(1e-6)
+    assert_allclose(worths, expected)
+    assert_allclose(births, [0.0, *[np.log(BIRTH * STEP)] * 2])
+    assert_allclose(deaths, [np.log(1.0 - SURVIVAL), 0.0, np.log(1.0 - SURVIVAL)])
+    assert odds.anew(smoother()) == pytest.approx(np.log(BIRTH * STEP * (1.0 - SURVIVAL)))
+
+
+def test_a_link_survives_its_gap_and_its_motion_tells_as_much_as_is_new() -> None:
+    paths = standing((1, 0, 4, 0.0), (2, 5, 9, 0.1), (3, 8, 12, 0.2), (4, 26, 28, 0.2))
+    known = Ends.alone(fitted(paths), PRIOR)
+    found = odds.GoesOn(smoother(), paths, NOBODYS, P, None).by(known)
+    pairs = Pairs(np.array([0, 0, 1, 2]), np.array([1, 2, 3, 3]), np.array([1, 4, 17, 14]),
+                  np.zeros(4))  # fmt: skip
+    for name in ("earlier", "later", "gaps"):
+        assert getattr(found, name).tolist() == getattr(pairs, name).tolist()
+    motion = motion_gains(
+        paths, pairs, known.told_by(0.4), smoother().model.motion, PRIOR, smoother().log_place
+    )
+    assert_allclose(found.gains, motion + pairs.gaps * np.log(SURVIVAL))
+
+
+def test_the_longest_gap_is_two_seconds_and_the_fastest_goes_three_metres_in_one() -> None:
+    p = SmoothingParams(longest=0.6)
+    paths = standing((1, 0, 4, 0.0), (2, 10, 12, 2.8), (3, 10, 12, 2.8001), (4, 11, 12, 0.0))
+    found = odds.GoesOn(smoother(), paths, NOBODYS, p, None).by(Ends.alone(fitted(paths), PRIOR))
+    assert list(zip(found.earlier.tolist(), found.later.tolist(), strict=True)) == [(0, 1)]
+
+
+def test_who_comes_back_is_one_of_those_who_left() -> None:
+    """By the label of the filter alone; by looks as likely as one of all who were gone."""
+    paths = standing((5, 0, 2, 0.0), (6, 0, 3, 3.0), (5, 8, 9, 0.0), (7, 3, 4, 0.0))
+    chains = [[0], [1], [2], [3]]
+    found = odds.comes_back(smoother(), paths, NOBODYS, chains, P, None)
+    newcomer = np.log(BIRTH * STEP * (1.0 - SURVIVAL))
+    assert list(zip(found.earlier.tolist(), found.later.tolist(), strict=True)) == [(0, 2)]
+    assert found.gains == pytest.approx([newcomer + P.keeping])
+    assert found.gaps.tolist() == [6]
+    # of one chain already, or overlapping, nothing is said
+    assert len(odds.comes_back(smoother(), paths, NOBODYS, [[0, 2], [1]], P, None).gains) == 0
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.5])
+def test_looks_weigh_in_a_link_and_in_a_return(weight: float) -> None:
+    _, links, camera, looks = looking([[0.0] * 4, [2.0] * 4, [0.1] * 4])
+    # the third comes after both
+    later = standing((0, 0, 3, 0.0), (1, 0, 3, 3.0), (2, 4, 7, 0.1))
+    p = SmoothingParams(appearance=weight, memory=0.25)
+    alike = Appearance(later, links, [camera], [looks], STEP)
+    ratio, known = alike.log_ratio(np.array([0, 1]), np.array([2, 2]))
+    assert known.all()
+    assert ratio[0] > ratio[1]
+    found = odds.comes_back(smoother(camera), later, links, [[0], [1], [2]], p, [looks])
+    newcomer = np.log(BIRTH * STEP * (1.0 - SURVIVAL))
+    assert_allclose(found.gains, newcomer - np.log(2.0) + weight * ratio)
+    assert list(zip(found.earlier.tolist(), found.later.tolist(), strict=True)) == [(0, 2), (1, 2)]
+
+
+# ── what is told of them
+
+
+def test_a_cut_is_told_where_a_track_does_not_go_on_as_the_filter_had_it() -> None:
+    """Pieces of label 4 in two chains, with rows left out in between for a reason; of label 6 in
+    one."""
+    before = standing((4, 2, 11, 0.0), (6, 0, 9, 3.0))
+    cut = standing((4, 2, 5, 0.0), (4, 8, 11, 0.0), (6, 0, 3, 3.0), (6, 5, 9, 3.0))
+    kept = np.array([0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 15, 16, 17, 18, 19])
+    for reasons, why in (
+        ([0, 0], "past and future do not fit"), ([2, 0], "past and future do not fit"),
+        ([3, 2], "nobody saw it, or it was not there"), ([3, 1], "whose boxes these are was near"),
+        ([1, 0], "whose boxes these are was near"),
+    ):  # fmt: skip
+        every = np.full(20, 3)
+        every[4:6] = reasons
+        every[[3, 6]] = 1  # the pieces' own rows do not count
+        found = decisions.cuts(cut, before, kept, every, [[0], [1], [2, 3]], [4, 9, 6])
+        (one,) = found
+        assert (one.kind, one.step, one.label, one.other) == ("cut", 8, 4, 4)
+        assert one.reason.startswith(why)
+    assert decisions.cuts(cut, before, kept, every, [[1], [2, 3]], [9, 6]) == []
+
+
+def test_a_join_is_told_with_its_odds_against_the_best_other() -> None:
+    cut = standing((4, 0, 5, 0.0), (7, 6, 9, 0.0), (8, 0, 4, 1.0), (9, 12, 14, 0.0), (9, 16, 19, 0))
+    pairs = Pairs(np.array([0, 2, 1]), np.array([1, 1, 3]), np.array([1, 2, 3]),
+                  np.array([2.0, 1.0, -1.0]))  # fmt: skip
+    found = decisions.joins(cut, pairs, [[0, 1, 3, 4], [2]], [4, 8], -3.0, set())
+    weights = np.exp([2.0, 1.0, -3.0])
+    first, second = found
+    assert (first.step, first.label, first.other) == (6, 4, 7)
+    assert (first.probability, first.against) == pytest.approx(tuple(weights[:2] / weights.sum()))
+    assert first.reason == "one person goes on"
+    assert (second.step, second.other, second.reason) == (12, 9, "one person")
+    assert second.probability == pytest.approx(1.0 / (1.0 + np.exp(-2.0)))
+    told = decisions.joins(cut, pairs, [[0, 1], [2]], [7, 8], -3.0, {(0, 1)})[0]
+    assert (told.other, told.probability, told.reason) == (4, 1.0, "a person said so")
+    (tied,) = decisions.joins(cut, pairs, [[2, 3]], [8], -3.0, set())
+    assert tied.reason == "a person said so"

@@ -1,0 +1,268 @@
+"""The whole stage: its symmetries, what it joins and parts, and where its tracks end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy import ndarray
+from numpy.testing import assert_allclose, assert_array_equal
+
+from tests import world
+from tests.smoothing.known import CAMERAS, PLAIN, Known, backwards, known
+from tracker.corrections.kinds import make
+from tracker.corrections.outcomes import outcomes
+from tracker.parameters import RunParameters, with_values
+from tracker.smoothing import create
+from tracker.smoothing.result import Smoothed
+
+SETTLED = with_values(PLAIN, {"smoothing_method": "identities", "smoothing.learning": True})
+POSITIONS = with_values(SETTLED, {"smoothing_method": "positions"})
+STEPS = 30
+
+
+def smoothed(scene: Known, labels: ndarray, parameters: RunParameters = SETTLED) -> Smoothed:
+    """Stage 3 of the walkers, whom the filter had under some labels, (steps, people)."""
+    found = create(scene.whole, parameters).smooth(scene.views, scene.fused(labels))
+    assert found is not None
+    return found
+
+
+def passing() -> Known:
+    """Two who pass each other at half a metre; the second is not seen for four steps."""
+    paths = world.together(
+        world.walk([(-1.2, 0.25), (1.2, 0.25)], [0.0, 3.0], 10.0),
+        world.walk([(1.2, -0.25), (-1.2, -0.25)], [0.0, 3.0], 10.0),
+    )
+    return known(paths, hidden=lambda camera, person, step: person == 1 and 20 <= step < 24)
+
+
+def labels_of(scene: Known) -> ndarray:
+    """Each of the filter's labels is one person's until the second is lost for four steps."""
+    labels = np.tile([4, 7], (STEPS, 1))
+    labels[20:24, 1], labels[24:, 1] = -1, 9
+    return labels
+
+
+def people_of(found: Smoothed) -> set[tuple[int, ...]]:
+    """The steps of each track."""
+    return {tuple(found.frames[found.labels == k].tolist()) for k in set(found.labels.tolist())}
+
+
+def test_a_recording_seen_backwards_has_the_same_tracks_links_and_ends() -> None:
+    scene = passing()
+    labels = labels_of(scene)
+    one = smoothed(scene, labels)
+    other = smoothed(backwards(scene), labels[::-1])
+    assert sorted(set(one.labels.tolist())) == [4, 7]
+    assert len(one.frames) == len(other.frames) == 2 * STEPS
+    names = dict(zip(one.labels[one.frames == 0], other.labels[other.frames == STEPS - 1],
+                     strict=True))  # fmt: skip
+    if np.sign(one.means[0, 1]) != np.sign(other.means[-2, 1]):
+        names = {4: names[7], 7: names[4]}
+    for label, name in names.items():
+        a, b = one.labels == label, other.labels == name
+        assert_array_equal(one.frames[a], STEPS - 1 - other.frames[b][::-1])
+        # what is known of the first velocity alone tells the directions apart
+        assert_allclose(one.means[a, :3], other.means[b, :3][::-1], atol=0.02)
+        assert_allclose(one.existences[a], other.existences[b][::-1], atol=0.02)
+        assert_array_equal(one.seen[a], other.seen[b][::-1])
+    assert {(d.kind, d.label, d.other) for d in one.decisions} == {("joined", 7, 9)}
+    assert [d.kind for d in other.decisions] == ["joined"]
+
+
+def test_the_order_of_cameras_and_of_labels_changes_nothing() -> None:
+    scene, order = passing(), [2, 0, 1]
+    one = smoothed(scene, labels_of(scene))
+    seen = [scene.seen[c] for c in order]
+    cameras = [CAMERAS[c] for c in order]
+    mixed = Known(world.sequence(cameras, scene.places, seen), seen, scene.places)
+    other = smoothed(mixed, np.where(labels_of(scene) >= 0, 20 - labels_of(scene), -1))
+    names = {4: 16, 7: 13}
+    rows = np.lexsort((20 - other.labels, other.frames))
+    assert_array_equal(one.frames, other.frames[rows])
+    assert [names[k] for k in one.labels.tolist()] == other.labels[rows].tolist()
+    assert_allclose(one.means, other.means[rows], atol=1e-6)
+    assert_allclose(one.existences, other.existences[rows], atol=1e-6)
+    assert_array_equal(one.seen, other.seen[rows][:, np.argsort(order)])
+
+
+@pytest.mark.parametrize(("gap", "joined"), [(4, True), (5, True), (6, False)])
+def test_who_stands_is_joined_over_the_longest_gap_and_no_longer(gap: int, joined: bool) -> None:
+    """Of half a second: from the last step of the one to the first of the other five steps."""
+    p = with_values(SETTLED, {"smoothing.longest": 0.5})
+    path = world.stand((0.3, 0.2), 24)[:, None]
+    scene = known(path, hidden=lambda camera, person, step: 10 <= step < 9 + gap)
+    labels = np.full((24, 1), 3)
+    labels[10 : 9 + gap], labels[9 + gap :] = -1, 5
+    found = smoothed(scene, labels, p)
+    assert len(set(found.labels.tolist())) == (1 if joined else 2)
+    assert [d.kind for d in found.decisions] == (["joined"] if joined else [])
+
+
+@pytest.mark.parametrize("method", ["positions", "identities"])
+@pytest.mark.parametrize(("away", "filled"), [(2, True), (3, False)])
+def test_nobody_is_there_before_the_first_or_after_the_last_box(
+    method: str, away: int, filled: bool
+) -> None:
+    """The filter had him later and for longer. At p_D = 0.95 three cameras that miss him tell 0.4
+    times 9.0 a step against him, and going and returning cost twice 4: two steps are no absence,
+    and three are one."""
+    path = world.stand((0.3, 0.2), STEPS)[:, None]
+    boxed = [*range(6, 13), *range(13 + away, 24)]
+    scene = known(path, hidden=lambda camera, person, step: step not in boxed)
+    labels = np.full((STEPS, 1), -1)
+    labels[9:27] = 3
+    found = smoothed(scene, labels, with_values(SETTLED, {"smoothing_method": method}))
+    there = found.existences > 0.5
+    assert found.frames[there].tolist() == (list(range(6, 24)) if filled else boxed)
+    assert set(found.labels.tolist()) == {3}
+    assert_array_equal(found.seen, np.tile(np.isin(found.frames, boxed)[:, None], (1, 3)))
+
+
+def test_two_whom_the_filter_took_for_each_other_go_on_as_themselves() -> None:
+    """Where they pass, the labels are exchanged; both lives as a whole say so."""
+    scene = passing()
+    labels = np.tile([4, 7], (STEPS, 1))
+    labels[15:] = [7, 4]
+    found = smoothed(scene, labels)
+    assert set(found.labels.tolist()) == {4, 7}
+    for label in (4, 7):
+        side = np.sign(found.means[found.labels == label, 1])
+        assert abs(side.sum()) == len(side) == STEPS
+    plain = smoothed(scene, labels, POSITIONS)
+    side = np.sign(plain.means[plain.labels == 4, 1])
+    assert abs(side.sum()) < len(side), "positions alone leave who is who as it is"
+
+
+def test_without_tracks_nobody_is_found() -> None:
+    scene = known(world.stand((0.3, 0.2), 5)[:, None])
+    found = smoothed(scene, np.full((5, 1), -1))
+    assert len(found.frames) == 0
+    assert found.seen.shape == (0, 3)
+    assert found.means.shape == (0, 6)
+
+
+def test_a_camera_without_a_frame_says_nothing_against_somebody() -> None:
+    """One who is seen by two cameras is there while the third has no frame, or has and misses."""
+    path = world.stand((0.3, 0.2), 12)[:, None]
+    scene = known(path, hidden=lambda camera, person, step: camera == 0)
+    labels = np.full((12, 1), 3)
+    missed = smoothed(scene, labels, POSITIONS)
+    blind = [(replace(step[0], blind=True), *step[1:]) for step in scene.views]
+    found = create(scene.whole, POSITIONS).smooth(blind, scene.fused(labels))
+    assert found is not None
+    assert (found.existences > missed.existences).all()
+
+
+# ── what a person said holds
+
+
+def place(scene: Known, person: int, step: int, aside: float = 0.0) -> list[float]:
+    """Where somebody is, as a log has it."""
+    x, y, z = scene.places[step, person].tolist()
+    return [step, x, y + aside, z]
+
+
+@pytest.mark.parametrize(
+    ("kind", "of", "aside"),
+    [
+        ("came", [(0, 14)], 0.0),
+        ("left", [(0, 14)], 0.0),
+        ("different", [(0, 4), (0, 25)], 0.0),
+        ("exchanged", [(0, 8), (1, 8), (1, 18), (0, 18)], 0.0),
+        ("nobody", [(1, 0), (1, 29)], 0.0),
+        ("here", [(0, 24), (0, 24)], 1.0),
+    ],
+)
+def test_each_kind_of_correction_holds_where_it_did_not(
+    kind: str, of: list[tuple[int, int]], aside: float
+) -> None:
+    """And taken back it leaves no trace; bit for bit, whatever was kept of earlier runs."""
+    scene, labels = passing(), np.tile([4, 7], (STEPS, 1))
+    places = [place(scene, *one) for one in of]
+    places[0] = place(scene, *of[0], aside)
+    said = make(kind=kind, places=places)
+    stage = create(scene.whole, SETTLED)
+    kept: dict[str, object] = {}
+    # runs that differ in where somebody is said to be have nothing in common
+    known_earlier = SimpleNamespace(get=kept.get, put=kept.__setitem__)
+    earlier = None if kind == "here" else known_earlier
+    plain, told, again = (
+        stage.smooth(scene.views, scene.fused(labels), corrections=log, earlier=earlier)
+        for log in ((), (said,), ())
+    )
+    assert plain is not None
+    assert told is not None
+    assert again is not None
+    for found, met in ((plain, False), (told, True)):
+        there = found.existences > 0.5
+        (outcome,) = outcomes(
+            found.frames[there], found.labels[there], found.means[there, :3], [said], leeway=10
+        )
+        assert outcome.met is met, outcome.why
+    assert_array_equal(plain.means, again.means)
+    assert_array_equal(plain.labels, again.labels)
+    alone = stage.smooth(scene.views, scene.fused(labels), corrections=(said,))
+    assert alone is not None
+    assert_array_equal(alone.means, told.means)
+    assert_array_equal(alone.labels, told.labels)
+    if kind in ("came", "left"):
+        at = (told.frames == 14) & (told.means[:, 1] > 0.0)
+        there = told.frames[(told.labels == told.labels[at][0]) & (told.existences > 0.5)]
+        assert (there.min() if kind == "came" else there.max()) == 14
+
+
+def test_who_was_away_too_long_is_joined_where_somebody_says_so() -> None:
+    path = world.stand((0.3, 0.2), 24)[:, None]
+    scene = known(path, hidden=lambda camera, person, step: 8 <= step < 16)
+    labels = np.full((24, 1), 3)
+    labels[8:16], labels[16:] = -1, 5
+    p = with_values(SETTLED, {"smoothing.longest": 0.5})
+    said = make(kind="same", places=[place(scene, 0, 4), place(scene, 0, 20)])
+    found = create(scene.whole, p).smooth(scene.views, scene.fused(labels), corrections=[said])
+    assert found is not None
+    assert len(set(found.labels.tolist())) == 1
+    assert found.frames[found.existences > 0.5].tolist() == [*range(8), *range(16, 24)]
+    (one,) = found.decisions
+    assert (one.kind, one.step, one.reason) == ("joined", 16, "a person said so")
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.0])
+def test_who_comes_back_on_the_other_side_is_known_by_looks(weight: float) -> None:
+    """Two leave for two and a half seconds and come back as each other's neighbours; a network's
+    vectors beside the boxes say who is who."""
+    left, right = ([-0.8, 0.2], [0.8, -0.3])
+    paths = np.full((45, 2, 3), np.nan)
+    paths[:10, 0], paths[:10, 1] = world.stand(left, 10), world.stand(right, 10)
+    paths[35:, 0], paths[35:, 1] = world.stand(right, 10), world.stand(left, 10)
+    rng = np.random.default_rng(5)
+    vectors = rng.normal(size=(2, 16))
+    seen = world.boxes(CAMERAS, paths, 2.0, rng)
+    scene = Known(world.sequence(CAMERAS, paths, seen), seen, paths)
+    views = []
+    for step, own in enumerate(scene.views):
+        looks = []
+        for view, one in zip(own, seen, strict=True):
+            noisy = vectors[one.people[one.frames == step]]
+            noisy = noisy + 0.3 * rng.normal(size=noisy.shape)
+            noisy /= np.linalg.norm(noisy, axis=1, keepdims=True)
+            looks.append(replace(view, looks=noisy))
+        views.append(tuple(looks))
+    labels = np.tile([4, 7], (45, 1))
+    labels[10:35], labels[35:] = -1, [8, 9]
+    p = with_values(SETTLED, {"smoothing.appearance": weight})
+    found = create(scene.whole, p).smooth(views, scene.fused(labels))
+    assert found is not None
+
+    def of(step: int) -> dict[bool, int]:
+        """The label of whoever is on the left, and of the other."""
+        own = found.frames == step
+        return dict(zip((found.means[own, 0] < 0.0).tolist(), found.labels[own].tolist(),
+                        strict=True))  # fmt: skip
+
+    before, after = of(5), of(40)
+    assert (before[True] == after[False] and before[False] == after[True]) is (weight == 1.0)
+    assert not weight or {d.kind for d in found.decisions} == {"joined"}
