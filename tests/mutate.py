@@ -67,7 +67,7 @@ NOT_DRAWN = (
     "kernels/compilation.py",  # does nothing where kernels are not compiled
     "kernels/checked_cache.py",
 )
-NOT_RUN = ("test_compilation.py", "test_checked_cache.py", "test_robustness.py", "test_shape.py")
+NOT_RUN = ("test_compilation.py", "test_checked_cache.py", "test_robustness.py")
 """Tests of compiled kernels alone, and of many or large pictures, which take long interpreted."""
 
 SORTS = ("bound", "sign", "off by one", "factor", "swapped", "and/or", "negated")

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
 
-from tests.engine.rooms import SKIN, clip, empty_room, person_mask, photograph, with_person
+from tests.pictures.furnished import SKIN, clip, empty_room, person_mask, photograph, with_person
 from tracker.kernels.pictures.foreground import above, update_background
 from tracker.parameters import ForegroundParams
 from tracker.pictures.foreground import AdaptiveForeground, first_background

@@ -11,7 +11,7 @@ from hypothesis.extra import numpy as arrays
 from numpy import ndarray
 from numpy.testing import assert_array_equal
 
-from tests.engine.rooms import SKIN, clip, empty_room, person_mask, photograph, with_person
+from tests.pictures.furnished import SKIN, clip, empty_room, person_mask, photograph, with_person
 from tracker.kernels.pictures import images
 from tracker.kernels.pictures.foreground import level_medians, upper_medians
 from tracker.parameters import ForegroundParams

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.synthetic import camera_toml, head_toml, number_in, write_lines, write_sequence
-from tracker.sequences.clock import Clock, Timing
+from tests.synthetic import number_in, write_lines, write_sequence
+from tracker.sequences.clock import Timing
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence, read_summary
 from tracker.sequences.sequence import SequenceError
@@ -37,16 +37,6 @@ def test_a_step_shows_the_nearest_frame_and_a_frame_belongs_to_one_step(
     if own >= fps:  # a faster camera has a frame at every step after its first
         begun = np.arange(80) / fps > offset - (first - 0.5) / own
         assert (shown[begun] >= 0).all()
-
-
-def test_without_a_clock_frames_are_steps() -> None:
-    assert Timing(7).clock(25.0, 100) is None
-
-
-def test_frames_outside_and_gaps_belong_to_no_step() -> None:
-    clock = Clock.of_times(np.array([-1.0, 0.0, 0.11, np.nan, 0.5]), 10.0, 4)
-    assert clock.frame_of_step.tolist() == [1, 2, -1, -1]
-    assert clock.steps_of(np.array([-1, 0, 1, 2, 3, 4, 9])).tolist() == [-1, -1, 0, 1, -1, -1, -1]
 
 
 def edited(folder: Path, old: str, new: str) -> Path:
@@ -112,18 +102,6 @@ def test_rows_without_a_box_say_that_nobody_was_seen(tmp_path: Path) -> None:
     assert [step for step in range(8) if view.was_looked_at(step)] == [0, 3, 5]
 
 
-def test_boxes_counted_from_one_are_told_and_put_right(tmp_path: Path) -> None:
-    folder = write_sequence(tmp_path / "room", frames=8, container=None, detections=True)
-    rows = [f"{k},20,30,24,48,0.9" for k in range(1, 9)]
-    write_lines(folder / "cam1.csv", "frame,left,top,width,height,score", rows)
-    with pytest.raises(SequenceError, match="counted from 1; write detections_first_frame = 1"):
-        read_sequence(folder)
-    edited(folder, 'detections = "cam1.csv"', 'detections = "cam1.csv"\ndetections_first_frame = 1')
-    own = read_sequence(folder).views[0].detections
-    assert own is not None
-    assert own.frames.tolist() == list(range(8))
-
-
 def test_what_the_videos_know_need_not_be_stated(tmp_path: Path) -> None:
     folder = write_sequence(tmp_path / "room", frames=30, first_frame=4)
     full = read_sequence(folder)
@@ -135,22 +113,6 @@ def test_what_the_videos_know_need_not_be_stated(tmp_path: Path) -> None:
     assert any(said.startswith("fps is not stated: 25") for said in sequence.warnings)
     summary = read_summary(folder)
     assert (summary.fps, summary.frames) == (None, None)
-
-
-def test_everything_that_is_missing_is_told_at_once(tmp_path: Path) -> None:
-    folder = tmp_path / "room"
-    folder.mkdir()
-    text = head_toml(8) + camera_toml("cam1") + camera_toml("cam2")
-    for line in ('name = "numbers"\n', "fps = 25.0\n", "frames = 8\n"):
-        text = text.replace(line, "")
-    text = "\n".join(line for line in text.split("\n") if not line.startswith("t = "))
-    (folder / "sequence.toml").write_text(text, encoding="utf-8")
-    with pytest.raises(SequenceError) as caught:
-        read_sequence(folder)
-    assert str(caught.value) == (
-        "room/sequence.toml: these are missing and cannot be found out: name; fps (steps a "
-        'second); frames (the number of steps); t of camera "cam1"; t of camera "cam2"'
-    )
 
 
 def test_room_and_target_are_found_where_views_overlap(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.engine.rooms import empty_room, person_mask, photograph, with_person
+from tests.pictures.furnished import empty_room, person_mask, photograph, with_person
 from tests.synthetic import camera_toml, head_toml, write_sequence
 from tracker.library import bundle
 from tracker.parameters import ForegroundParams, RunParameters

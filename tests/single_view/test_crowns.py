@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from numpy import ndarray
 
-from tests.engine.synthetic import CAMERAS, ROOM
+from tests.world import SMALL_CAMERAS as CAMERAS
+from tests.world import SMALL_ROOM as ROOM
 from tracker.parameters import JpdaParams
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import upright_boxes

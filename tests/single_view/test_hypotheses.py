@@ -190,32 +190,6 @@ def test_somebody_comes_goes_and_returns() -> None:
     assert len(story.tracks.departed.labels) == 0
 
 
-def test_nobody_is_remembered_for_ever() -> None:
-    story = Story(memory=4, confirmation=1, patience=0)
-    assert story.step((50.0, 0)) == [event("new", 1)]
-    assert story.step() == [event("vanished", 1)]
-    for _ in range(5):
-        story.step()
-    assert story.step((50.0, 0)) == [event("new", 2)]
-
-
-def test_of_two_alike_who_vanished_the_last_returns_first() -> None:
-    story = Story(confirmation=1, patience=0)
-    assert story.step((50.0, 0), (120.0, 0)) == [event("new", 1), event("new", 2)]
-    assert story.step((120.0, 0)) == [event("vanished", 1)]
-    assert story.step() == [event("vanished", 2)]
-    assert story.step((50.0, 0)) == [event("returned", 2)]
-    assert story.step((50.0, 0), (120.0, 0)) == [event("returned", 1)]
-
-
-def test_what_is_seen_once_is_forgotten_without_an_event() -> None:
-    story = Story(confirmation=3)
-    assert story.step((50.0, 0)) == []
-    assert [story.step(), story.step()] == [[], []]
-    assert len(story.tracks.targets) == 0
-    assert story.tracks.next_label == 1
-
-
 def test_a_label_is_given_once() -> None:
     rng = np.random.default_rng(3)
     story, given = Story(patience=1), []
