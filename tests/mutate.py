@@ -57,6 +57,7 @@ TESTED_BY = {
     "kernels/association": ("kernels", "association"),
     "kernels/lens.py": ("kernels", "geometry"),
     "kernels": ("kernels", "filters"),
+    "sequences": ("sequences", "bad_input/test_table.py"),
     "boxes.py": ("geometry",),
     "camera.py": ("geometry",),
     "assignment.py": ("geometry", "association"),

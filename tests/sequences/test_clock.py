@@ -65,15 +65,6 @@ def test_a_late_camera_shows_and_detects_what_it_took_then(tmp_path: Path) -> No
     assert any("from step 17 on it has no picture" in said for said in sequence.warnings)
 
 
-def test_a_slow_camera_has_no_frame_at_most_steps(tmp_path: Path) -> None:
-    folder = write_sequence(tmp_path / "room", frames=20, detections=True, container=None)
-    edited(folder, 'detections = "cam2.csv"', 'detections = "cam2.csv"\nfps = 5')
-    view = read_sequence(folder).views[1]
-    assert view.detections is not None
-    assert np.unique(view.detections.frames).tolist() == [0, 5, 10, 15]
-    assert [view.was_looked_at(step) for step in range(7)] == [1, 0, 0, 0, 0, 1, 0]
-
-
 def test_time_stamps_in_the_layout_of_caliscope(tmp_path: Path) -> None:
     folder = write_sequence(tmp_path / "room", frames=10, container="images", templates=False)
     rows = [f"{k},1,{k},{100.0 + k / 25:.4f}" for k in range(10)]
@@ -88,18 +79,6 @@ def test_time_stamps_in_the_layout_of_caliscope(tmp_path: Path) -> None:
     edited(folder, 'name = "cam2"', 'name = "door"')
     with pytest.raises(SequenceError, match="name the camera after its port"):
         read_sequence(folder)
-
-
-def test_rows_without_a_box_say_that_nobody_was_seen(tmp_path: Path) -> None:
-    folder = write_sequence(tmp_path / "room", frames=8, container=None, detections=True)
-    rows = ["0,20,30,24,48,0.9", "3,,,,,", "5,25,30,24,48,0.9"]
-    write_lines(folder / "cam1.csv", "frame,left,top,width,height,score", rows)
-    assert read_sequence(folder).views[0].looked_at is None
-    edited(folder, 'detections = "cam1.csv"', 'detections = "cam1.csv"\ndetected_steps = "listed"')
-    view = read_sequence(folder).views[0]
-    assert view.detections is not None
-    assert view.detections.frames.tolist() == [0, 5]
-    assert [step for step in range(8) if view.was_looked_at(step)] == [0, 3, 5]
 
 
 def test_what_the_videos_know_need_not_be_stated(tmp_path: Path) -> None:

@@ -119,9 +119,6 @@ def test_the_picture_is_reduced_as_the_others_are(tmp_path: Path) -> None:
         ('background = "none.png"', 'there is no file "none.png" in the sequence folder'),
         ('background = "sequence.toml"', '"sequence.toml" cannot be read as a picture ('),
         ('background = "small.png"', "background 4×4 does not match calibration 128×96"),
-        ("background = [0, 12]", "whole numbers from 0 to 11, found 0 and 12"),
-        ("background = [3, 1]", "whole numbers from 0 to 11, found 3 and 1"),
-        ("background = [1.5, 3]", "whole numbers from 0 to 11, found 1.5 and 3"),
         ("background = [3]", "expected 2 numbers"),
         (
             "background = 3",

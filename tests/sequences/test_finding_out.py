@@ -70,8 +70,8 @@ def test_rate_and_steps_follow_from_the_longest_and_the_fastest(
 ) -> None:
     time = find_time(sources, fps, None, fields())
     assert (time.fps, time.steps, time.own_rates) == (found, steps, own)
-    told = [one.partition(" is")[0] for one in time.told]
-    assert told == (["fps", "frames"] if fps is None else ["frames"])
+    reported = [one.partition(" is")[0] for one in time.told]
+    assert reported == (["fps", "frames"] if fps is None else ["frames"])
     assert ("fastest" in time.told[0]) == own
     assert find_time(sources, fps, 7, fields()).steps == 7
     assert time.beginning == (6.5 if sources[0].timing.stamps else 0.0)
@@ -85,8 +85,8 @@ def test_without_anything_that_tells_rate_and_steps_are_asked_for() -> None:
     assert find_time([source(1, 5.0)], 5.0, None, fields()).steps == 1
 
 
-def test_of_several_things_that_are_missing_all_are_told() -> None:
-    def told(top: dict[str, Any], *cameras: dict[str, Any]) -> str:
+def test_of_several_things_that_are_missing_all_are_reported() -> None:
+    def reported(top: dict[str, Any], *cameras: dict[str, Any]) -> str:
         tables = [Fields("c", camera, camera) for camera in cameras]
         try:
             check_missing(Fields("file", top, top), tables)
@@ -96,16 +96,16 @@ def test_of_several_things_that_are_missing_all_are_told() -> None:
 
     pose = {"K": [], "R": [], "t": []}
     whole = {"name": "x", "video": "x.mp4", **pose}
-    assert told({}, whole) == ""  # one alone is left to its reader
-    assert told({}, {"name": "x", **pose}) == (
+    assert reported({}, whole) == ""  # one alone is left to its reader
+    assert reported({}, {"name": "x", **pose}) == (
         "name; fps (steps a second); frames (the number of steps)"
     )
-    assert told({"fps": 1.0}, {"name": "x", "images": "*", **pose}) == ""
-    assert told({"name": "a"}, {"name": "x", "detections": "a.csv", "projection": []}) == ""
-    assert told({"name": "a"}, {"images": "", "K": [], "R": []}) == (
+    assert reported({"fps": 1.0}, {"name": "x", "images": "*", **pose}) == ""
+    assert reported({"name": "a"}, {"name": "x", "detections": "a.csv", "projection": []}) == ""
+    assert reported({"name": "a"}, {"images": "", "K": [], "R": []}) == (
         "fps (steps a second); name and t of camera 1"
     )
-    assert told({"name": "a"}, whole, {"name": "y", "t": []}, {"projection": []}) == (
+    assert reported({"name": "a"}, whole, {"name": "y", "t": []}, {"projection": []}) == (
         'K and R of camera "y"; name of camera 3'
     )
 
@@ -116,21 +116,21 @@ def test_room_and_target_are_where_boxes_of_two_cameras_meet() -> None:
     paths = world.together(*(world.wander(rng, 80, size=3.0, pace=0.1) for _ in range(2)))
     seen = world.boxes(cameras, paths, 0.5, rng)
     views = list(world.sequence(cameras, paths, seen).views)
-    room, half, told = find_room(views, None, None, fields())
+    room, half, reported = find_room(views, None, None, fields())
     inside = room.contains(world.present(paths)[2], margin=0.3)
     assert inside.mean() > 0.9
     assert_allclose(half, world.PERSON, atol=0.15)
-    assert [one.partition(" is")[0] for one in told] == ["[room]", "[target]"]
-    assert all("boxes of two cameras meet" in told[0] for _ in told)
+    assert [one.partition(" is")[0] for one in reported] == ["[room]", "[target]"]
+    assert all("boxes of two cameras meet" in reported[0] for _ in reported)
     # what is stated is left as it is
     stated = world.volume(1.0)
-    same, half, told = find_room(views, stated, None, fields())
+    same, half, reported = find_room(views, stated, None, fields())
     assert same is stated
-    assert len(told) == 1
+    assert len(reported) == 1
     given = np.array([0.2, 0.2, 0.6])
-    _, half, told = find_room(views, None, given, fields())
+    _, half, reported = find_room(views, None, given, fields())
     assert half is given
-    assert len(told) == 1
+    assert len(reported) == 1
     # boxes of a low score are none, and from boxes of one camera nothing follows
     unsure = [replace(one, detections=replace(one.detections, scores=np.full(len(
         one.detections.frames), score))) for one, score in zip(views, (0.29, 0.29, 1.0),
@@ -182,7 +182,7 @@ def test_pictures_that_are_too_few_are_counted() -> None:
 
 
 @pytest.mark.parametrize(
-    ("gone", "told"),
+    ("gone", "reported"),
     [
         ([], ""),
         ([2], '"02.png" is missing in the row'),
@@ -190,17 +190,17 @@ def test_pictures_that_are_too_few_are_counted() -> None:
         ([2, 4, 5, 6], '"02.png" and 3 others are missing in the row'),
     ],
 )
-def test_holes_in_a_row_are_named(gone: list[int], told: str) -> None:
+def test_holes_in_a_row_are_named(gone: list[int], reported: str) -> None:
     there = np.ones(9, dtype=bool)
     there[gone] = False
     found = warnings(images(*(f"{k:02d}.png" for k in range(9)), there=there), 9, 9)
-    assert [one.startswith(told) for one in found] == ([True] if told else [])
+    assert [one.startswith(reported) for one in found] == ([True] if reported else [])
 
 
-def test_names_that_sort_otherwise_than_their_numbers_are_told() -> None:
+def test_names_that_sort_otherwise_than_their_numbers_are_reported() -> None:
     assert warnings(images("a1b2.png", "a1b10.png"), 2, 2) == []
-    (told,) = warnings(images("a1.png", "a10.png", "a2.png"), 3, 3)
-    assert 'so "a10.png" comes before "a2.png"' in told
+    (reported,) = warnings(images("a1.png", "a10.png", "a2.png"), 3, 3)
+    assert 'so "a10.png" comes before "a2.png"' in reported
 
 
 def view_of(table: dict[str, Any], pictures: Pictures | None = None, steps: int = 5) -> View:
@@ -318,17 +318,17 @@ def test_of_what_was_taught_on_another_rendering_that_is_carried_over_which_fits
 def test_changes_of_entrances_and_templates_are_paired_by_what_stays() -> None:
     door, gate, hatch = ({"position": [x, 0.0, 1.0], "sigma": [0.1] * 3} for x in (1.0, 2.0, 3.0))
 
-    def told(old: list[Values], new: list[Values]) -> list[str]:
+    def reported(old: list[Values], new: list[Values]) -> list[str]:
         one, other = taught(), taught()
         one["room"]["entrances"], other["room"]["entrances"] = old, new
         return changes(one, other)
 
-    assert told([door, gate], [gate, door]) == []
-    assert told([door, gate], [gate]) == ["entrance 1 removed"]
-    assert told([door, gate, hatch], [gate]) == ["entrance 1 removed", "entrance 3 removed"]
-    assert told([gate], [door, gate, hatch]) == ["entrance 1 added", "entrance 3 added"]
-    assert told([door, gate], [door, hatch]) == ["entrance 2 moved"]
-    assert told([door], [gate, hatch]) == ["entrance 1 moved", "entrance 2 added"]
+    assert reported([door, gate], [gate, door]) == []
+    assert reported([door, gate], [gate]) == ["entrance 1 removed"]
+    assert reported([door, gate, hatch], [gate]) == ["entrance 1 removed", "entrance 3 removed"]
+    assert reported([gate], [door, gate, hatch]) == ["entrance 1 added", "entrance 3 added"]
+    assert reported([door, gate], [door, hatch]) == ["entrance 2 moved"]
+    assert reported([door], [gate, hatch]) == ["entrance 1 moved", "entrance 2 added"]
     swapped = changes(taught(1, 2), taught(2, 1, 3))
     assert swapped == ["template n3 added"]
     wider = taught()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.synthetic import camera_toml, head_toml, write_lines, write_sequence, write_video
+from tests.synthetic import camera_toml, head_toml, write_sequence, write_video
 from tracker.sequences.reader import read_sequence, read_summary
 from tracker.sequences.sequence import SequenceError
 
@@ -87,36 +87,6 @@ def test_summary_needs_no_videos(folder: Path) -> None:
     (folder / "cam1.mp4").unlink()
     summary = read_summary(folder)
     assert (summary.name, summary.frames, summary.cameras) == ("numbers", 8, 2)
-
-
-def test_rows_are_sorted_and_scores_may_be_missing(folder: Path) -> None:
-    write_lines(
-        folder / "cam1.csv", "width,frame,left,top,height,note", ["9,5,1,2,8,7", "", "7,0,3,4,6,7"]
-    )
-    write_lines(folder / "ground_truth.csv", "frame,id,x,y,z", ["3,2,0,0,1", "3,1,1,0,1"])
-    sequence = read_sequence(folder)
-    detections, truth = sequence.views[0].detections, sequence.ground_truth
-    assert detections is not None
-    assert truth is not None
-    assert detections.frames.tolist() == [0, 5]
-    assert detections.boxes.tolist() == [[3.0, 4.0, 7.0, 6.0], [1.0, 2.0, 9.0, 8.0]]
-    assert detections.scores.tolist() == [1.0, 1.0]
-    assert truth.ids.tolist() == [1, 2]
-    assert truth.valid.all()
-    assert detections.boxes[detections.at(5)].tolist() == [[1.0, 2.0, 9.0, 8.0]]
-    assert len(detections.boxes[detections.at(4)]) == 0
-
-
-@pytest.mark.parametrize("line_end", ["\n", "\r\n"])
-def test_a_table_may_have_no_rows_or_windows_lines(folder: Path, line_end: str) -> None:
-    header = "\ufeffframe,left,top,width,height,score"
-    (folder / "cam1.csv").write_bytes(line_end.join([header, ""]).encode())
-    (folder / "cam2.csv").write_bytes(line_end.join([header, '"1", 2,3,4,5,0.5', ""]).encode())
-    views = read_sequence(folder).views
-    assert views[0].detections is not None
-    assert views[0].detections.boxes.shape == (0, 4)
-    assert views[1].detections is not None
-    assert views[1].detections.boxes.tolist() == [[2.0, 3.0, 4.0, 5.0]]
 
 
 def test_the_digest_follows_every_file(folder: Path) -> None:

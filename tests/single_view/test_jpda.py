@@ -104,19 +104,6 @@ def test_measurements_can_go_on_instead_of_estimates() -> None:
     assert len(result.measurements) == 2
 
 
-def test_boxes_of_one_pixel_and_of_none_raise_nothing() -> None:
-    steps: list = [
-        [(40.0 + k, 60.0, 0.5, 0.5), (80.0, 60.0, 0.01, 0.01), (0.0, 0.0, 0.5, 0.5)]
-        for k in range(30)
-    ]
-    for changes in ({}, {"five_cases": False}, {"occlusion": "measurement"}):
-        results = track(steps, **changes)
-        for result in results:
-            assert np.isfinite(result.estimates).all()
-            assert np.isfinite(result.gates).all()
-            assert np.isfinite(result.sigmas).all()
-
-
 def test_only_what_the_source_reads_counts() -> None:
     def groups(source: str) -> set[str]:
         chosen = {"single_view": "jpda", "jpda.measurements": source}
