@@ -18,7 +18,7 @@ from tracker.sequences.csv_columns import Columns
 from tracker.sequences.fields import Fields
 from tracker.sequences.filling import check_missing, find_room, find_time
 from tracker.sequences.pictures.media import Pictures, check_pictures
-from tracker.sequences.pictures.video import index_video
+from tracker.sequences.pictures.video import VideoIndex, index_video
 from tracker.sequences.sequence import SequenceError, View
 from tracker.sequences.tables import BoxTable, Reading
 from tracker.sequences.views import Source, read_views
@@ -169,16 +169,16 @@ def test_pictures_that_are_too_few_are_counted() -> None:
         "steps 6 to 7 have no picture"
     ]
     assert warnings(replace(row, first_frame=9), 8, 2)[0].endswith("steps 0 to 1 have no picture")
-    film = View(CAMERA, video=Path("a.mp4"))
-    assert warnings(film, 3, 4)[0].startswith("the video has too few: expected 4 frames, found 3")
+    video = View(CAMERA, video=Path("a.mp4"))
+    assert warnings(video, 3, 4)[0].startswith("the video has too few: expected 4 frames, found 3")
     clock = Clock(np.array([5, -1, 6, 7]), np.zeros(0, dtype=np.int64))
-    assert warnings(replace(film, clock=clock), 8, 4) == []
-    assert warnings(replace(film, clock=clock), 6, 4) == [
+    assert warnings(replace(video, clock=clock), 8, 4) == []
+    assert warnings(replace(video, clock=clock), 6, 4) == [
         "the video has too few: expected at least 8 frames, found 6; "
         "from step 2 on it has no picture"
     ]
     with pytest.raises(SequenceError, match="frame size 48×64 does not match calibration 64×48"):
-        list(check_pictures(film, Pictures((48, 64), 9, None), fields(), 3))
+        list(check_pictures(video, Pictures((48, 64), 9, None), fields(), 3))
 
 
 @pytest.mark.parametrize(
@@ -250,15 +250,25 @@ def test_a_video_of_another_rate_has_a_clock_where_none_is_stated() -> None:
     assert view_of(POSE, Pictures((64, 48), 9, None)).clock is None
 
 
+def written(path: Path, codec: str, fps: float, frames: int) -> VideoIndex:
+    code = cv2.VideoWriter.fourcc(*codec)
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, fps, (64, 48))
+    for _ in range(frames):
+        writer.write(np.zeros((48, 64, 3), np.uint8))
+    writer.release()
+    return index_video(path)
+
+
+@pytest.mark.parametrize("fps", [25.0, 590.0])
+def test_of_one_frame_the_header_says_the_rate(tmp_path: Path, fps: float) -> None:
+    index = written(tmp_path / "a.avi", "MJPG", fps, 1)
+    assert (index.frames, index.fps) == (1, pytest.approx(fps))
+
+
 @pytest.mark.parametrize("fps", [5.0, 12.5, 29.97])
 def test_a_videos_rate_and_frames_are_counted(tmp_path: Path, fps: float) -> None:
     for name, codec in (("a.mp4", "mp4v"), ("a.avi", "MJPG")):
-        code = cv2.VideoWriter.fourcc(*codec)
-        writer = cv2.VideoWriter(str(tmp_path / name), cv2.CAP_FFMPEG, code, fps, (64, 48))
-        for _ in range(30):
-            writer.write(np.zeros((48, 64, 3), np.uint8))
-        writer.release()
-        index = index_video(tmp_path / name)
+        index = written(tmp_path / name, codec, fps, 30)
         assert (index.size, index.frames) == ((64, 48), 30)
         assert index.fps == pytest.approx(fps, rel=1e-4)
         if index.times is not None:
